@@ -1,0 +1,115 @@
+"""The space grains live in: open or periodic, axis by axis, centred on the origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .errors import BadInput
+from .jit import formula
+from .units import si
+
+
+class Span(NamedTuple):
+    """What kernels know of a box: lengths L [m] and 1/L per axis, both 0 on an open axis."""
+
+    x: float
+    y: float
+    z: float
+    inverse_x: float
+    inverse_y: float
+    inverse_z: float
+
+
+@formula
+def nearest_image(v, span):
+    """The shortest periodic image of a separation v [m]; open axes stay as they are.
+
+    np.rint vectorises; a component of exactly L/2 may come back as either sign.
+    """
+    return (
+        v[0] - span.x * np.rint(v[0] * span.inverse_x),
+        v[1] - span.y * np.rint(v[1] * span.inverse_y),
+        v[2] - span.z * np.rint(v[2] * span.inverse_z),
+    )
+
+
+@dataclass(frozen=True)
+class Box:
+    """Lengths of the periodic axes [m]; None for an open axis.  Build it with `open` or `periodic`."""
+
+    lengths: tuple[float | None, float | None, float | None] = (None, None, None)
+
+    @classmethod
+    def open(cls) -> Box:
+        """Free space."""
+        return cls()
+
+    @classmethod
+    def periodic(cls, x: Any, y: Any = "same", z: Any = "same") -> Box:
+        """A periodic box: one length for a cube, or one per axis with None for an open axis.
+
+        Raises:
+            BadInput: a length that is not positive, or of the wrong unit.
+        """
+        y = x if isinstance(y, str) and y == "same" else y
+        z = x if isinstance(z, str) and z == "same" else z
+        lengths = tuple(
+            None if v is None else si(v, "m", f"box length {axis}", above=0.0)
+            for v, axis in zip((x, y, z), "xyz", strict=True)
+        )
+        return cls(lengths)  # type: ignore[arg-type]
+
+    @property
+    def is_open(self) -> bool:
+        return all(v is None for v in self.lengths)
+
+    @property
+    def shortest(self) -> float:
+        """Length of the shortest periodic axis [m]; infinite in an open box."""
+        return min((v for v in self.lengths if v is not None), default=float("inf"))
+
+    @property
+    def volume(self) -> float:
+        """[m³]; infinite if any axis is open."""
+        return float(np.prod([v if v is not None else np.inf for v in self.lengths]))
+
+    @property
+    def span(self) -> Span:
+        """The same for kernels."""
+        return Span(
+            *(v if v is not None else 0.0 for v in self.lengths),
+            *(1.0 / v if v is not None else 0.0 for v in self.lengths),
+        )
+
+    def nearest(self, separation: np.ndarray) -> np.ndarray:
+        """Shortest images of separations (…, 3) [m]."""
+        separation = np.asarray(separation, dtype=np.float64)
+        return np.stack(nearest_image(np.moveaxis(separation, -1, 0), self.span), axis=-1)
+
+    def wrap(self, position: np.ndarray) -> np.ndarray:
+        """Positions (…, 3) [m] moved into −L/2 … L/2 on periodic axes."""
+        return self.nearest(position)
+
+    def describe(self) -> str:
+        """One line for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
+        from .units import spoken
+
+        if self.is_open:
+            return "open"
+        return "periodic " + " x ".join("open" if v is None else spoken(v, "m") for v in self.lengths)
+
+
+def as_box(value: Any) -> Box:
+    """A Box from a Box, a length, or three lengths.  Raises BadInput."""
+    if isinstance(value, Box):
+        return value
+    if value is None:
+        return Box.open()
+    if isinstance(value, (list, tuple)):
+        if len(value) != 3:
+            raise BadInput(f"box = {value!r} must be one length or three (None for an open axis)")
+        return Box.periodic(*value)
+    return Box.periodic(value)

@@ -1,0 +1,9 @@
+"""Constants of nature, CODATA 2018 (SI)."""
+
+import math
+
+BOLTZMANN = 1.380649e-23
+"""k_B [J/K], exact"""
+
+MAGNETIC = 1.25663706212e-6 / (4.0 * math.pi)
+"""k = μ0/4π [T m/A]; 1e-7 to ten digits"""

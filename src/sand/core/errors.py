@@ -1,0 +1,44 @@
+"""Everything SAND may complain about."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+
+class SandError(Exception):
+    """Base of all our errors; the command line prints it without a traceback."""
+
+
+class BadInput(SandError, ValueError):
+    """The user's mistakes, one line each: what, where, unit, what is allowed, what to do.
+
+    Args:
+        problems: one sentence, or several when a file holds several mistakes.
+    """
+
+    def __init__(self, problems: str | Iterable[str]):
+        self.problems: list[str] = [problems] if isinstance(problems, str) else list(problems)
+        super().__init__("\n".join(self.problems))
+
+    def at(self, where: str) -> BadInput:
+        """The same mistakes with the place in front, for example `iron-gas.toml: grains.radius`."""
+        return BadInput(f"{where}: {problem}" for problem in self.problems)
+
+
+class FilesFailed(SandError, OSError):
+    """A file or folder could not be read or written; what was there before is untouched."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C or SIGTERM reached a run; its checkpoint is written. `result` says how far it came."""
+
+    def __init__(self, result: object):
+        super().__init__()
+        self.result = result
+
+
+def did_you_mean(word: str, allowed: Sequence[str]) -> str:
+    """A closing remark for a misspelt word: the nearest allowed one, or all of them."""
+    near = difflib.get_close_matches(word, allowed, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(allowed)}"

@@ -1,0 +1,93 @@
+"""One table describes every per-grain quantity.
+
+Storage, validation, file layout, axis labels and the reference page are all made from it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .errors import BadInput
+from .units import EXAMPLES, in_unit
+
+
+class Field(NamedTuple):
+    """One quantity per grain."""
+
+    name: str
+    width: int  # numbers per grain
+    unit: str
+    kind: str  # "fixed": set once; "moving": changes each step; "load": worked out from the others
+    meaning: str
+    symbol: str
+
+
+FIELDS = (
+    Field("radius", 1, "m", "fixed", "radius of the sphere", "r"),
+    Field("mass", 1, "kg", "fixed", "mass", "m"),
+    Field("inertia", 1, "kg m^2", "fixed", "moment of inertia, (2/5) m r²", "I"),
+    Field("charge", 1, "C", "fixed", "electric charge", "q"),
+    Field("body_moment", 3, "A m^2", "fixed", "magnetic moment in the frame of the grain", "μ_body"),
+    Field("position", 3, "m", "moving", "centre, laboratory frame", "r"),
+    Field("velocity", 3, "m/s", "moving", "velocity of the centre, laboratory frame", "v"),
+    Field("orientation", 4, "1", "moving", "rotation parameters, vector 1..3 then scalar 4", "ϱ"),
+    Field("spin", 3, "rad/s", "moving", "angular velocity, laboratory frame", "ω"),
+    Field("moment", 3, "A m^2", "load", "magnetic moment, laboratory frame", "μ"),
+    Field("force", 3, "N", "load", "sum of all forces, laboratory frame", "F"),
+    Field("torque", 3, "N m", "load", "sum of all torques, laboratory frame", "M"),
+    Field("field", 3, "T", "load", "flux density at the centre from the other grains", "B"),
+)
+
+BY_NAME = {field.name: field for field in FIELDS}
+
+
+def blank(field: Field, count: int) -> np.ndarray:
+    """Zeros in the stored shape: (count,) or (width, count), contiguous, float64."""
+    return np.zeros(count if field.width == 1 else (field.width, count))
+
+
+def public(array: np.ndarray) -> np.ndarray:
+    """The view a user sees: (N,) or (N, width), no copy, read only."""
+    view = array.T if array.ndim == 2 else array.view()
+    view.flags.writeable = False
+    return view
+
+
+def stored(field: Field, values: Any, count: int, *, positive: bool = False) -> np.ndarray:
+    """`values` in the stored shape, or one line for what is wrong with them.
+
+    Args:
+        values: SI numbers, text with a unit, or a quantity; one value serves all grains where width is 1.
+        count: number of grains N.
+        positive: every number must be above 0.
+
+    Raises:
+        BadInput: wrong unit, shape (N, width) or a value that is not finite, with the first grain concerned.
+    """
+    array = in_unit(values, field.unit)
+    if array is None:
+        example = EXAMPLES.get(field.unit, f"1 {field.unit}")
+        raise BadInput(f"{field.name} is not in {field.unit}; give numbers in SI or text such as '{example}'")
+    array = np.asarray(array, dtype=np.float64)
+    if array.ndim == 0 and field.width == 1:
+        array = np.full(count, float(array))
+    shape = (count,) if field.width == 1 else (count, field.width)
+    if array.shape != shape:
+        raise BadInput(
+            f"{field.name} has shape {array.shape} but must be {shape} for {count} grains "
+            f"({field.meaning}, in {field.unit})"
+        )
+    rows = array.reshape(count, -1)
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if bad.size:
+        raise BadInput(
+            f"{field.name} of grain {bad[0]} is {array[bad[0]]}: every number must be finite, in {field.unit}; "
+            f"{bad.size} of {count} grains are concerned"
+        )
+    if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
+        raise BadInput(
+            f"{field.name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0"
+        )
+    return np.ascontiguousarray(array.T)

@@ -1,0 +1,175 @@
+"""The grains: spheres with position, spin and magnetic moment."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .errors import BadInput
+from .fields import BY_NAME, FIELDS, blank, public, stored
+from .material import Material, material_named
+from .units import in_unit
+
+
+class GrainArrays(NamedTuple):
+    """Every array of the field table in stored shape, (N,) or (width, N); what kernels read and write."""
+
+    radius: np.ndarray
+    mass: np.ndarray
+    inertia: np.ndarray
+    charge: np.ndarray
+    body_moment: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    orientation: np.ndarray
+    spin: np.ndarray
+    moment: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+    field: np.ndarray
+    material: np.ndarray  # index into Grains.materials, uint32
+    id: np.ndarray  # number the user knows the grain by, uint32
+
+
+def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.ndarray]:
+    """The distinct materials and each grain's index among them.
+
+    Args:
+        material: a Material or preset name for all grains, or a sequence of N of them.
+    """
+    one = isinstance(material, (str, Material))
+    each: Sequence[Any] = [material] * count if one else list(material)
+    if len(each) != count:
+        raise BadInput(f"material has {len(each)} entries but there are {count} grains")
+    index: dict[Material, int] = {}
+    numbers = np.empty(count, dtype=np.uint32)
+    for i, given in enumerate(each):
+        found = material_named(given) if isinstance(given, str) else given
+        if not isinstance(found, Material):
+            raise BadInput(
+                f"material of grain {i} is {found!r}; give a sand.Material or the name of a preset"
+            )
+        numbers[i] = index.setdefault(found, len(index))
+    return tuple(index), numbers
+
+
+class Grains:
+    """N spheres.
+
+    Args:
+        position: (N, 3) [m], laboratory frame.
+        radius: scalar or (N,) [m] > 0.
+        material: one `sand.Material` (or preset name) for all, or a sequence of N.
+        velocity: (N, 3) [m/s]; at rest by default.
+        spin: (N, 3) [rad/s], laboratory frame; none by default.
+        moment: (N, 3) [A m²] in the laboratory frame at the start, or one size as text, "6.6e-18 A m^2" or
+            per mass "200 A m^2/kg" (then along +z); none by default.
+        charge: scalar or (N,) [C]; none by default.
+        mass: scalar or (N,) [kg] > 0; by default density × volume.
+
+    All numbers may be SI floats, text with a unit, or pint/astropy quantities.
+
+    Raises:
+        BadInput: one line for each quantity that is wrong.
+    """
+
+    def __init__(
+        self,
+        position: Any,
+        radius: Any,
+        material: Any,
+        *,
+        velocity: Any = None,
+        spin: Any = None,
+        moment: Any = None,
+        charge: Any = None,
+        mass: Any = None,
+    ):
+        count = _count(position)
+        problems: list[str] = []
+        arrays = {field.name: blank(field, count) for field in FIELDS}
+        given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
+        for name, values in given.items():
+            if values is None:
+                continue
+            try:
+                arrays[name] = stored(BY_NAME[name], values, count, positive=name == "radius")
+            except BadInput as error:
+                problems += error.problems
+        try:
+            self.materials, index = materials_of(material, count)
+            density = np.array([m.density for m in self.materials])[index]
+            sphere = density * (4.0 / 3.0) * np.pi * arrays["radius"] ** 3
+            arrays["mass"] = sphere if mass is None else stored(BY_NAME["mass"], mass, count, positive=True)
+            if moment is not None:
+                arrays["body_moment"] = _moments(moment, arrays["mass"], count)
+        except BadInput as error:
+            problems += error.problems
+        if problems:
+            raise BadInput(problems)
+        arrays["inertia"] = 0.4 * arrays["mass"] * arrays["radius"] ** 2
+        arrays["orientation"][3] = 1.0
+        arrays["moment"] = arrays["body_moment"].copy()
+        self.arrays = GrainArrays(**arrays, material=index, id=np.arange(count, dtype=np.uint32))
+
+    def __len__(self) -> int:
+        return self.arrays.radius.size
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """Any quantity of the field table, (N,) or (N, width), read only."""
+        if name not in BY_NAME and name not in ("material", "id"):
+            raise AttributeError(f"grains have no '{name}'")
+        return public(getattr(self.arrays, name))
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *BY_NAME, "material", "id"]
+
+    def __repr__(self) -> str:
+        names = ", ".join(m.name for m in self.materials)
+        return f"<{len(self)} grains of {names}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+    def copy(self) -> Grains:
+        """An independent copy: a snapshot."""
+        twin = copy.copy(self)
+        twin.arrays = GrainArrays(*(a.copy() for a in self.arrays))
+        return twin
+
+
+def _count(position: Any) -> int:
+    array = in_unit(position, "m")
+    if array is None or np.ndim(array) != 2 or np.shape(array)[1] != 3 or np.shape(array)[0] == 0:
+        shape = "" if array is None else f", not {np.shape(array)}"
+        raise BadInput(f"position must be an array of shape (N, 3) in m with N ≥ 1{shape}")
+    return int(np.shape(array)[0])
+
+
+def _moments(moment: Any, mass: np.ndarray, count: int) -> np.ndarray:
+    """(3, N) [A m²] from vectors, or from a size (absolute or per mass), then along +z."""
+    if not isinstance(moment, str) and np.ndim(in_unit(moment, "A m^2")) == 2:
+        return stored(BY_NAME["body_moment"], moment, count)
+    vectors = np.zeros((3, count))
+    vectors[2] = moment_size(moment, mass)
+    return vectors
+
+
+def moment_size(moment: Any, mass: np.ndarray) -> np.ndarray:
+    """Sizes (N,) [A m²] of moments given as one number [A m²], or as text, absolute or per mass."""
+    size = in_unit(moment, "A m^2")
+    if size is None:
+        per_mass = in_unit(moment, "A m^2/kg")
+        size = None if per_mass is None else per_mass * mass
+    if size is None or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
+        raise BadInput(
+            f"moment = {moment!r} must be (N, 3) numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
+            "or, per mass, '200 A m^2/kg'"
+        )
+    return np.broadcast_to(np.asarray(size, dtype=np.float64), mass.shape)

@@ -1,0 +1,110 @@
+"""The door to the compiler: the only module that names numba (CUDA apart).
+
+`formula`  scalar physics on floats and 3-tuples.  It stays an ordinary Python function.
+`rare`     like `formula`, but not pasted into the caller: for code that seldom runs.
+`loop`     a loop over arrays that is pasted into a larger loop.  No array may be passed twice.
+`kernel`   a compiled entry point, called from Python.  No array may be passed twice.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import event
+from numba.extending import register_jitable
+
+__all__ = ["cache_folder", "compiling", "formula", "kernel", "loop", "rare"]
+
+# As fast as fastmath=True, but NaN and infinity stay what they are, so that guards can see them.
+_FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
+_COMMON: dict[str, Any] = {"_nrt": False, "fastmath": _FAST, "error_model": "numpy"}
+
+
+def _promise_no_aliases() -> dict[str, Any]:
+    """The option `noalias`, which numba has but does not list; without it code is slower, never wrong."""
+    try:
+        from numba.core.cpu import CPUTargetOptions
+        from numba.core.options import _mapping
+
+        CPUTargetOptions.noalias = _mapping("noalias")
+    except (ImportError, AttributeError):
+        return {}
+    return {"noalias": True}
+
+
+_NO_ALIASES = _promise_no_aliases()
+
+formula = register_jitable(**_COMMON, forceinline=True)
+rare = register_jitable(**_COMMON)
+loop = register_jitable(**_COMMON, **_NO_ALIASES, forceinline=True)
+
+
+def _digest() -> str:
+    """Fingerprint of every source that reaches compiled code, and of the compiler.
+
+    Numba looks for edits in the file of the kernel only; without this, a formula changed next door
+    would go on being computed the old way.  Editing a command recompiles nothing.
+    """
+    digest = hashlib.sha256(numba.__version__.encode())
+    house = Path(__file__).parents[1]
+    for room in ("core", "physics", "kernels", "stepping"):
+        for path in sorted((house / room).glob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Where compiled code is kept: `$SAND_CACHE`, else `~/.cache/sand`, else the temporary folder."""
+    wished = os.environ.get("SAND_CACHE") or os.path.join(os.path.expanduser("~"), ".cache", "sand")
+    for base in (Path(wished), Path(tempfile.gettempdir()) / f"sand-cache-{os.getuid()}"):
+        try:
+            folder = base / _digest()
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="sand-cache-"))
+
+
+_FOLDER = cache_folder()
+
+
+def kernel(function: Callable) -> Callable:
+    """Compile `function` on its first call and keep the result in our own cache folder.
+
+    numba's global cache folder is put back at once: a user's own kernels go where the user wants.
+    """
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_FOLDER)
+    try:
+        return numba.njit(cache=True, **_COMMON, **_NO_ALIASES)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+class _Listener(event.Listener):
+    def __init__(self, tell: Callable[[], None]):
+        self._tell: Callable[[], None] | None = tell
+
+    def on_start(self, _event: Any) -> None:
+        if self._tell is not None:
+            tell, self._tell = self._tell, None
+            tell()
+
+    def on_end(self, _event: Any) -> None:
+        pass
+
+
+@contextmanager
+def compiling(tell: Callable[[], None]) -> Iterator[None]:
+    """Call `tell` once if anything has to be compiled inside the block (not when the cache serves)."""
+    with event.install_listener("numba:compile", _Listener(tell)):
+        yield

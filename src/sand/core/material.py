@@ -1,0 +1,105 @@
+"""What grains are made of."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from .errors import BadInput, did_you_mean
+from .units import si
+
+_UNITS = {
+    "density": "kg/m^3",
+    "surface_energy": "J/m^2",
+    "young_modulus": "Pa",
+    "poisson_ratio": "1",
+    "rolling_limit": "m",
+    "specific_moment": "A m^2/kg",
+}
+
+
+@dataclass(frozen=True)
+class Material:
+    """One material.  Numbers are SI or text with a unit; all problems are reported at once.
+
+    Args:
+        name: how case files and tables call it.
+        density: ρ [kg/m³] > 0.
+        surface_energy: γ of one free surface [J/m²] ≥ 0; None where no value can be recommended (then the
+            user has to give one before grains may touch).
+        young_modulus: E [Pa] > 0.
+        poisson_ratio: ν, −1 < ν ≤ 0.5.
+        rolling_limit: critical rolling displacement ξ_c [m] > 0; 10 Å in SAND (Dominik & Nübold 2002, A.5).
+        specific_moment: magnetic moment per mass [A m²/kg] ≥ 0.
+
+    Raises:
+        BadInput: one line for each number that cannot be right.
+    """
+
+    name: str
+    density: Any
+    surface_energy: Any
+    young_modulus: Any
+    poisson_ratio: Any
+    rolling_limit: Any = "10 angstrom"
+    specific_moment: Any = 0.0
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        for key, unit in _UNITS.items():
+            value = getattr(self, key)
+            if key == "surface_energy" and value is None:
+                continue
+            lowest = {"least": 0.0} if key in ("surface_energy", "specific_moment") else {"above": 0.0}
+            if key == "poisson_ratio":
+                lowest = {"above": -1.0}
+            try:
+                number = si(value, unit, f"{self.name}: {key}", **lowest)
+            except BadInput as error:
+                problems += error.problems
+                continue
+            if key == "poisson_ratio" and number > 0.5:
+                problems.append(f"{self.name}: poisson_ratio = {value!r} must not exceed 0.5")
+            object.__setattr__(self, key, number)
+        if problems:
+            raise BadInput(problems)
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + ν)) [Pa]"""
+        return float(self.young_modulus / (2.0 * (1.0 + self.poisson_ratio)))
+
+    def but(self, **changes: Any) -> Material:
+        """A copy with some numbers changed: `sand.IRON.but(surface_energy="1 J/m^2")`."""
+        known = [f.name for f in dataclasses.fields(self)]
+        for key in changes:
+            if key not in known:
+                raise BadInput(f"a material has no '{key}'; {did_you_mean(key, known)}")
+        return dataclasses.replace(self, **changes)
+
+
+# physics.md 1.7; sources: [DT97] Dominik & Tielens 1997, [Wada] Wada et al. 2007, paper = Dominik & Nübold 2002.
+ICE = Material("ice", 1000.0, 0.10, 7.0e9, 0.25, rolling_limit=8e-10)
+"""Water ice, γ after Wada et al. (2007); DT97 use 0.37 J/m²."""
+SILICA = Material("silica", 2650.0, 0.025, 54.0e9, 0.17)
+"""Quartz or silica glass (DT97)."""
+GRAPHITE = Material("graphite", 2200.0, 0.075, 10.0e9, 0.32)
+"""Graphite (DT97)."""
+FORSTERITE = Material("forsterite", 3210.0, 0.07, 204.0e9, 0.24)
+"""Forsterite."""
+IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, specific_moment=200.0)
+"""Iron (DT97), 200 A m²/kg as in the paper."""
+MAGNETITE = Material("magnetite", 5200.0, None, 230.0e9, 0.26, specific_moment=92.0)
+"""Magnetite at saturation; its surface energy has to be given: `MAGNETITE.but(surface_energy=…)`."""
+
+PRESETS = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
+PRESETS["quartz"] = SILICA.but(name="quartz")
+
+
+def material_named(name: str) -> Material:
+    """The preset of that name (case ignored).  Raises BadInput with the nearest name."""
+    try:
+        return PRESETS[name.lower()]
+    except KeyError:
+        raise BadInput(f"unknown material '{name}'; {did_you_mean(name.lower(), list(PRESETS))}") from None

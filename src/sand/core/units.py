@@ -1,0 +1,131 @@
+"""Units at the door: text and quantities come in, SI floats go on.
+
+A bare number is SI already.  Text is a number and a unit ("10 nm", "200 A m^2/kg", "1 us").  Quantities of
+pint and astropy are accepted by what they can do, so neither has to be installed for plain numbers.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from typing import Any
+
+import numpy as np
+
+from .errors import BadInput
+
+#: one example per unit, for error messages
+EXAMPLES = {
+    "m": "10 nm",
+    "s": "5 us",
+    "kg": "3e-20 kg",
+    "K": "100 K",
+    "m/s": "10 m/s",
+    "m/s^2": "9.81 m/s^2",
+    "rad/s": "1e7 rad/s",
+    "kg/m^3": "2650 kg/m^3",
+    "J/m^2": "25 mJ/m^2",
+    "Pa": "54 GPa",
+    "T": "1 mT",
+    "A m^2": "6.6e-18 A m^2",
+    "A m^2/kg": "200 A m^2/kg",
+    "C": "1.6e-19 C",
+}
+
+# A number, then a unit made of names, small integer powers, products and quotients; nothing that computes.
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|[+-]?(?:inf|nan)"
+_UNIT = r"[A-Za-zµμΩÅ°%][A-Za-zµμΩÅ°]*(?:(?:\^|\*\*)?-?\d|[²³])?"
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*({_UNIT}(?:\s*(?:[*/·]|\s)\s*{_UNIT})*)?\s*", re.IGNORECASE)
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint
+
+    registry = pint.UnitRegistry(cache_folder=None)
+    registry.default_format = "~"
+    return registry
+
+
+@functools.lru_cache(maxsize=512)
+def _factor(text: str, unit: str) -> float | None:
+    """What one `text` is in `unit`, or None where that makes no sense."""
+    import pint
+
+    spelled = text.replace("·", "*").replace("²", "**2").replace("³", "**3")
+    spelled = re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", spelled)
+    try:
+        return float(_registry().Quantity(1.0, spelled).to(unit.replace("^", "**")).magnitude)
+    except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError, ValueError, AssertionError):
+        return None
+
+
+def _complain(value: Any, unit: str, name: str) -> BadInput:
+    example = EXAMPLES.get(unit, f"1 {unit}")
+    return BadInput(
+        f"{name} = {value!r} is not a quantity in {unit}; give a number in SI or text such as '{example}'"
+    )
+
+
+def in_unit(value: Any, unit: str) -> Any:
+    """`value` as an SI float or array of `unit`, or None if it is of another kind.
+
+    Text without a unit counts as SI only where the unit is "1".
+    """
+    if isinstance(value, str):
+        match = _TEXT.fullmatch(value)
+        if not match:
+            return None
+        number, given = match.groups()
+        factor = _factor(given.strip(), unit) if given else (1.0 if unit == "1" else None)
+        return None if factor is None else float(number) * factor
+    if isinstance(value, bool):
+        return None
+    if hasattr(value, "to_value"):  # astropy
+        try:
+            return np.asarray(value.to_value(unit.replace("^", "**").replace(" ", "*")), dtype=np.float64)[()]
+        except Exception:  # astropy's own error classes are not ours to import
+            return None
+    if hasattr(value, "magnitude"):  # pint, of whatever registry
+        factor = _factor(str(value.units), unit)
+        return None if factor is None else np.asarray(value.magnitude, dtype=np.float64)[()] * factor
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return float(array) if array.ndim == 0 else array
+
+
+def si(value: Any, unit: str, name: str, *, above: float | None = None, least: float | None = None) -> float:
+    """One finite number in SI.
+
+    Args:
+        value: float in SI, text with a unit, or a pint or astropy quantity.
+        unit: the SI unit, e.g. "m", "A m^2/kg"; "1" for a pure number.
+        name: how the user called it, for the message.
+        above, least: the number must be > above, ≥ least.
+
+    Raises:
+        BadInput: wrong unit, not a number, not finite, or out of range; one line.
+    """
+    number = in_unit(value, unit)
+    if number is None or np.ndim(number) != 0:
+        raise _complain(value, unit, name)
+    shown = f"{name} = {value!r}"
+    if not math.isfinite(number):
+        raise BadInput(f"{shown} is not finite; give a number in {unit}")
+    if above is not None and not number > above:
+        raise BadInput(f"{shown} must be above {above:g} {unit}")
+    if least is not None and not number >= least:
+        raise BadInput(f"{shown} must be at least {least:g} {unit}")
+    return float(number)
+
+
+def spoken(value: float, unit: str) -> str:
+    """A number for people, with an SI prefix: 1.2e-6 m → '1.2 um'."""
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g} {unit}"
+    prefixes = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+    exponent = min(max(3 * math.floor(math.log10(abs(value)) / 3 + 1e-12), -18), 9)
+    return f"{value / 10.0**exponent:.4g} {prefixes[exponent]}{unit}"

@@ -1,0 +1,169 @@
+"""The state of a simulation: copying it is a snapshot, writing it is a checkpoint."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .box import Box
+from .errors import BadInput
+from .grains import GrainArrays, Grains
+
+# --- places in World.clock (float64) ---------------------------------------------------------------
+TIME, STEP, LEVEL, CONTACT_STEP = range(4)
+CLOCK = ("time", "step", "level", "contact_step")
+
+# --- places in World.count (int64) -----------------------------------------------------------------
+STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2 = range(10)
+COUNT = ("steps", "stage", "contacts", "pairs", "made", "broken", "moved", "rebuilt", "grain1", "grain2")
+
+# --- places in World.lost (float64): energy dissipated per channel [J] ----------------------------------
+FORMING, BREAKING, SLIDING, ROLLING, TWISTING = range(5)
+LOST = ("forming", "breaking", "sliding", "rolling", "twisting")
+
+
+class ContactArrays(NamedTuple):
+    """One column per contact; the first count[CONTACTS] columns are in use, in the order they formed."""
+
+    pair: np.ndarray  # (2, C) uint32: grains 1 and 2
+    pointer1: np.ndarray  # (3, C) unit vector to the contact, body frame of grain 1
+    pointer2: np.ndarray  # (3, C) the same for grain 2
+    twist: np.ndarray  # (C,) φ [rad]
+    formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
+    bond: np.ndarray  # (K, C) constants of the contact law
+    push: np.ndarray  # (3, C) force on grain 1 [N]
+    torque1: np.ndarray  # (3, C) [N m]
+    torque2: np.ndarray  # (3, C) [N m]
+    flag: np.ndarray  # (C,) 1.0 where a limit was passed in this step
+    side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
+    start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
+
+
+class NearPairs(NamedTuple):
+    """Pairs close enough to touch soon; the first count[PAIRS] columns are in use."""
+
+    pair: np.ndarray  # (2, P) uint32
+    touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
+    step: np.ndarray  # (P,) the step their contact would need [s]
+    anchor: np.ndarray  # (3, N) positions when the list was made [m]
+
+
+def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
+    """Room for `capacity` contacts with `constants` numbers each."""
+    c = max(int(capacity), 16)
+    vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
+    numbers = {k: np.zeros(c) for k in ("twist", "formed", "flag")}
+    return ContactArrays(
+        pair=np.zeros((2, c), np.uint32),
+        bond=np.zeros((constants, c)),
+        side=np.zeros(2 * c, np.uint32),
+        start=np.zeros(grains + 1, np.uint32),
+        **vectors,
+        **numbers,
+    )
+
+
+def near_pairs(grains: int, capacity: int) -> NearPairs:
+    """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
+    p = max(int(capacity), 16)
+    return NearPairs(
+        np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p), np.full((3, grains), np.inf)
+    )
+
+
+def _grown(arrays: Any, per_grain: tuple[str, ...]) -> Any:
+    """The same columns in arrays twice as long."""
+    longer = {}
+    for name, old in arrays._asdict().items():
+        if name in per_grain:
+            longer[name] = old
+            continue
+        new = np.zeros((*old.shape[:-1], 2 * old.shape[-1]), old.dtype)
+        new[..., : old.shape[-1]] = old
+        longer[name] = new
+    return type(arrays)(**longer)
+
+
+@dataclass
+class World:
+    """Time, grains, contacts, box and the counters of a run; everything a restart needs."""
+
+    grains: Grains
+    box: Box
+    contacts: ContactArrays
+    near: NearPairs
+    clock: np.ndarray = field(default_factory=lambda: np.zeros(len(CLOCK)))
+    count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
+    lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return float(self.clock[TIME])
+
+    @property
+    def steps(self) -> int:
+        return int(self.count[STEPS])
+
+    def copy(self) -> World:
+        """An independent copy: a snapshot."""
+        return copy.deepcopy(self)
+
+    def grow_contacts(self) -> None:
+        """Twice the room for contacts."""
+        self.contacts = _grown(self.contacts, ("start",))
+
+    def grow_pairs(self) -> None:
+        """Twice the room for near pairs."""
+        self.near = _grown(self.near, ("anchor",))
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Every number of the state by name, for a checkpoint; unused columns are left out."""
+        used = {"contacts": int(self.count[CONTACTS]), "near": int(self.count[PAIRS])}
+        out = {"clock": self.clock, "count": self.count, "lost": self.lost}
+        out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
+        for group, per_grain in (("contacts", ("start",)), ("near", ("anchor",))):
+            for name, array in getattr(self, group)._asdict().items():
+                n = used[group] * (2 if name == "side" else 1)
+                out[f"{group}/{name}"] = array if name in per_grain else array[..., :n]
+        return out
+
+    def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
+        """Take over the numbers of `to_arrays`; the grains' number and materials are this world's own.
+
+        Raises:
+            BadInput: a missing array, or one of another shape.
+        """
+        for name in ("clock", "count", "lost"):
+            _take(getattr(self, name), saved, name)
+        while self.contacts.pair.shape[1] < self.count[CONTACTS]:
+            self.grow_contacts()
+        while self.near.pair.shape[1] < self.count[PAIRS]:
+            self.grow_pairs()
+        for name in GrainArrays._fields:
+            _take(getattr(self.grains.arrays, name), saved, f"grains/{name}")
+        for group in ("contacts", "near"):
+            for name, array in getattr(self, group)._asdict().items():
+                given = saved.get(f"{group}/{name}")
+                n = array.shape[-1] if given is None else given.shape[-1]
+                _take(array[..., :n], saved, f"{group}/{name}")
+
+
+def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
+    if name not in saved:
+        raise BadInput(f"the saved state has no '{name}'")
+    if saved[name].shape != target.shape:
+        raise BadInput(f"'{name}' of the saved state has shape {saved[name].shape}, not {target.shape}")
+    target[...] = saved[name]
+
+
+__all__ = [name for name in dir() if name.isupper()] + [
+    "ContactArrays",
+    "NearPairs",
+    "World",
+    "contact_arrays",
+    "near_pairs",
+]

@@ -1,0 +1,45 @@
+"""Per-grain forces: one composed formula over all grains."""
+
+from ..core.jit import loop
+from ..core.vec import accrue, load
+from ..physics.surroundings import One
+
+
+@loop
+def grain_at(grains, i):
+    """Grain i as a per-grain formula sees it."""
+    return One(
+        load(grains.position, i),
+        load(grains.velocity, i),
+        load(grains.spin, i),
+        load(grains.moment, i),
+        grains.radius[i],
+        grains.mass[i],
+        grains.charge[i],
+    )
+
+
+def outside_loads(formula_of_grain):
+    """The loop that adds force and torque of one composed formula to every grain."""
+
+    @loop
+    def add_loads(grains, time, parameters):
+        for i in range(grains.mass.size):
+            force, torque, _ = formula_of_grain(time, grain_at(grains, i), parameters)
+            accrue(grains.force, i, force)
+            accrue(grains.torque, i, torque)
+
+    return add_loads
+
+
+def outside_energy(formula_of_grain):
+    """The loop that sums the energy [J] of one formula over all grains."""
+
+    @loop
+    def sum_energy(grains, time, parameters):
+        total = 0.0
+        for i in range(grains.mass.size):
+            total += formula_of_grain(time, grain_at(grains, i), parameters)[2]
+        return total
+
+    return sum_energy

@@ -1,0 +1,41 @@
+"""Rotation parameters ϱ (vector 1..3, scalar 4): Eqs. 30–32 of the paper, start (0, 0, 0, 1).
+
+R(ϱ) turns body vectors into the laboratory frame (active), and ω is in the laboratory frame.
+"""
+
+from ..core.jit import formula
+from ..core.vec import add, axpy, cross, scale
+
+
+@formula
+def turned(q, v):
+    """R(ϱ) v: a body vector in the laboratory frame (Eq. 30, |ϱ| = 1)."""
+    u = (q[0], q[1], q[2])
+    t = scale(2.0, cross(u, v))
+    return add(axpy(q[3], t, v), cross(u, t))
+
+
+@formula
+def turned_back(q, v):
+    """R(ϱ)ᵀ v: a laboratory vector in the body frame."""
+    return turned((-q[0], -q[1], -q[2], q[3]), v)
+
+
+@formula
+def turn(q, angle):
+    """ϱ after a rotation by the vector `angle` = ω dt [rad] in the laboratory frame, renormalised (Eq. 32).
+
+    sin and cos of the half angle are series to (|angle|/2)⁵: error |angle|⁷/6e5, 2e-9 for 0.1 rad.
+    """
+    h = scale(0.5, angle)
+    s = h[0] * h[0] + h[1] * h[1] + h[2] * h[2]
+    sine = 1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0))
+    cosine = 1.0 + s * (-0.5 + s * (1.0 / 24.0))
+    x, y, z = sine * h[0], sine * h[1], sine * h[2]
+    w0 = cosine * q[0] + x * q[3] + y * q[2] - z * q[1]
+    w1 = cosine * q[1] + y * q[3] + z * q[0] - x * q[2]
+    w2 = cosine * q[2] + z * q[3] + x * q[1] - y * q[0]
+    w3 = cosine * q[3] - x * q[0] - y * q[1] - z * q[2]
+    # one Newton step of 1/√n² from 1: n² is 1 to 1e-7 already
+    c = 1.5 - 0.5 * (w0 * w0 + w1 * w1 + w2 * w2 + w3 * w3)
+    return c * w0, c * w1, c * w2, c * w3

@@ -1,0 +1,107 @@
+"""The choice of the step: contact periods while anything touches, magnetic and closing times otherwise."""
+
+import math
+from typing import NamedTuple
+
+from ..core.box import nearest_image
+from ..core.jit import formula, loop
+from ..core.vec import dot, load, sub
+from ..core.world import CONTACT_STEP, CONTACTS, GRAIN1, LEVEL, PAIRS, STEPS
+from ..physics.surroundings import stiffness_of_field
+
+CHECK_EVERY = 16
+"""Steps between two looks at the physics while contacts set the step."""
+GROW_EVERY = 64
+"""The step is halved at once but doubled only at multiples of this many steps, so that it does not flap."""
+SPIN_ANGLE = 0.05
+"""Largest turn of a grain in one step [rad]."""
+FIELD_ANGLE = 0.03
+"""Largest phase √(μB/I) dt of a moment swinging in its field; Verlet then errs by 4e-5 in its frequency."""
+CLOSING_PART = 0.2
+"""Largest part of the gap that two grains about to touch may close in one step."""
+LONGEST = 2.0**-10
+"""Longest step [s], for worlds in which nothing happens."""
+REACH_PART = 1.0 / 16.0
+"""Largest part of the list's reach that a grain may fly in one step; keeps `list_is_stale` safe."""
+
+
+class Control(NamedTuple):
+    """What the choice of the step needs to know."""
+
+    fixed: float  # the user's own step [s]; 0: choose
+    reach: float  # of the list of near pairs [m]
+    energy_scale: float  # what the magnetics may put at stake, |U_min| [J]; 0: no such force
+    accuracy: float  # part of it that a step may misplace
+    outer_field: float  # size of the external flux density [T]
+
+
+@formula
+def field_step(moment, b, outer, inertia):
+    """Longest step [s] for a moment in the field b of the others plus an external one of size `outer`."""
+    square = stiffness_of_field(moment, b, inertia) + math.sqrt(dot(moment, moment)) * outer / inertia
+    return FIELD_ANGLE / math.sqrt(square) if square > 0.0 else math.inf
+
+
+@formula
+def load_step(force, torque, mass, inertia, control):
+    """Longest step [s] for which Verlet's energy error dt²/24 (F²/m + M²/I) stays below its share."""
+    rate = dot(force, force) / mass + dot(torque, torque) / inertia
+    stake = 24.0 * control.accuracy * control.energy_scale
+    return math.sqrt(stake / rate) if rate > 0.0 and stake > 0.0 else math.inf
+
+
+@loop
+def wanted_step(grains, contacts, near, count, span, control):
+    """The longest step [s] that all but the contacts allow; 0 if something is not finite.
+
+    Bound grains are left out of the accuracy rule: they ring, and their step is that of contacts.
+    """
+    wanted = math.inf
+    for i in range(grains.mass.size):
+        v, w = load(grains.velocity, i), load(grains.spin, i)
+        speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
+        if not (speed < math.inf and turning < math.inf):
+            count[GRAIN1] = i
+            return 0.0
+        if speed > 0.0:
+            wanted = min(wanted, REACH_PART * control.reach / speed)
+        if turning > 0.0:
+            wanted = min(wanted, SPIN_ANGLE / turning)
+        moment, inertia = load(grains.moment, i), grains.inertia[i]
+        wanted = min(wanted, field_step(moment, load(grains.field, i), control.outer_field, inertia))
+        if contacts.start[i + 1] == contacts.start[i]:
+            force, torque = load(grains.force, i), load(grains.torque, i)
+            wanted = min(wanted, load_step(force, torque, grains.mass[i], inertia, control))
+    for p in range(count[PAIRS]):
+        if near.touching[p] == 0:
+            i, j = near.pair[0, p], near.pair[1, p]
+            apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+            distance = math.sqrt(dot(apart, apart))
+            closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), apart) / distance
+            if closing > 0.0:
+                gap = distance - grains.radius[i] - grains.radius[j]
+                wanted = min(wanted, max(near.step[p], CLOSING_PART * gap / closing))
+    return wanted
+
+
+@loop
+def choose_step(grains, contacts, near, clock, count, span, control):
+    """The next step [s], or 0 if there is none: that of the contacts, or less if something else needs less.
+
+    Steps that are not the contacts' are powers of two of a second and change seldom, because every change
+    costs velocity Verlet a little energy.
+    """
+    if count[CONTACTS] == 0 or count[STEPS] % CHECK_EVERY == 0:
+        wanted = wanted_step(grains, contacts, near, count, span, control)
+        if not wanted > 0.0:
+            return 0.0
+        level = clock[LEVEL] if clock[LEVEL] > 0.0 else LONGEST
+        while level > wanted:
+            level *= 0.5
+        if count[STEPS] % GROW_EVERY == 0:
+            while 2.0 * level <= wanted and level < LONGEST:
+                level *= 2.0
+        clock[LEVEL] = level
+    if control.fixed > 0.0:
+        return control.fixed
+    return min(clock[LEVEL], clock[CONTACT_STEP])
