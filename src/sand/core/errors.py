@@ -38,6 +38,10 @@ class Interrupted(KeyboardInterrupt):
         self.result = result
 
 
+FORBID_EXTRA = {"extra": "forbid"}
+"""Marks the settings classes that case files build: an unknown key is a mistake, never ignored."""
+
+
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
     """A closing remark for a misspelt word: the nearest allowed one, or all of them."""
     near = difflib.get_close_matches(word, allowed, n=1)

@@ -79,7 +79,7 @@ class Material:
         return dataclasses.replace(self, **changes)
 
 
-# physics.md 1.7; sources: [DT97] Dominik & Tielens 1997, [Wada] Wada et al. 2007, paper = Dominik & Nübold 2002.
+# Sources: DT97 = Dominik & Tielens 1997; Wada et al. 2007; the paper = Dominik & Nübold 2002.
 ICE = Material("ice", 1000.0, 0.10, 7.0e9, 0.25, rolling_limit=8e-10)
 """Water ice, γ after Wada et al. (2007); DT97 use 0.37 J/m²."""
 SILICA = Material("silica", 2650.0, 0.025, 54.0e9, 0.17)

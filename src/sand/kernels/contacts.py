@@ -144,7 +144,7 @@ def sort_sides(contacts, count, grains):
 
 @rare
 def contact_step(contacts, count, grains, clock, per_period):
-    """The longest step the present contacts allow [s]: fastest period / per_period, less above 6 neighbours."""
+    """The longest step [s] the contacts allow: fastest period / per_period, less above 6 neighbours."""
     fastest, most = 0.0, 0
     for c in range(count[CONTACTS]):
         fastest = max(fastest, contacts.bond[9, c])

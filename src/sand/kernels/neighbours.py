@@ -57,7 +57,7 @@ def in_contact(contacts, i, j):
 def make_list(grains, contacts, near, count, span, reach, law):
     """List all pairs with a gap below `reach` [m]; all pairs are looked at.  FULL if there is no room."""
     found = 0
-    for i in range(grains.mass.size):
+    for i in range(grains.mass.size if law.on else 0):
         here, r1 = load(grains.position, i), grains.radius[i]
         for j in range(i):
             apart = nearest_image(sub(here, load(grains.position, j)), span)

@@ -1,6 +1,8 @@
 """Per-grain forces: one composed formula over all grains."""
 
-from ..core.jit import loop
+import functools
+
+from ..core.jit import kernel, loop
 from ..core.vec import accrue, load
 from ..physics.surroundings import One
 
@@ -32,10 +34,11 @@ def outside_loads(formula_of_grain):
     return add_loads
 
 
-def outside_energy(formula_of_grain):
-    """The loop that sums the energy [J] of one formula over all grains."""
+@functools.cache
+def energy_sum_for(formula_of_grain):
+    """The compiled sum of the energy [J] of one formula over all grains."""
 
-    @loop
+    @kernel
     def sum_energy(grains, time, parameters):
         total = 0.0
         for i in range(grains.mass.size):

@@ -164,7 +164,7 @@ def energies(pose, overlap, r1, r2, bond):
 
 @formula
 def lost_by_yielding(before, reached, left, bond):
-    """Energy [J] dissipated in a step by sliding, rolling, twisting: ½k (q_before + q_left)·(q_reached − q_left).
+    """Energy [J] lost in a step by sliding, rolling, twisting: ½k (q_before + q_left)·(q_reached − q_left).
 
     It is the work of the mode's force over the step less what stays stored, so that with trapezoidal work
     (velocity Verlet) nothing is lost from the books.  A broken contact leaves q = 0.

@@ -56,6 +56,7 @@ class Stop(IntEnum):
 class ContactRules(NamedTuple):
     """The contact law's run-time numbers."""
 
+    on: bool  # False: grains pass through each other
     pairings: Any  # (5, M, M) table: what two materials make together
     release: bool  # displacement beyond its limit: False clamp, True release
     per_period: float  # steps per fastest period
@@ -143,21 +144,20 @@ def driver_for(outside: Callable) -> Callable:
     def second_half(grains, contacts, near, clock, count, lost, rules):
         """Contacts, loads, the other half kick; may be entered again after arrays have grown."""
         span, law, dt = rules.span, rules.contact, clock[STEP]
-        if list_is_stale(grains, near, span, rules.control.reach):
-            if make_list(grains, contacts, near, count, span, rules.control.reach, law) == FULL:
-                return Stop.PAIRS_FULL
+        reach = rules.control.reach
+        stale = list_is_stale(grains, near, span, reach)
+        if stale and make_list(grains, contacts, near, count, span, reach, law) == FULL:
+            return Stop.PAIRS_FULL
         fresh = new_touches(grains, near, count, span)
         if count[CONTACTS] + fresh > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
-        changed = False
-        if contact_pass(grains, contacts, count, span, dt):
-            if settle_flagged(grains, contacts, near, count, lost, span, law, dt):
-                drop_broken(contacts, count)
-                changed = True
+        flagged = contact_pass(grains, contacts, count, span, dt)
+        parted = flagged and settle_flagged(grains, contacts, near, count, lost, span, law, dt)
+        if parted:
+            drop_broken(contacts, count)
         if fresh > 0:
             make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
-            changed = True
-        if changed:
+        if parted or fresh > 0:
             sort_sides(contacts, count, grains)
             contact_step(contacts, count, grains, clock, law.per_period)
         sum_loads(grains, contacts, clock[TIME] + dt, rules)

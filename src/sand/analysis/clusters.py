@@ -1,0 +1,75 @@
+"""Clusters: grains connected by contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.box import Box
+
+
+def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
+    """The cluster each grain belongs to, numbered by their lowest grain.
+
+    Args:
+        count: number of grains N.
+        pairs: contacts, (2, C) or (C, 2) grain numbers.
+
+    Returns:
+        (N,) integers 0…K−1.
+    """
+    edges = np.asarray(pairs, dtype=np.int64)
+    edges = edges if edges.ndim == 2 and edges.shape[0] == 2 else edges.reshape(-1, 2).T
+    parent = list(range(count))
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = parent[i]
+        return i
+
+    for a, b in edges.T.tolist():
+        a, b = root(a), root(b)
+        if a != b:
+            parent[max(a, b)] = min(a, b)
+    roots = np.array([root(i) for i in range(count)])
+    return np.unique(roots, return_inverse=True)[1].reshape(count)
+
+
+def cluster_sizes(labels: np.ndarray) -> np.ndarray:
+    """Number of grains of each cluster, (K,)."""
+    return np.bincount(labels)
+
+
+def mean_cluster_size(labels: np.ndarray) -> float:
+    """S = Σ s² n_s / Σ s n_s (Eq. 17): the size of the cluster of a grain picked at random."""
+    sizes = cluster_sizes(labels).astype(np.float64)
+    return float((sizes**2).sum() / sizes.sum())
+
+
+def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
+    """Positions (N, 3) [m] in which clusters are whole, not cut by the faces of a periodic box.
+
+    Each cluster keeps the image of its lowest grain; the others follow along their contacts.
+    """
+    count = len(position)
+    edges = np.asarray(pairs, dtype=np.int64)
+    edges = edges if edges.ndim == 2 and edges.shape[0] == 2 else edges.reshape(-1, 2).T
+    neighbours: list[list[int]] = [[] for _ in range(count)]
+    for a, b in edges.T.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    whole = np.array(position, dtype=np.float64)
+    seen = np.zeros(count, dtype=bool)
+    for start in range(count):
+        if seen[start]:
+            continue
+        seen[start] = True
+        queue = [start]
+        while queue:
+            i = queue.pop()
+            for j in neighbours[i]:
+                if not seen[j]:
+                    seen[j] = True
+                    whole[j] = whole[i] + box.nearest(whole[j] - whole[i])
+                    queue.append(j)
+    return whole

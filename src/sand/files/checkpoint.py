@@ -1,0 +1,85 @@
+"""checkpoint-*.npz: the whole state in float64, versioned and checksummed; two are kept."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import BadInput
+from .folder import replace_file
+
+VERSION = 1
+"""Of the file format; a newer program reads older versions, an older one refuses newer files."""
+KEPT = 2
+_META = "meta.json"
+
+
+def _checksum(arrays: dict[str, np.ndarray]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Path:
+    """Write one checkpoint, then drop all but the newest two.
+
+    Args:
+        arrays: the state by name.
+        meta: plain numbers and text that go with it; must hold `steps`.
+
+    Raises:
+        FilesFailed: nothing is lost, the older checkpoints stay.
+    """
+    header = {"format": "SAND checkpoint", "version": VERSION, "sha256": _checksum(arrays), **meta}
+    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    memory = io.BytesIO()
+    np.savez(memory, **{_META: text}, **arrays)
+    path = folder / f"checkpoint-{int(meta['steps']):015d}.npz"
+    replace_file(path, memory.getvalue())
+    for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:
+        old.unlink(missing_ok=True)
+    return path
+
+
+def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Arrays and meta of one checkpoint.
+
+    Raises:
+        BadInput: not a checkpoint, of a newer version, or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as saved:
+            arrays = {name: saved[name] for name in saved.files}
+        meta = json.loads(arrays.pop(_META).tobytes())
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, json.JSONDecodeError) as error:
+        raise BadInput(f"{path} is not a readable checkpoint ({type(error).__name__})") from error
+    if meta.get("format") != "SAND checkpoint":
+        raise BadInput(f"{path} is not a checkpoint of SAND")
+    if meta.get("version", 0) > VERSION:
+        raise BadInput(
+            f"{path} was written by a newer SAND (format {meta['version']}, this one reads up to {VERSION}); "
+            "update SAND"
+        )
+    if _checksum(arrays) != meta.get("sha256"):
+        raise BadInput(f"{path} is damaged: its checksum is wrong")
+    return arrays, meta
+
+
+def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The newest checkpoint that is whole.  Raises BadInput if there is none."""
+    problems: list[str] = []
+    for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
+        try:
+            return read_checkpoint(path)
+        except BadInput as error:
+            problems += error.problems
+    raise BadInput([*problems, f"{folder} holds no checkpoint to go on from"])

@@ -1,0 +1,164 @@
+"""A run's folder: what lies where, and how small files are written without ever being half there."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import BadInput, FilesFailed
+
+CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE = (
+    "case.toml",
+    "trajectory.gsd",
+    "ledger.csv",
+    "summary.json",
+    "figure.png",
+)
+OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE)
+
+
+def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:
+    """Make the folder of a new run.
+
+    Raises:
+        BadInput: it exists and is not empty (unless `overwrite`, which removes an earlier run's own files and
+            nothing else), or it cannot be made.
+    """
+    folder = Path(path)
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise BadInput(f"{folder} is a file; give the name of a new folder")
+        if folder.is_dir() and any(folder.iterdir()):
+            if not overwrite:
+                raise BadInput(
+                    f"folder {folder} exists and is not empty; give another one, remove it, "
+                    "or say that it may be overwritten"
+                )
+            for old in [*(folder / name for name in OURS), *folder.glob("checkpoint-*.npz")]:
+                old.unlink(missing_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".probe"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise BadInput(f"cannot write to folder {folder}: {error.strerror}") from error
+    return folder
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write beside, sync, rename: the file is the old one or the new one, never half of it.
+
+    Raises:
+        FilesFailed: the disk is full, the folder has vanished, …
+    """
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        with open(beside, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+        handle = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Readable JSON; NaN and infinities become null."""
+    replace_file(path, (json.dumps(_plain(content), indent=2, allow_nan=False) + "\n").encode())
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Raises BadInput for a missing or broken file."""
+    return json.loads(read_text(path))
+
+
+def read_text(path: str | Path) -> str:
+    """Raises BadInput for a missing or unreadable file."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadInput(f"there is no file {path}") from None
+    except UnicodeDecodeError:
+        raise BadInput(f"{path} is not a text file") from None
+    except OSError as error:
+        raise BadInput(f"cannot read {path}: {error.strerror}") from None
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Raises BadInput for a missing file, or with the line of a slip in its grammar."""
+    try:
+        return tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path} is not TOML: {error}") from None
+
+
+def write_toml(path: Path, content: dict[str, Any], comment: str) -> None:
+    """A case file, with a comment on top."""
+    import tomli_w
+
+    text = "".join(f"# {line}\n" for line in comment.splitlines()) + "\n" + tomli_w.dumps(content)
+    replace_file(path, text.encode())
+
+
+class LedgerFile:
+    """ledger.csv: one row per entry, numbers to the last bit; opened anew for each row, so nothing is held.
+
+    Args:
+        path: of the file.
+        columns: names, the first being `step`.
+        resume_at: number of the step a restart begins from; later rows and a torn last one are dropped.
+    """
+
+    def __init__(self, path: Path, columns: Sequence[str], resume_at: int | None = None):
+        self.path, self.columns = path, list(columns)
+        rows: list[str] = []
+        if resume_at is not None and path.exists():
+            rows = [line for line in read_text(path).splitlines()[1:] if _step_of(line) <= resume_at]
+        replace_file(path, ("\n".join([",".join(self.columns), *rows]) + "\n").encode())
+
+    def append(self, row: dict[str, float]) -> None:
+        """Raises FilesFailed."""
+        try:
+            with open(self.path, "a", encoding="utf-8", newline="") as file:
+                file.write(",".join(repr(row[name]) for name in self.columns) + "\n")
+        except OSError as error:
+            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
+
+
+def _step_of(line: str) -> float:
+    try:
+        return int(line.split(",", 1)[0])
+    except ValueError:
+        return float("inf")
+
+
+def read_ledger(path: Path) -> list[dict[str, float]]:
+    """The rows of ledger.csv as numbers.  Raises BadInput."""
+    lines = read_text(path).splitlines()
+    rows = list(csv.DictReader(lines))
+    try:
+        return [{k: float(v) if k not in ("step",) else int(v) for k, v in row.items()} for row in rows]
+    except (TypeError, ValueError):
+        raise BadInput(f"{path} is not a ledger of SAND") from None

@@ -1,0 +1,1 @@
+"""Running: the simulation object, its books, its case files."""

@@ -1,0 +1,98 @@
+"""The books: every joule of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
+from ..core.constants import BOLTZMANN
+from ..core.world import BROKEN, CONTACTS, LOST, MADE, MOVED, World
+from ..kernels.measure import ENERGIES, measure_energies, measure_momenta
+
+LOSSES = tuple(f"lost_{name}" for name in LOST)
+MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
+NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
+
+
+def take_stock(world: World, dipoles: Any, outside: dict[str, float]) -> dict[str, float]:
+    """One row of the ledger: all energies [J], losses [J], momenta (SI), numbers of contacts and clusters.
+
+    Args:
+        dipoles: the rules of the magnetic sum.
+        outside: energy [J] of each per-grain force by name.
+    """
+    energies, momenta = np.empty(len(ENERGIES)), np.empty(6)
+    grains = world.grains.arrays
+    span = world.box.span
+    measure_energies(grains, world.contacts, world.count, span, dipoles, energies)
+    measure_momenta(grains, momenta)
+    contacts = int(world.count[CONTACTS])
+    labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts])
+    row: dict[str, float] = {"step": world.steps, "time": world.time}
+    row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | outside
+    row |= dict(zip(LOSSES, world.lost.tolist(), strict=True))
+    row["total"] = math.fsum([*energies.tolist(), *outside.values(), *world.lost.tolist()])
+    row |= dict(zip(MOMENTA, momenta.tolist(), strict=True))
+    row |= {
+        "contacts": contacts,
+        "made": int(world.count[MADE]),
+        "moved": int(world.count[MOVED]),
+        "broken": int(world.count[BROKEN]),
+        "clusters": int(labels.max()) + 1,
+        "mean_cluster_size": mean_cluster_size(labels),
+        "largest_cluster": int(cluster_sizes(labels).max()),
+    }
+    return row
+
+
+class Ledger:
+    """The rows written so far, oldest first.
+
+    Args:
+        outside: names of the per-grain forces, one energy column each.
+    """
+
+    def __init__(self, outside: Sequence[str] = ()):
+        self.columns = ("step", "time", *ENERGIES, *outside, *LOSSES, "total", *MOMENTA, *NUMBERS)
+        self.rows: list[dict[str, float]] = []
+
+    def add(self, row: dict[str, float]) -> bool:
+        """Append a row; False if this step is in the books already."""
+        if self.rows and row["step"] <= self.rows[-1]["step"]:
+            return False
+        self.rows.append(row)
+        return True
+
+    def restore(self, rows: Iterable[dict[str, float]]) -> None:
+        """Take over the rows of a checkpoint."""
+        self.rows = list(rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        """One column over time."""
+        return np.array([row[column] for row in self.rows])
+
+    def _change(self) -> float:
+        return abs(self.rows[-1]["total"] - self.rows[0]["total"]) if self.rows else 0.0
+
+    @property
+    def dissipated(self) -> float:
+        """Energy lost in all channels so far [J], forming included."""
+        return math.fsum(self.rows[-1][name] for name in LOSSES) if self.rows else 0.0
+
+    @property
+    def drift(self) -> float:
+        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy)."""
+        largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
+        scale = self.dissipated + largest
+        return self._change() / scale if scale > 0.0 else 0.0
+
+    def drift_per_kT(self, temperature: float, grains: int) -> float:
+        """The same change over N k_B T; not a number for T = 0."""
+        return self._change() / (grains * BOLTZMANN * temperature) if temperature > 0.0 else math.nan

@@ -1,0 +1,47 @@
+"""Those who look on.  They may look, never change."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .outcome import Result
+    from .simulation import Simulation
+
+
+class Observer:
+    """Derive from this and put an instance into `Simulation(observers=[…])`."""
+
+    def see(self, simulation: Simulation, row: dict[str, float]) -> None:
+        """Called at every frame with the new row of the ledger."""
+
+    def tick(self, simulation: Simulation) -> None:
+        """Called about ten times a second of wall time, between two steps."""
+
+    def close(self, simulation: Simulation, result: Result) -> None:
+        """Called at the end of each `run`."""
+
+
+class Schedule:
+    """When the next frame is due: at multiples of `every` [s] of simulated time, seen from time 0.
+
+    A frame is the first step at or after its time; steps are never bent towards it.
+    """
+
+    def __init__(self, every: float, time: float):
+        self._every = every
+        self._number = 0
+        self.pass_by(time)
+
+    @property
+    def due(self) -> float:
+        return self._number * self._every if math.isfinite(self._every) else math.inf
+
+    def pass_by(self, time: float) -> None:
+        """Move on to the first due time after `time`."""
+        if not math.isfinite(self._every):
+            return
+        self._number = max(self._number, math.floor(time / self._every))
+        while self._number * self._every <= time:
+            self._number += 1

@@ -1,0 +1,145 @@
+"""What a run leaves in its folder, and when."""
+
+from __future__ import annotations
+
+import platform
+import time as wall
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..core.jit import cache_folder
+from ..core.world import CLOCK, COUNT, LOST, STAGE
+from ..files import folder as files
+from ..files.checkpoint import write_checkpoint
+from ..files.folder import LedgerFile, make_folder, read_ledger, write_json, write_toml
+from ..files.trajectory import TrajectoryWriter
+from .outcome import Result
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+CHECKPOINT_EVERY = 60.0
+"""Seconds of wall time between checkpoints."""
+
+
+class Record:
+    """Keeps case.toml, trajectory.gsd, ledger.csv, checkpoints, summary.json and the figure.
+
+    Args:
+        out: the folder.
+        overwrite: an earlier run's files in it may be replaced.
+        resumed: the folder is that of the run itself, which goes on.
+    """
+
+    def __init__(self, out: str | Path, overwrite: bool = False, resumed: bool = False):
+        self.folder = Path(out) if resumed else make_folder(out, overwrite=overwrite)
+        self._resumed = resumed
+        self._trajectory: TrajectoryWriter | None = None
+        self._ledger: LedgerFile | None = None
+        self._saved = wall.monotonic()
+        self._until: float | None = None
+
+    def open(self, simulation: Simulation, until: float) -> None:
+        """Begin or go on with the files; called by each `run`."""
+        from .case import case_of
+
+        self._until = until
+        if self._trajectory is not None:
+            return
+        text = "as understood by SAND, all defaults filled in, SI units"
+        write_toml(self.folder / files.CASE, case_of(simulation, until), text)
+        steps = simulation.world.steps if self._resumed else None
+        self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, steps)
+        if self._resumed:
+            simulation.ledger.restore(read_ledger(self.folder / files.LEDGER))
+        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, append=self._resumed)
+        if not self._resumed:
+            for row in simulation.ledger.rows:
+                self._ledger.append(row)
+            self._frame(simulation)
+        self.save(simulation)
+
+    def write(self, simulation: Simulation, row: dict[str, float]) -> None:
+        """A frame and a row."""
+        if self._ledger is None:
+            return
+        self._ledger.append(row)
+        self._frame(simulation)
+
+    def _frame(self, simulation: Simulation) -> None:
+        assert self._trajectory is not None
+        w = simulation.world
+        self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts)
+
+    def tick(self, simulation: Simulation) -> None:
+        """A checkpoint if the last one is old."""
+        if wall.monotonic() - self._saved > CHECKPOINT_EVERY:
+            self.save(simulation)
+
+    def save(self, simulation: Simulation) -> None:
+        """Write a checkpoint now; the trajectory is flushed first, so that nothing before it is lost."""
+        assert simulation.world.count[STAGE] == 0
+        if self._trajectory is not None:
+            self._trajectory.flush()
+        meta = {
+            "steps": simulation.world.steps,
+            "time": simulation.time,
+            "until": None if self._until is None or self._until == float("inf") else self._until,
+            "wall_seconds": simulation.wall_seconds,
+            "temperature": simulation.temperature,
+            "clock": CLOCK,
+            "count": COUNT,
+            "lost": LOST,
+        }
+        write_checkpoint(self.folder, simulation.world.to_arrays(), meta)
+        self._saved = wall.monotonic()
+
+    def close(self, simulation: Simulation, result: Result) -> None:
+        """Checkpoint, summary and figure; the trajectory stays open for a further `run`."""
+        self.save(simulation)
+        write_json(self.folder / files.SUMMARY, summary_of(simulation, result))
+        if simulation.ledger.rows:
+            from ..view.figure import run_figure, save
+
+            save(run_figure(simulation), self.folder / files.FIGURE)
+
+
+def summary_of(simulation: Simulation, result: Result) -> dict[str, Any]:
+    """Everything a table of many runs wants to know of one."""
+    from .. import __version__
+
+    last = simulation.ledger.rows[-1]
+    grain_steps = result.steps * len(simulation.grains)
+    return {
+        "outcome": result.outcome.name.lower(),
+        "outcome_text": result.outcome.value,
+        "grains_concerned": list(result.grains),
+        "time": result.time,
+        "steps": result.steps,
+        "grains": len(simulation.grains),
+        "contacts": last["contacts"],
+        "contacts_made": last["made"],
+        "contacts_moved": last["moved"],
+        "contacts_broken": last["broken"],
+        "clusters": last["clusters"],
+        "mean_cluster_size": last["mean_cluster_size"],
+        "largest_cluster": last["largest_cluster"],
+        "dissipated": simulation.ledger.dissipated,
+        "drift": result.drift,
+        "drift_per_kT": simulation.ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
+        "temperature_at_start": simulation.temperature,
+        "seed": simulation.seed,
+        "choices": simulation.choices,
+        "wall_seconds": simulation.wall_seconds,
+        "ns_per_grain_step": 1e9 * simulation.wall_seconds / grain_steps if grain_steps else None,
+        "versions": versions(),
+        "source_digest": cache_folder().name,
+        "sand": __version__,
+    }
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of the packages that can change a number."""
+    packages = {name: metadata.version(name) for name in ("numpy", "numba")}
+    return {"python": platform.python_version(), **packages}

@@ -1,0 +1,236 @@
+"""The simulation object: composes forces, box and integrator, and runs them."""
+
+from __future__ import annotations
+
+import math
+import time as wall
+import warnings
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.box import as_box
+from ..core.errors import BadInput, Interrupted
+from ..core.grains import Grains
+from ..core.units import si
+from ..core.world import CONTACTS
+from ..forces.base import Force
+from ..forces.dipoles import kinetic_temperature
+from ..kernels.measure import measure_gaps
+from ..stepping.advance import Stop
+from ..stepping.verlet import Verlet
+from .engine import build_engine
+from .ledger import Ledger, take_stock
+from .observers import Observer, Schedule
+from .outcome import OF_STOP, Outcome, Result
+from .record import Record
+from .signals import Signals
+
+BURST = 0.1
+"""Wall time [s] the compiled driver stays away from Python, about."""
+
+
+class Simulation:
+    """Grains, forces and a box, and the time they have lived.
+
+    Args:
+        grains: the start; copied.
+        forces: a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once.
+        box: a Box, or a length for a periodic cube; open by default.
+        stepping: the integrator, `sand.Verlet()` by default.
+        seed: of random forces; kept with the run.
+        out: folder for the run's files, made at the first `run`; None keeps everything in memory.
+        overwrite: allow `out` to hold an earlier run, whose files are then replaced.
+        observers: objects that look on (see `sand.Observer`); they never change the physics.
+        frame_every: time between frames [s]; by default a two-hundredth of the first `run`.
+        restart: arrays and meta of a checkpoint in `out`, from which the run goes on (`sand.resume` does this).
+
+    Raises:
+        BadInput: everything that is wrong, one line each.
+    """
+
+    def __init__(
+        self,
+        grains: Grains,
+        forces: Sequence[Force] = (),
+        *,
+        box: Any = None,
+        stepping: Verlet | None = None,
+        seed: int | None = None,
+        out: str | Path | None = None,
+        overwrite: bool = False,
+        observers: Iterable[Observer] = (),
+        frame_every: Any = None,
+        restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
+    ):
+        if not isinstance(grains, Grains):
+            raise BadInput(f"grains = {grains!r}; give sand.Grains(…) or sand.setup.gas(…)")
+        self.forces = list(forces)
+        self.box = as_box(box)
+        self.stepping = stepping or Verlet()
+        self.seed = seed
+        self.observers = list(observers)
+        self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
+        self.recipe: dict[str, Any] | None = None  # how a case file made the grains
+        self.start = grains.copy()
+        self._engine = build_engine(grains, self.forces, self.box, self.stepping, fresh=restart is None)
+        self.world = self._engine.world
+        self.temperature = kinetic_temperature(grains)
+        self.ledger = Ledger([force.name for force in self._engine._outside])
+        self.record = Record(out, overwrite, resumed=restart is not None) if out is not None else None
+        self.wall_seconds = 0.0
+        self._begun = restart is not None
+        if restart is not None:
+            arrays, meta = restart
+            self.world.from_arrays(arrays)
+            self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
+        for text in self._engine.warnings:
+            warnings.warn(text, stacklevel=2)
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return self.world.time
+
+    @property
+    def grains(self) -> Grains:
+        """The grains as they are now; their arrays are read only."""
+        return self.world.grains
+
+    @property
+    def contacts(self) -> dict[str, np.ndarray]:
+        """The contacts as they are now: `pair` (C, 2), `overlap` [m], `twist` [rad], `formed` [s]."""
+        self._start()
+        w = self.world
+        used = int(w.count[CONTACTS])
+        pair = np.ascontiguousarray(w.contacts.pair[:, :used])
+        overlap = np.empty(used)
+        measure_gaps(w.grains.arrays, pair, w.box.span, overlap)
+        return {
+            "pair": pair.T.copy(),
+            "overlap": overlap,
+            "twist": w.contacts.twist[:used].copy(),
+            "formed": w.contacts.formed[:used].copy(),
+        }
+
+    @property
+    def choices(self) -> dict[str, str]:
+        """What was decided for the user, and why: boundary, cut-off, step."""
+        told = {"boundary": self.box.describe()}
+        for force in self.forces:
+            choose = getattr(force, "choose", None)
+            if choose is not None:
+                radius, reason = choose(self.start, self.box)
+                told[f"{force.name} cut-off"] = (
+                    f"{'none' if radius is None else f'{radius:.4g} m'} ({reason})"
+                )
+        return told
+
+    def loads(self) -> dict[str, Any]:
+        """Force (N, 3) [N], torque (N, 3) [N m], field (N, 3) [T] and energies by name [J], without stepping."""
+        self._start()
+        row = self._stock()
+        names = ("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.outside_energies())
+        return {
+            "force": self.grains.force.copy(),
+            "torque": self.grains.torque.copy(),
+            "field": self.grains.field.copy(),
+            "energy": {name: row[name] for name in names},
+        }
+
+    def run(self, until: Any = None, *, steps: int | None = None) -> Result:
+        """Go on until a time, or for a number of steps, whichever comes first.
+
+        Args:
+            until: absolute time [s]; the run ends at the first step at or after it.
+            steps: number of steps from now, ≥ 1.
+
+        Raises:
+            BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
+            Interrupted: Ctrl-C or SIGTERM; the checkpoint is written before.
+        """
+        end = math.inf if until is None else si(until, "s", "until")
+        if until is None and steps is None:
+            raise BadInput("run needs an end: until='5 us' or steps=1000")
+        if steps is not None and (isinstance(steps, bool) or int(steps) != steps or steps < 1):
+            raise BadInput(f"steps = {steps!r} must be a whole number of at least 1")
+        if end < self.time:
+            raise BadInput(f"until = {until!r} lies before the present time, {self.time:.6g} s")
+        if self.frame_every is None:
+            self.frame_every = (end - self.time) / 200.0 if 0.0 < end - self.time < math.inf else math.inf
+        last = math.inf if steps is None else self.world.steps + int(steps)
+        self._start()
+        if self.record:
+            self.record.open(self, end)
+        begun = wall.monotonic()
+        with Signals() as signals:
+            try:
+                outcome = self._loop(end, last, signals)
+            finally:
+                self.wall_seconds += wall.monotonic() - begun
+        return self._close(outcome)
+
+    def view(self) -> Any:
+        """The figure of the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
+        from ..view.figure import run_figure, show
+
+        self._start()
+        return show(run_figure(self))
+
+    def _start(self) -> None:
+        if not self._begun:
+            self._engine.begin()
+            self._begun = True
+            self._look()
+
+    def _stock(self) -> dict[str, float]:
+        return take_stock(self.world, self._engine.rules.dipoles, self._engine.outside_energies())
+
+    def _look(self) -> None:
+        """A row of the ledger, a frame and everyone who looks on."""
+        row = self._stock()
+        self.ledger.add(row)
+        if self.record:
+            self.record.write(self, row)
+        for observer in self.observers:
+            observer.see(self, row)
+
+    def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
+        frames = Schedule(self.frame_every or math.inf, self.time)
+        burst = 64
+        while True:
+            began = wall.monotonic()
+            left = int(min(burst, last - self.world.steps))
+            stop = self._engine.advance(min(end, frames.due), max(left, 0))
+            spent = wall.monotonic() - began
+            if left == burst:
+                burst = max(64, min(int(burst * min(BURST / max(spent, 1e-9), 2.0)), 10**7))
+            if stop in OF_STOP:
+                return OF_STOP[stop]
+            done = self.time >= end or self.world.steps >= last
+            if stop is Stop.TIME_REACHED or done:
+                self._look()
+                frames.pass_by(self.time)
+            if done:
+                return Outcome.FINISHED
+            if self.record:
+                self.record.tick(self)
+            for observer in self.observers:
+                observer.tick(self)
+            if signals.received:
+                return Outcome.INTERRUPTED
+
+    def _close(self, outcome: Outcome) -> Result:
+        named = self._engine.culprits() if outcome.is_physics else ()
+        if outcome.is_physics:
+            self._look()
+        result = Result(outcome, self.world.steps, self.time, self.ledger.drift, named)
+        if self.record:
+            self.record.close(self, result)
+        for observer in self.observers:
+            observer.close(self, result)
+        if outcome is Outcome.INTERRUPTED:
+            raise Interrupted(result)
+        return result

@@ -1,0 +1,5 @@
+"""How simulations begin."""
+
+from .gas import gas
+
+__all__ = ["gas"]
