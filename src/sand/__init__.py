@@ -28,6 +28,7 @@ _HOMES = {
     "Field": "forces.field",
     "Verlet": "stepping.verlet",
     "Simulation": "run.simulation",
+    "resume": "run.build",
     "Observer": "run.observers",
     "Outcome": "run.outcome",
     "Result": "run.outcome",
@@ -37,18 +38,30 @@ _ROOMS = ("setup", "theory", "analysis", "files")
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 
 if TYPE_CHECKING:
-    from . import analysis, files, setup
-    from .core.box import Box
-    from .core.errors import BadInput, Interrupted, SandError
-    from .core.grains import Grains
-    from .core.material import FORSTERITE, GRAPHITE, ICE, IRON, MAGNETITE, SILICA, Material
-    from .forces.contact import Contact
-    from .forces.dipoles import Dipoles
-    from .forces.field import Field
-    from .run.observers import Observer
-    from .run.outcome import Outcome, Result
-    from .run.simulation import Simulation
-    from .stepping.verlet import Verlet
+    from . import analysis as analysis
+    from . import files as files
+    from . import setup as setup
+    from .core.box import Box as Box
+    from .core.errors import BadInput as BadInput
+    from .core.errors import Interrupted as Interrupted
+    from .core.errors import SandError as SandError
+    from .core.grains import Grains as Grains
+    from .core.material import FORSTERITE as FORSTERITE
+    from .core.material import GRAPHITE as GRAPHITE
+    from .core.material import ICE as ICE
+    from .core.material import IRON as IRON
+    from .core.material import MAGNETITE as MAGNETITE
+    from .core.material import SILICA as SILICA
+    from .core.material import Material as Material
+    from .forces.contact import Contact as Contact
+    from .forces.dipoles import Dipoles as Dipoles
+    from .forces.field import Field as Field
+    from .run.build import resume as resume
+    from .run.observers import Observer as Observer
+    from .run.outcome import Outcome as Outcome
+    from .run.outcome import Result as Result
+    from .run.simulation import Simulation as Simulation
+    from .stepping.verlet import Verlet as Verlet
 
 
 def __getattr__(name: str) -> Any:

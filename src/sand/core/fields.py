@@ -83,8 +83,8 @@ def stored(field: Field, values: Any, count: int, *, positive: bool = False) -> 
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise BadInput(
-            f"{field.name} of grain {bad[0]} is {array[bad[0]]}: every number must be finite, in {field.unit};"
-            f" {bad.size} of {count} grains are concerned"
+            f"{field.name} of grain {bad[0]} is {array[bad[0]]}: numbers must be finite, in {field.unit};"
+            f" {bad.size} of {count} concerned"
         )
     if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
         raise BadInput(

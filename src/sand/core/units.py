@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import re
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,14 @@ def _factor(text: str, unit: str) -> float | None:
         return None
 
 
+def _times(number: str, factor: float) -> float:
+    """number × factor; exact in decimals where the factor is a power of ten: '5 us' is 5e-06."""
+    power = round(math.log10(factor)) if factor > 0.0 else 0
+    if factor == float(f"1e{power}") and "n" not in number.lower():
+        return float(Decimal(number).scaleb(power))
+    return float(number) * factor
+
+
 def _complain(value: Any, unit: str, name: str) -> BadInput:
     example = EXAMPLES.get(unit, f"1 {unit}")
     return BadInput(
@@ -79,7 +88,7 @@ def in_unit(value: Any, unit: str) -> Any:
             return None
         number, given = match.groups()
         factor = _factor(given.strip(), unit) if given else (1.0 if unit == "1" else None)
-        return None if factor is None else float(number) * factor
+        return None if factor is None else _times(number, factor)
     if isinstance(value, bool):
         return None
     if hasattr(value, "to_value"):  # astropy

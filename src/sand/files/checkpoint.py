@@ -42,7 +42,7 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     header = {"format": "SAND checkpoint", "version": VERSION, "sha256": _checksum(arrays), **meta}
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     memory = io.BytesIO()
-    np.savez(memory, **{_META: text}, **arrays)
+    np.savez(memory, **{_META: text}, **arrays)  # type: ignore[arg-type]
     path = folder / f"checkpoint-{int(meta['steps']):015d}.npz"
     replace_file(path, memory.getvalue())
     for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:

@@ -142,7 +142,8 @@ class Frame:
         self.pair = np.asarray(stored.bonds.group).reshape(-1, 2)
         periodic = stored.log["periodic"].astype(bool)
         lengths = np.asarray(stored.configuration.box[:3], dtype=np.float64) * scale
-        self.box = Box(tuple(float(v) if on else None for v, on in zip(lengths, periodic, strict=True)))
+        x, y, z = (float(v) if on else None for v, on in zip(lengths, periodic, strict=True))
+        self.box = Box((x, y, z))
 
 
 def read_frames(path: Path) -> list[Frame]:

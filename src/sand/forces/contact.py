@@ -18,7 +18,7 @@ from ..physics.contact import Pairing
 
 BEYOND = ("clamp", "release")
 JKR_LIMIT = 0.3
-"""a0/R above which JKR is at the edge of its validity (physics.md 1.7)."""
+"""a0/R above which JKR is at the edge of its validity."""
 
 
 def pairing(a: Material, b: Material) -> Pairing:

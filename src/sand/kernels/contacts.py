@@ -1,28 +1,17 @@
-"""Contacts: a pass per contact, a gather per grain, and the rare ones that form, move or break."""
+"""Contacts: a pass per contact that vectorises, then a gather per grain in a fixed order."""
 
 import math
 
 from ..core.box import nearest_image
 from ..core.jit import loop, rare
-from ..core.vec import accrue, across, add, dot, load, load4, put, scale, sub
+from ..core.vec import across, add, dot, load, load4, put, scale, sub
 from ..core.world import (
-    BREAKING,
-    BROKEN,
     CONTACT_STEP,
     CONTACTS,
-    FORMING,
-    MADE,
-    MOVED,
-    PAIRS,
-    ROLLING,
-    SLIDING,
-    TIME,
-    TWISTING,
 )
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
-from ..physics.rotation import turn, turned, turned_back
-from .neighbours import bond_of, forget_touch
+from ..physics.rotation import turned
 
 
 @loop
@@ -154,177 +143,3 @@ def contact_step(contacts, count, grains, clock, per_period):
     clock[CONTACT_STEP] = (
         math.inf if fastest == 0.0 else (2.0 * math.pi / math.sqrt(fastest * crowd) / per_period)
     )
-
-
-@loop
-def strain_before(grains, contacts, span, c, pose, bond, dt):
-    """Displacements at the start of the step, from where the grains came."""
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    apart = sub(
-        scale(pose.distance, pose.n),
-        scale(dt, sub(load(grains.velocity, i), load(grains.velocity, j))),
-    )
-    distance = math.sqrt(dot(apart, apart))
-    q1 = turn(load4(grains.orientation, i), scale(-dt, load(grains.spin, i)))
-    q2 = turn(load4(grains.orientation, j), scale(-dt, load(grains.spin, j)))
-    earlier = law_of.Pose(
-        scale(1.0 / distance, apart),
-        distance,
-        turned(q1, load(contacts.pointer1, c)),
-        turned(q2, load(contacts.pointer2, c)),
-        contacts.twist[c] - twist_gain(grains, contacts, c, pose, dt),
-    )
-    r1, r2 = grains.radius[i], grains.radius[j]
-    return law_of.strain_of(earlier, r1 + r2 - distance, r1, r2, bond)
-
-
-@loop
-def book(lost, channels):
-    """Add the energies lost by sliding, rolling, twisting."""
-    lost[SLIDING] += channels[0]
-    lost[ROLLING] += channels[1]
-    lost[TWISTING] += channels[2]
-
-
-@loop
-def knock(grains, i, j, n, impulse):
-    """Give grain i the impulse [N s] along n and grain j the opposite."""
-    accrue(grains.velocity, i, scale(impulse / grains.mass[i], n))
-    accrue(grains.velocity, j, scale(-impulse / grains.mass[j], n))
-
-
-@rare
-def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
-    """Book the energy of a neck that snapped inside the step, and mark the contact as dead (flag 2).
-
-    The force −(5/9)F_c ended τ ago; velocity Verlet let it act until half the step: the difference is
-    given as an impulse.
-    """
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    overlap = grains.radius[i] + grains.radius[j] - pose.distance
-    opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    late = -bond.pull_off_overlap - overlap
-    since = min(late / opening, dt) if opening > 0.0 else 0.0
-    energy, force = law_of.breaking(bond)
-    knock(grains, i, j, pose.n, force * (0.5 * dt - since))
-    lost[BREAKING] += energy
-    count[BROKEN] += 1
-    contacts.flag[c] = 2.0
-    forget_touch(near, count, i, j)
-
-
-@rare
-def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
-    """Break or move the contacts that passed a limit; returns True if any broke."""
-    parted = False
-    for c in range(count[CONTACTS]):
-        if contacts.flag[c] == 0.0:
-            continue
-        i, j = contacts.pair[0, c], contacts.pair[1, c]
-        r1, r2 = grains.radius[i], grains.radius[j]
-        bond = bond_at(contacts, c)
-        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        if law_of.beyond_limits(strain, bond):
-            before = strain_before(grains, contacts, span, c, pose, bond, dt)
-            if strain.overlap < -bond.pull_off_overlap:
-                zero = (0.0, 0.0, 0.0)
-                gone = law_of.Strain(strain.overlap, zero, zero, 0.0)
-                book(lost, law_of.lost_by_yielding(before, strain, gone, bond))
-                break_contact(grains, contacts, near, count, lost, c, pose, bond, dt)
-                parted = True
-                continue
-            left = law_of.yielded(strain, bond, law.release)
-            book(lost, law_of.lost_by_yielding(before, strain, left, bond))
-            n1, n2 = tangential.pointers_for(left.slide, left.roll, pose.n, r1, r2)
-            put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
-            put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
-            contacts.twist[c] = left.twist
-            count[MOVED] += 1
-        write_loads(grains, contacts, span, c)
-    return parted
-
-
-@rare
-def drop_broken(contacts, count):
-    """Close the gaps that broken contacts leave; the order of the others stays."""
-    kept = 0
-    for c in range(count[CONTACTS]):
-        if contacts.flag[c] == 2.0:
-            continue
-        if kept != c:
-            for row in range(2):
-                contacts.pair[row, kept] = contacts.pair[row, c]
-            for row in range(3):
-                contacts.pointer1[row, kept] = contacts.pointer1[row, c]
-                contacts.pointer2[row, kept] = contacts.pointer2[row, c]
-                contacts.push[row, kept] = contacts.push[row, c]
-                contacts.torque1[row, kept] = contacts.torque1[row, c]
-                contacts.torque2[row, kept] = contacts.torque2[row, c]
-            for row in range(contacts.bond.shape[0]):
-                contacts.bond[row, kept] = contacts.bond[row, c]
-            contacts.twist[kept] = contacts.twist[c]
-            contacts.formed[kept] = contacts.formed[c]
-            contacts.flag[kept] = contacts.flag[c]
-        kept += 1
-    count[CONTACTS] = kept
-
-
-@loop
-def new_touches(grains, near, count, span):
-    """How many listed pairs have come to touch (D ≤ r1 + r2)."""
-    found = 0
-    for p in range(count[PAIRS]):
-        i, j = near.pair[0, p], near.pair[1, p]
-        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        reach = grains.radius[i] + grains.radius[j]
-        if near.touching[p] == 0 and dot(apart, apart) <= reach * reach:
-            found += 1
-    return found
-
-
-@rare
-def add_contact(grains, contacts, count, span, law, i, j, formed):
-    """Append an unstrained contact (but for its overlap) between grains i and j; returns its number."""
-    c = count[CONTACTS]
-    count[CONTACTS] = c + 1
-    contacts.pair[0, c] = i
-    contacts.pair[1, c] = j
-    apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    n = scale(1.0 / math.sqrt(dot(apart, apart)), apart)
-    put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), scale(-1.0, n)))
-    put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n))
-    contacts.twist[c] = 0.0
-    contacts.formed[c] = formed
-    contacts.flag[c] = 0.0
-    bond = bond_of(grains, law.pairings, i, j)
-    for row in range(contacts.bond.shape[0]):
-        contacts.bond[row, c] = bond[row]
-    write_loads(grains, contacts, span, c)
-    return c
-
-
-@rare
-def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
-    """Form the contacts of pairs that came to touch inside the step, and book −U(0).
-
-    τ = overlap / closing speed is the time since touch.  Velocity Verlet will let the force act for half a
-    step; the difference F (τ − dt/2) is given as an impulse along n.
-    """
-    for p in range(count[PAIRS]):
-        i, j = near.pair[0, p], near.pair[1, p]
-        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        reach = grains.radius[i] + grains.radius[j]
-        square = dot(apart, apart)
-        if near.touching[p] == 1 or square > reach * reach:
-            continue
-        distance = math.sqrt(square)
-        n = scale(1.0 / distance, apart)
-        closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
-        since = min((reach - distance) / closing, dt) if closing > 0.0 else 0.0
-        c = add_contact(grains, contacts, count, span, law, i, j, clock[TIME] + dt - since)
-        knock(grains, i, j, n, dot(load(contacts.push, c), n) * (since - 0.5 * dt))
-        energy, _ = law_of.forming(bond_at(contacts, c))
-        lost[FORMING] += energy
-        near.touching[p] = 1
-        count[MADE] += 1

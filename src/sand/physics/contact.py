@@ -1,6 +1,7 @@
 """The whole contact law: JKR normal force and springs that slide, roll and twist up to a limit.
 
-physics.md 1.1–1.4; the stiffnesses are frozen at a₀, so forces are exact gradients of the energy.
+The stiffnesses are frozen at a₀, so forces are exact gradients of the energy (Dominik & Tielens 1997;
+Dominik & Nübold 2002, appendix A.5).
 """
 
 import math

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import typing
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,15 +19,16 @@ from pydantic import (
 
 from ..core.box import Box, as_box
 from ..core.errors import BadInput, did_you_mean
-from ..core.grains import Grains, moment_size
+from ..core.grains import moment_size
 from ..core.material import PRESETS, Material, material_named
 from ..core.units import si
+from ..files.folder import read_toml
 from ..forces.contact import Contact
 from ..forces.dipoles import Dipoles
 from ..forces.field import Field as MagneticField
-from ..setup.gas import SPINS, gas
+from ..setup.gas import SPINS
 from ..stepping.verlet import Verlet
-from .simulation import Simulation
+from .mistakes import complaints
 
 INTEGRATORS = {"verlet": Verlet}
 
@@ -164,16 +163,22 @@ class Case(_Section):
                 own[name] = section.build(name)
             except BadInput as error:
                 problems += error.at("materials").problems
-        names = [self.grains.material] if isinstance(self.grains.material, str) else self.grains.material
-        known = {**PRESETS, **own}
-        for name in names:
-            if name not in known and name not in self.materials:
-                problems.append(
-                    f"grains.material: unknown material '{name}'; {did_you_mean(name, list(known))}"
-                )
         if problems:
             raise BadInput(problems)
-        return known
+        return {**PRESETS, **own}
+
+
+def _unknown_materials(content: dict[str, Any]) -> list[str]:
+    """Complaints about names in [grains] that are neither presets nor in [materials]."""
+    grains, own = content.get("grains"), content.get("materials", {})
+    given = grains.get("material", []) if isinstance(grains, dict) else []
+    names = [given] if isinstance(given, str) else given if isinstance(given, list) else []
+    known = [*PRESETS, *(own if isinstance(own, dict) else [])]
+    return [
+        f"grains.material: unknown material '{name}'; {did_you_mean(str(name), known)}"
+        for name in names
+        if str(name) not in known
+    ]
 
 
 def read_case(path: str | Path) -> Case:
@@ -182,171 +187,20 @@ def read_case(path: str | Path) -> Case:
     Raises:
         BadInput: every mistake of the file, one line each, with its place.
     """
-    from ..files.folder import read_toml
-
     return check_case(read_toml(path), str(path))
 
 
 def check_case(content: dict[str, Any], name: str) -> Case:
     """A Case from a dictionary; `name` stands in front of each complaint.  Raises BadInput."""
+    kinds: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
+    problems = _unknown_materials(content)
     try:
         case = Case.model_validate(content)
-    except ValidationError as error:
-        lines = [f"{name}: {line}" for slip in error.errors() for line in _complaints(slip)]
-        raise BadInput(lines) from None
-    try:
         case.library()
+    except ValidationError as error:
+        problems += [line for slip in error.errors() for line in complaints(slip, Case, kinds)]
     except BadInput as error:
-        raise error.at(name) from None
+        problems += error.problems
+    if problems:
+        raise BadInput(f"{name}: {problem}" for problem in problems)
     return case
-
-
-def _complaints(slip: Any) -> list[str]:
-    """pydantic's error as our lines: place, what is wrong, what to do."""
-    place = ".".join(str(part) for part in slip["loc"] if not str(part).startswith("function-"))
-    if slip["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        keys = _keys_at(slip["loc"][:-1])
-        return [f"{place}: there is no such key; {did_you_mean(str(slip['loc'][-1]), keys)}"]
-    if slip["type"] == "missing":
-        return [f"{place} is missing; add it"]
-    if slip["type"] == "value_error":
-        return [f"{place}: {line}" for line in str(slip["ctx"]["error"]).splitlines()]
-    return [f"{place} = {slip['input']!r}: {slip['msg'][0].lower()}{slip['msg'][1:]}"]
-
-
-def _keys_at(places: tuple[Any, ...]) -> list[str]:
-    """The keys allowed at a place of the case file."""
-    here: Any = Case
-    for place in places:
-        fields = _annotations(here)
-        if place not in fields:
-            here = fields.get("*", here)
-            continue
-        here = fields[place]
-    return [k for k in _annotations(here) if k != "*"]
-
-
-def _annotations(kind: Any) -> dict[str, Any]:
-    inner = [a for a in typing.get_args(kind) if a is not type(None)]
-    if typing.get_origin(kind) is dict:
-        return {"*": inner[1]}
-    for candidate in (kind, *inner):
-        if isinstance(candidate, type) and issubclass(candidate, BaseModel):
-            return {k: f.annotation for k, f in candidate.model_fields.items()}
-        if dataclasses.is_dataclass(candidate):
-            extra = ["method"] if candidate in INTEGRATORS.values() else []
-            return dict.fromkeys([*extra, *(f.name for f in dataclasses.fields(candidate))])
-    return {}
-
-
-def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
-    """The simulation a case describes.
-
-    Args:
-        out: folder for its files, None for none.
-        options: passed on to `Simulation` (observers, overwrite).
-
-    Raises:
-        BadInput: what only shows when grains, forces and box come together.
-    """
-    if case.grains.kind != "gas":
-        raise BadInput(
-            "grains.kind = 'given': these grains came from a script; use `sand resume` on the folder"
-        )
-    section, library = case.grains, case.library()
-    if not isinstance(section.material, str):
-        raise BadInput("grains.material of a gas must be one name")
-    grains = gas(
-        section.number,
-        case.box.periodic,
-        radius=section.radius,
-        material=library[section.material],
-        moment=section.moment,
-        temperature=section.temperature,
-        spins=section.spins,
-        seed=case.run.seed,
-    )
-    simulation = Simulation(
-        grains,
-        case.forces.build(),
-        box=case.box.periodic,
-        stepping=case.stepping,
-        seed=case.run.seed,
-        out=out,
-        frame_every=case.run.frame_every,
-        **options,
-    )
-    simulation.recipe = section.model_dump(exclude_none=True)
-    return simulation
-
-
-def case_of(simulation: Simulation, until: float) -> dict[str, Any]:
-    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back."""
-    materials = simulation.grains.materials
-    recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
-    names = [m.name for m in materials]
-    run = {"until": until, "frame_every": simulation.frame_every, "seed": simulation.seed or 0}
-    forces = {}
-    for force in simulation.forces:
-        forces[force.name] = dict(force.parameters())
-        if isinstance(force, Dipoles):
-            radius = force.choose(simulation.start, simulation.box).radius
-            forces[force.name]["cutoff"] = "none" if radius is None else radius
-    lengths = ["open" if v is None else v for v in simulation.box.lengths]
-    return {
-        "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},
-        "box": {} if simulation.box.is_open else {"periodic": lengths},
-        "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
-        "materials": {
-            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None}
-            for m in materials
-        },
-        "forces": forces,
-        "stepping": simulation.stepping.parameters(),
-    }
-
-
-def resume_simulation(folder: str | Path, **options: Any) -> tuple[Simulation, float]:
-    """The simulation of a folder at its newest checkpoint, and the time [s] it was to reach.
-
-    Raises:
-        BadInput: no checkpoint, a damaged one, or a case that needs forces SAND does not know.
-    """
-    from ..files.checkpoint import newest_checkpoint
-    from ..files.folder import CASE
-
-    place = Path(folder)
-    if not place.is_dir():
-        raise BadInput(f"there is no folder {place}")
-    case = read_case(place / CASE)
-    arrays, meta = newest_checkpoint(place)
-    names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
-    library = case.library()
-    try:
-        part = {name.split("/", 1)[1]: array for name, array in arrays.items() if name.startswith("grains/")}
-        grains = Grains(
-            part["position"].T,
-            part["radius"],
-            [library[names[i]] for i in part["material"]],
-            velocity=part["velocity"].T,
-            spin=part["spin"].T,
-            moment=part["body_moment"].T,
-            charge=part["charge"],
-            mass=part["mass"],
-        )
-    except (KeyError, IndexError) as error:
-        raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
-    simulation = Simulation(
-        grains,
-        case.forces.build(),
-        box=case.box.periodic,
-        stepping=case.stepping,
-        seed=case.run.seed,
-        out=place,
-        frame_every=case.run.frame_every,
-        restart=(arrays, meta),
-        **options,
-    )
-    if case.grains.kind == "gas":
-        simulation.recipe = case.grains.model_dump(exclude_none=True)
-    return simulation, meta["until"] if meta["until"] is not None else case.run.until

@@ -203,7 +203,7 @@ def _refuse_overlaps(engine: Engine, contact: Contact) -> None:
         limit = max(MOST_OVERLAP[0] * rest, MOST_OVERLAP[1] * min(radius[i], radius[j]))
         if delta > limit:
             problems.append(
-                f"grains {i} and {j} overlap by {delta:.3g} m at the start; at most {limit:.3g} m is allowed: "
+                f"grains {i} and {j} overlap by {delta:.3g} m at the start; at most {limit:.3g} m may be: "
                 "move them apart"
             )
     if len(problems) > 10:

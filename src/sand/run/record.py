@@ -42,7 +42,7 @@ class Record:
 
     def open(self, simulation: Simulation, until: float) -> None:
         """Begin or go on with the files; called by each `run`."""
-        from .case import case_of
+        from .build import case_of
 
         self._until = until
         if self._trajectory is not None:

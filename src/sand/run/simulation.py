@@ -45,7 +45,7 @@ class Simulation:
         overwrite: allow `out` to hold an earlier run, whose files are then replaced.
         observers: objects that look on (see `sand.Observer`); they never change the physics.
         frame_every: time between frames [s]; by default a two-hundredth of the first `run`.
-        restart: arrays and meta of a checkpoint in `out`, from which the run goes on (`sand.resume` does this).
+        restart: arrays and meta of a checkpoint in `out` to go on from (`sand.resume` gives them).
 
     Raises:
         BadInput: everything that is wrong, one line each.
@@ -74,6 +74,7 @@ class Simulation:
         self.observers = list(observers)
         self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
+        self.planned_end: float | None = None  # what a resumed run was to reach [s]
         self.start = grains.copy()
         self._engine = build_engine(grains, self.forces, self.box, self.stepping, fresh=restart is None)
         self.world = self._engine.world
@@ -129,7 +130,7 @@ class Simulation:
         return told
 
     def loads(self) -> dict[str, Any]:
-        """Force (N, 3) [N], torque (N, 3) [N m], field (N, 3) [T] and energies by name [J], without stepping."""
+        """Force (N, 3) [N], torque (N, 3) [N m], field (N, 3) [T], energies by name [J]; no step is taken."""
         self._start()
         row = self._stock()
         names = ("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.outside_energies())
@@ -144,13 +145,15 @@ class Simulation:
         """Go on until a time, or for a number of steps, whichever comes first.
 
         Args:
-            until: absolute time [s]; the run ends at the first step at or after it.
+            until: absolute time [s]; the run ends at the first step at or after it. Resumed runs know theirs.
             steps: number of steps from now, ≥ 1.
 
         Raises:
             BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
             Interrupted: Ctrl-C or SIGTERM; the checkpoint is written before.
         """
+        if until is None and steps is None:
+            until = self.planned_end
         end = math.inf if until is None else si(until, "s", "until")
         if until is None and steps is None:
             raise BadInput("run needs an end: until='5 us' or steps=1000")

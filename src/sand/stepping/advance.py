@@ -23,17 +23,9 @@ from ..core.world import (
     STEPS,
     TIME,
 )
-from ..kernels.contacts import (
-    contact_pass,
-    contact_step,
-    drop_broken,
-    gather,
-    make_contacts,
-    new_touches,
-    settle_flagged,
-    sort_sides,
-)
+from ..kernels.contacts import contact_pass, contact_step, gather, sort_sides
 from ..kernels.dipoles import dipole_loads
+from ..kernels.events import drop_broken, make_contacts, new_touches, settle_flagged
 from ..kernels.motion import drift, kick
 from ..kernels.neighbours import FULL, list_is_stale, make_list
 from ..kernels.outside import outside_loads

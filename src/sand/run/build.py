@@ -1,0 +1,131 @@
+"""From a case to a simulation and back, and from a run's folder to the run that goes on."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import BadInput
+from ..core.grains import Grains
+from ..files.checkpoint import newest_checkpoint
+from ..files.folder import CASE
+from ..forces.dipoles import Dipoles
+from ..setup.gas import gas
+from .case import Case, read_case
+from .simulation import Simulation
+
+
+def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
+    """The simulation a case describes.
+
+    Args:
+        out: folder for its files, None for none.
+        options: passed on to `Simulation` (observers, overwrite).
+
+    Raises:
+        BadInput: what only shows when grains, forces and box come together.
+    """
+    if case.grains.kind != "gas":
+        raise BadInput(
+            "grains.kind = 'given': these grains came from a script; use `sand resume` on the folder"
+        )
+    section, library = case.grains, case.library()
+    if not isinstance(section.material, str):
+        raise BadInput("grains.material of a gas must be one name")
+    grains = gas(
+        section.number,
+        case.box.periodic,
+        radius=section.radius,
+        material=library[section.material],
+        moment=section.moment,
+        temperature=section.temperature,
+        spins=section.spins,
+        seed=case.run.seed,
+    )
+    simulation = Simulation(
+        grains,
+        case.forces.build(),
+        box=case.box.periodic,
+        stepping=case.stepping,
+        seed=case.run.seed,
+        out=out,
+        frame_every=case.run.frame_every,
+        **options,
+    )
+    simulation.recipe = section.model_dump(exclude_none=True)
+    return simulation
+
+
+def case_of(simulation: Simulation, until: float) -> dict[str, Any]:
+    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back."""
+    materials = simulation.grains.materials
+    recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
+    names = [m.name for m in materials]
+    run = {"until": until, "frame_every": simulation.frame_every, "seed": simulation.seed or 0}
+    forces = {}
+    for force in simulation.forces:
+        forces[force.name] = dict(force.parameters())
+        if isinstance(force, Dipoles):
+            radius = force.choose(simulation.start, simulation.box).radius
+            forces[force.name]["cutoff"] = "none" if radius is None else radius
+    lengths = ["open" if v is None else v for v in simulation.box.lengths]
+    return {
+        "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},
+        "box": {} if simulation.box.is_open else {"periodic": lengths},
+        "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
+        "materials": {
+            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None}
+            for m in materials
+        },
+        "forces": forces,
+        "stepping": simulation.stepping.parameters(),
+    }
+
+
+def resume(folder: str | Path, **options: Any) -> Simulation:
+    """A run's folder at its newest checkpoint as a simulation; `run()` goes on to the end once asked for.
+
+    Args:
+        folder: of an earlier run; new frames and rows are added to its files.
+        options: passed on to `Simulation` (observers).
+
+    Raises:
+        BadInput: no checkpoint, a damaged one, or a case that needs forces SAND does not know.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise BadInput(f"there is no folder {place}")
+    case = read_case(place / CASE)
+    arrays, meta = newest_checkpoint(place)
+    names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
+    library = case.library()
+    try:
+        part = {name.split("/", 1)[1]: array for name, array in arrays.items() if name.startswith("grains/")}
+        grains = Grains(
+            part["position"].T,
+            part["radius"],
+            [library[names[i]] for i in part["material"]],
+            velocity=part["velocity"].T,
+            spin=part["spin"].T,
+            moment=part["body_moment"].T,
+            charge=part["charge"],
+            mass=part["mass"],
+        )
+    except (KeyError, IndexError) as error:
+        raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
+    simulation = Simulation(
+        grains,
+        case.forces.build(),
+        box=case.box.periodic,
+        stepping=case.stepping,
+        seed=case.run.seed,
+        out=place,
+        frame_every=case.run.frame_every,
+        restart=(arrays, meta),
+        **options,
+    )
+    if case.grains.kind == "gas":
+        simulation.recipe = case.grains.model_dump(exclude_none=True)
+    simulation.planned_end = meta["until"]
+    return simulation
