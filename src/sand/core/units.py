@@ -45,7 +45,6 @@ def _registry() -> Any:
     import pint
 
     registry = pint.UnitRegistry(cache_folder=None)
-    registry.default_format = "~"
     return registry
 
 

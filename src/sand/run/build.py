@@ -57,12 +57,22 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     return simulation
 
 
-def case_of(simulation: Simulation, until: float) -> dict[str, Any]:
-    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back."""
+def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str, Any]:
+    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back.
+
+    Args:
+        until: time [s] the run is to reach, or infinity.
+        last_step: number of the step it is to reach, or infinity.
+    """
     materials = simulation.grains.materials
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     names = [m.name for m in materials]
-    run = {"until": until, "frame_every": simulation.frame_every, "seed": simulation.seed or 0}
+    run = {
+        "until": until,
+        "steps": last_step if last_step == float("inf") else int(last_step),
+        "frame_every": simulation.frame_every,
+        "seed": simulation.seed or 0,
+    }
     forces = {}
     for force in simulation.forces:
         forces[force.name] = dict(force.parameters())

@@ -47,12 +47,19 @@ class _Section(BaseModel):
 
 
 class RunSection(_Section):
-    """[run]: how long, how often, which seed, where to."""
+    """[run]: how long (a time, or a number of steps), how often, which seed, where to."""
 
-    until: quantity("s", above=0.0)  # type: ignore[valid-type]
+    until: quantity("s", above=0.0) | None = None  # type: ignore[valid-type]
+    steps: Annotated[int, Field(ge=1, strict=True)] | None = None
     frame_every: quantity("s", above=0.0) | None = None  # type: ignore[valid-type]
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
     out: str | None = None
+
+    @model_validator(mode="after")
+    def _ends(self) -> RunSection:
+        if self.until is None and self.steps is None:
+            raise ValueError("until is missing; add it, for example until = '5 us'")
+        return self
 
 
 class BoxSection(_Section):

@@ -40,15 +40,15 @@ class Record:
         self._saved = wall.monotonic()
         self._until: float | None = None
 
-    def open(self, simulation: Simulation, until: float) -> None:
-        """Begin or go on with the files; called by each `run`."""
+    def open(self, simulation: Simulation, until: float, last_step: float) -> None:
+        """Begin or go on with the files; called by each `run` with its end."""
         from .build import case_of
 
         self._until = until
         if self._trajectory is not None:
             return
         text = "as understood by SAND, all defaults filled in, SI units"
-        write_toml(self.folder / files.CASE, case_of(simulation, until), text)
+        write_toml(self.folder / files.CASE, case_of(simulation, until, last_step), text)
         steps = simulation.world.steps if self._resumed else None
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, steps)
         if self._resumed:

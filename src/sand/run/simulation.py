@@ -166,7 +166,7 @@ class Simulation:
         last = math.inf if steps is None else self.world.steps + int(steps)
         self._start()
         if self.record:
-            self.record.open(self, end)
+            self.record.open(self, end, last)
         begun = wall.monotonic()
         with Signals() as signals:
             try:

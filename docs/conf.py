@@ -1,0 +1,44 @@
+"""Sphinx: the pages are Markdown, their code blocks are executed, the reference is written from the source.
+
+Build with:  sphinx-build -W --keep-going -b html docs docs/_build/html
+"""
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
+
+from sand import __version__  # noqa: E402
+
+project = "SAND"
+author = "The SAND developers"
+copyright = "The SAND developers, BSD 3-clause licence"
+version = release = __version__
+
+extensions = ["myst_nb", "sphinx.ext.mathjax", "sand_reference"]
+source_suffix = {".md": "myst-nb"}
+exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
+nitpicky = True
+
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
+myst_heading_anchors = 3
+myst_dmath_double_inline = True
+
+# Every page with code runs anew at every build: a page can only show what this version does.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_execution_in_temp = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+# pages that run the command line or the examples of this checkout find them here
+os.environ["SAND_EXAMPLES"] = str(HERE.parent / "examples")
+
+html_theme = "furo"
+html_title = f"SAND {release}"
+html_show_sphinx = False
+html_theme_options = {"navigation_with_keys": True}
+html_static_path = ["_static"]
+html_css_files = ["sand.css"]

@@ -1,0 +1,43 @@
+"""`sand cite`: what to cite."""
+
+from __future__ import annotations
+
+import click
+
+from .. import __version__
+from . import options, report
+
+#: what it gave to SAND, and the reference
+REFERENCES = (
+    (
+        "the equations of SAND, magnetic aggregation",
+        "Dominik C., Nübold H. (2002): Magnetic Aggregation: Dynamics and Numerical Modeling. "
+        "Icarus 157, 173–186. arXiv:astro-ph/0201500",
+    ),
+    (
+        "contacts of grains: rolling, sliding, twisting",
+        "Dominik C., Tielens A. G. G. M. (1997): The Physics of Dust Coagulation and the Structure of Dust "
+        "Aggregates in Space. ApJ 480, 647–673. doi:10.1086/303996",
+    ),
+    (
+        "adhesion",
+        "Johnson K. L., Kendall K., Roberts A. D. (1971): Surface energy and the contact of elastic solids. "
+        "Proc. R. Soc. Lond. A 324, 301–313. doi:10.1098/rspa.1971.0141",
+    ),
+)
+
+
+@click.command("cite", short_help="What to cite.")
+@options.as_json
+@options.debug
+def command(as_json: bool) -> int:
+    """What to cite when SAND was of use."""
+    software = f"SAND, Soft Aggregate Numerical Dynamics, version {__version__}"
+    if as_json:
+        references = [{"for": reason, "reference": text} for reason, text in REFERENCES]
+        report.emit({"software": software, "version": __version__, "references": references})
+        return 0
+    click.echo(f"Please cite the version you used:\n  {software}\nand what it is built on:")
+    for reason, text in REFERENCES:
+        click.echo(f"  {text}\n      ({reason})")
+    return 0

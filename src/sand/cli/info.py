@@ -1,0 +1,200 @@
+"""`sand info DIR|FILE`: what a run or one of its files holds, on one screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..core.errors import BadInput, did_you_mean
+from ..files import folder as files
+from . import options, report
+
+Told = tuple[str, report.Rows, dict[str, Any]]
+"""A heading, rows for people, and the same for machines."""
+
+
+@click.command("info", short_help="What a run, or one of its files, holds.")
+@click.argument("path", metavar="DIR|FILE")
+@options.as_json
+@options.debug
+def command(path: str, as_json: bool) -> int:
+    """What a run's folder holds, or a case file, trajectory.gsd, ledger.csv, summary.json or checkpoint.
+
+    A case file is checked as `sand run` would, without running it.
+    """
+    heading, rows, content = _teller(Path(path))(Path(path))
+    if as_json:
+        report.emit(content)
+    else:
+        report.show(heading, rows)
+    return 0
+
+
+def _teller(path: Path) -> Callable[[Path], Told]:
+    """The function that knows this kind of file.  Raises BadInput."""
+    if path.is_dir():
+        return of_run
+    if not path.exists():
+        near = did_you_mean(path.name, _names_beside(path)) if _names_beside(path) else ""
+        raise BadInput(f"there is no file or folder {path}" + (f"; {near}" if "mean" in near else ""))
+    if path.suffix not in KINDS:
+        raise BadInput(f"{path} is none of the files that SAND knows: a run's folder, {', '.join(KINDS)}")
+    return KINDS[path.suffix]
+
+
+def _names_beside(path: Path) -> list[str]:
+    try:
+        return [p.name for p in path.parent.iterdir()]
+    except OSError:
+        return []
+
+
+def of_run(path: Path) -> Told:
+    """A run's folder: how it ended or how far it is."""
+    from ..core.units import spoken
+
+    if not (path / files.CASE).exists():
+        raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
+    end = files.read_toml(path / files.CASE).get("run", {}).get("until")
+    summary = files.read_json(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
+    ledger = files.read_ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
+    last = ledger[-1] if ledger else None
+    # a run that is going on, or was killed, is in its ledger beyond its summary
+    beyond = last if last and (summary is None or last["step"] > summary["steps"]) else None
+    rows: report.Rows = []
+    if summary is not None:
+        rows += [
+            ("outcome", summary["outcome_text"] + report.named(summary["grains_concerned"])),
+            ("grains", str(summary["grains"])),
+            *summary["choices"].items(),
+            *report.results(summary),
+        ]
+    if beyond is not None:
+        rows += [
+            ("state" if summary is None else "since then", "running, or stopped without having been closed"),
+            ("last frame", f"{spoken(beyond['time'], 's')} after {beyond['step']} steps"),
+            ("clusters", report.clusters(beyond)),
+        ]
+    if end is not None:
+        rows.append(("planned end", spoken(end, "s")))
+    rows.append(("files", "  ".join(report.files_of(path))))
+    time = max((row["time"] for row in (summary, last) if row), default=0.0)
+    if report.checkpoints(path) and (end is None or time < end):
+        rows.append(("go on with", report.resume_line(path)))
+    content = {
+        "kind": "run",
+        "folder": str(path),
+        "summary": summary,
+        "last_row": last,
+        "planned_end": end,
+        "files": report.files_of(path),
+    }
+    return f"{path}: a run", rows, content
+
+
+def of_case(path: Path) -> Told:
+    """A case file, checked: what would run, and what would be chosen."""
+    from ..run.build import case_of, simulation_of
+    from ..run.case import read_case
+
+    case = read_case(path)
+    if case.grains.kind == "given":
+        rows = [("grains", f"{case.grains.number}, made by a script"), ("box", case.box.periodic.describe())]
+        return f"{path}: the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
+    simulation = report.with_notes(lambda: simulation_of(case, None))
+    folder = Path(case.run.out or path.stem)
+    simulation.frame_every = case.run.frame_every
+    rows = report.opening(simulation, case.run.until, folder)
+    content = {"kind": "case", "case": case_of(simulation, case.run.until), "choices": simulation.choices}
+    return f"{path}: a case without mistakes", rows, content
+
+
+def of_trajectory(path: Path) -> Told:
+    """Frames, times and the last frame of a trajectory."""
+    from ..core.units import spoken
+    from ..files.trajectory import read_frames
+
+    frames = read_frames(path)
+    if not frames:
+        raise BadInput(f"{path} holds no frame")
+    first, last = frames[0], frames[-1]
+    rows = [
+        ("frames", f"{len(frames)}, from {spoken(first.time, 's')} to {spoken(last.time, 's')}"),
+        ("grains", str(len(last.radius))),
+        ("box", last.box.describe()),
+        ("last frame", f"step {last.step}, {len(last.pair)} contacts"),
+    ]
+    content = {
+        "kind": "trajectory",
+        "frames": len(frames),
+        "grains": len(last.radius),
+        "first_time": first.time,
+        "last_time": last.time,
+        "last_step": last.step,
+        "contacts": len(last.pair),
+        "box": list(last.box.lengths),
+    }
+    return f"{path}: a trajectory", rows, content
+
+
+def of_checkpoint(path: Path) -> Told:
+    """The state a checkpoint holds."""
+    from ..core.units import spoken
+    from ..files.checkpoint import read_checkpoint
+
+    arrays, meta = read_checkpoint(path)
+    grains, contacts = len(arrays["grains/radius"]), arrays["contacts/pair"].shape[1]
+    end = meta.get("until")
+    rows = [
+        ("time", f"{spoken(meta['time'], 's')} after {meta['steps']} steps"),
+        ("grains", f"{grains}, {contacts} contacts"),
+        ("planned end", "none" if end is None else spoken(end, "s")),
+        ("go on with", report.resume_line(path.parent)),
+    ]
+    content = {"kind": "checkpoint", "grains": grains, "contacts": contacts, **meta}
+    return f"{path}: a checkpoint, whole", rows, content
+
+
+def of_summary(path: Path) -> Told:
+    """A summary."""
+    summary = files.read_json(path)
+    try:
+        rows = [("outcome", summary["outcome_text"]), *report.results(summary)]
+    except (KeyError, TypeError):
+        raise BadInput(f"{path} is not a summary of SAND") from None
+    return f"{path}: the summary of a run", rows, {"kind": "summary", **summary}
+
+
+def of_ledger(path: Path) -> Told:
+    """First and last row of the books."""
+    from ..core.units import spoken
+
+    ledger = files.read_ledger(path)
+    try:
+        first, last = ledger[0], ledger[-1]
+        lost = {name: value for name, value in last.items() if name.startswith("lost_")}
+        rows = [
+            ("rows", f"{len(ledger)}, from {spoken(first['time'], 's')} to {spoken(last['time'], 's')}"),
+            ("total energy", f"{first['total']:.6g} J at first, {last['total']:.6g} J at last"),
+            ("dissipated", ", ".join(f"{k[5:]} {v:.3g} J" for k, v in lost.items())),
+            ("clusters", report.clusters(last)),
+        ]
+    except (KeyError, IndexError):
+        raise BadInput(f"{path} is not a ledger of SAND, or an empty one") from None
+    return (
+        f"{path}: the ledger of a run",
+        rows,
+        {"kind": "ledger", "rows": len(ledger), "first": first, "last": last},
+    )
+
+
+KINDS: dict[str, Callable[[Path], Told]] = {
+    ".toml": of_case,
+    ".gsd": of_trajectory,
+    ".npz": of_checkpoint,
+    ".json": of_summary,
+    ".csv": of_ledger,
+}

@@ -1,0 +1,107 @@
+"""What `sand run` and `sand resume` share: start, watch, and tell how it ended."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import BadInput, Interrupted
+from ..core.units import spoken
+from ..files.folder import SUMMARY, read_json
+from . import report
+from .exits import DONE, INTERRUPTED, PHYSICS
+from .progress import Progress
+
+
+def launch(
+    make: Callable[[], Any], folder: Path, heading: str, until: float | None, *, quiet: bool, as_json: bool
+) -> int:
+    """Make a simulation, run it and tell; returns the exit code.
+
+    Args:
+        make: returns the simulation, its files in `folder`.
+        heading: of what is told before the start.
+        until: end of the run [s]; None: the end that the simulation has in its plans.
+    """
+    from ..core.jit import compiling
+
+    def tell() -> None:
+        if not quiet:
+            report.note("compiling (once per version of SAND), about a quarter of a minute …")
+
+    talk = not (quiet or as_json)
+    with compiling(tell):
+        simulation = report.with_notes(make)
+        end = simulation.planned_end if until is None else until
+        if talk:
+            report.show(heading, report.opening(simulation, end, folder))
+        bar = Progress(end) if talk and sys.stderr.isatty() else None
+        if bar is not None:
+            simulation.observers.append(bar)
+        try:
+            result = simulation.run(until=end)
+        except Interrupted as stop:
+            result = stop.result
+        except KeyboardInterrupt:
+            return _cut_off(folder)
+        finally:
+            if bar is not None:
+                bar.finish()
+    return _conclude(result, folder, talk=talk, as_json=as_json)
+
+
+def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
+    """Tell how a run ended; returns the exit code."""
+    from ..run.outcome import Outcome
+
+    outcome, when = result.outcome, f"t = {spoken(result.time, 's')}"
+    summary = read_json(folder / SUMMARY)
+    if as_json:
+        report.emit({**summary, "folder": str(folder)})
+    if talk:
+        rows = [*report.results(summary), ("files", _listed(folder))]
+        report.show("done" if outcome is Outcome.FINISHED else "so far", rows)
+    if outcome is Outcome.INTERRUPTED:
+        report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
+        return INTERRUPTED
+    if outcome.is_physics:
+        report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
+        report.note(f"the state just before is in {report.checkpoints(folder)[-1]}")
+        return PHYSICS
+    return DONE
+
+
+def _cut_off(folder: Path) -> int:
+    """Ctrl-C before the first step, or twice: the last checkpoint, if any, is what is left."""
+    if report.checkpoints(folder):
+        report.note(f"interrupted at once; go on from the last checkpoint with: {report.resume_line(folder)}")
+    else:
+        report.note("interrupted before the first step; nothing is lost, start again")
+    return INTERRUPTED
+
+
+def _listed(folder: Path) -> str:
+    """The files written: folder/ and their names, as one line."""
+    return f"{folder}/  " + "  ".join(report.files_of(folder))
+
+
+def refuse_used_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
+    """The two slips with --out that cost most, in words of the command line.
+
+    Raises:
+        BadInput: the folder is in use and --overwrite is not given; or it holds the case file itself.
+    """
+    if not folder.is_dir() or not any(folder.iterdir()):
+        return
+    if not overwrite:
+        told = "give another one with --out, or --overwrite to replace the run in it"
+        if report.checkpoints(folder):
+            told += f"; or go on with that run: {report.resume_line(folder)}"
+        raise BadInput(f"folder {folder} exists and is not empty; {told}")
+    if any((folder / name).exists() and (folder / name).samefile(case) for name in report.OURS):
+        raise BadInput(
+            f"--overwrite would replace the case file {case} itself; copy it to another folder first, "
+            "or give another --out"
+        )

@@ -1,0 +1,153 @@
+"""What is printed, and how: lines for people, one JSON object for machines, notes on stderr."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from ..files.folder import OURS
+
+T = TypeVar("T")
+Rows = list[tuple[str, str]]
+
+
+def note(text: str) -> None:
+    """One line on stderr."""
+    click.echo(f"sand: {text}", err=True)
+
+
+def emit(content: dict[str, Any]) -> None:
+    """The one JSON object of --json; NaN and infinities become null."""
+    click.echo(json.dumps(_plain(content), indent=2, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
+
+
+def show(heading: str, rows: Rows) -> None:
+    """A heading and two columns."""
+    width = max((len(label) for label, _ in rows), default=0)
+    click.echo("\n".join([heading, *(f"  {label:<{width}}  {text}" for label, text in rows)]))
+
+
+def with_notes(make: Callable[[], T]) -> T:
+    """`make()`, its warnings printed as notes, each once."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made = make()
+    for text in dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)):
+        note(f"note: {text}")
+    return made
+
+
+def resume_line(folder: Path) -> str:
+    """What to type to go on with a run."""
+    return f"sand resume {shlex.quote(str(folder))}"
+
+
+def checkpoints(folder: Path) -> list[Path]:
+    """The checkpoints in a run's folder, oldest first."""
+    return sorted(folder.glob("checkpoint-*.npz"))
+
+
+def files_of(folder: Path) -> list[str]:
+    """Names of the run's files that are there."""
+    return [name for name in OURS if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
+
+
+def opening(simulation: Any, end: float, folder: Path) -> Rows:
+    """What is about to run, and what was chosen for the user."""
+    from ..core.units import spoken
+
+    every = simulation.frame_every
+    frames = "200 frames" if every is None else f"a frame every {spoken(every, 's')}"
+    time = f"from {spoken(simulation.time, 's')} " if simulation.time > 0.0 else ""
+    return [
+        ("grains", _grains(simulation.grains, simulation.temperature)),
+        *simulation.choices.items(),
+        ("forces", ", ".join(_force(f) for f in simulation.forces) or "none: grains fly straight on"),
+        ("time", f"{time}to {spoken(end, 's')}, {frames}"),
+        ("seed", str(simulation.seed)),
+        ("folder", str(folder)),
+    ]
+
+
+def _grains(grains: Any, temperature: float) -> str:
+    from ..core.units import spoken
+
+    def span(values: Any, say: Callable[[float], str]) -> str:
+        least, most = say(float(values.min())), say(float(values.max()))
+        return least if least == most else f"{least} to {most}"
+
+    parts = [
+        f"{len(grains)} of {', '.join(m.name for m in grains.materials)}",
+        f"radius {span(grains.radius, lambda v: spoken(v, 'm'))}",
+    ]
+    if grains.body_moment.any():
+        size = (grains.body_moment**2).sum(axis=1) ** 0.5
+        parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
+    moving = f"moving at {spoken(temperature, 'K')}" if temperature > 0.0 else "at rest"
+    return ", ".join([*parts, moving])
+
+
+def _force(force: Any) -> str:
+    settings = ", ".join(f"{key} = {value}" for key, value in force.parameters().items())
+    return f"{force.name} ({settings})" if settings else force.name
+
+
+def results(summary: dict[str, Any]) -> Rows:
+    """The numbers of summary.json that people ask for first."""
+    from ..core.units import spoken
+
+    rate = summary["ns_per_grain_step"]
+    wall = spoken_wall(summary["wall_seconds"])
+    return [
+        ("time", f"{spoken(summary['time'], 's')} in {summary['steps']} steps"),
+        ("clusters", clusters(summary)),
+        (
+            "contacts",
+            f"{summary['contacts']} ({summary['contacts_made']} made, {summary['contacts_moved']} moved, "
+            f"{summary['contacts_broken']} broken)",
+        ),
+        ("energy drift", f"{summary['drift']:.2g} of the energy dissipated and in motion"),
+        ("wall time", wall if rate is None else f"{wall}, {rate:.3g} ns per grain and step"),
+    ]
+
+
+def clusters(row: dict[str, Any]) -> str:
+    """Number, mean size S and largest, of a summary or a row of the ledger."""
+    return (
+        f"{int(row['clusters'])}, mean size S = {row['mean_cluster_size']:.4g}, "
+        f"largest {int(row['largest_cluster'])}"
+    )
+
+
+def spoken_wall(seconds: float) -> str:
+    """Wall time for people: '5.6 s', '12 min 05 s', '3 h 07 min'."""
+    if seconds < 60.0:
+        return f"{seconds:.3g} s"
+    whole = round(seconds)
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def named(grains: Iterable[int]) -> str:
+    """The grains an outcome concerns, in brackets; nothing if there are none."""
+    numbers = ", ".join(str(i) for i in grains)
+    return f" (grains {numbers})" if numbers else ""

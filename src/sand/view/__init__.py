@@ -1,0 +1,1 @@
+"""What a run looks like.  matplotlib, which is heavy, is imported nowhere else."""

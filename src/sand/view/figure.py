@@ -1,0 +1,226 @@
+"""The figure at the end of every run: clusters, energies, losses and balance over time; the grains in 3-D."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..core.box import Box
+from ..core.grains import Grains
+from ..files.folder import replace_file
+from .panels import (
+    draw_balance,
+    draw_clusters,
+    draw_energies,
+    draw_losses,
+    draw_time,
+    energy_unit,
+    time_unit,
+)
+from .scene import Scene, draw_largest, draw_scene, scene_of, view_window
+from .style import FAINT, letter, pretty, styled
+
+if TYPE_CHECKING:
+    from ..run.simulation import Simulation
+
+WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
+"""Inches, inches, pixels per inch: 1600 × 1000 pixels."""
+SMALL_GRAIN = 11.0
+"""Pixels: with grains of a smaller radius in the box, the largest clusters are shown by themselves too."""
+LARGEST_FILE = 300_000
+"""Bytes of the PNG."""
+
+_LEFT, _RIGHT = (0.068, 0.452), (0.485, 0.992)
+_TOP, _BOTTOM = 0.865, 0.075
+
+
+class RunFigure(Figure):
+    """A figure that notebooks display as it is, whatever backend is in use."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
+
+
+def run_figure(simulation: Simulation) -> Figure:
+    """One landscape figure of the run so far.
+
+    Left, over time: clusters (Eq. 17), energies, losses by channel, the balance of the books.  Right: the
+    grains as they are now, coloured by cluster, with their moments; where they are small, the largest
+    clusters once more.  Energies in N k_B T of the start, or in J if the grains were at rest.
+
+    Args:
+        simulation: with at least one row in its ledger.
+    """
+    scene = scene_of(simulation.grains, simulation.contacts["pair"], simulation.box)
+    with styled():
+        figure = RunFigure(figsize=(WIDTH, HEIGHT), dpi=DPI)
+        _draw_headline(figure, simulation)
+        _draw_history(figure, simulation)
+        _draw_grains(figure, scene)
+    return figure
+
+
+def _draw_headline(figure: Figure, simulation: Simulation) -> None:
+    ledger = simulation.ledger
+    last = ledger.rows[-1]
+    figure.text(_LEFT[0] - 0.055, 0.965, headline(simulation), size=10.5, weight="bold", va="center")
+    count = int(last["clusters"])
+    facts = [
+        f"{count} cluster{'s' if count != 1 else ''}",
+        f"mean size S = {last['mean_cluster_size']:.3g}",
+        f"largest {int(last['largest_cluster'])}",
+        f"{int(last['contacts'])} contacts ({int(last['made'])} made, {int(last['broken'])} broken)",
+    ]
+    if simulation.temperature > 0.0:
+        facts.append(rf"$T_0$ = {simulation.temperature:.3g} K")
+    figure.text(_LEFT[0] - 0.055, 0.928, "  ·  ".join(facts), size=8.5, color=FAINT, va="center")
+
+
+def headline(simulation: Simulation) -> str:
+    """Who is where, and how old: '100 grains of iron, r = 10 nm, periodic box 1.2 µm, t = 5 µs'."""
+    grains = simulation.grains
+    parts = [
+        f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {_materials(grains)}",
+        f"r = {_span(grains.radius)}",
+        _describe(simulation.box),
+        f"t = {pretty(simulation.time, 's')}",
+    ]
+    return ",  ".join(parts)
+
+
+def _materials(grains: Grains) -> str:
+    names = [material.name for material in grains.materials]
+    return ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
+
+
+def _span(radius: np.ndarray) -> str:
+    small, large = float(radius.min()), float(radius.max())
+    if large < 1.001 * small:
+        return pretty(large, "m")
+    return f"{pretty(small, 'm')} to {pretty(large, 'm')}"
+
+
+def _describe(box: Box) -> str:
+    if box.is_open:
+        return "open space"
+    if len(set(box.lengths)) == 1:
+        return f"periodic cube of {pretty(box.shortest, 'm')}"
+    return "periodic " + " × ".join("open" if v is None else pretty(v, "m") for v in box.lengths)
+
+
+def _draw_history(figure: Figure, simulation: Simulation) -> None:
+    ledger = simulation.ledger
+    time = time_unit(ledger)
+    unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
+    panels = [_panel(figure, _LEFT, bottom, height) for bottom, height in _stack((1.0, 1.35, 1.1, 0.5), 0.036)]
+    draw_clusters(panels[0], ledger, time)
+    draw_energies(panels[1], ledger, time, unit)
+    draw_losses(panels[2], ledger, time, unit)
+    draw_balance(panels[3], ledger, time, unit)
+    draw_time(panels, time, ledger)
+    figure.align_ylabels(panels)
+    for name, axes in zip("abcd", panels, strict=True):
+        letter(axes, name, -0.155)
+
+
+def _draw_grains(figure: Figure, scene: Scene) -> None:
+    """The box, and under it the largest clusters if they would be hard to make out in it."""
+    whole = (_BOTTOM - 0.045, _TOP + 0.03 - _BOTTOM + 0.045)
+    window = view_window(scene, _pixels(whole[1])[0] / _pixels(whole[1])[1])
+    grain = float(np.median(scene.radius)) * _pixels(whole[1])[0] / (window[1] - window[0])
+    small = grain < SMALL_GRAIN and bool(scene.largest())
+    strip = 0.235
+    bottom, height = (whole[0] + strip + 0.02, whole[1] - strip - 0.02) if small else whole
+    axes = _panel(figure, _RIGHT, bottom, height)
+    draw_scene(axes, scene, _pixels(height))
+    letter(axes, "e", 0.0)
+    axes.text(
+        0.04, 1.004, _caption(scene), transform=axes.transAxes, size=7, color=FAINT, va="bottom", ha="left"
+    )
+    if small:
+        axes = _panel(figure, _RIGHT, whole[0], strip)
+        draw_largest(axes, scene, _pixels(strip))
+        letter(axes, "f", 0.0)
+
+
+def _caption(scene: Scene) -> str:
+    told = []
+    if scene.largest():
+        told.append("one colour per cluster, single grains grey")
+    if scene.arrow.any():
+        told.append("arrows: moments")
+    return "; ".join(told)
+
+
+def _panel(figure: Figure, columns: tuple[float, float], bottom: float, height: float) -> Axes:
+    return figure.add_axes((columns[0], bottom, columns[1] - columns[0], height))
+
+
+def _pixels(height: float) -> tuple[int, int]:
+    """Of a panel on the right whose height is that share of the figure's."""
+    return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
+
+
+def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
+    """Bottom and height of panels above each other, the highest first; `heights` in proportion."""
+    room = (_TOP - _BOTTOM - gap * (len(heights) - 1)) / sum(heights)
+    places, top = [], _TOP
+    for share in heights:
+        places.append((top - share * room, share * room))
+        top -= share * room + gap
+    return places
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as a PNG of at most 300 kB: with fewer colours if it must."""
+    content = io.BytesIO()
+    with styled():
+        figure.savefig(content, format="png", dpi=DPI, metadata={"Software": "SAND"})
+    if content.tell() <= LARGEST_FILE:
+        return content.getvalue()
+    from PIL import Image
+
+    fewer = io.BytesIO()
+    Image.open(content).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(
+        fewer, format="png", optimize=True
+    )
+    return fewer.getvalue()
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write the figure as a PNG below 300 kB; the file is whole or not there.
+
+    Raises:
+        FilesFailed: the disk is full, the folder has vanished, …
+    """
+    replace_file(Path(path), png(figure))
+
+
+def show(figure: Figure) -> Figure:
+    """Show the figure in a window where there can be one; notebooks display what is returned."""
+    if not _in_notebook():
+        from matplotlib import pyplot as plt
+
+        if plt.get_backend().lower() in _windows():
+            # pyplot takes a figure only when it makes it: this hands it ours as the new one.
+            plt.figure(FigureClass=lambda *_, **__: figure)
+            plt.show()
+    return figure
+
+
+def _in_notebook() -> bool:
+    python = sys.modules.get("IPython")
+    shell: Any = python.get_ipython() if python is not None else None
+    return shell is not None and hasattr(shell, "kernel")
+
+
+def _windows() -> set[str]:
+    """Backends that open windows."""
+    kits = ("qt5", "qt", "gtk3", "gtk4", "tk", "wx")
+    return {f"{kit}{how}" for kit in kits for how in ("agg", "cairo")} | {"macosx"}

@@ -1,0 +1,240 @@
+"""The grains in three dimensions: clusters whole, in the box, and the largest ones by themselves."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..analysis.clusters import cluster_labels, cluster_sizes, unwrapped
+from ..core.box import Box
+from ..core.grains import Grains
+from .spheres import Balls, draw
+from .style import BIG, FAINT, INK, SINGLE, SMALL, pretty, rgb, round_length
+
+AZIMUTH, ELEVATION = 32.0, 20.0
+"""Where the eye is [degrees], seen from the middle of the box; z is up."""
+LARGEST_SHOWN = 3
+"""Clusters shown by themselves."""
+
+
+def camera() -> np.ndarray:
+    """(3, 3): rows are the directions right, up and towards the eye in the laboratory frame."""
+    a, e = np.radians(AZIMUTH), np.radians(ELEVATION)
+    eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    return np.array([right, np.cross(eye, right), eye])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What there is to see, laboratory frame.
+
+    Attributes:
+        position: (N, 3) [m], clusters whole and with their middle in the box.
+        radius: (N,) [m].
+        label: (N,) cluster of each grain.
+        colour: (N, 3).
+        arrow: (N, 3) direction of the moment times its share of the largest one's size.
+        box: with lengths [m].
+    """
+
+    position: np.ndarray
+    radius: np.ndarray
+    label: np.ndarray
+    colour: np.ndarray
+    arrow: np.ndarray
+    box: Box
+
+    def seen(self, rotation: np.ndarray, chosen: slice | np.ndarray = slice(None)) -> Balls:
+        """The chosen grains in screen coordinates; rows of `rotation` are right, up, to the eye."""
+        return Balls(
+            self.position[chosen] @ rotation.T,
+            self.radius[chosen],
+            self.colour[chosen],
+            self.arrow[chosen] @ rotation.T,
+        )
+
+    def corners(self) -> np.ndarray | None:
+        """(2, 2, 2, 3) corners of the box [m], on open axes around the grains; None if it is all open."""
+        if self.box.is_open:
+            return None
+        low = (self.position - self.radius[:, None]).min(axis=0)
+        high = (self.position + self.radius[:, None]).max(axis=0)
+        for axis, length in enumerate(self.box.lengths):
+            if length is not None:
+                low[axis], high[axis] = -length / 2, length / 2
+        return np.array(list(itertools.product(*zip(low, high, strict=True)))).reshape(2, 2, 2, 3)
+
+    def largest(self) -> list[int]:
+        """Labels of clusters of at least two grains, the largest first."""
+        sizes = cluster_sizes(self.label)
+        order = np.argsort(-sizes, kind="stable")
+        return [int(k) for k in order if sizes[k] > 1]
+
+
+def scene_of(grains: Grains, pairs: np.ndarray, box: Box) -> Scene:
+    """The scene of grains with contacts `pairs` (C, 2)."""
+    label = cluster_labels(len(grains), pairs)
+    position = unwrapped(box.wrap(grains.position), pairs, box)
+    sizes = cluster_sizes(label)
+    middle = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
+    position = position + (box.wrap(middle) - middle)[label]
+    size = np.linalg.norm(grains.moment, axis=1)
+    # In proportion, but a grain a hundred times weaker than the strongest still shows where it points.
+    share = np.where(size > 0.0, np.maximum(size / max(size.max(), 1e-300), 0.35), 0.0)
+    direction = grains.moment / np.where(size > 0.0, size, 1.0)[:, None]
+    arrow = 0.9 * share[:, None] * direction
+    return Scene(position, np.array(grains.radius), label, _colours(label), arrow, box)
+
+
+def _colours(label: np.ndarray) -> np.ndarray:
+    """(N, 3): a colour of its own for each of the largest clusters, grey for single grains."""
+    sizes = cluster_sizes(label)
+    of_cluster = np.tile(rgb(SINGLE), (sizes.size, 1))
+    for rank, k in enumerate(np.argsort(-sizes, kind="stable")):
+        if sizes[k] > 1:
+            name = BIG[rank] if rank < len(BIG) else SMALL[(rank - len(BIG)) % len(SMALL)]
+            of_cluster[k] = rgb(name)
+    return of_cluster[label]
+
+
+def view_window(scene: Scene, wide: float, margin: float = 0.03) -> tuple[float, float, float, float]:
+    """Left, right, bottom, top [m] that hold the grains and the box; `wide` is width over height."""
+    left, right, bottom, top = scene.seen(camera()).bounds
+    corners = scene.corners()
+    if corners is not None:
+        flat = corners.reshape(-1, 3) @ camera().T
+        left, right = min(left, flat[:, 0].min()), max(right, flat[:, 0].max())
+        bottom, top = min(bottom, flat[:, 1].min()), max(top, flat[:, 1].max())
+    return widened((left, right, bottom, top), wide, margin)
+
+
+def widened(
+    bounds: tuple[float, float, float, float], wide: float, margin: float, least: float = 0.0
+) -> tuple[float, float, float, float]:
+    """The window of proportions `wide` around `bounds`, at least `least` [m] high."""
+    left, right, bottom, top = bounds
+    height = max((top - bottom), (right - left) / wide, least) * (1.0 + 2.0 * margin)
+    x, y = (left + right) / 2, (bottom + top) / 2
+    return x - wide * height / 2, x + wide * height / 2, y - height / 2, y + height / 2
+
+
+def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
+    """All grains in their box, with a scale bar and the directions of the axes."""
+    window = view_window(scene, pixels[0] / pixels[1])
+    _show(axes, scene.seen(camera()), window, pixels)
+    corners = scene.corners()
+    if corners is not None:
+        _draw_box(axes, corners, scene.box)
+    _draw_directions(axes)
+    draw_scale_bar(axes)
+
+
+def _show(
+    axes: Axes, balls: Balls, window: tuple[float, float, float, float], pixels: tuple[int, int]
+) -> None:
+    axes.imshow(
+        draw(balls, window, *pixels),
+        extent=window,
+        origin="lower",
+        aspect="auto",
+        interpolation="antialiased",
+        zorder=2,
+    )
+    axes.set(xlim=window[:2], ylim=window[2:])
+    axes.set_axis_off()
+
+
+def _draw_box(axes: Axes, corners: np.ndarray, box: Box) -> None:
+    """The twelve edges; the three that meet in the farthest corner lie behind the grains."""
+    flat = corners @ camera().T
+    far = np.unravel_index(np.argmin(flat[..., 2]), (2, 2, 2))
+    for axis in range(3):
+        for others in itertools.product((0, 1), repeat=2):
+            start = list(others)
+            start.insert(axis, 0)
+            end = list(start)
+            end[axis] = 1
+            behind = tuple(start) == far or tuple(end) == far
+            line = np.array([flat[tuple(start)], flat[tuple(end)]])
+            axes.plot(
+                line[:, 0],
+                line[:, 1],
+                color=FAINT,
+                linewidth=0.6 if behind else 0.8,
+                alpha=0.55 if behind else 0.75,
+                linestyle="-" if box.lengths[axis] is not None else (0, (1.5, 3)),
+                zorder=1 if behind else 3,
+                gid="box",
+            )
+
+
+def _draw_directions(axes: Axes) -> None:
+    """x, y and z as a small cross in the lower left corner."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    size = 0.055 * (top - bottom)
+    x, y = left + 1.3 * size, bottom + 1.1 * size
+    for name, step in zip("xyz", camera()[:2].T * size, strict=True):
+        axes.plot([x, x + step[0]], [y, y + step[1]], color=FAINT, linewidth=0.9, zorder=4)
+        axes.text(x + 1.45 * step[0], y + 1.45 * step[1], name, color=FAINT, size=7, ha="center", va="center")
+
+
+def draw_scale_bar(axes: Axes, share: float = 0.25) -> None:
+    """A bar of a round length, at most `share` of the width, in the lower right corner."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    length = round_length(share * (right - left))
+    x, y = right - 0.015 * (right - left), bottom + 0.02 * (top - bottom)
+    axes.plot([x - length, x], [y, y], color=INK, linewidth=2.0, solid_capstyle="butt", zorder=4, gid="scale")
+    axes.annotate(
+        pretty(length, "m"), (x - length / 2, y), (0, 3), textcoords="offset points", ha="center", size=7.5
+    )
+
+
+def side_by_side(scene: Scene, count: int) -> tuple[Balls, np.ndarray, list[int]]:
+    """The `count` largest clusters next to each other, each turned so that its long axis is across.
+
+    Returns:
+        What to draw; (K, 2) the middle of the lower edge of each cluster [m]; their numbers of grains.
+    """
+    parts, feet, sizes, edge = [], [], [], 0.0
+    gap = 3.0 * float(scene.radius.max())
+    for label in scene.largest()[:count]:
+        chosen = np.flatnonzero(scene.label == label)
+        balls = scene.seen(_principal(scene.position[chosen]), chosen)
+        left, right, bottom, top = balls.bounds
+        shift = np.array([edge - left, -(bottom + top) / 2, -balls.centre[:, 2].mean()])
+        parts.append(Balls(balls.centre + shift, balls.radius, balls.colour, balls.arrow))
+        feet.append((edge + (right - left) / 2, -(top - bottom) / 2))
+        sizes.append(chosen.size)
+        edge += right - left + gap
+    fields = zip(*((p.centre, p.radius, p.colour, p.arrow) for p in parts), strict=True)
+    return Balls(*(np.concatenate(each) for each in fields)), np.array(feet), sizes
+
+
+def _principal(position: np.ndarray) -> np.ndarray:
+    """Rows: longest, middle and shortest axis of a cluster, right-handed."""
+    _, _, axes = np.linalg.svd(position - position.mean(axis=0), full_matrices=True)
+    axes[2] = np.cross(axes[0], axes[1])
+    return axes
+
+
+def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
+    """The largest clusters at a scale at which grains, contacts and moments can be told apart."""
+    wide = pixels[0] / pixels[1]
+    least = 2.0 * float(np.median(scene.radius)) * pixels[1] / 60.0  # a grain is at most 60 pixels across
+    for count in range(min(LARGEST_SHOWN, len(scene.largest())), 0, -1):
+        balls, feet, sizes = side_by_side(scene, count)
+        left, right, bottom, top = balls.bounds
+        # More clusters only as long as they do not make all of them small.
+        if right - left < 1.5 * wide * max(top - bottom, least):
+            break
+    window = widened((left, right, bottom - 0.22 * (top - bottom), top), wide, 0.02, least)
+    _show(axes, balls, window, pixels)
+    for (x, y), size in zip(feet, sizes, strict=True):
+        axes.annotate(
+            f"{size} grains", (x, y), (0, -3), textcoords="offset points", ha="center", va="top", size=7
+        )
+    draw_scale_bar(axes, 0.15)

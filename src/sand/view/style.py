@@ -1,0 +1,123 @@
+"""How every figure of SAND looks: one style, colours everyone can tell apart, units with SI prefixes."""
+
+from __future__ import annotations
+
+import math
+from contextlib import AbstractContextManager
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+
+BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#B8579A",
+    "#E69F00",
+    "#56B4E9",
+    "#D9C400",
+)
+"""After Okabe & Ito (2008): distinct for the colour-blind too."""
+BIG = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
+"""Of the largest clusters, the largest first."""
+SMALL = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
+"""Of all others, in turn."""
+SINGLE = "#B9BDC3"
+"""Of grains without a contact."""
+INK, FAINT = "#22262B", "#7A828C"
+"""Of text and frames; of notes."""
+
+_STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8.0,
+    "mathtext.fontset": "dejavusans",
+    "text.color": INK,
+    "axes.labelsize": 8.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.facecolor": "none",
+    "axes.grid": False,
+    "axes.unicode_minus": True,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "savefig.bbox": None,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "xtick.minor.width": 0.5,
+    "ytick.minor.width": 0.5,
+    "legend.frameon": False,
+    "legend.fontsize": 7.0,
+    "text.usetex": False,
+    "path.simplify": True,
+}
+
+_PREFIX = {
+    **{-24: "y", -21: "z", -18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m"},
+    **{0: "", 3: "k", 6: "M", 9: "G", 12: "T", 15: "P"},
+}
+
+
+def styled() -> AbstractContextManager[None]:
+    """The shipped style while the context lasts, whatever the user has set; that is there again after it."""
+    # Where figures are shown is no matter of style: setting a backend here would start one.
+    plain = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith(("backend", "interactive"))}
+    return matplotlib.rc_context({**plain, **_STYLE})
+
+
+def with_prefix(size: float, unit: str) -> tuple[float, str]:
+    """One of the prefixed unit in SI units, and its name: of 3e-7 m, (1e-9, 'nm').
+
+    Args:
+        size: the largest number to be shown [SI].
+    """
+    if not (math.isfinite(size) and size > 0.0):
+        return 1.0, unit
+    exponent = min(max(3 * math.floor(math.log10(size) / 3 + 1e-9), min(_PREFIX)), max(_PREFIX))
+    return float(f"1e{exponent}"), _PREFIX[exponent] + unit
+
+
+def pretty(size: float, unit: str) -> str:
+    """A number for people: 1.2e-6 m → '1.2 µm'."""
+    one, name = with_prefix(abs(size), unit)
+    return f"{size / one:.3g} {name}"
+
+
+def legend_above(axes: Axes, columns: int) -> None:
+    """The legend as one row over the frame, where it hides no data."""
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.01, 0.97),
+        ncols=columns,
+        borderpad=0.1,
+        handlelength=1.3,
+        handletextpad=0.5,
+        columnspacing=1.2,
+    )
+
+
+def letter(axes: Axes, text: str, x: float) -> None:
+    """The panel's letter, `x` in widths of the panel."""
+    axes.text(x, 1.0, text, transform=axes.transAxes, weight="bold", size=10.0, va="bottom", ha="left")
+
+
+def round_length(at_most: float) -> float:
+    """The largest 1, 2 or 5 times a power of ten that does not exceed `at_most`."""
+    power = 10.0 ** math.floor(math.log10(at_most))
+    return float(max(m for m in (1.0, 2.0, 5.0) if m * power <= at_most * (1.0 + 1e-9)) * power)
+
+
+def rgb(colour: str) -> np.ndarray:
+    """(3,) red, green, blue from 0 to 1."""
+    return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0

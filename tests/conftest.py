@@ -1,0 +1,29 @@
+"""What all tests share."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--validate", action="store_true", help="also run the long statistical checks")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--validate"):
+        return
+    skip = pytest.mark.skip(reason="long statistical check; run with --validate")
+    for item in items:
+        if "validate" in item.keywords:
+            item.add_marker(skip)
+
+
+@pytest.fixture(autouse=True)
+def _no_physics_warnings() -> Iterator[None]:
+    """Small iron grains warn about JKR's validity; tests of that warning look for it themselves."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="contacts of .* grains")
+        yield

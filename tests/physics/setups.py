@@ -1,0 +1,56 @@
+"""Small worlds that several tests share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sand
+from sand.forces.contact import pairing
+from sand.physics.adhesion import rest_overlap, rest_radius
+
+
+def rest_distance(a: sand.Material, r1: float, r2: float, b: sand.Material | None = None) -> float:
+    """Distance of two centres in equilibrium [m]."""
+    p = pairing(a, b or a)
+    reduced = r1 * r2 / (r1 + r2)
+    return r1 + r2 - rest_overlap(rest_radius(p.surface_energy, reduced, p.modulus), reduced)
+
+
+def struck_chain(
+    material: sand.Material = sand.IRON,
+    radius: float = 1e-8,
+    length: int = 7,
+    speed: float = 100.0,
+    offset: float = 0.0,
+    steps_per_period: float = 25.0,
+    **options,
+) -> sand.Simulation:
+    """A straight chain at rest along x, hit from above at its end grain; `offset` in radii along x."""
+    pitch = rest_distance(material, radius, radius)
+    position = np.zeros((length + 1, 3))
+    position[:length, 0] = pitch * np.arange(length)
+    position[length] = [pitch * (length - 1) + offset * radius, 2.2 * radius, 0.1 * radius]
+    velocity = np.zeros((length + 1, 3))
+    velocity[length, 1] = -speed
+    grains = sand.Grains(position, radius, material, velocity=velocity, **options)
+    return sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(steps_per_period=steps_per_period))
+
+
+def random_aggregate(
+    count: int, seed: int, *, radii: tuple[float, float] = (1e-8, 1e-8), material=sand.SILICA, **options
+) -> sand.Grains:
+    """Grains added one by one, each touching a random earlier one at rest, none overlapping."""
+    rng = np.random.default_rng(seed)
+    radius = rng.uniform(*radii, size=count)
+    position = np.zeros((count, 3))
+    for i in range(1, count):
+        while True:
+            j = int(rng.integers(i))
+            direction = rng.normal(size=3)
+            direction /= np.linalg.norm(direction)
+            position[i] = position[j] + rest_distance(material, radius[i], radius[j]) * direction
+            gap = np.linalg.norm(position[:i] - position[i], axis=1) - radius[:i] - radius[i]
+            if np.all(np.delete(gap, j) > 0.02 * radius[i]):
+                break
+    given = {"velocity": 0.3 * rng.normal(size=(count, 3)), "spin": 1e7 * rng.normal(size=(count, 3))}
+    return sand.Grains(position, radius, material, **(given | options))

@@ -1,0 +1,169 @@
+"""The same start gives the same bits, however it is watched, cut up, interrupted or compiled."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.world import CONTACTS
+
+from .setups import random_aggregate, struck_chain
+
+
+def gas_simulation(**options):
+    box = sand.Box.periodic("0.25 um")
+    grains = sand.setup.gas(
+        20, box, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="100 K", seed=11
+    )
+    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box=box, **options)
+
+
+def state(sim):
+    """All numbers of the world, as bytes."""
+    return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
+
+
+def test_output_cadence_changes_nothing():
+    """Frames each 0.1 ns, each 7 ns, or none: the same bits after 20,000 steps, contacts included."""
+    ends = []
+    for every in ("0.1 ns", "7 ns", "1 s"):
+        sim = gas_simulation(frame_every=every)
+        sim.run(steps=20_000)
+        ends.append(state(sim))
+    assert sim.world.count[CONTACTS] > 0
+    assert ends[0] == ends[1] == ends[2]
+
+
+def test_running_in_pieces_changes_nothing():
+    """run(20,000) equals many short runs; an observer that reads everything in between changes nothing."""
+
+    class Curious(sand.Observer):
+        def see(self, simulation, row):
+            simulation.loads()
+            simulation.contacts["overlap"].sum()
+            simulation.grains.position.sum()
+
+    whole, pieces = gas_simulation(), gas_simulation(observers=[Curious()], frame_every="1 ns")
+    whole.run(steps=20_000)
+    for steps in (1, 2, 997, 4000, 5000, 10_000):
+        pieces.run(steps=steps)
+    assert state(whole) == state(pieces)
+
+
+def test_growing_arrays_changes_nothing():
+    """With room for 16 contacts and pairs to begin with, or for many: the same bits."""
+    from sand.core.world import contact_arrays, near_pairs
+    from sand.physics.contact import Bond
+
+    ends = []
+    for room in (16, 4096):
+        sim = struck_chain(length=30, offset=0.2)
+        n = len(sim.grains)
+        sim.world.contacts = contact_arrays(n, room, len(Bond._fields))
+        sim.world.near = near_pairs(n, room)
+        sim.run(until=1e-9)
+        ends.append(state(sim))
+    assert sim.world.count[CONTACTS] > 16
+    assert ends[0] == ends[1]
+
+
+def test_a_frame_is_the_first_step_at_or_after_its_time():
+    """Steps are never bent: frames come late by less than one step and carry their true time."""
+    seen = []
+
+    class Note(sand.Observer):
+        def see(self, simulation, row):
+            seen.append((row["time"], simulation.world.clock[1]))
+
+    gas_simulation(frame_every="1 ns", observers=[Note()]).run(until="10 ns")
+    assert len(seen) == 11
+    for k, (time, step) in enumerate(seen):
+        assert k * 1e-9 <= time < k * 1e-9 + step or k == 0
+
+
+def test_resume_is_bit_for_bit(tmp_path):
+    """A run stopped at 7,000 steps and resumed equals the uninterrupted one: state, ledger, trajectory."""
+    whole = gas_simulation(out=tmp_path / "whole", frame_every="5 ns")
+    whole.run(until="60 ns")
+    first = gas_simulation(out=tmp_path / "parts", frame_every="5 ns")
+    first.run(steps=7000)
+    del first
+    second = sand.resume(tmp_path / "parts")
+    assert second.world.steps == 7000
+    second.run(until="60 ns")
+    assert state(second) == state(whole)
+    rows = [(tmp_path / name / "ledger.csv").read_text().splitlines() for name in ("whole", "parts")]
+    assert set(rows[0]) <= set(rows[1])  # the end of the first part is one more row
+    assert len(rows[1]) - len(rows[0]) <= 1
+
+
+PROGRAM = """
+import sys, warnings; warnings.simplefilter("ignore")
+import numpy as np
+from tests.physics.setups import random_aggregate
+import sand
+fast = 8.0 * np.random.default_rng(3).normal(size=(5, 3))
+grains = random_aggregate(5, 7, radii=(5e-9, 1e-8), moment="300 A m^2/kg", velocity=fast)
+sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(), sand.Field("1 mT")])
+sim.run(steps=120)
+np.savez(sys.argv[1], position=sim.grains.position, spin=sim.grains.spin, lost=sim.world.lost, time=sim.time)
+"""
+
+
+@pytest.mark.interpreted
+def test_the_compiler_changes_nothing_but_rounding(tmp_path):
+    """120 steps of a breaking, rolling aggregate with the compiler off: equal to 1e-10 (rounding, amplified)."""
+    ends = []
+    for name, off in (("compiled", "0"), ("plain", "1")):
+        env = os.environ | {"NUMBA_DISABLE_JIT": off}
+        path = tmp_path / f"{name}.npz"
+        subprocess.run([sys.executable, "-c", PROGRAM, str(path)], check=True, env=env, timeout=300)
+        ends.append(np.load(path))
+    for key in ("position", "spin", "lost", "time"):
+        scale = np.abs(ends[0][key]).max()
+        assert np.abs(ends[0][key] - ends[1][key]).max() <= 1e-10 * scale
+    assert ends[0]["lost"].sum() > 0
+
+
+def test_kernels_against_plain_python_loops():
+    """Pair list, contacts and gather of a random aggregate against double loops written out in NumPy."""
+    from sand.physics import adhesion
+    from sand.physics import contact as law
+
+    grains = random_aggregate(
+        40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3))
+    )
+    sim = sand.Simulation(grains, [sand.Contact()])
+    sim.run(steps=50)
+    g, w = sim.grains, sim.world
+    listed = {frozenset(p) for p in w.near.pair[:, : w.count[3]].T.tolist()}
+    touching = {
+        frozenset((i, j))
+        for i in range(40)
+        for j in range(i)
+        if np.linalg.norm(g.position[i] - g.position[j]) < g.radius[i] + g.radius[j]
+    }
+    assert touching <= listed
+    force, torque = np.zeros((40, 3)), np.zeros((40, 3))
+    for c in range(w.count[CONTACTS]):
+        i, j = (int(k) for k in w.contacts.pair[:, c])
+        bond = law.Bond(*w.contacts.bond[:, c])
+        apart = g.position[i] - g.position[j]
+        distance = np.linalg.norm(apart)
+        from scipy.spatial.transform import Rotation
+
+        n1 = Rotation.from_quat(g.orientation[i]).apply(w.contacts.pointer1[:, c])
+        n2 = Rotation.from_quat(g.orientation[j]).apply(w.contacts.pointer2[:, c])
+        pose = law.Pose(tuple(apart / distance), distance, tuple(n1), tuple(n2), w.contacts.twist[c])
+        overlap = g.radius[i] + g.radius[j] - distance
+        y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+        f, t1, t2 = law.contact_load(pose, overlap, y, g.radius[i], g.radius[j], bond)
+        force[i] += f
+        force[j] -= f
+        torque[i] += t1
+        torque[j] += t2
+    assert g.force == pytest.approx(force, abs=1e-9 * np.abs(force).max())
+    assert g.torque == pytest.approx(torque, abs=1e-9 * np.abs(torque).max())

@@ -1,0 +1,1 @@
+"""Numbers tests compare with, and the scripts that made them."""

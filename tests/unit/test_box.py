@@ -1,0 +1,48 @@
+"""Boxes: nearest images and wrapping."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sand.core.box import Box, as_box
+from sand.core.errors import BadInput
+
+coordinate = st.floats(-30, 30)
+triple = st.tuples(coordinate, coordinate, coordinate)
+
+
+@given(triple)
+def test_nearest_image_is_the_shortest(v):
+    """Brute force over the 27 neighbours of neighbours; the open axis is left alone."""
+    box = Box.periodic(7.0, None, 5.0)
+    found = box.nearest(np.array(v))
+    assert found[1] == v[1]
+    for axis, length in ((0, 7.0), (2, 5.0)):
+        images = v[axis] + length * np.arange(-10, 11)
+        assert abs(found[axis]) == pytest.approx(np.abs(images).min(), abs=1e-12)
+        turns = (found[axis] - v[axis]) / length
+        assert turns == pytest.approx(round(turns), abs=1e-12)
+
+
+def test_an_open_box_changes_nothing():
+    """Not even a bit."""
+    v = np.array([1e300, -3.3, 1e-300])
+    assert (Box.open().nearest(v) == v).all()
+
+
+def test_ways_to_say_it():
+    """A length is a cube; None or no length is an open axis."""
+    assert as_box("1 um") == Box.periodic(1e-6) == Box((1e-6, 1e-6, 1e-6))
+    assert as_box(None).is_open
+    assert Box.periodic("1 um", None, "2 um").lengths == (1e-6, None, 2e-6)
+    assert Box.periodic("1 um", None, "2 um").shortest == 1e-6
+    assert Box.open().describe() == "open"
+    assert Box.periodic("1.2 um").volume == pytest.approx(1.728e-18)
+
+
+@pytest.mark.parametrize("bad", ["-1 um", "3 kg", 0.0, float("nan"), ["1 um", "2 um"]])
+def test_bad_boxes_are_refused(bad):
+    """One line that names the length."""
+    with pytest.raises(BadInput, match="box"):
+        as_box(bad)

@@ -1,0 +1,92 @@
+"""Grains, their table of quantities, and what bad input is told."""
+
+import copy
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.fields import FIELDS
+from sand.core.grains import GrainArrays
+
+
+def two(**changes):
+    given = {"position": [[0, 0, 0], [3e-8, 0, 0]], "radius": "10 nm", "material": sand.IRON} | changes
+    return sand.Grains(**given)
+
+
+def test_what_follows_from_radius_and_material():
+    """m = ρ (4/3)π r³, I = (2/5) m r², moment = specific moment × mass along +z, orientation (0,0,0,1)."""
+    grains = two(moment="200 A m^2/kg", radius=[1e-8, 2e-8], material=["iron", sand.SILICA])
+    mass = np.array([7874.0, 2650.0]) * 4 / 3 * math.pi * np.array([1e-8, 2e-8]) ** 3
+    assert grains.mass == pytest.approx(mass)
+    assert grains.inertia == pytest.approx(0.4 * mass * grains.radius**2)
+    assert grains.moment == pytest.approx(np.outer(200 * mass, [0, 0, 1]))
+    assert (grains.orientation == [0, 0, 0, 1]).all()
+    assert [m.name for m in grains.materials] == ["iron", "silica"]
+
+
+def test_every_quantity_of_the_table_is_there():
+    """Public shape (N,) or (N, width), a view without a copy, read only."""
+    grains = two()
+    for field in FIELDS:
+        view = getattr(grains, field.name)
+        assert view.shape == ((2,) if field.width == 1 else (2, field.width))
+        assert np.shares_memory(view, getattr(grains.arrays, field.name))
+        with pytest.raises(ValueError):
+            view[...] = 0.0
+    assert {f.name for f in FIELDS} | {"material", "id"} == set(GrainArrays._fields)
+
+
+def test_a_copy_is_independent():
+    """A snapshot does not follow."""
+    grains = two()
+    snapshot, deep = grains.copy(), copy.deepcopy(grains)
+    grains.arrays.position[0, 0] = 1.0
+    assert snapshot.position[0, 0] == 0.0
+    assert deep.position[0, 0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"radius": -1e-8}, r"radius of grain 0 is -1e-08 m: it must be above 0"),
+        ({"radius": "10 kg"}, r"radius is not in m; .*'10 nm'"),
+        ({"radius": [1e-8, 1e-8, 1e-8]}, r"radius has shape \(3,\) but must be \(2,\)"),
+        ({"velocity": [[0, 0, 0]]}, r"velocity has shape \(1, 3\) but must be \(2, 3\).*m/s"),
+        ({"velocity": [[0, 0, math.nan], [0, 0, 0]]}, r"velocity of grain 0 .*finite.*m/s"),
+        ({"position": [[0, 0], [1, 1]]}, r"position must be .*\(N, 3\).*\(2, 2\)"),
+        ({"position": "1 nm"}, r"position must be"),
+        ({"material": "irom"}, r"unknown material 'irom'; did you mean 'iron'"),
+        ({"material": [sand.IRON]}, r"material has 1 entries but there are 2 grains"),
+        ({"material": [1, 2]}, r"material of grain 0 is 1"),
+        ({"moment": "200 K"}, r"moment = '200 K' must be"),
+        ({"moment": -1.0}, r"moment = -1.0 must be"),
+        ({"charge": math.inf}, r"charge of grain 0 .*C"),
+        ({"mass": 0.0}, r"mass of grain 0 is 0 kg"),
+    ],
+)
+def test_bad_input_says_what_where_and_which_unit(changes, message):
+    """One clear line."""
+    with pytest.raises(sand.BadInput, match=message):
+        two(**changes)
+
+
+def test_all_mistakes_at_once():
+    """Three wrong quantities, three lines."""
+    with pytest.raises(sand.BadInput) as caught:
+        two(radius=-1.0, velocity=[[0, 0, 0]], charge=math.nan)
+    assert len(caught.value.problems) == 3
+
+
+def test_materials_check_themselves():
+    """All problems at once; a copy with changes is checked too; unknown keys get a hint."""
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Material("x", -1, -1, "3 kg", 0.7)
+    assert len(caught.value.problems) == 4
+    with pytest.raises(sand.BadInput, match="did you mean 'surface_energy'"):
+        sand.IRON.but(surface_energi=1.0)
+    assert sand.IRON.but(surface_energy="1 J/m^2").surface_energy == 1.0
+    assert sand.IRON.rolling_limit == 1e-9
+    assert sand.MAGNETITE.surface_energy is None
