@@ -33,7 +33,9 @@ nb_execution_timeout = 300
 nb_execution_in_temp = True
 nb_execution_show_tb = True
 nb_merge_streams = True
-# pages that run the command line or the examples of this checkout find them here
+nb_render_markdown_format = "myst"
+# pages call the `sand` command of this very environment, and copy the examples of this checkout
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 os.environ["SAND_EXAMPLES"] = str(HERE.parent / "examples")
 
 html_theme = "furo"

@@ -392,6 +392,7 @@ def outcomes_page() -> str:
 # --- case files ---------------------------------------------------------------------------------------
 CASE_KEYS = {
     "run.until": "end of the run, simulated time",
+    "run.steps": "end of the run, number of steps",
     "run.frame_every": "time between frames and rows of the ledger; a two-hundredth of the run by default",
     "run.seed": "seed of everything random",
     "run.out": "folder of the run",

@@ -215,9 +215,7 @@ def test_limits_hold_on_both_sides(release, sign):
     assert left.slide[1] == pytest.approx(part * sign * bond.slide_limit)
     assert left.roll[0] == pytest.approx(part * bond.roll_limit)
     assert left.twist == pytest.approx(part * sign * bond.twist_limit)
-    within = law.Strain(
-        0.0, (0.0, 0.9 * bond.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * bond.twist_limit
-    )
+    within = law.Strain(0.0, (0.0, 0.9 * bond.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * bond.twist_limit)
     assert not law.beyond_limits(within, bond)
     assert law.yielded(within, bond, release) == within
 

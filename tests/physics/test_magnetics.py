@@ -56,9 +56,7 @@ def test_two_far_grains_swing_in_each_others_field():
     size = 200 * sand.IRON.density * 4 / 3 * math.pi * r**3
     apart = 10_000 * r
     for sign, factor in ((1, 3.0), (-1, 1.0)):
-        moment = size * np.array(
-            [[math.cos(tilt), math.sin(tilt), 0], [math.cos(tilt), sign * math.sin(tilt), 0]]
-        )
+        moment = size * np.array([[math.cos(tilt), math.sin(tilt), 0], [math.cos(tilt), sign * math.sin(tilt), 0]])
         grains = sand.Grains([[0, 0, 0], [apart, 0, 0]], r, sand.IRON, moment=moment)
         expected = 2 * math.pi / math.sqrt(factor * MAGNETIC * size**2 / apart**3 / grains.inertia[0])
         found, _ = swing(grains, [sand.Dipoles()], lambda s: s.grains.moment[0, 1], expected, periods=4.2)
@@ -85,9 +83,7 @@ def test_a_quiet_bound_pair_turns_about_the_field():
         x = sim.grains.position
         return math.atan2(x[1, 1] - x[0, 1], x[1, 0] - x[0, 0])
 
-    found, _ = swing(
-        grains, [sand.Contact(), sand.Dipoles(), sand.Field([field, 0, 0])], angle, expected, periods=4.2
-    )
+    found, _ = swing(grains, [sand.Contact(), sand.Dipoles(), sand.Field([field, 0, 0])], angle, expected, periods=4.2)
     # the pull of the dipoles shortens D by ~1e-5 of itself; pendulum: tilt²/16 = 2.5e-5
     assert found == pytest.approx(expected, rel=1e-4)
 
@@ -153,12 +149,7 @@ def test_loads_against_brute_force_with_images():
             mi, mj, n = moment[i], moment[j], r / d
             b = MAGNETIC / d**3 * (3 * n * (mj @ n) - mj)
             u = -mi @ b
-            f = (
-                3
-                * MAGNETIC
-                / d**4
-                * ((mi @ n) * mj + (mj @ n) * mi + (mi @ mj - 5 * (mi @ n) * (mj @ n)) * n)
-            )
+            f = 3 * MAGNETIC / d**4 * ((mi @ n) * mj + (mj @ n) * mi + (mi @ mj - 5 * (mi @ n) * (mj @ n)) * n)
             force[i] += weight * f - u * slope * n
             torque[i] += weight * np.cross(mi, b)
             energy += 0.5 * weight * u

@@ -133,9 +133,7 @@ def test_kernels_against_plain_python_loops():
     from sand.physics import adhesion
     from sand.physics import contact as law
 
-    grains = random_aggregate(
-        40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3))
-    )
+    grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])
     sim.run(steps=50)
     g, w = sim.grains, sim.world

@@ -52,8 +52,7 @@ def test_force_is_the_slope_of_the_energy(cut, apart, m1, m2):
     def slope(step):
         return np.array(
             [
-                (loads(tuple(x - step * e), m1, m2, cut)[3] - loads(tuple(x + step * e), m1, m2, cut)[3])
-                / (2 * step)
+                (loads(tuple(x - step * e), m1, m2, cut)[3] - loads(tuple(x + step * e), m1, m2, cut)[3]) / (2 * step)
                 for e in np.eye(3)
             ]
         )

@@ -11,9 +11,7 @@ as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON o
 quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
 
 # main() looks for the word itself, because what goes wrong may do so before options are understood.
-debug = click.option(
-    "--debug", is_flag=True, expose_value=False, help="Show where in the program an error arose."
-)
+debug = click.option("--debug", is_flag=True, expose_value=False, help="Show where in the program an error arose.")
 
 
 def end_of_run(text: str) -> Any:

@@ -132,8 +132,7 @@ def results(summary: dict[str, Any]) -> Rows:
 def clusters(row: dict[str, Any]) -> str:
     """Number, mean size S and largest, of a summary or a row of the ledger."""
     return (
-        f"{int(row['clusters'])}, mean size S = {row['mean_cluster_size']:.4g}, "
-        f"largest {int(row['largest_cluster'])}"
+        f"{int(row['clusters'])}, mean size S = {row['mean_cluster_size']:.4g}, largest {int(row['largest_cluster'])}"
     )
 
 

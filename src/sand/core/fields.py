@@ -87,7 +87,5 @@ def stored(field: Field, values: Any, count: int, *, positive: bool = False) -> 
             f" {bad.size} of {count} concerned"
         )
     if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
-        raise BadInput(
-            f"{field.name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0"
-        )
+        raise BadInput(f"{field.name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0")
     return np.ascontiguousarray(array.T)

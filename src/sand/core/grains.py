@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .box import Box
 from .errors import BadInput
 from .fields import BY_NAME, FIELDS, blank, public, stored
 from .material import Material, material_named
@@ -49,9 +50,7 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
     for i, given in enumerate(each):
         found = material_named(given) if isinstance(given, str) else given
         if not isinstance(found, Material):
-            raise BadInput(
-                f"material of grain {i} is {found!r}; give a sand.Material or the name of a preset"
-            )
+            raise BadInput(f"material of grain {i} is {found!r}; give a sand.Material or the name of a preset")
         numbers[i] = index.setdefault(found, len(index))
     return tuple(index), numbers
 
@@ -136,6 +135,12 @@ class Grains:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+
+    def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
+        """Overlap δ [m] of each pair of grains (P, 2); negative for surfaces apart."""
+        i, j = np.asarray(pairs).T
+        apart = box.nearest(self.position[i] - self.position[j])
+        return self.radius[i] + self.radius[j] - np.linalg.norm(apart, axis=1)
 
     def copy(self) -> Grains:
         """An independent copy: a snapshot."""

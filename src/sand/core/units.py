@@ -71,9 +71,7 @@ def _times(number: str, factor: float) -> float:
 
 def _complain(value: Any, unit: str, name: str) -> BadInput:
     example = EXAMPLES.get(unit, f"1 {unit}")
-    return BadInput(
-        f"{name} = {value!r} is not a quantity in {unit}; give a number in SI or text such as '{example}'"
-    )
+    return BadInput(f"{name} = {value!r} is not a quantity in {unit}; give a number in SI or text such as '{example}'")
 
 
 def in_unit(value: Any, unit: str) -> Any:

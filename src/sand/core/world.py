@@ -69,9 +69,7 @@ def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
 def near_pairs(grains: int, capacity: int) -> NearPairs:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
     p = max(int(capacity), 16)
-    return NearPairs(
-        np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p), np.full((3, grains), np.inf)
-    )
+    return NearPairs(np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p), np.full((3, grains), np.inf))
 
 
 def _grown(arrays: Any, per_grain: tuple[str, ...]) -> Any:

@@ -35,13 +35,9 @@ class Field:
         given = self.flux_density
         parts = list(given) if hasattr(given, "__len__") and not isinstance(given, str) else [0.0, 0.0, given]
         if len(parts) != 3:
-            raise BadInput(
-                f"field: flux_density = {given!r} must be one size along z or three components, in T"
-            )
+            raise BadInput(f"field: flux_density = {given!r} must be one size along z or three components, in T")
         names = (f"field: flux_density {axis}" for axis in "xyz")
-        object.__setattr__(
-            self, "flux_density", tuple(si(p, "T", n) for p, n in zip(parts, names, strict=True))
-        )
+        object.__setattr__(self, "flux_density", tuple(si(p, "T", n) for p, n in zip(parts, names, strict=True)))
 
     def parameters(self) -> dict[str, Any]:
         return {"flux_density": list(self.flux_density)}

@@ -18,9 +18,7 @@ from ..physics.rotation import turned
 def bond_at(contacts, c):
     """The stored constants of contact c."""
     b = contacts.bond
-    return law_of.Bond(
-        b[0, c], b[1, c], b[2, c], b[3, c], b[4, c], b[5, c], b[6, c], b[7, c], b[8, c], b[9, c]
-    )
+    return law_of.Bond(b[0, c], b[1, c], b[2, c], b[3, c], b[4, c], b[5, c], b[6, c], b[7, c], b[8, c], b[9, c])
 
 
 @loop
@@ -43,9 +41,7 @@ def twist_gain(grains, contacts, c, pose, dt):
     """Twist gained in the step that led to this pose, from mid-step velocities and spins."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     moving = across(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    rate = tangential.twisting_rate(
-        pose.n, load(grains.spin, i), load(grains.spin, j), moving, pose.distance, dt
-    )
+    rate = tangential.twisting_rate(pose.n, load(grains.spin, i), load(grains.spin, j), moving, pose.distance, dt)
     return dt * rate
 
 
@@ -140,6 +136,4 @@ def contact_step(contacts, count, grains, clock, per_period):
     for g in range(grains.mass.size):
         most = max(most, int(contacts.start[g + 1]) - int(contacts.start[g]))
     crowd = max(1.0, most / 6.0)
-    clock[CONTACT_STEP] = (
-        math.inf if fastest == 0.0 else (2.0 * math.pi / math.sqrt(fastest * crowd) / per_period)
-    )
+    clock[CONTACT_STEP] = math.inf if fastest == 0.0 else (2.0 * math.pi / math.sqrt(fastest * crowd) / per_period)

@@ -1,8 +1,7 @@
-"""What the books need: energies, momenta.  Looked at between steps, never inside them."""
+"""Energies for the books.  Looked at between steps, never inside them."""
 
-from ..core.box import nearest_image
 from ..core.jit import kernel, loop
-from ..core.vec import add, cross, dot, load, scale
+from ..core.vec import dot, load
 from ..core.world import CONTACTS
 from ..physics import contact as law_of
 from .contacts import bond_at, pose_at
@@ -35,33 +34,3 @@ def measure_energies(grains, contacts, count, span, dipoles, out):
         for mode in range(4):
             out[2 + mode] += stored[mode]
     out[6] = dipole_energy(grains, span, dipoles)
-
-
-@kernel
-def measure_momenta(grains, out):
-    """Fill `out` (6,) with momentum [kg m/s] and angular momentum about the origin [J s], spin included."""
-    linear = angular = (0.0, 0.0, 0.0)
-    for i in range(grains.mass.size):
-        p = scale(grains.mass[i], load(grains.velocity, i))
-        linear = add(linear, p)
-        orbit = cross(load(grains.position, i), p)
-        angular = add(angular, add(orbit, scale(grains.inertia[i], load(grains.spin, i))))
-    for axis in range(3):
-        out[axis] = linear[axis]
-        out[3 + axis] = angular[axis]
-
-
-@kernel
-def measure_gaps(grains, pairs, span, out):
-    """Overlap δ [m] of each listed pair (2, P)."""
-    for p in range(pairs.shape[1]):
-        i, j = pairs[0, p], pairs[1, p]
-        apart = nearest_image(
-            (
-                grains.position[0, i] - grains.position[0, j],
-                grains.position[1, i] - grains.position[1, j],
-                grains.position[2, i] - grains.position[2, j],
-            ),
-            span,
-        )
-        out[p] = grains.radius[i] + grains.radius[j] - dot(apart, apart) ** 0.5

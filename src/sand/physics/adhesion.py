@@ -72,9 +72,7 @@ def root(s):
     y = math.sqrt(math.sqrt(s * s / (2.0 * CUBE_ROOT_6)))
     for _ in range(4):
         cube = y * y * y
-        y -= (CUBE_ROOT_6 * (2.0 * cube * y - 4.0 / 3.0 * y) - overlap) / (
-            CUBE_ROOT_6 * (8.0 * cube - 4.0 / 3.0)
-        )
+        y -= (CUBE_ROOT_6 * (2.0 * cube * y - 4.0 / 3.0 * y) - overlap) / (CUBE_ROOT_6 * (8.0 * cube - 4.0 / 3.0))
     return y
 
 

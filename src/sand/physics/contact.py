@@ -141,9 +141,7 @@ def yielded(strain, bond, release):
     slides = _yielded(math.sqrt(dot(strain.slide, strain.slide)), bond.slide_limit, release)
     rolls = _yielded(math.sqrt(dot(strain.roll, strain.roll)), bond.roll_limit, release)
     twists = _yielded(abs(strain.twist), bond.twist_limit, release)
-    return Strain(
-        strain.overlap, scale(slides, strain.slide), scale(rolls, strain.roll), twists * strain.twist
-    )
+    return Strain(strain.overlap, scale(slides, strain.slide), scale(rolls, strain.roll), twists * strain.twist)
 
 
 @formula

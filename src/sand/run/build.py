@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +28,8 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
         BadInput: what only shows when grains, forces and box come together.
     """
     if case.grains.kind != "gas":
-        raise BadInput(
-            "grains.kind = 'given': these grains came from a script; use `sand resume` on the folder"
-        )
-    section, library = case.grains, case.library()
+        raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
+    section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
         raise BadInput("grains.material of a gas must be one name")
     grains = gas(
@@ -85,8 +84,7 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
         "box": {} if simulation.box.is_open else {"periodic": lengths},
         "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
         "materials": {
-            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None}
-            for m in materials
+            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
         },
         "forces": forces,
         "stepping": simulation.stepping.parameters(),
@@ -109,7 +107,7 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     case = read_case(place / CASE)
     arrays, meta = newest_checkpoint(place)
     names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
-    library = case.library()
+    library = case.materials_by_name()
     try:
         part = {name.split("/", 1)[1]: array for name, array in arrays.items() if name.startswith("grains/")}
         grains = Grains(
@@ -137,5 +135,5 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     )
     if case.grains.kind == "gas":
         simulation.recipe = case.grains.model_dump(exclude_none=True)
-    simulation.planned_end = meta["until"]
+    simulation.planned = tuple(math.inf if end is None else end for end in (meta["until"], meta["last_step"]))
     return simulation

@@ -162,7 +162,7 @@ class Case(_Section):
                 raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
         return value
 
-    def library(self) -> dict[str, Material]:
+    def materials_by_name(self) -> dict[str, Material]:
         """Presets and the case's own materials by name.  Raises BadInput."""
         own, problems = {}, []
         for name, section in self.materials.items():
@@ -203,7 +203,7 @@ def check_case(content: dict[str, Any], name: str) -> Case:
     problems = _unknown_materials(content)
     try:
         case = Case.model_validate(content)
-        case.library()
+        case.materials_by_name()
     except ValidationError as error:
         problems += [line for slip in error.errors() for line in complaints(slip, Case, kinds)]
     except BadInput as error:

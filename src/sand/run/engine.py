@@ -15,7 +15,6 @@ from ..forces.base import Force, GrainForce, compose
 from ..forces.contact import Contact
 from ..forces.dipoles import Dipoles
 from ..kernels.dipoles import OFF
-from ..kernels.measure import measure_gaps
 from ..kernels.outside import energy_sum_for
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
@@ -92,9 +91,7 @@ class Engine:
         return tuple(sorted({int(self.world.count[GRAIN1]), int(self.world.count[GRAIN2])}))
 
 
-def build_engine(
-    grains: Grains, forces: Sequence[Force], box: Box, stepping: Verlet, *, fresh: bool = True
-) -> Engine:
+def build_engine(grains: Grains, forces: Sequence[Force], box: Box, stepping: Verlet, *, fresh: bool = True) -> Engine:
     """Check that everything fits together and translate it.
 
     Args:
@@ -186,17 +183,13 @@ def _refuse_overlaps(engine: Engine, contact: Contact) -> None:
     grains, box = engine.world.grains, engine.world.box
     position, radius = grains.position, grains.radius
     lengths = np.array([v if v is not None else 0.0 for v in box.lengths])
-    shifted = np.where(
-        lengths > 0.0, np.mod(position + 0.5 * lengths, np.where(lengths > 0.0, lengths, 1.0)), position
-    )
+    shifted = np.where(lengths > 0.0, np.mod(position + 0.5 * lengths, np.where(lengths > 0.0, lengths, 1.0)), position)
     tree = cKDTree(shifted, boxsize=lengths)
-    pairs = tree.query_pairs(2.0 * float(radius.max()), output_type="ndarray").astype(np.uint32).T
-    pairs = np.ascontiguousarray(pairs)
-    overlap = np.empty(pairs.shape[1])
-    measure_gaps(grains.arrays, pairs, box.span, overlap)
+    pairs = tree.query_pairs(2.0 * float(radius.max()), output_type="ndarray")
+    overlap = grains.overlaps(pairs, box)
     table = contact.pairings(grains.materials)
     problems = []
-    for (i, j), delta in zip(pairs.T[overlap > 0.0], overlap[overlap > 0.0], strict=True):
+    for (i, j), delta in zip(pairs[overlap > 0.0], overlap[overlap > 0.0], strict=True):
         reduced = radius[i] * radius[j] / (radius[i] + radius[j])
         gamma, modulus = table[:2, grains.material[i], grains.material[j]]
         rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..core.constants import BOLTZMANN
+from ..core.grains import Grains
 from ..core.world import BROKEN, CONTACTS, LOST, MADE, MOVED, World
-from ..kernels.measure import ENERGIES, measure_energies, measure_momenta
+from ..kernels.measure import ENERGIES, measure_energies
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
@@ -25,18 +26,17 @@ def take_stock(world: World, dipoles: Any, outside: dict[str, float]) -> dict[st
         dipoles: the rules of the magnetic sum.
         outside: energy [J] of each per-grain force by name.
     """
-    energies, momenta = np.empty(len(ENERGIES)), np.empty(6)
+    energies = np.empty(len(ENERGIES))
     grains = world.grains.arrays
     span = world.box.span
     measure_energies(grains, world.contacts, world.count, span, dipoles, energies)
-    measure_momenta(grains, momenta)
     contacts = int(world.count[CONTACTS])
     labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts])
     row: dict[str, float] = {"step": world.steps, "time": world.time}
     row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | outside
     row |= dict(zip(LOSSES, world.lost.tolist(), strict=True))
     row["total"] = math.fsum([*energies.tolist(), *outside.values(), *world.lost.tolist()])
-    row |= dict(zip(MOMENTA, momenta.tolist(), strict=True))
+    row |= dict(zip(MOMENTA, momenta(world.grains), strict=True))
     row |= {
         "contacts": contacts,
         "made": int(world.count[MADE]),
@@ -47,6 +47,13 @@ def take_stock(world: World, dipoles: Any, outside: dict[str, float]) -> dict[st
         "largest_cluster": int(cluster_sizes(labels).max()),
     }
     return row
+
+
+def momenta(grains: Grains) -> list[float]:
+    """Momentum [kg m/s] and angular momentum about the origin [J s], spin included: six numbers."""
+    p = grains.mass[:, None] * grains.velocity
+    angular = np.cross(grains.position, p) + grains.inertia[:, None] * grains.spin
+    return [*p.sum(axis=0).tolist(), *angular.sum(axis=0).tolist()]
 
 
 class Ledger:

@@ -52,7 +52,4 @@ class Result:
 
     def __str__(self) -> str:
         named = f" (grains {', '.join(map(str, self.grains))})" if self.grains else ""
-        return (
-            f"{self.outcome.value}{named}: {self.time:.6g} s after {self.steps} steps, "
-            f"energy drift {self.drift:.2g}"
-        )
+        return f"{self.outcome.value}{named}: {self.time:.6g} s after {self.steps} steps, energy drift {self.drift:.2g}"

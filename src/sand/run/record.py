@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import time as wall
 from importlib import metadata
@@ -38,13 +39,13 @@ class Record:
         self._trajectory: TrajectoryWriter | None = None
         self._ledger: LedgerFile | None = None
         self._saved = wall.monotonic()
-        self._until: float | None = None
+        self._ends = (math.inf, math.inf)
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
         """Begin or go on with the files; called by each `run` with its end."""
         from .build import case_of
 
-        self._until = until
+        self._ends = (until, last_step)
         if self._trajectory is not None:
             return
         text = "as understood by SAND, all defaults filled in, SI units"
@@ -85,7 +86,8 @@ class Record:
         meta = {
             "steps": simulation.world.steps,
             "time": simulation.time,
-            "until": None if self._until is None or self._until == float("inf") else self._until,
+            "until": None if math.isinf(self._ends[0]) else self._ends[0],
+            "last_step": None if math.isinf(self._ends[1]) else int(self._ends[1]),
             "wall_seconds": simulation.wall_seconds,
             "temperature": simulation.temperature,
             "clock": CLOCK,

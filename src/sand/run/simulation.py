@@ -18,7 +18,6 @@ from ..core.units import si
 from ..core.world import CONTACTS
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
-from ..kernels.measure import measure_gaps
 from ..stepping.advance import Stop
 from ..stepping.verlet import Verlet
 from .engine import build_engine
@@ -74,7 +73,7 @@ class Simulation:
         self.observers = list(observers)
         self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
-        self.planned_end: float | None = None  # what a resumed run was to reach [s]
+        self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
         self.start = grains.copy()
         self._engine = build_engine(grains, self.forces, self.box, self.stepping, fresh=restart is None)
         self.world = self._engine.world
@@ -106,12 +105,10 @@ class Simulation:
         self._start()
         w = self.world
         used = int(w.count[CONTACTS])
-        pair = np.ascontiguousarray(w.contacts.pair[:, :used])
-        overlap = np.empty(used)
-        measure_gaps(w.grains.arrays, pair, w.box.span, overlap)
+        pair = np.ascontiguousarray(w.contacts.pair[:, :used].T)
         return {
-            "pair": pair.T.copy(),
-            "overlap": overlap,
+            "pair": pair,
+            "overlap": w.grains.overlaps(pair, w.box),
             "twist": w.contacts.twist[:used].copy(),
             "formed": w.contacts.formed[:used].copy(),
         }
@@ -124,9 +121,7 @@ class Simulation:
             choose = getattr(force, "choose", None)
             if choose is not None:
                 radius, reason = choose(self.start, self.box)
-                told[f"{force.name} cut-off"] = (
-                    f"{'none' if radius is None else f'{radius:.4g} m'} ({reason})"
-                )
+                told[f"{force.name} cut-off"] = f"{'none' if radius is None else f'{radius:.4g} m'} ({reason})"
         return told
 
     def loads(self) -> dict[str, Any]:
@@ -152,18 +147,16 @@ class Simulation:
             BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
             Interrupted: Ctrl-C or SIGTERM; the checkpoint is written before.
         """
-        if until is None and steps is None:
-            until = self.planned_end
         end = math.inf if until is None else si(until, "s", "until")
+        last = math.inf if steps is None else self.world.steps + _whole_steps(steps)
         if until is None and steps is None:
+            end, last = self.planned
+        if end == last == math.inf:
             raise BadInput("run needs an end: until='5 us' or steps=1000")
-        if steps is not None and (isinstance(steps, bool) or int(steps) != steps or steps < 1):
-            raise BadInput(f"steps = {steps!r} must be a whole number of at least 1")
         if end < self.time:
             raise BadInput(f"until = {until!r} lies before the present time, {self.time:.6g} s")
         if self.frame_every is None:
             self.frame_every = (end - self.time) / 200.0 if 0.0 < end - self.time < math.inf else math.inf
-        last = math.inf if steps is None else self.world.steps + int(steps)
         self._start()
         if self.record:
             self.record.open(self, end, last)
@@ -237,3 +230,9 @@ class Simulation:
         if outcome is Outcome.INTERRUPTED:
             raise Interrupted(result)
         return result
+
+
+def _whole_steps(steps: Any) -> int:
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise BadInput(f"steps = {steps!r} must be a whole number of at least 1")
+    return int(steps)

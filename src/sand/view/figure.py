@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from PIL import Image  # comes with matplotlib
 
 from ..core.box import Box
 from ..core.grains import Grains
@@ -24,7 +25,7 @@ from .panels import (
     time_unit,
 )
 from .scene import Scene, draw_largest, draw_scene, scene_of, view_window
-from .style import FAINT, letter, pretty, styled
+from .style import FAINT, letter, power_of_ten, pretty, styled
 
 if TYPE_CHECKING:
     from ..run.simulation import Simulation
@@ -35,9 +36,16 @@ SMALL_GRAIN = 11.0
 """Pixels: with grains of a smaller radius in the box, the largest clusters are shown by themselves too."""
 LARGEST_FILE = 300_000
 """Bytes of the PNG."""
+_PNG: dict[str, Any] = {
+    "format": "png",
+    "dpi": DPI,
+    "metadata": {"Software": "SAND"},
+    "pil_kwargs": {"compress_level": 9},
+}
 
-_LEFT, _RIGHT = (0.068, 0.452), (0.485, 0.992)
-_TOP, _BOTTOM = 0.865, 0.075
+_LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
+_TOP, _BOTTOM = 0.862, 0.075
+_EDGE = 0.012
 
 
 class RunFigure(Figure):
@@ -54,32 +62,38 @@ def run_figure(simulation: Simulation) -> Figure:
     grains as they are now, coloured by cluster, with their moments; where they are small, the largest
     clusters once more.  Energies in N k_B T of the start, or in J if the grains were at rest.
 
-    Args:
-        simulation: with at least one row in its ledger.
+    A run that has no rows in its ledger yet, or in which no position is a finite number, gets the other half.
     """
     scene = scene_of(simulation.grains, simulation.contacts["pair"], simulation.box)
     with styled():
         figure = RunFigure(figsize=(WIDTH, HEIGHT), dpi=DPI)
         _draw_headline(figure, simulation)
-        _draw_history(figure, simulation)
-        _draw_grains(figure, scene)
+        if simulation.ledger.rows:
+            _draw_history(figure, simulation)
+        if scene.label.size:
+            _draw_grains(figure, scene, len(simulation.grains) - scene.label.size)
     return figure
 
 
 def _draw_headline(figure: Figure, simulation: Simulation) -> None:
-    ledger = simulation.ledger
-    last = ledger.rows[-1]
-    figure.text(_LEFT[0] - 0.055, 0.965, headline(simulation), size=10.5, weight="bold", va="center")
+    figure.text(_EDGE, 0.968, headline(simulation), size=10.5, weight="bold", va="center")
+    if not simulation.ledger.rows:
+        return
+    last = simulation.ledger.rows[-1]
     count = int(last["clusters"])
     facts = [
         f"{count} cluster{'s' if count != 1 else ''}",
-        f"mean size S = {last['mean_cluster_size']:.3g}",
+        f"mean size S = {_count(last['mean_cluster_size'])}",
         f"largest {int(last['largest_cluster'])}",
         f"{int(last['contacts'])} contacts ({int(last['made'])} made, {int(last['broken'])} broken)",
     ]
     if simulation.temperature > 0.0:
-        facts.append(rf"$T_0$ = {simulation.temperature:.3g} K")
-    figure.text(_LEFT[0] - 0.055, 0.928, "  ·  ".join(facts), size=8.5, color=FAINT, va="center")
+        facts.append(f"$T_0$ = {power_of_ten(simulation.temperature)} K")
+    figure.text(_EDGE, 0.931, "  ·  ".join(facts), size=8.5, color=FAINT, va="center")
+
+
+def _count(number: float) -> str:
+    return f"{number:.0f}" if number >= 100.0 else f"{number:.3g}"
 
 
 def headline(simulation: Simulation) -> str:
@@ -124,14 +138,14 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     draw_losses(panels[2], ledger, time, unit)
     draw_balance(panels[3], ledger, time, unit)
     draw_time(panels, time, ledger)
-    figure.align_ylabels(panels)
     for name, axes in zip("abcd", panels, strict=True):
-        letter(axes, name, -0.155)
+        axes.yaxis.set_label_coords(-0.138, 0.5)
+        letter(axes, name, -0.185)
 
 
-def _draw_grains(figure: Figure, scene: Scene) -> None:
-    """The box, and under it the largest clusters if they would be hard to make out in it."""
-    whole = (_BOTTOM - 0.045, _TOP + 0.03 - _BOTTOM + 0.045)
+def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
+    """The box, and under it the largest clusters if they are small in it; `lost` grains are not drawn."""
+    whole = (0.03, 0.85)
     window = view_window(scene, _pixels(whole[1])[0] / _pixels(whole[1])[1])
     grain = float(np.median(scene.radius)) * _pixels(whole[1])[0] / (window[1] - window[0])
     small = grain < SMALL_GRAIN and bool(scene.largest())
@@ -141,7 +155,14 @@ def _draw_grains(figure: Figure, scene: Scene) -> None:
     draw_scene(axes, scene, _pixels(height))
     letter(axes, "e", 0.0)
     axes.text(
-        0.04, 1.004, _caption(scene), transform=axes.transAxes, size=7, color=FAINT, va="bottom", ha="left"
+        0.04,
+        1.004,
+        _caption(scene, lost),
+        transform=axes.transAxes,
+        size=7.5,
+        color=FAINT,
+        va="bottom",
+        ha="left",
     )
     if small:
         axes = _panel(figure, _RIGHT, whole[0], strip)
@@ -149,12 +170,14 @@ def _draw_grains(figure: Figure, scene: Scene) -> None:
         letter(axes, "f", 0.0)
 
 
-def _caption(scene: Scene) -> str:
+def _caption(scene: Scene, lost: int) -> str:
     told = []
     if scene.largest():
         told.append("one colour per cluster, single grains grey")
     if scene.arrow.any():
         told.append("arrows: moments")
+    if lost:
+        told.append(f"left out: {lost} without a finite position")
     return "; ".join(told)
 
 
@@ -178,19 +201,18 @@ def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG of at most 300 kB: with fewer colours if it must."""
-    content = io.BytesIO()
+    """The figure as a PNG of at most 300 kB: of coarser shades if it must."""
     with styled():
-        figure.savefig(content, format="png", dpi=DPI, metadata={"Software": "SAND"})
-    if content.tell() <= LARGEST_FILE:
-        return content.getvalue()
-    from PIL import Image
-
-    fewer = io.BytesIO()
-    Image.open(content).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(
-        fewer, format="png", optimize=True
-    )
-    return fewer.getvalue()
+        figure.savefig(content := io.BytesIO(), **_PNG)
+    for step in (4, 8, 16, 32):
+        if content.tell() <= LARGEST_FILE:
+            break
+        # Crowds of small shaded grains hardly compress; steps this fine are not seen on them.
+        picture = np.asarray(Image.open(content).convert("RGB"), dtype=np.int16)
+        coarse = np.minimum((picture + step // 2) // step * step, 255).astype(np.uint8)
+        content = io.BytesIO()
+        Image.fromarray(coarse).save(content, format="png", dpi=(DPI, DPI), compress_level=9)
+    return content.getvalue()
 
 
 def save(figure: Figure, path: str | Path) -> None:

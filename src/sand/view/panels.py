@@ -11,7 +11,20 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from ..core.constants import BOLTZMANN
 from ..core.world import LOST
-from .style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, RED, SKY, YELLOW, legend_above, with_prefix
+from .style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    YELLOW,
+    legend_above,
+    power_of_ten,
+    with_prefix,
+)
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
@@ -19,7 +32,7 @@ LOSSES = tuple(f"lost_{name}" for name in LOST)
 LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE)
 OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 
-DECADES = 5
+DECADES = 6
 """Shown of a quantity that spans many."""
 FLAT = 1e-3
 """The balance is shown at least within this share of the energy turned over."""
@@ -33,9 +46,20 @@ class Unit:
     name: str
 
 
+def column(ledger: Any, *names: str) -> np.ndarray:
+    """The sum of columns over time; not a number where a run that failed left one that is not finite."""
+    total = np.sum([ledger[name] for name in names], axis=0, dtype=np.float64)
+    return np.where(np.isfinite(total), total, np.nan)
+
+
+def peak(values: np.ndarray) -> float:
+    """The largest size among finite values; 0 if there is none."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+
+
 def time_unit(ledger: Any) -> Unit:
     """Seconds with the prefix that suits the length of the run."""
-    return Unit(*with_prefix(float(np.abs(ledger["time"]).max()), "s"))
+    return Unit(*with_prefix(peak(ledger["time"]), "s"))
 
 
 def energy_unit(ledger: Any, temperature: float, grains: int) -> Unit:
@@ -43,25 +67,20 @@ def energy_unit(ledger: Any, temperature: float, grains: int) -> Unit:
     if temperature > 0.0:
         name = r"$N k_\mathrm{B}T_0$" if grains > 1 else r"$k_\mathrm{B}T_0$"
         return Unit(grains * BOLTZMANN * temperature, name)
-    largest = max(float(np.abs(v).max()) for v in (*energies(ledger).values(), *losses(ledger).values()))
-    return Unit(*with_prefix(largest, "J"))
+    return Unit(*with_prefix(max(map(peak, (*energies(ledger).values(), *losses(ledger).values()))), "J"))
 
 
 def energies(ledger: Any) -> dict[str, np.ndarray]:
     """Energies over time [J] as they are drawn: kinetic, of all contacts, magnetic, of each outside force."""
     columns = list(ledger.columns)
     outside = columns[columns.index("magnetic") + 1 : columns.index(LOSSES[0])]
-    drawn = {
-        "kinetic": np.sum([ledger[name] for name in KINETIC], axis=0),
-        "contacts": np.sum([ledger[name] for name in ELASTIC], axis=0),
-        "magnetic": ledger["magnetic"],
-    }
-    return drawn | {name: ledger[name] for name in outside}
+    drawn = {"kinetic": KINETIC, "contacts": ELASTIC, "magnetic": ("magnetic",)}
+    return {name: column(ledger, *parts) for name, parts in (drawn | {k: (k,) for k in outside}).items()}
 
 
 def losses(ledger: Any) -> dict[str, np.ndarray]:
     """Energy lost so far by channel [J]."""
-    return {name: ledger[f"lost_{name}"] for name in LOST}
+    return {name: column(ledger, f"lost_{name}") for name in LOST}
 
 
 def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
@@ -70,76 +89,74 @@ def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
     style = _marks(t)
     axes.plot(t, ledger["clusters"], color=FAINT, linewidth=1.0, label="number of clusters", **style)
     axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest (grains)", **style)
-    axes.plot(
-        t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$ (grains)", **style
-    )
+    axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$ (grains)", **style)
     top = max(float(ledger[name].max()) for name in ("clusters", "largest_cluster", "mean_cluster_size"))
     axes.set_yscale("log")
     axes.set_ylim(0.85, max(1.25 * top, 4.0))
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if top < 200 else (1.0,)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_ylabel("clusters")
-    legend_above(axes, 3)
+    _log_ticks(axes, plain=True)
+    axes.set_ylabel("number")
+    legend_above(axes)
 
 
 def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """Energies; those that never differ from zero are left out."""
     t = ledger["time"] / time.size
-    drawn = {name: values / unit.size for name, values in energies(ledger).items() if values.any()}
-    names = [name for name in drawn if name not in ("kinetic", "contacts", "magnetic")]
+    drawn = {name: values / unit.size for name, values in energies(ledger).items() if peak(values)}
+    outside = [name for name in drawn if name not in ("kinetic", "contacts", "magnetic")]
     colour = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
-    colour |= {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(names)}
+    colour |= {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
+    longer = {} if len(outside) > 1 else {"contacts": "contacts (elastic, adhesion)"}
     axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
     for name, values in drawn.items():
-        label = {"contacts": "contacts (elastic, adhesion)"}.get(name, name)
-        axes.plot(t, values, color=colour[name], label=label, **_marks(t))
+        axes.plot(t, values, color=colour[name], label=longer.get(name, name), **_marks(t))
     if drawn:
         _scale(axes, list(drawn.values()))
-        legend_above(axes, 4)
+        legend_above(axes)
     else:
         _nothing(axes, "no energy at any time")
     axes.set_ylabel(f"energy ({unit.name})")
 
 
 def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
-    """Losses by channel; channels that never lost anything are named only."""
+    """Losses by channel; channels too small for the frame, or without any loss, are named only."""
     t = ledger["time"] / time.size
-    all_of_them = losses(ledger)
-    never = [name for name, values in all_of_them.items() if not values.any()]
-    for (name, values), colour in zip(all_of_them.items(), LOSS_COLOURS, strict=True):
-        if name not in never:
-            shown = np.where(values > 0.0, values / unit.size, np.nan)
-            axes.plot(t, shown, color=colour, label=name, **_marks(t))
+    channels = {name: values / unit.size for name, values in losses(ledger).items()}
     axes.set_ylabel(f"lost ({unit.name})")
-    if len(never) == len(all_of_them):
+    top = max(map(peak, channels.values()))
+    if top == 0.0:
         _nothing(axes, "nothing lost")
         return
-    top = max(float(v.max()) for v in all_of_them.values()) / unit.size
-    least = min(float(v[v > 0.0].min()) for v in all_of_them.values() if v.any()) / unit.size
+    drawn = {name: v for name, v in channels.items() if peak(v) > top * 10.0**-DECADES}
+    colour = dict(zip(LOST, LOSS_COLOURS, strict=True))
+    for name, values in drawn.items():
+        axes.plot(t, np.where(values > 0.0, values, np.nan), color=colour[name], label=name, **_marks(t))
+    least = min(float(values[values > 0.0].min()) for values in drawn.values())
     axes.set_yscale("log")
     axes.set_ylim(max(least / 2.0, top * 10.0**-DECADES), top * 2.5)
-    _few_decades(axes)
-    legend_above(axes, 5)
-    if never:
-        text = f"none in {', '.join(never)}"
-        axes.text(0.99, 0.05, text, transform=axes.transAxes, ha="right", size=6.5, color=FAINT)
+    _log_ticks(axes)
+    legend_above(axes)
+    none = ", ".join(name for name, values in channels.items() if not peak(values))
+    tiny = ", ".join(name for name, values in channels.items() if name not in drawn and peak(values))
+    note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)
+    axes.text(0.0, 1.03, note, transform=axes.transAxes, va="bottom", size=7, color=FAINT)
 
 
 def draw_balance(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """The total, losses included, minus its start: a flat line if the books balance."""
     t = ledger["time"] / time.size
-    change = (ledger["total"] - ledger["total"][0]) / unit.size
-    kinetic = np.sum([ledger[name] for name in KINETIC], axis=0)
-    turned_over = (ledger.dissipated + float(kinetic.max())) / unit.size
+    total = column(ledger, "total")
+    change = (total - total[0]) / unit.size
+    turned_over = (sum(map(peak, losses(ledger).values())) + peak(column(ledger, *KINETIC))) / unit.size
     axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
     axes.plot(t, change, color=INK, linewidth=1.0, **_marks(t))
-    half = max(1.3 * float(np.abs(change).max()), FLAT * turned_over)
-    axes.set_ylim(-half, half) if half > 0.0 else axes.set_ylim(-1.0, 1.0)
+    half = max(1.3 * peak(change), FLAT * turned_over) or 1.0
+    axes.set_ylim(-half, half)
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
-    axes.set_ylabel("Δ total")
-    text = f"total − start: drift {ledger.drift:.1e} of the energy turned over"
-    axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7)
+    axes.yaxis.set_major_formatter(FuncFormatter(_short))
+    axes.set_ylabel(f"Δ ({unit.name})")
+    drift = f"drift {power_of_ten(ledger.drift)} of the energy turned over"
+    text = f"total − start: {drift if np.isfinite(ledger.drift) else 'not a number at the end'}"
+    axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
 
 
 def draw_time(panels: list[Axes], time: Unit, ledger: Any) -> None:
@@ -165,22 +182,34 @@ def _nothing(axes: Axes, text: str) -> None:
 
 def _scale(axes: Axes, curves: list[np.ndarray]) -> None:
     """Linear if one glance holds all curves, otherwise logarithmic on both sides of zero."""
-    peaks = [float(np.abs(values).max()) for values in curves]
+    peaks = [peak(values) for values in curves]
     top = max(peaks)
     if min(peaks) > top / 30.0:
         axes.margins(y=0.08)
         axes.yaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_formatter(FuncFormatter(_short))
         return
     # Below the smallest peak, or ever so far below the largest, the axis is linear.
     linear = 10.0 ** np.floor(np.log10(max(min(peaks), top * 10.0**-DECADES)))
-    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
-    high, low = max(float(v.max()) for v in curves), min(float(v.min()) for v in curves)
-    axes.set_ylim(min(2.5 * low, -0.3 * linear), max(2.5 * high, 0.3 * linear))
+    high = max(2.5 * max(peak(np.maximum(values, 0.0)) for values in curves), 0.3 * linear)
+    low = max(2.5 * max(peak(np.minimum(values, 0.0)) for values in curves), 0.3 * linear)
+    decades = sum(np.log10(max(side / linear, 1.0)) for side in (high, low))
+    axes.set_yscale("symlog", linthresh=linear, linscale=max(0.6, 0.12 * decades))
+    axes.set_ylim(-low, high)
     locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
     locator.set_params(numticks=6)
     axes.yaxis.set_major_locator(locator)
 
 
-def _few_decades(axes: Axes) -> None:
-    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+def _log_ticks(axes: Axes, plain: bool = False) -> None:
+    """Powers of ten; 1, 2 and 5 where there are few; `plain` writes 1000 and not 10³."""
+    low, high = axes.get_ylim()
+    few = high < 250.0 * low
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=5))
+    if plain or few:
+        axes.yaxis.set_major_formatter(FuncFormatter(_short))
     axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _short(value: float, _: int) -> str:
+    return f"{value:.4g}".replace("-", "−") if value == 0.0 or 1e-3 <= abs(value) < 1e5 else f"{value:.1e}"

@@ -76,18 +76,32 @@ class Scene:
 
 
 def scene_of(grains: Grains, pairs: np.ndarray, box: Box) -> Scene:
-    """The scene of grains with contacts `pairs` (C, 2)."""
+    """The scene of grains with contacts `pairs` (C, 2); grains whose place is not a number are left out."""
     label = cluster_labels(len(grains), pairs)
-    position = unwrapped(box.wrap(grains.position), pairs, box)
+    place = np.where(np.isfinite(grains.position), grains.position, np.nan)
+    position = unwrapped(box.wrap(place), pairs, box)
     sizes = cluster_sizes(label)
     middle = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
     position = position + (box.wrap(middle) - middle)[label]
-    size = np.linalg.norm(grains.moment, axis=1)
-    # In proportion, but a grain a hundred times weaker than the strongest still shows where it points.
-    share = np.where(size > 0.0, np.maximum(size / max(size.max(), 1e-300), 0.35), 0.0)
-    direction = grains.moment / np.where(size > 0.0, size, 1.0)[:, None]
-    arrow = 0.9 * share[:, None] * direction
-    return Scene(position, np.array(grains.radius), label, _colours(label), arrow, box)
+    there = np.isfinite(position).all(axis=1)
+    numbered = np.unique(label[there], return_inverse=True)[1]
+    return Scene(
+        position[there],
+        grains.radius[there],
+        numbered,
+        _colours(numbered),
+        _arrows(grains.moment[there]),
+        box,
+    )
+
+
+def _arrows(moment: np.ndarray) -> np.ndarray:
+    """(N, 3) in radii of the grains: in proportion to the largest moment, but never too short to be seen."""
+    moment = np.nan_to_num(moment, posinf=0.0, neginf=0.0)
+    size = np.linalg.norm(moment, axis=1, keepdims=True)
+    largest = max(float(size.max(initial=0.0)), 1e-300)
+    share = np.where(size > 0.0, np.maximum(size / largest, 0.35), 0.0)
+    return 0.9 * share * moment / np.where(size > 0.0, size, 1.0)
 
 
 def _colours(label: np.ndarray) -> np.ndarray:
@@ -101,7 +115,7 @@ def _colours(label: np.ndarray) -> np.ndarray:
     return of_cluster[label]
 
 
-def view_window(scene: Scene, wide: float, margin: float = 0.03) -> tuple[float, float, float, float]:
+def view_window(scene: Scene, wide: float, margin: float = 0.02) -> tuple[float, float, float, float]:
     """Left, right, bottom, top [m] that hold the grains and the box; `wide` is width over height."""
     left, right, bottom, top = scene.seen(camera()).bounds
     corners = scene.corners()
@@ -109,7 +123,7 @@ def view_window(scene: Scene, wide: float, margin: float = 0.03) -> tuple[float,
         flat = corners.reshape(-1, 3) @ camera().T
         left, right = min(left, flat[:, 0].min()), max(right, flat[:, 0].max())
         bottom, top = min(bottom, flat[:, 1].min()), max(top, flat[:, 1].max())
-    return widened((left, right, bottom, top), wide, margin)
+    return widened((left, right, bottom, top), wide, margin, least=5.0 * float(scene.radius.max()))
 
 
 def widened(
@@ -133,9 +147,7 @@ def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     draw_scale_bar(axes)
 
 
-def _show(
-    axes: Axes, balls: Balls, window: tuple[float, float, float, float], pixels: tuple[int, int]
-) -> None:
+def _show(axes: Axes, balls: Balls, window: tuple[float, float, float, float], pixels: tuple[int, int]) -> None:
     axes.imshow(
         draw(balls, window, *pixels),
         extent=window,
@@ -174,12 +186,12 @@ def _draw_box(axes: Axes, corners: np.ndarray, box: Box) -> None:
 
 def _draw_directions(axes: Axes) -> None:
     """x, y and z as a small cross in the lower left corner."""
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    size = 0.055 * (top - bottom)
-    x, y = left + 1.3 * size, bottom + 1.1 * size
+    left, (bottom, top) = axes.get_xlim()[0], axes.get_ylim()
+    size = 0.042 * (top - bottom)
+    x, y = left + 1.6 * size, bottom + 0.9 * size
     for name, step in zip("xyz", camera()[:2].T * size, strict=True):
         axes.plot([x, x + step[0]], [y, y + step[1]], color=FAINT, linewidth=0.9, zorder=4)
-        axes.text(x + 1.45 * step[0], y + 1.45 * step[1], name, color=FAINT, size=7, ha="center", va="center")
+        axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=FAINT, size=7, ha="center", va="center")
 
 
 def draw_scale_bar(axes: Axes, share: float = 0.25) -> None:
@@ -188,9 +200,7 @@ def draw_scale_bar(axes: Axes, share: float = 0.25) -> None:
     length = round_length(share * (right - left))
     x, y = right - 0.015 * (right - left), bottom + 0.02 * (top - bottom)
     axes.plot([x - length, x], [y, y], color=INK, linewidth=2.0, solid_capstyle="butt", zorder=4, gid="scale")
-    axes.annotate(
-        pretty(length, "m"), (x - length / 2, y), (0, 3), textcoords="offset points", ha="center", size=7.5
-    )
+    axes.annotate(pretty(length, "m"), (x - length / 2, y), (0, 3), textcoords="offset points", ha="center", size=7.5)
 
 
 def side_by_side(scene: Scene, count: int) -> tuple[Balls, np.ndarray, list[int]]:
@@ -224,7 +234,7 @@ def _principal(position: np.ndarray) -> np.ndarray:
 def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     """The largest clusters at a scale at which grains, contacts and moments can be told apart."""
     wide = pixels[0] / pixels[1]
-    least = 2.0 * float(np.median(scene.radius)) * pixels[1] / 60.0  # a grain is at most 60 pixels across
+    least = 2.0 * float(np.median(scene.radius)) * pixels[1] / 76.0  # a grain is at most 76 pixels across
     for count in range(min(LARGEST_SHOWN, len(scene.largest())), 0, -1):
         balls, feet, sizes = side_by_side(scene, count)
         left, right, bottom, top = balls.bounds
@@ -234,7 +244,5 @@ def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     window = widened((left, right, bottom - 0.22 * (top - bottom), top), wide, 0.02, least)
     _show(axes, balls, window, pixels)
     for (x, y), size in zip(feet, sizes, strict=True):
-        axes.annotate(
-            f"{size} grains", (x, y), (0, -3), textcoords="offset points", ha="center", va="top", size=7
-        )
+        axes.annotate(f"{size} grains", (x, y), (0, -3), textcoords="offset points", ha="center", va="top", size=7.5)
     draw_scale_bar(axes, 0.15)

@@ -47,8 +47,8 @@ _STYLE = {
     "savefig.bbox": None,
     "lines.linewidth": 1.3,
     "lines.solid_capstyle": "round",
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
     "xtick.color": INK,
     "ytick.color": INK,
     "xtick.direction": "out",
@@ -58,15 +58,14 @@ _STYLE = {
     "xtick.minor.width": 0.5,
     "ytick.minor.width": 0.5,
     "legend.frameon": False,
-    "legend.fontsize": 7.0,
+    "legend.fontsize": 7.5,
     "text.usetex": False,
     "path.simplify": True,
 }
 
-_PREFIX = {
-    **{-24: "y", -21: "z", -18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m"},
-    **{0: "", 3: "k", 6: "M", 9: "G", 12: "T", 15: "P"},
-}
+_PREFIX = dict(
+    zip(range(-24, 16, 3), ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"), strict=True)
+)
 
 
 def styled() -> AbstractContextManager[None]:
@@ -94,16 +93,24 @@ def pretty(size: float, unit: str) -> str:
     return f"{size / one:.3g} {name}"
 
 
-def legend_above(axes: Axes, columns: int) -> None:
+def power_of_ten(number: float) -> str:
+    """A pure number with two digits: 6.7e-4 → '6.7×10⁻⁴', 31400 → '3.1×10⁴', 81.9 → '82'."""
+    if number == 0.0 or not math.isfinite(number) or 0.01 <= abs(number) < 1e4:
+        return f"{number:.3g}" if abs(number) >= 100.0 else f"{number:.2g}"
+    digits, exponent = f"{number:.1e}".split("e")
+    return rf"{digits}$\times 10^{{{int(exponent)}}}$"
+
+
+def legend_above(axes: Axes) -> None:
     """The legend as one row over the frame, where it hides no data."""
     axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.01, 0.97),
-        ncols=columns,
+        ncols=max(len(axes.get_legend_handles_labels()[1]), 1),
         borderpad=0.1,
         handlelength=1.3,
         handletextpad=0.5,
-        columnspacing=1.2,
+        columnspacing=1.1,
     )
 
 

@@ -1,0 +1,34 @@
+"""python -m benchmarks [--quick] [--json]: a table of what SAND costs on this machine."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import warnings
+
+from sand.run.record import versions
+
+from .rows import all_rows
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="smaller worlds, less repetition")
+    parser.add_argument("--json", action="store_true", help="one JSON object")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    rows = all_rows(options.quick)
+    if options.json:
+        print(json.dumps({"machine": platform.processor() or platform.machine(), "versions": versions(), "rows": rows}))
+        return
+    print(f"{'what':34} {'ours':>10} {'target':>8} {'peer':>10} {'ratio':>7}  unit")
+    for r in rows:
+        peer = f"{r['peer']:10.3g} {r['ratio']:7.1f}" if r["peer"] else f"{'-':>10} {'-':>7}"
+        mark = "" if r["met"] else "  MISSED"
+        print(f"{r['name']:34} {r['ours']:10.3g} {r['target']:8.3g} {peer}  {r['unit']} {r['peer_name']}{mark}")
+
+
+if __name__ == "__main__":
+    main()

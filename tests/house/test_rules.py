@@ -1,0 +1,169 @@
+"""The rules of the house: which room may open which door, how long things may be, who names the compiler."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).parents[2]
+HOUSE = TOP / "src" / "sand"
+SOURCES = sorted(HOUSE.rglob("*.py"))
+EVERYTHING = {"core", "physics", "kernels", "forces", "stepping", "theory", "setup", "run", "files",
+              "analysis", "experiments", "view"}  # fmt: skip
+MAY_IMPORT = {
+    "core": set(),
+    "physics": {"core"},
+    "kernels": {"core", "physics"},
+    "forces": {"core", "physics", "kernels"},
+    "stepping": {"core", "physics", "kernels"},
+    "theory": {"core", "physics"},
+    "files": {"core"},
+    "setup": {"core", "physics", "kernels", "theory"},
+    "analysis": {"core", "physics", "kernels", "forces", "files"},
+    "run": {"core", "physics", "kernels", "forces", "stepping", "setup", "analysis", "files", "theory"},
+    "experiments": EVERYTHING,
+    "view": {"core", "files", "analysis"},
+    "cli": EVERYTHING,
+}
+# A simulation shows itself: `Simulation.view()` and the figure at the end import `view` when called.
+LATE = {("run", "view")}
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(HOUSE).parts[0]
+
+
+def imports(path: Path) -> list[tuple[str, bool]]:
+    """(room or package, at the top level of the module?) of every import; typing-only ones are left out."""
+    tree = ast.parse(path.read_text())
+    typing_only = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+        for inner in ast.walk(node)
+    }
+    top = {id(node) for node in tree.body}
+    found = []
+    for node in ast.walk(tree):
+        if id(node) in typing_only:
+            continue
+        if isinstance(node, ast.ImportFrom):
+            if node.level == 0:
+                found.append(((node.module or "").split(".")[0], id(node) in top))
+            elif node.level == 2:
+                names = [node.module.split(".")[0]] if node.module else [a.name for a in node.names]
+                found += [(f"sand.{name}", id(node) in top) for name in names]
+        elif isinstance(node, ast.Import):
+            found += [(alias.name.split(".")[0], id(node) in top) for alias in node.names]
+    return found
+
+
+def test_nobody_imports_upstairs():
+    """Rooms import only what ARCHITECTURE.md allows."""
+    wrong = [
+        f"{path.relative_to(HOUSE)} imports {name}"
+        for path in SOURCES
+        if room_of(path) in MAY_IMPORT
+        for name, top in imports(path)
+        if name.startswith("sand.")
+        and (room := name.split(".")[1]) in MAY_IMPORT
+        and room != room_of(path)
+        and room not in MAY_IMPORT[room_of(path)]
+        and not ((room_of(path), room) in LATE and not top)
+    ]
+    assert not wrong, wrong
+
+
+def test_every_room_is_on_the_plan():
+    """A new folder needs a place in the table here and in ARCHITECTURE.md."""
+    rooms = {p.name for p in HOUSE.iterdir() if p.is_dir() and p.name != "__pycache__" and any(p.glob("*.py"))}
+    assert rooms <= set(MAY_IMPORT), rooms - set(MAY_IMPORT)
+    plan = (TOP / "ARCHITECTURE.md").read_text()
+    assert all(f"{room}/" in plan for room in rooms)
+
+
+def test_files_and_functions_stay_short():
+    """Under 300 lines, under 60 lines."""
+    long = [str(p.relative_to(TOP)) for p in SOURCES if len(p.read_text().splitlines()) >= 300]
+    assert not long, long
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            nested = isinstance(node, ast.FunctionDef) and any(
+                isinstance(inner, ast.FunctionDef) for inner in node.body
+            )
+            if isinstance(node, ast.FunctionDef) and not nested:
+                length = (node.end_lineno or 0) - node.lineno
+                assert length < 60, f"{path.relative_to(TOP)}: {node.name} has {length} lines"
+
+
+def test_public_names_have_docstrings():
+    """Modules, and public classes, functions and methods with more than one statement."""
+    silent = []
+    for path in SOURCES:
+        tree = ast.parse(path.read_text())
+        if not ast.get_docstring(tree):
+            silent.append(str(path.relative_to(TOP)))
+        for parent in ast.walk(tree):
+            if not isinstance(parent, (ast.Module, ast.ClassDef)):
+                continue
+            for node in parent.body:
+                public = isinstance(node, (ast.FunctionDef, ast.ClassDef)) and not node.name.startswith("_")
+                private_home = isinstance(parent, ast.ClassDef) and parent.name.startswith("_")
+                if public and not private_home and not ast.get_docstring(node) and len(node.body) > 1:
+                    silent.append(f"{path.relative_to(TOP)}: {node.name}")
+    assert not silent, silent
+
+
+def test_only_the_door_names_the_compiler():
+    """numba is imported in core/jit.py and kernels/gpu.py alone."""
+    allowed = {HOUSE / "core" / "jit.py", HOUSE / "kernels" / "gpu.py"}
+    wrong = [str(p) for p in SOURCES if p not in allowed and any(n == "numba" for n, _ in imports(p))]
+    assert not wrong, wrong
+
+
+def test_only_files_opens_files_and_only_cli_prints():
+    """`open`, `read_text`, `write_text` and friends live in files/ (and the compiler's digest); print in cli/."""
+    for path in SOURCES:
+        room = room_of(path)
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call):
+                continue
+            name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
+            where = f"{path.relative_to(TOP)}:{node.lineno} calls {name}"
+            if name == "print" or (name == "echo" and isinstance(node.func, ast.Attribute)):
+                assert room == "cli", where
+            if name in {"read_text", "write_text", "read_bytes", "write_bytes"} or (
+                isinstance(node.func, ast.Name) and name == "open"
+            ):
+                assert room == "files" or path == HOUSE / "core" / "jit.py", where
+
+
+def test_no_pickle_no_network():
+    """Neither pickle nor sockets anywhere; NumPy files are read with allow_pickle=False."""
+    for path in SOURCES:
+        names = {name for name, _ in imports(path)}
+        assert not names & {"pickle", "dill", "cloudpickle", "socket", "urllib", "requests", "http"}, path
+        text = path.read_text()
+        assert text.count("np.load(") == text.count("allow_pickle=False")
+
+
+def test_help_is_light():
+    """`import sand` and the command line's parser load neither numba nor NumPy nor anything as heavy."""
+    program = (
+        "import sys, sand, sand.cli.main\n"
+        "heavy = {'numba', 'numpy', 'scipy', 'pydantic', 'matplotlib', 'gsd', 'pint'} & set(sys.modules)\n"
+        "print(sorted(heavy))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_no_large_files():
+    """Nothing above 300 kB in git."""
+    tracked = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True)
+    if tracked.returncode != 0:
+        pytest.skip("not a git checkout")
+    large = [n for n in tracked.stdout.splitlines() if (TOP / n).is_file() and (TOP / n).stat().st_size > 300_000]
+    assert not large, large

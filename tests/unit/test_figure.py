@@ -1,0 +1,371 @@
+"""The figure of a run: what it draws is what the run holds, and no run is too odd for it."""
+
+import io
+from types import SimpleNamespace
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+import sand
+from sand.analysis.clusters import unwrapped
+from sand.core.box import Box
+from sand.core.constants import BOLTZMANN
+from sand.run.ledger import Ledger
+from sand.view.figure import LARGEST_FILE, png, run_figure, save, show
+from sand.view.panels import energy_unit, time_unit
+from sand.view.scene import camera, scene_of, side_by_side, view_window
+from sand.view.spheres import FINER, Balls, arrow_covers, draw
+from sand.view.style import pretty, round_length, with_prefix
+
+
+def ledger_of(rows, outside=()):
+    """A ledger of rows in which all that is not given is zero, but for one cluster of one grain."""
+    ledger = Ledger(outside)
+    for step, row in enumerate(rows):
+        blank = dict.fromkeys(ledger.columns, 0.0)
+        numbers = {"clusters": 1, "mean_cluster_size": 1.0, "largest_cluster": 1}
+        ledger.add(blank | numbers | {"step": step} | row)
+    return ledger
+
+
+def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.0, outside=(), **more):
+    """What the figure needs of a simulation."""
+    grains = sand.Grains(position, radius, sand.SILICA, **more)
+    ledger = ledger_of(rows, outside)
+    return SimpleNamespace(
+        grains=grains,
+        box=box or Box.open(),
+        contacts={"pair": np.array(pairs, dtype=np.uint32).reshape(-1, 2)},
+        ledger=ledger,
+        temperature=temperature,
+        time=ledger.rows[-1]["time"] if rows else 0.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def grown():
+    """Four grains in a periodic box, three of them in a cluster across a face, with a history."""
+    rows = [
+        {
+            "time": k * 1e-8,
+            "translation": 3e-20 * (1 + k),
+            "rotation": 1e-20,
+            "normal": -4e-18 * k,
+            "sliding": 1e-20 * k,
+            "magnetic": -1e-19 * k,
+            "field": -2e-20,
+            "lost_forming": 3e-18 * k,
+            "lost_sliding": 1e-22 * k,
+            "total": 1e-19 + 1e-22 * k,
+            "clusters": 4 - k // 5,
+            "mean_cluster_size": 1.0 + 0.15 * k,
+            "largest_cluster": 1 + k // 5,
+        }
+        for k in range(11)
+    ]
+    position = np.array([[0.95, 0.0, 0.0], [-0.86, 0.0, 0.0], [-0.67, 0.0, 0.0], [0.0, 0.5, 0.5]]) * 1e-7
+    return run_of(
+        position,
+        radius=[1e-8, 1e-8, 1e-8, 5e-9],
+        pairs=[(0, 1), (1, 2)],
+        box=Box.periodic("200 nm"),
+        rows=rows,
+        temperature=100.0,
+        outside=("field",),
+        moment=np.eye(4, 3) * 1e-18,
+    )
+
+
+@pytest.fixture(scope="module")
+def figure(grown):
+    return run_figure(grown)
+
+
+def lines(axes):
+    """Label → (x, y) of the labelled lines."""
+    return {line.get_label(): line.get_data() for line in axes.get_lines() if line.get_label()[0] != "_"}
+
+
+def texts(figure):
+    """All that is written in a figure outside its ticks."""
+    inside = [text.get_text() for axes in figure.axes for text in axes.texts]
+    return " ".join([text.get_text() for text in figure.texts] + inside)
+
+
+# --- history -----------------------------------------------------------------------------------------
+
+
+def test_clusters_drawn_are_the_ledgers(grown, figure):
+    """S, the largest cluster and the number of clusters are the ledger's columns over its times."""
+    drawn = lines(figure.axes[0])
+    columns = {"mean size $S$ (grains)": "mean_cluster_size", "largest (grains)": "largest_cluster"}
+    for label, column in {**columns, "number of clusters": "clusters"}.items():
+        np.testing.assert_allclose(drawn[label][0], grown.ledger["time"] / 1e-9)
+        np.testing.assert_array_equal(drawn[label][1], grown.ledger[column])
+
+
+def test_energies_drawn_are_the_ledgers(grown, figure):
+    """Kinetic, contact, magnetic and outside energies are sums of columns over N k_B T of the start."""
+    unit, books = 4 * BOLTZMANN * 100.0, grown.ledger
+    drawn = lines(figure.axes[1])
+    expected = {
+        "kinetic": books["translation"] + books["rotation"],
+        "contacts (elastic, adhesion)": books["normal"] + books["sliding"],
+        "magnetic": books["magnetic"],
+        "field": books["field"],
+    }
+    assert set(drawn) == set(expected)
+    for label, energy in expected.items():
+        np.testing.assert_allclose(drawn[label][1] * unit, energy)
+
+
+def test_losses_drawn_are_the_ledgers(grown, figure):
+    """Channels that lost something are drawn where they did; the others are named."""
+    drawn = lines(figure.axes[2])
+    assert set(drawn) == {"forming", "sliding"}
+    for channel in drawn:
+        lost = drawn[channel][1] * 4 * BOLTZMANN * 100.0
+        np.testing.assert_allclose(np.nan_to_num(lost), grown.ledger[f"lost_{channel}"])
+    assert "none: breaking, rolling, twisting" in texts(figure)
+
+
+def test_balance_is_the_change_of_the_total(grown, figure):
+    """The lowest panel shows the total minus its start, inside its frame, and the ledger's own drift."""
+    axes = figure.axes[3]
+    change = axes.get_lines()[-1].get_ydata() * 4 * BOLTZMANN * 100.0
+    np.testing.assert_allclose(change, grown.ledger["total"] - 1e-19, atol=1e-30)
+    low, high = axes.get_ylim()
+    assert low < min(axes.get_lines()[-1].get_ydata()) and max(axes.get_lines()[-1].get_ydata()) < high
+    assert f"{grown.ledger.drift:.1e}".split("e")[0] in texts(figure)
+
+
+def test_every_curve_lies_in_its_frame(figure):
+    """No limit of an axis cuts off a curve of energies or clusters."""
+    for axes in figure.axes[:2]:
+        low, high = axes.get_ylim()
+        for _, y in lines(axes).values():
+            assert low <= np.min(y) and np.max(y) <= high
+
+
+def test_units_are_natural():
+    """Time has the prefix of its largest value; energy is in N k_B T, without T in prefixed joules."""
+    ledger = ledger_of([{"time": 0.0}, {"time": 3e-7, "translation": 2.5e-17}])
+    assert time_unit(ledger).name == "ns"
+    assert time_unit(ledger).size == 1e-9
+    assert energy_unit(ledger, 0.0, 5).name == "aJ"
+    assert energy_unit(ledger, 0.0, 5).size == 1e-18
+    assert energy_unit(ledger, 50.0, 5).size == pytest.approx(5 * BOLTZMANN * 50.0)
+
+
+# --- grains ------------------------------------------------------------------------------------------
+
+
+def test_spheres_stand_where_the_grains_are(grown):
+    """Positions are the unwrapped ones, each cluster moved by whole boxes; radii are the true ones."""
+    pairs = grown.contacts["pair"]
+    scene = scene_of(grown.grains, pairs, grown.box)
+    moved = (scene.position - unwrapped(grown.grains.position, pairs, grown.box)) / 2e-7
+    np.testing.assert_allclose(moved, np.round(moved), atol=1e-9)
+    np.testing.assert_allclose(np.diff(moved[:3], axis=0), 0.0, atol=1e-9)
+    np.testing.assert_array_equal(scene.radius, grown.grains.radius)
+    np.testing.assert_allclose(np.diff(scene.position[:3, 0]), 1.9e-8)
+
+
+def test_projection_is_a_rotation():
+    """Rows right, up and eye are orthonormal and right-handed, and z shows upwards."""
+    rotation = camera()
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+    assert rotation[0, 2] == 0.0 and rotation[1, 2] > 0.9
+
+
+def test_picture_shows_each_grain_at_its_place(grown):
+    """The picture has a grain's colour at its projected centre, its true size, and nothing beside it."""
+    scene = scene_of(grown.grains, grown.contacts["pair"], grown.box)
+    balls = scene.seen(camera())
+    np.testing.assert_allclose(balls.centre[:, 0], scene.position @ camera()[0])
+    bare = Balls(balls.centre, balls.radius, balls.colour, np.zeros_like(balls.arrow))
+    window = view_window(scene, 1.0)
+    picture = draw(bare, window, 400, 400)
+    scale = 400 / (window[1] - window[0])
+    for i in range(4):
+        column, row = ((balls.centre[i, :2] - np.array([window[0], window[2]])) * scale).astype(int)
+        assert picture[row, column, 3] == 1.0
+        seen, true = picture[row, column, :3], balls.colour[i]
+        assert np.argmax(seen) == np.argmax(true) or np.ptp(true) < 0.1
+    alone = Balls(bare.centre[3:], bare.radius[3:], bare.colour[3:], bare.arrow[3:])
+    area = draw(alone, window, 400, 400)[..., 3].sum()
+    assert area == pytest.approx(np.pi * (5e-9 * scale) ** 2, rel=0.02)
+
+
+def test_nearer_grains_hide_farther_ones():
+    """Of two spheres behind each other the one nearer to the eye (larger z) is seen."""
+    red, blue = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    for order in ([0, 1], [1, 0]):
+        centre = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])[order]
+        colour = np.array([red, blue])[order]
+        picture = draw(Balls(centre, np.ones(2), colour, np.zeros((2, 3))), (-2.0, 2.0, -2.0, 2.0), 40, 40)
+        assert picture[20, 20, 0] > picture[20, 20, 2]
+
+
+def test_clusters_can_be_told_apart():
+    """Grains of one cluster share a colour, other clusters have another, single grains are grey."""
+    chain = [[2.0 * i, 0.0, 0.0] for i in range(6)]
+    scene = scene_of(sand.Grains(np.array(chain), 1.0, "ice"), np.array([(0, 1), (1, 2), (3, 4)]), Box.open())
+    first, second, single = scene.colour[0], scene.colour[3], scene.colour[5]
+    assert np.all(scene.colour[:3] == first) and np.all(scene.colour[3:5] == second)
+    assert not np.allclose(first, second)
+    assert np.ptp(single) < 0.05 < np.ptp(first)
+
+
+def test_arrows_point_along_moments():
+    """An arrow is wider towards its head than at its tail; along the line of sight it is a dot."""
+    x, y = np.meshgrid(np.linspace(-1.2, 1.2, 121), np.linspace(-1.2, 1.2, 121))
+    covered = arrow_covers(x, y, np.array([0.9, 0.0]))
+    assert covered[:, 75].sum() > 2 * covered[:, 45].sum() > 0  # x = ±0.3
+    assert covered[60, 103] and not covered[60, 107] and covered[60, 17] and not covered[60, 13]
+    dot = arrow_covers(x, y, np.zeros(2))
+    assert dot[60, 60] and not dot[np.hypot(x, y) > 0.3].any()
+
+
+def test_arrows_are_in_proportion(grown):
+    """The largest moment has the longest arrow, weak ones stay visible, grains without one have none."""
+    moment = np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 0.0, 0.0]]) * 1e-18
+    grains = sand.Grains(grown.grains.position, 1e-9, sand.SILICA, moment=moment)
+    size = np.linalg.norm(scene_of(grains, np.empty((0, 2)), grown.box).arrow, axis=1)
+    assert size[0] == pytest.approx(2 * size[1])
+    assert size[0] > size[1] > size[2] > 0.0 == size[3]
+
+
+def test_largest_clusters_are_moved_as_rigid_bodies(grown):
+    """Clusters shown by themselves keep all distances, do not overlap, and come largest first."""
+    position = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [9, 9, 9], [9, 9, 11]]
+    pairs = np.array([(3, 4), (0, 1), (1, 2)])
+    scene = scene_of(sand.Grains(np.array(position, float), 1.0, "ice"), pairs, Box.open())
+    balls, _, sizes = side_by_side(scene, 3)
+    assert sizes == [3, 2]
+
+    def distance(p):
+        return np.linalg.norm(p[:, None] - p[None], axis=-1)
+
+    np.testing.assert_allclose(distance(balls.centre[:3]), distance(scene.position[:3]))
+    np.testing.assert_allclose(distance(balls.centre[3:]), distance(scene.position[3:]))
+    assert balls.centre[3:, 0].min() - balls.centre[:3, 0].max() > 2.0
+
+
+def test_scale_bar_is_as_long_as_it_says(figure):
+    """The bar's length in the axes' own coordinates (metres) is the number written over it."""
+    axes = figure.axes[4]
+    (bar,) = [line for line in axes.get_lines() if line.get_gid() == "scale"]
+    length = float(np.ptp(bar.get_xdata()))
+    assert pretty(length, "m") in [text.get_text() for text in axes.texts]
+
+
+def test_box_has_twelve_edges(figure):
+    """A periodic box is outlined; open space is not."""
+    edges = [line for line in figure.axes[4].get_lines() if line.get_gid() == "box"]
+    assert len(edges) == 12
+    alone = run_figure(run_of([[0.0, 0.0, 0.0]]))
+    assert not [line for line in alone.axes[4].get_lines() if line.get_gid() == "box"]
+
+
+# --- odd runs ----------------------------------------------------------------------------------------
+
+
+def odd_runs():
+    """Runs at the edge of what there can be."""
+    two = [[0.0, 0.0, 0.0], [3e-8, 0.0, 0.0]]
+    nan = {"time": 1e-9, "translation": np.nan, "normal": np.inf, "total": np.nan, "lost_forming": np.nan}
+    far = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    slab = Box.periodic("60 nm", "60 nm", None)
+    return {
+        "one grain at rest, one row": run_of(two[:1]),
+        "two grains, unequal, touching": run_of(two, [1e-8, 2e-8], [(0, 1)], rows=[{"time": 0.0}, {"time": 1.0}]),
+        "grains a metre apart": run_of(far),
+        "a slab": run_of(two, box=slab, temperature=10.0),
+        "no history": run_of(two, rows=()),
+        "numbers that are none": run_of(two, rows=[{"time": 0.0, "translation": 1e-20}, nan], temperature=1.0),
+        "only numbers that are none": run_of(two, rows=[nan, nan]),
+        "a decade in one channel": run_of(two, rows=[{"time": 1e-9 * k, "lost_rolling": 10.0**k} for k in (0, 1)]),
+        "forty decades": run_of(two, rows=[{"time": 1e-9, "normal": -1e-20, "magnetic": 1e20, "lost_forming": 1e-300}]),
+    }
+
+
+@pytest.mark.parametrize("name", odd_runs())
+def test_odd_runs_have_a_figure(name):
+    """A PNG of 1600 × 1000 pixels below 300 kB comes of every run, and no warning."""
+    picture = Image.open(io.BytesIO(png(run_figure(odd_runs()[name]))))
+    assert picture.size == (1600, 1000)
+
+
+def test_grains_without_a_place_are_left_out():
+    """After a run that blew up, what still has a position is drawn, and the rest is mentioned."""
+    run = run_of([[0.0, 0.0, 0.0], [3e-8, 0.0, 0.0]])
+    run.grains.arrays.position[0, 1] = np.nan
+    figure = run_figure(run)
+    assert "left out: 1" in texts(figure)
+    run.grains.arrays.position[0, 0] = np.inf
+    assert len(run_figure(run).axes) == 4
+
+
+def test_thousand_grains_stay_small(tmp_path):
+    """A thousand grains in one crowd are drawn, and their PNG is below 300 kB."""
+    rng = np.random.default_rng(7)
+    position = rng.normal(size=(1000, 3)) * 6e-8
+    run = run_of(position, 1e-8, [(i, i + 1) for i in range(0, 998, 3)], moment=rng.normal(size=(1000, 3)))
+    save(run_figure(run), tmp_path / "figure.png")
+    assert 50_000 < (tmp_path / "figure.png").stat().st_size <= LARGEST_FILE
+    assert [path.name for path in tmp_path.iterdir()] == ["figure.png"]
+
+
+# --- the rest ----------------------------------------------------------------------------------------
+
+
+def test_a_real_run_has_its_figure():
+    """A simulation's `view` returns the figure, which notebooks show as a PNG, even before the first step."""
+    grains = sand.Grains([[0.0, 0.0, 0.0], [2.5e-8, 0.0, 0.0]], "10 nm", sand.SILICA)
+    figure = sand.Simulation(grains, forces=[sand.Contact()]).view()
+    assert isinstance(figure, Figure)
+    assert figure._repr_png_()[:4] == b"\x89PNG"
+
+
+def test_nothing_global_changes(grown):
+    """Neither the settings of matplotlib nor the list of open figures knows that a figure was made."""
+    from matplotlib import pyplot
+
+    before, opened = dict(matplotlib.rcParams), pyplot.get_fignums()
+    with matplotlib.rc_context({"font.size": 31.0, "axes.grid": True}):
+        figure = run_figure(grown)
+        png(figure)
+        assert matplotlib.rcParams["font.size"] == 31.0
+    assert figure.texts[0].get_size() < 31.0
+    assert dict(matplotlib.rcParams) == before
+    assert pyplot.get_fignums() == opened
+    assert show(figure) is figure
+
+
+def test_same_run_same_picture(grown):
+    """Two figures of one run agree byte for byte."""
+    assert png(run_figure(grown)) == png(run_figure(grown))
+
+
+@pytest.mark.parametrize(
+    ("size", "text"), [(1.2e-6, "1.2 µm"), (1e-9, "1 nm"), (0.0, "0 m"), (999.0e-9, "999 nm"), (1e-3, "1 mm")]
+)
+def test_pretty_numbers(size, text):
+    """Numbers are written with the SI prefix that leaves one to three digits before the point."""
+    assert pretty(size, "m") == text
+
+
+def test_prefixes_and_round_lengths():
+    """Prefixes end where SI's do; round lengths are 1, 2 or 5 and never above what is allowed."""
+    assert with_prefix(np.nan, "s") == (1.0, "s")
+    assert with_prefix(1e-30, "J") == (1e-24, "yJ")
+    for at_most in (1e-9, 1.99e-9, 2e-9, 4.7e-8, 9.9e-7, 5.0):
+        length = round_length(at_most)
+        assert at_most / 2.5 < length <= at_most * (1.0 + 1e-6)
+        assert f"{length:e}"[0] in "125"
+    assert FINER >= 2
