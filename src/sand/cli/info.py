@@ -41,7 +41,8 @@ def _teller(path: Path) -> Callable[[Path], Told]:
         near = did_you_mean(path.name, _names_beside(path)) if _names_beside(path) else ""
         raise BadInput(f"there is no file or folder {path}" + (f"; {near}" if "mean" in near else ""))
     if path.suffix not in KINDS:
-        raise BadInput(f"{path} is none of the files that SAND knows: a run's folder, {', '.join(KINDS)}")
+        raise BadInput(f"{path} is not something to tell about; give a run's folder, a case file (.toml), trajectory.gsd, "
+            "a checkpoint (.npz), summary.json or ledger.csv")
     return KINDS[path.suffix]
 
 

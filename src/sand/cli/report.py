@@ -106,7 +106,10 @@ def _grains(grains: Any, temperature: float) -> str:
 
 
 def _force(force: Any) -> str:
-    settings = ", ".join(f"{key} = {value}" for key, value in force.parameters().items())
+    def say(value: Any) -> str:
+        return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+    settings = ", ".join(f"{key} = {say(value)}" for key, value in force.parameters().items())
     return f"{force.name} ({settings})" if settings else force.name
 
 

@@ -135,5 +135,6 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     )
     if case.grains.kind == "gas":
         simulation.recipe = case.grains.model_dump(exclude_none=True)
-    simulation.planned = tuple(math.inf if end is None else end for end in (meta["until"], meta["last_step"]))
+    end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))
+    simulation.planned = (end, last)
     return simulation

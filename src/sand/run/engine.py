@@ -25,6 +25,8 @@ from ..stepping.verlet import Verlet
 
 SPREAD = 8
 """Columns for contacts and near pairs per grain to begin with; they grow when needed."""
+IDLE = 1e5
+"""Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
 MOST_OVERLAP = (2.0, 1e-3)
 """Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
 
@@ -139,12 +141,20 @@ def build_engine(grains: Grains, forces: Sequence[Force], box: Box, stepping: Ve
             energy_scale=dipoles.energy_scale(grains) if dipoles else 0.0,
             accuracy=stepping.accuracy,
             outer_field=math.fsum(f.flux_density_size() for f in outside),
+            longest=IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials))),
         ),
     )
     engine = Engine(world, rules, warnings, driver_for(composed), outside)
     if contact is not None and fresh:
         _refuse_overlaps(engine, contact)
     return engine
+
+
+def sound_crossing(grains: Grains, number: int) -> float:
+    """r √(ρ/E) [s] of the smallest grain of one material."""
+    material = grains.materials[number]
+    radius = float(grains.radius[grains.material == number].min())
+    return radius * math.sqrt(material.density / material.young_modulus)
 
 
 def _refuse_doubles(forces: Sequence[Force]) -> None:

@@ -51,5 +51,5 @@ def _annotations(kind: Any, extra: dict[type, list[str]]) -> dict[str, Any]:
             return {k: f.annotation for k, f in candidate.model_fields.items()}
         if dataclasses.is_dataclass(candidate):
             own = [f.name for f in dataclasses.fields(candidate)]
-            return dict.fromkeys([*extra.get(candidate, []), *own])
+            return dict.fromkeys([*extra.get(typing.cast(type, candidate), []), *own])
     return {}

@@ -52,14 +52,17 @@ class Record:
         write_toml(self.folder / files.CASE, case_of(simulation, until, last_step), text)
         steps = simulation.world.steps if self._resumed else None
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, steps)
-        if self._resumed:
-            simulation.ledger.restore(read_ledger(self.folder / files.LEDGER))
         self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, append=self._resumed)
         if not self._resumed:
             for row in simulation.ledger.rows:
                 self._ledger.append(row)
             self._frame(simulation)
         self.save(simulation)
+
+    def earlier_rows(self, steps: int) -> list[dict[str, float]]:
+        """The rows of the ledger up to a step, for a restart."""
+        rows = read_ledger(self.folder / files.LEDGER)
+        return [row for row in rows if row["step"] <= steps]
 
     def write(self, simulation: Simulation, row: dict[str, float]) -> None:
         """A frame and a row."""

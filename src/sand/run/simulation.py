@@ -86,6 +86,8 @@ class Simulation:
             arrays, meta = restart
             self.world.from_arrays(arrays)
             self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
+            if self.record:
+                self.ledger.restore(self.record.earlier_rows(self.world.steps))
         for text in self._engine.warnings:
             warnings.warn(text, stacklevel=2)
 

@@ -19,8 +19,6 @@ FIELD_ANGLE = 0.03
 """Largest phase √(μB/I) dt of a moment swinging in its field; Verlet then errs by 4e-5 in its frequency."""
 CLOSING_PART = 0.2
 """Largest part of the gap that two grains about to touch may close in one step."""
-LONGEST = 2.0**-10
-"""Longest step [s], for worlds in which nothing happens."""
 REACH_PART = 1.0 / 16.0
 """Largest part of the list's reach that a grain may fly in one step; keeps `list_is_stale` safe."""
 
@@ -33,6 +31,7 @@ class Control(NamedTuple):
     energy_scale: float  # what the magnetics may put at stake, |U_min| [J]; 0: no such force
     accuracy: float  # part of it that a step may misplace
     outer_field: float  # size of the external flux density [T]
+    longest: float  # for worlds in which nothing happens [s]
 
 
 @formula
@@ -56,7 +55,7 @@ def wanted_step(grains, contacts, near, count, span, control):
 
     Bound grains are left out of the accuracy rule: they ring, and their step is that of contacts.
     """
-    wanted = math.inf
+    wanted = control.longest
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
@@ -95,11 +94,11 @@ def choose_step(grains, contacts, near, clock, count, span, control):
         wanted = wanted_step(grains, contacts, near, count, span, control)
         if not wanted > 0.0:
             return 0.0
-        level = clock[LEVEL] if clock[LEVEL] > 0.0 else LONGEST
+        level = clock[LEVEL] if clock[LEVEL] > 0.0 else 1.0
         while level > wanted:
             level *= 0.5
         if count[STEPS] % GROW_EVERY == 0:
-            while 2.0 * level <= wanted and level < LONGEST:
+            while 2.0 * level <= wanted:
                 level *= 2.0
         clock[LEVEL] = level
     if control.fixed > 0.0:

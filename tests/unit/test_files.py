@@ -1,0 +1,135 @@
+"""Files: never half there, never silently wrong."""
+
+import json
+import os
+
+import gsd.hoomd
+import numpy as np
+import pytest
+
+import sand
+from sand.core.errors import FilesFailed
+from sand.files.checkpoint import newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.files.folder import LedgerFile, make_folder, read_ledger, read_toml, replace_file, write_json, write_toml
+from sand.files.trajectory import read_frames
+
+from ..physics.setups import struck_chain
+
+ARRAYS = {"a/x": np.arange(6.0).reshape(2, 3), "count": np.array([3, 4])}
+
+
+def test_a_checkpoint_comes_back_bit_for_bit(tmp_path):
+    """Arrays, types and meta; two are kept."""
+    for steps in (1, 2, 30):
+        write_checkpoint(tmp_path, ARRAYS, {"steps": steps})
+    assert len(list(tmp_path.glob("checkpoint-*.npz"))) == 2
+    arrays, meta = newest_checkpoint(tmp_path)
+    assert meta["steps"] == 30
+    for name, array in ARRAYS.items():
+        assert arrays[name].tobytes() == array.tobytes()
+        assert arrays[name].dtype == array.dtype
+
+
+@pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "text"])
+def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage):
+    """A flipped bit in the data, a torn file, an empty one, a foreign one: one line, never wrong numbers."""
+    write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
+    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 2})
+    content = bytearray(path.read_bytes())
+    if damage == "flip":
+        at = content.find(np.float64(3.0).tobytes())
+        content[at + 7] ^= 1
+    cut = {"flip": bytes(content), "truncate": bytes(content[:200]), "empty": b"", "text": b"hello"}[damage]
+    path.write_bytes(cut)
+    with pytest.raises(sand.BadInput, match=str(path)):
+        read_checkpoint(path)
+    assert newest_checkpoint(tmp_path)[1]["steps"] == 1
+
+
+def test_a_checkpoint_of_the_future_is_refused_politely(tmp_path, monkeypatch):
+    """An older program says that it is too old."""
+    monkeypatch.setattr("sand.files.checkpoint.VERSION", 99)
+    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
+    monkeypatch.undo()
+    with pytest.raises(sand.BadInput, match=r"newer SAND.*update"):
+        read_checkpoint(path)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
+    """A disk that fills up while writing: the old content stays, the message names the file."""
+    path = tmp_path / "x.json"
+    replace_file(path, b"old")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(FilesFailed, match=r"x\.json.*No space left.*untouched"):
+        replace_file(path, b"new")
+    assert path.read_bytes() == b"old"
+
+
+def test_folders_are_never_overwritten_unasked(tmp_path):
+    """A folder with anything in it is refused; `overwrite` removes our own files and nothing else."""
+    folder = tmp_path / "run"
+    make_folder(folder)
+    (folder / "notes.txt").write_text("mine")
+    (folder / "summary.json").write_text("{}")
+    with pytest.raises(sand.BadInput, match="not empty"):
+        make_folder(folder)
+    make_folder(folder, overwrite=True)
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert not (folder / "summary.json").exists()
+    with pytest.raises(sand.BadInput, match="is a file"):
+        make_folder(folder / "notes.txt")
+
+
+def test_json_and_toml(tmp_path):
+    """NumPy numbers become plain, NaN becomes null, floats survive TOML to the last bit."""
+    write_json(tmp_path / "a.json", {"x": np.float64(1.5), "n": np.int64(3), "bad": float("nan"), "l": [np.inf]})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"x": 1.5, "n": 3, "bad": None, "l": [None]}
+    values = {"run": {"until": 0.1 + 0.2, "tiny": 5e-324}}
+    write_toml(tmp_path / "a.toml", values, "a comment")
+    assert read_toml(tmp_path / "a.toml") == values
+
+
+def test_the_ledger_file_drops_what_a_restart_will_write_again(tmp_path):
+    """Rows after the checkpoint and a torn last line go; numbers come back to the last bit."""
+    path = tmp_path / "ledger.csv"
+    file = LedgerFile(path, ["step", "x"])
+    for step in (0, 5, 9):
+        file.append({"step": step, "x": 0.1 * step})
+    with open(path, "a") as torn:
+        torn.write("12")
+    LedgerFile(path, ["step", "x"], resume_at=5)
+    assert read_ledger(path) == [{"step": 0, "x": 0.0}, {"step": 5, "x": 0.5}]
+
+
+def test_the_trajectory_holds_what_the_world_held(tmp_path):
+    """Positions to float32 of a radius, moments and times to the last bit, contacts as bonds; GSD reads it."""
+    sim = struck_chain(moment="200 A m^2/kg")
+    sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="0.1 ns")
+    sim.run(until="0.5 ns")
+    frames = read_frames(tmp_path / "run" / "trajectory.gsd")
+    assert len(frames) == len(sim.ledger) == 6
+    last = frames[-1]
+    assert last.time == sim.time
+    assert last.step == sim.world.steps
+    assert last.position == pytest.approx(sim.grains.position, abs=1e-6 * 1e-8 * 20)
+    assert (last.moment == sim.grains.moment).all()
+    assert last.radius == pytest.approx(sim.grains.radius)
+    assert (last.pair == sim.contacts["pair"]).all()
+    assert last.box.is_open
+    with gsd.hoomd.open(str(tmp_path / "run" / "trajectory.gsd"), "r") as file:
+        assert file[-1].particles.types == ["iron"]
+        assert len(sim.contacts["pair"]) == file[-1].bonds.N
+
+
+def test_foreign_files_are_named(tmp_path):
+    """A file that is not a trajectory, and one that is not there."""
+    path = tmp_path / "trajectory.gsd"
+    with pytest.raises(sand.BadInput, match="there is no file"):
+        read_frames(path)
+    path.write_bytes(b"not a trajectory" * 100)
+    with pytest.raises(sand.BadInput, match="not a trajectory"):
+        read_frames(path)

@@ -1,0 +1,183 @@
+"""The simulation object: what it refuses, what it warns of, how it ends."""
+
+import math
+import signal
+import threading
+import warnings
+
+import numpy as np
+import pytest
+
+import sand
+from sand.run.observers import Schedule
+
+from ..physics.setups import rest_distance, struck_chain
+
+
+def pair(distance=3e-8, **options):
+    return sand.Grains([[0, 0, 0], [distance, 0, 0]], 1e-8, options.pop("material", sand.IRON), **options)
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: sand.Simulation([1, 2]), r"give sand.Grains"),
+        (lambda: sand.Simulation(pair(), ["contact"]), r"'contact' is not a force"),
+        (lambda: sand.Simulation(pair(), [sand.Contact(), sand.Contact()]), r"'contact' is given more than once"),
+        (lambda: sand.Simulation(pair(), [sand.Contact()], box="50 nm"), r"too small: .* at least 6e-08 m"),
+        (lambda: sand.Simulation(pair(distance=1.5e-8), [sand.Contact()]), r"grains 0 and 1 overlap|grains 1 and 0"),
+        (lambda: sand.Simulation(pair(material=sand.MAGNETITE), [sand.Contact()]), r"magnetite.*no surface energy"),
+        (lambda: sand.Contact(beyond="clmp"), r"did you mean 'clamp'"),
+        (lambda: sand.Dipoles(cutoff="3 K"), r"cutoff = '3 K' is not a quantity in m"),
+        (lambda: sand.Dipoles(cutoff=-1.0), r"cutoff = -1.0 must be above 0"),
+        (
+            lambda: sand.Simulation(pair(moment="1 A m^2/kg"), [sand.Dipoles(cutoff="1 um")], box="1 um"),
+            r"beyond half the box",
+        ),
+        (lambda: sand.Field([1, 2]), r"one size along z or three components, in T"),
+        (lambda: sand.Field("1 m"), r"flux_density z = '1 m'"),
+        (lambda: sand.Verlet(steps_per_period=2), r"at least 10"),
+        (lambda: sand.Verlet(step="1 m"), r"step = '1 m'"),
+        (lambda: sand.Simulation(pair()).run(), r"run needs an end"),
+        (lambda: sand.Simulation(pair()).run(until="-1 s"), r"lies before"),
+        (lambda: sand.Simulation(pair()).run(steps=0), r"steps = 0"),
+        (lambda: sand.Simulation(pair()).run(until="3 m"), r"until = '3 m'"),
+    ],
+)
+def test_bad_input(build, message):
+    """One clear line each."""
+    with pytest.raises(sand.BadInput, match=message):
+        build()
+
+
+def test_overlaps_name_ten_pairs_and_count_the_rest():
+    """Twenty grains in one place: 190 pairs, ten lines and a remark."""
+    grains = sand.Grains(1e-9 * np.arange(60).reshape(20, 3) * 0.01, 1e-8, sand.IRON)
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Simulation(grains, [sand.Contact()])
+    assert len(caught.value.problems) == 11
+    assert "180 more" in caught.value.problems[-1]
+
+
+def test_overlap_is_measured_across_the_faces_of_the_box():
+    """Two grains that touch only through the periodic boundary are seen."""
+    grains = sand.Grains([[-9.5e-8, 0, 0], [9.5e-8, 0, 0]], 1e-8, sand.SILICA)
+    with pytest.raises(sand.BadInput, match="overlap by 1e-08"):
+        sand.Simulation(grains, [sand.Contact()], box="0.2 um")
+
+
+def test_warnings():
+    """a0/R > 0.3, moments that are missing, images without a cut."""
+    with pytest.warns(UserWarning, match=r"a0/R = 0\.53"):
+        sand.Simulation(pair(), [sand.Contact()])
+    with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
+        sand.Simulation(pair(), [sand.Dipoles()])
+    with pytest.warns(UserWarning, match="energy jumps"):
+        sand.Simulation(pair(moment="1 A m^2/kg"), [sand.Dipoles(cutoff=None)], box="1 um")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sand.Simulation(sand.Grains([[0, 0, 0]], 1e-6, sand.SILICA), [sand.Contact()])
+
+
+def test_the_cutoff_is_stated_with_its_reason():
+    """Open box: none. Periodic: the smaller of 1.5 b_max and half the box / 1.35, and which one."""
+    hot = pair(moment="200 A m^2/kg", velocity=[[1.0, 0, 0], [-1.0, 0, 0]])
+    assert "open box" in sand.Simulation(hot, [sand.Dipoles()]).choices["dipoles cut-off"]
+    small = sand.Simulation(hot, [sand.Dipoles()], box="0.2 um").choices["dipoles cut-off"]
+    assert small.startswith(f"{0.5 * 2e-7 / 1.35:.4g} m (half the box / 1.35")
+    large = sand.Simulation(hot, [sand.Dipoles()], box="1 mm").choices["dipoles cut-off"]
+    assert "1.5 b_max" in large
+
+
+def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
+    """A fixed step in which a grain flies more than half its radius: an Outcome and a checkpoint."""
+    grains = pair(velocity=[[0, 0, 0], [0, 100.0, 0]])
+    sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="1 ns"), out=tmp_path / "run")
+    result = sim.run(until="1 us")
+    assert result.outcome is sand.Outcome.FLEW_TOO_FAR
+    assert result.grains == (1,)
+    assert list((tmp_path / "run").glob("checkpoint-*.npz"))
+    assert "grains 1" in str(result)
+
+
+def test_crushed_grains_end_the_run():
+    """An impact so fast that a centre enters the other grain: JKR has nothing to say."""
+    grains = pair(velocity=[[0, 0, 0], [-2e5, 0, 0]], material=sand.SILICA)
+    result = sand.Simulation(grains, [sand.Contact()]).run(until="1 ns")
+    assert result.outcome is sand.Outcome.CRUSHED
+    assert result.grains == (0, 1)
+
+
+def test_numbers_that_are_not_finite_end_the_run():
+    """A spin driven to NaN from outside is seen within 16 steps."""
+    sim = struck_chain()
+    sim.run(steps=100)
+    sim.world.grains.arrays.spin[0, 3] = math.nan
+    result = sim.run(steps=200)
+    assert result.outcome is sand.Outcome.NOT_FINITE
+
+
+def test_nothing_happens_in_an_empty_world():
+    """One grain at rest: the run ends at its time, in steps of at most 1e5 sound-crossing times r √(ρ/E)."""
+    sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.IRON), [sand.Contact()])
+    result = sim.run(until="1 ms")
+    assert result.outcome is sand.Outcome.FINISHED
+    assert 1e-3 <= result.time < 1e-3 + 1e5 * 1e-8 * math.sqrt(7874 / 210e9)
+    assert result.drift == 0.0
+
+
+def test_without_contact_grains_pass_through_each_other():
+    """No Contact in the list: no contact forms."""
+    sim = sand.Simulation(pair(velocity=[[0, 0, 0], [-1.0, 0, 0]]), [])
+    sim.run(until="60 ns")
+    assert len(sim.contacts["pair"]) == 0
+    assert sim.grains.position[1, 0] == pytest.approx(3e-8 - sim.time, rel=1e-12)
+
+
+def test_a_pair_that_touches_across_the_faces():
+    """Periodic images: a pair through the boundary sticks as it does in the middle, to rounding."""
+    ends = []
+    for shift in (0.0, 1e-7):
+        x = np.array([[shift - 1.2e-8, 0, 0], [shift + 1.2e-8, 0, 0]])
+        grains = sand.Grains(x, 1e-8, sand.SILICA, velocity=[[2.0, 0, 0], [-2.0, 0.5, 0]])
+        sim = sand.Simulation(grains, [sand.Contact()], box=2e-7)
+        sim.run(steps=3000)
+        ends.append((sim.grains.velocity.copy(), len(sim.contacts["pair"])))
+    assert ends[0][1] == ends[1][1] == 1
+    assert ends[0][0] == pytest.approx(ends[1][0], abs=1e-6 * np.abs(ends[0][0]).max())
+
+
+def test_the_starting_objects_are_untouched():
+    """The simulation works on a copy, and shows views nobody can write to."""
+    grains = pair(velocity=[[0, 0, 0], [-1.0, 0, 0]])
+    sim = sand.Simulation(grains, [sand.Contact()])
+    sim.run(steps=10)
+    assert grains.position[1, 0] == 3e-8
+    with pytest.raises(ValueError):
+        sim.grains.position[0] = 0.0
+
+
+def test_an_interrupt_stops_between_two_steps(tmp_path):
+    """SIGINT: the run raises Interrupted, a checkpoint is there, and a resumed run reaches the end."""
+    d = rest_distance(sand.SILICA, 1e-7, 1e-7)
+    grains = sand.Grains([[0, 0, 0], [d, 0, 0]], 1e-7, sand.SILICA, velocity=[[0.01, 0, 0], [0, 0, 0]])
+    sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run")
+    sim.run(steps=10)  # compiled
+    timer = threading.Timer(0.3, lambda: signal.raise_signal(signal.SIGINT))
+    timer.start()
+    with pytest.raises(sand.Interrupted) as caught:
+        sim.run(until="1 s")
+    assert caught.value.result.outcome is sand.Outcome.INTERRUPTED
+    again = sand.resume(tmp_path / "run")
+    assert again.time == caught.value.result.time
+    assert again.run(steps=100).outcome is sand.Outcome.FINISHED
+
+
+def test_when_frames_are_due():
+    """Multiples of the interval, the first after the present time; none if there is no interval."""
+    schedule = Schedule(0.1, 0.0)
+    assert schedule.due == pytest.approx(0.1)
+    schedule.pass_by(0.35)
+    assert schedule.due == pytest.approx(0.4)
+    assert Schedule(0.1, 7.05).due == pytest.approx(7.1)
+    assert Schedule(math.inf, 0.0).due == math.inf
