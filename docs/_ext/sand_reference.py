@@ -118,6 +118,12 @@ def markdown(docstring: str | None) -> str:
     return "\n\n".join(out)
 
 
+def of_section(docstring: str | None) -> str:
+    """The docstring of a section without the name of its table, which the heading has already."""
+    text = re.sub(r"^\[[\w.*]+\]: ", "", inspect.cleandoc(docstring or ""))
+    return markdown(text[:1].upper() + text[1:])
+
+
 def first_sentence(docstring: str | None) -> str:
     """The summary line of a docstring, with its continuation."""
     return " ".join(inspect.cleandoc(docstring or "").split("\n\n")[0].split())
@@ -468,14 +474,14 @@ def case_page() -> str:
                 kind = typing.get_args(kind)[1]
                 notes = argument_notes(Material.__doc__)
                 defaults = {f.name: f.default for f in dataclasses.fields(Material)}
-                out += ["## `[materials.NAME]`", markdown(kind.__doc__)]
+                out += ["## `[materials.NAME]`", of_section(kind.__doc__)]
                 rows = _model_rows("materials.NAME", kind, notes)
                 for row in rows[1:]:
                     default = defaults[row[0].strip("`")]
                     row[1] = "needed" if default is dataclasses.MISSING else _default(default)
                 out += [table(head, rows)]
             elif name == "forces":
-                out += ["## `[forces.*]`", markdown(kind.__doc__)]
+                out += ["## `[forces.*]`", of_section(kind.__doc__)]
                 for key, inner in kind.model_fields.items():
                     law = next(t for t in typing.get_args(inner.annotation) if t is not type(None))
                     out += [f"### `[forces.{key}]`", escaped(first_sentence(law.__doc__)), _settings(law, head)]
@@ -485,7 +491,7 @@ def case_page() -> str:
                 out += [f"## `[{name}]`", escaped(first_sentence(kind.__doc__)), _settings(kind, head, first)]
             else:
                 note = "" if not field.is_required() else " This section is required."
-                out += [f"## `[{name}]`", markdown(kind.__doc__) + note]
+                out += [f"## `[{name}]`", of_section(kind.__doc__) + note]
                 out += [table(head, _model_rows(name, kind, {}))]
         if CASE_KEYS:
             raise ValueError(f"these case keys do not exist any more: {', '.join(CASE_KEYS)}")

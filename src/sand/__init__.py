@@ -33,7 +33,7 @@ _HOMES = {
     "Outcome": "run.outcome",
     "Result": "run.outcome",
 }
-_ROOMS = ("setup", "theory", "analysis", "files")
+_ROOMS = ("setup", "analysis", "files")
 
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 import sand
@@ -54,3 +56,20 @@ def random_aggregate(
                 break
     given = {"velocity": 0.3 * rng.normal(size=(count, 3)), "spin": 1e7 * rng.normal(size=(count, 3))}
     return sand.Grains(position, radius, material, **(given | options))
+
+
+class Imposed:
+    """A simulation whose motion is imposed from outside: grains are moved, contacts answer, loads are ignored."""
+
+    def __init__(self, grains, contact=None):
+        self.sim = sand.Simulation(grains, [contact or sand.Contact()], stepping=sand.Verlet(step=1.0))
+        self.sim.loads()
+
+    def step(self, velocity, spin):
+        """One step of 1 s at these velocities (N, 3) [m/s] and spins [rad/s]; what Verlet adds is taken back."""
+        g = self.sim.world.grains.arrays
+        g.force[...] = 0.0
+        g.torque[...] = 0.0
+        g.velocity[...] = np.transpose(velocity)
+        g.spin[...] = np.transpose(spin)
+        self.sim._engine.advance(math.inf, 1)

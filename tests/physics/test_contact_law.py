@@ -215,6 +215,14 @@ def test_limits_hold_on_both_sides(release, sign):
     assert left.slide[1] == pytest.approx(part * sign * bond.slide_limit)
     assert left.roll[0] == pytest.approx(part * bond.roll_limit)
     assert left.twist == pytest.approx(part * sign * bond.twist_limit)
+    zero = (0.0, 0.0, 0.0)
+    alone = (
+        law.Strain(0.0, zero, zero, sign * 1.1 * bond.twist_limit),
+        law.Strain(0.0, (0.0, sign * 1.1 * bond.slide_limit, 0.0), zero, 0.0),
+        law.Strain(0.0, zero, (sign * 1.1 * bond.roll_limit, 0.0, 0.0), 0.0),
+        law.Strain(-1.01 * bond.pull_off_overlap, zero, zero, 0.0),
+    )
+    assert all(law.beyond_limits(strain, bond) for strain in alone)
     within = law.Strain(0.0, (0.0, 0.9 * bond.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * bond.twist_limit)
     assert not law.beyond_limits(within, bond)
     assert law.yielded(within, bond, release) == within

@@ -27,6 +27,12 @@ def test_what_follows_from_radius_and_material():
     assert [m.name for m in grains.materials] == ["iron", "silica"]
 
 
+def test_moments_of_the_material():
+    """moment="material": the material's own moment per mass."""
+    grains = two(moment="material", material=["iron", sand.SILICA])
+    assert grains.moment[:, 2] == pytest.approx([200 * grains.mass[0], 0.0])
+
+
 def test_every_quantity_of_the_table_is_there():
     """Public shape (N,) or (N, width), a view without a copy, read only."""
     grains = two()
@@ -61,6 +67,7 @@ def test_a_copy_is_independent():
         ({"material": "irom"}, r"unknown material 'irom'; did you mean 'iron'"),
         ({"material": [sand.IRON]}, r"material has 1 entries but there are 2 grains"),
         ({"material": [1, 2]}, r"material of grain 0 is 1"),
+        ({"material": [sand.IRON, sand.IRON.but(density=1.0)]}, r"two different materials are called 'iron'"),
         ({"moment": "200 K"}, r"moment = '200 K' must be"),
         ({"moment": -1.0}, r"moment = -1.0 must be"),
         ({"charge": math.inf}, r"charge of grain 0 .*C"),

@@ -11,18 +11,18 @@ from . import options, report
 REFERENCES = (
     (
         "the equations of SAND, magnetic aggregation",
-        "Dominik C., Nübold H. (2002): Magnetic Aggregation: Dynamics and Numerical Modeling. "
-        "Icarus 157, 173–186. arXiv:astro-ph/0201500",
+        "Dominik C., Nübold H. (2002): Magnetic Aggregation I: Aggregation Dynamics and Numerical Modelling. "
+        "Icarus 157, 173. arXiv:astro-ph/0201500",
     ),
     (
         "contacts of grains: rolling, sliding, twisting",
         "Dominik C., Tielens A. G. G. M. (1997): The Physics of Dust Coagulation and the Structure of Dust "
-        "Aggregates in Space. ApJ 480, 647–673. doi:10.1086/303996",
+        "Aggregates in Space. ApJ 480, 647. doi:10.1086/303996",
     ),
     (
         "adhesion",
         "Johnson K. L., Kendall K., Roberts A. D. (1971): Surface energy and the contact of elastic solids. "
-        "Proc. R. Soc. Lond. A 324, 301–313. doi:10.1098/rspa.1971.0141",
+        "Proc. R. Soc. Lond. A 324, 301. doi:10.1098/rspa.1971.0141",
     ),
 )
 

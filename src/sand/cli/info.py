@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..core.errors import BadInput, did_you_mean
+from ..core.errors import BadInput
 from ..files import folder as files
 from . import options, report
 
@@ -38,19 +39,33 @@ def _teller(path: Path) -> Callable[[Path], Told]:
     if path.is_dir():
         return of_run
     if not path.exists():
-        near = did_you_mean(path.name, _names_beside(path)) if _names_beside(path) else ""
-        raise BadInput(f"there is no file or folder {path}" + (f"; {near}" if "mean" in near else ""))
+        raise BadInput(f"there is no file or folder {path}")
     if path.suffix not in KINDS:
-        raise BadInput(f"{path} is not something to tell about; give a run's folder, a case file (.toml), trajectory.gsd, "
-            "a checkpoint (.npz), summary.json or ledger.csv")
+        raise BadInput(
+            f"{path} is not something to tell about; give a run's folder, a case file (.toml), trajectory.gsd, "
+            "a checkpoint (.npz), summary.json or ledger.csv"
+        )
     return KINDS[path.suffix]
 
 
-def _names_beside(path: Path) -> list[str]:
+def _summary(path: Path) -> dict[str, Any]:
+    """A summary that holds what is told of it.  Raises BadInput."""
     try:
-        return [p.name for p in path.parent.iterdir()]
-    except OSError:
-        return []
+        summary = files.read_json(path)
+        report.results(summary)
+        if {"outcome", "outcome_text", "grains_concerned", "choices", "grains"} <= summary.keys():
+            return summary
+    except (BadInput, KeyError, TypeError, ValueError):
+        pass
+    raise BadInput(f"{path} is not a summary of SAND")
+
+
+def _ledger(path: Path) -> list[dict[str, float]]:
+    """The rows of a ledger.  Raises BadInput."""
+    rows = files.read_ledger(path)
+    if not rows or not {"step", "time", "total", "clusters", "mean_cluster_size", "largest_cluster"} <= rows[0].keys():
+        raise BadInput(f"{path} is not a ledger of SAND, or an empty one")
+    return rows
 
 
 def of_run(path: Path) -> Told:
@@ -59,40 +74,33 @@ def of_run(path: Path) -> Told:
 
     if not (path / files.CASE).exists():
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
-    end = files.read_toml(path / files.CASE).get("run", {}).get("until")
-    summary = files.read_json(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
-    ledger = files.read_ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
+    planned = files.read_toml(path / files.CASE).get("run", {})
+    summary = _summary(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
+    ledger = _ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
     last = ledger[-1] if ledger else None
     # a run that is going on, or was killed, is in its ledger beyond its summary
     beyond = last if last and (summary is None or last["step"] > summary["steps"]) else None
     rows: report.Rows = []
     if summary is not None:
-        rows += [
-            ("outcome", summary["outcome_text"] + report.named(summary["grains_concerned"])),
-            ("grains", str(summary["grains"])),
-            *summary["choices"].items(),
-            *report.results(summary),
-        ]
+        named = report.named(summary["grains_concerned"])
+        rows += [("outcome", summary["outcome_text"] + named), ("grains", str(summary["grains"]))]
+        rows += [*summary["choices"].items(), *report.results(summary)]
     if beyond is not None:
+        label = "state" if summary is None else "since then"
         rows += [
-            ("state" if summary is None else "since then", "running, or stopped without having been closed"),
+            (label, "running, or stopped without having been closed"),
             ("last frame", f"{spoken(beyond['time'], 's')} after {beyond['step']} steps"),
             ("clusters", report.clusters(beyond)),
         ]
-    if end is not None:
-        rows.append(("planned end", spoken(end, "s")))
+    if "until" in planned:
+        rows.append(("planned end", spoken(planned["until"], "s")))
     rows.append(("files", "  ".join(report.files_of(path))))
-    time = max((row["time"] for row in (summary, last) if row), default=0.0)
-    if report.checkpoints(path) and (end is None or time < end):
+    until = planned.get("until", 0.0)
+    ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
+    if report.checkpoints(path) and not ended:
         rows.append(("go on with", report.resume_line(path)))
-    content = {
-        "kind": "run",
-        "folder": str(path),
-        "summary": summary,
-        "last_row": last,
-        "planned_end": end,
-        "files": report.files_of(path),
-    }
+    content: dict[str, Any] = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
+    content |= {"planned_end": planned.get("until"), "files": report.files_of(path)}
     return f"{path}: a run", rows, content
 
 
@@ -105,11 +113,12 @@ def of_case(path: Path) -> Told:
     if case.grains.kind == "given":
         rows = [("grains", f"{case.grains.number}, made by a script"), ("box", case.box.periodic.describe())]
         return f"{path}: the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
-    simulation = report.with_notes(lambda: simulation_of(case, None))
+    simulation = report.with_notes(lambda: report.blame(path, lambda: simulation_of(case, None)))
     folder = Path(case.run.out or path.stem)
-    simulation.frame_every = case.run.frame_every
-    rows = report.opening(simulation, case.run.until, folder)
-    content = {"kind": "case", "case": case_of(simulation, case.run.until), "choices": simulation.choices}
+    end = math.inf if case.run.until is None else case.run.until
+    steps = math.inf if case.run.steps is None else case.run.steps
+    rows = report.opening(simulation, end, steps, folder)
+    content = {"kind": "case", "case": case_of(simulation, end, steps), "choices": simulation.choices}
     return f"{path}: a case without mistakes", rows, content
 
 
@@ -161,35 +170,26 @@ def of_checkpoint(path: Path) -> Told:
 
 def of_summary(path: Path) -> Told:
     """A summary."""
-    summary = files.read_json(path)
-    try:
-        rows = [("outcome", summary["outcome_text"]), *report.results(summary)]
-    except (KeyError, TypeError):
-        raise BadInput(f"{path} is not a summary of SAND") from None
-    return f"{path}: the summary of a run", rows, {"kind": "summary", **summary}
+    summary = _summary(path)
+    rows = [("outcome", summary["outcome_text"] + report.named(summary["grains_concerned"]))]
+    return f"{path}: the summary of a run", rows + report.results(summary), {"kind": "summary", **summary}
 
 
 def of_ledger(path: Path) -> Told:
     """First and last row of the books."""
     from ..core.units import spoken
 
-    ledger = files.read_ledger(path)
-    try:
-        first, last = ledger[0], ledger[-1]
-        lost = {name: value for name, value in last.items() if name.startswith("lost_")}
-        rows = [
-            ("rows", f"{len(ledger)}, from {spoken(first['time'], 's')} to {spoken(last['time'], 's')}"),
-            ("total energy", f"{first['total']:.6g} J at first, {last['total']:.6g} J at last"),
-            ("dissipated", ", ".join(f"{k[5:]} {v:.3g} J" for k, v in lost.items())),
-            ("clusters", report.clusters(last)),
-        ]
-    except (KeyError, IndexError):
-        raise BadInput(f"{path} is not a ledger of SAND, or an empty one") from None
-    return (
-        f"{path}: the ledger of a run",
-        rows,
-        {"kind": "ledger", "rows": len(ledger), "first": first, "last": last},
-    )
+    ledger = _ledger(path)
+    first, last = ledger[0], ledger[-1]
+    lost = {name: value for name, value in last.items() if name.startswith("lost_")}
+    rows = [
+        ("rows", f"{len(ledger)}, from {spoken(first['time'], 's')} to {spoken(last['time'], 's')}"),
+        ("total energy", f"{first['total']:.6g} J at first, {last['total']:.6g} J at last"),
+        ("dissipated", ", ".join(f"{k[5:]} {v:.3g} J" for k, v in lost.items())),
+        ("clusters", report.clusters(last)),
+    ]
+    content = {"kind": "ledger", "rows": len(ledger), "first": first, "last": last}
+    return f"{path}: the ledger of a run", rows, content
 
 
 KINDS: dict[str, Callable[[Path], Told]] = {

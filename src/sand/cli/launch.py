@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.errors import BadInput, Interrupted
 from ..core.units import spoken
@@ -15,15 +17,20 @@ from .exits import DONE, INTERRUPTED, PHYSICS
 from .progress import Progress
 
 
-def launch(
-    make: Callable[[], Any], folder: Path, heading: str, until: float | None, *, quiet: bool, as_json: bool
-) -> int:
+class End(NamedTuple):
+    """Where a run is to go: to a time [s], to a number of steps from now, or to whichever comes first."""
+
+    until: float | None = None
+    steps: int | None = None
+
+
+def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None, *, quiet: bool, as_json: bool) -> int:
     """Make a simulation, run it and tell; returns the exit code.
 
     Args:
         make: returns the simulation, its files in `folder`.
         heading: of what is told before the start.
-        until: end of the run [s]; None: the end that the simulation has in its plans.
+        end: of the run; None: the end that the simulation has in its plans.
     """
     from ..core.jit import compiling
 
@@ -32,16 +39,18 @@ def launch(
             report.note("compiling (once per version of SAND), about a quarter of a minute …")
 
     talk = not (quiet or as_json)
+    bar = None
     with compiling(tell):
         simulation = report.with_notes(make)
-        end = simulation.planned_end if until is None else until
+        goal = _goal(simulation, end)
         if talk:
-            report.show(heading, report.opening(simulation, end, folder))
-        bar = Progress(end) if talk and sys.stderr.isatty() else None
-        if bar is not None:
-            simulation.observers.append(bar)
+            report.show(heading, report.opening(simulation, *goal, folder))
+            if sys.stderr.isatty():
+                bar = Progress(*goal)
+                simulation.observers.append(bar)
         try:
-            result = simulation.run(until=end)
+            until, steps = end or End()
+            result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
         except KeyboardInterrupt:
@@ -50,6 +59,16 @@ def launch(
             if bar is not None:
                 bar.finish()
     return _conclude(result, folder, talk=talk, as_json=as_json)
+
+
+def _goal(simulation: Any, end: End | None) -> tuple[float, float]:
+    """Time [s] and step to reach, infinite where there is none."""
+    if end is None:
+        return simulation.planned
+    return (
+        math.inf if end.until is None else end.until,
+        math.inf if end.steps is None else simulation.world.steps + end.steps,
+    )
 
 
 def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
@@ -87,13 +106,19 @@ def _listed(folder: Path) -> str:
     return f"{folder}/  " + "  ".join(report.files_of(folder))
 
 
-def refuse_used_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
-    """The two slips with --out that cost most, in words of the command line.
+def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
+    """What can be wrong with --out, in words of the command line, before anything is computed.
 
     Raises:
-        BadInput: the folder is in use and --overwrite is not given; or it holds the case file itself.
+        BadInput: nothing can be written there; or the folder is in use and --overwrite is not given; or it holds
+            the case file itself.
     """
-    if not folder.is_dir() or not any(folder.iterdir()):
+    ground = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not ground.is_dir():
+        raise BadInput(f"cannot write to folder {folder}: {ground} is a file; give another one with --out")
+    if not os.access(ground, os.W_OK):
+        raise BadInput(f"cannot write to folder {folder}: no permission in {ground}; give another one with --out")
+    if ground != folder or not any(folder.iterdir()):
         return
     if not overwrite:
         told = "give another one with --out, or --overwrite to replace the run in it"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import IO, Any
 
@@ -9,49 +10,59 @@ from ..core.units import spoken
 from ..run.observers import Observer
 
 FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
+"""Fits into 80 columns."""
 
 
 class Progress(Observer):
     """A bar over physical time: rate, time left, clusters, S and energy drift.
 
     Args:
-        end: of the run [s].
+        end: of the run [s]; infinite if it ends at a number of steps, over which the bar then goes.
+        last_step: that number.
         file: a terminal.
     """
 
-    def __init__(self, end: float, file: IO[str] | None = None):
-        self._end = end
+    def __init__(self, end: float, last_step: float, file: IO[str] | None = None):
+        self._end, self._last_step = end, last_step
+        self._by_time = math.isfinite(end)
         self._file = file or sys.stderr
         self._bar: Any = None
         self._numbers = ""
 
     def see(self, simulation: Any, row: dict[str, float]) -> None:
         """New numbers at every frame."""
-        clusters, size = int(row["clusters"]), row["mean_cluster_size"]
-        self._numbers = f"{clusters} clusters, S = {size:.3g}, drift {simulation.ledger.drift:.0e}"
+        self._take(simulation, row)
         self.tick(simulation)
+
+    def _take(self, simulation: Any, row: dict[str, float]) -> None:
+        clusters, size = int(row["clusters"]), row["mean_cluster_size"]
+        self._numbers = f"{clusters} clusters, S = {size:.3g}, drift {simulation.ledger.drift:.1g}"
 
     def tick(self, simulation: Any) -> None:
         """The bar moves; tqdm itself sees to it that it is not drawn too often."""
+        here = simulation.time if self._by_time else simulation.world.steps
+        total = self._end if self._by_time else self._last_step
         if self._bar is None:
-            self._bar = self._open(simulation.time)
+            self._take(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
+            self._bar = self._open(here, total)
         bar = self._bar
-        rate = bar.format_dict["rate"]
-        bar.set_description_str(f"{spoken(simulation.time, 's')} of {spoken(self._end, 's')}", refresh=False)
-        speed = f"{spoken(rate, 's')} per s" if rate else ""
-        bar.set_postfix_str(", ".join(part for part in (speed, self._numbers) if part), refresh=False)
-        bar.update(min(simulation.time, self._end) - bar.n)
+        bar.set_description_str(spoken(simulation.time, "s"), refresh=False)
+        rate = bar.format_dict["rate"] or 0.0
+        speed = f"{spoken(float(f'{rate:.2g}'), 's')}/s" if self._by_time else f"{rate:.2g} steps/s"
+        bar.set_postfix_str(f"{speed}, {self._numbers}" if rate else self._numbers, refresh=False)
+        bar.update(min(here, total) - bar.n)
 
-    def _open(self, time: float) -> Any:
+    def _open(self, here: float, total: float) -> Any:
         from tqdm import tqdm
 
         tqdm.monitor_interval = 0  # no thread of its own: ticks come often enough
         return tqdm(
-            total=self._end,
-            initial=time,
+            total=total,
+            initial=here,
             bar_format=FORMAT,
             dynamic_ncols=True,
             miniters=0,
+            delay=0.2,
             leave=False,
             file=self._file,
         )

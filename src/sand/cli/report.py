@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shlex
 import warnings
 from collections.abc import Callable, Iterable
@@ -11,6 +12,7 @@ from typing import Any, TypeVar
 
 import click
 
+from ..core.errors import BadInput
 from ..files.folder import OURS
 
 T = TypeVar("T")
@@ -55,6 +57,14 @@ def with_notes(make: Callable[[], T]) -> T:
     return made
 
 
+def blame(case: Path, make: Callable[[], T]) -> T:
+    """`make()`; what turns out to be wrong with the case there gets the file's name in front, too."""
+    try:
+        return make()
+    except BadInput as error:
+        raise error.at(str(case)) from None
+
+
 def resume_line(folder: Path) -> str:
     """What to type to go on with a run."""
     return f"sand resume {shlex.quote(str(folder))}"
@@ -70,18 +80,26 @@ def files_of(folder: Path) -> list[str]:
     return [name for name in OURS if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
 
 
-def opening(simulation: Any, end: float, folder: Path) -> Rows:
-    """What is about to run, and what was chosen for the user."""
+def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:
+    """What is about to run, and what was chosen for the user.
+
+    Args:
+        end, last_step: time [s] and step that are to be reached, infinite where there is none.
+    """
     from ..core.units import spoken
 
     every = simulation.frame_every
-    frames = "200 frames" if every is None else f"a frame every {spoken(every, 's')}"
-    time = f"from {spoken(simulation.time, 's')} " if simulation.time > 0.0 else ""
+    if every is None:  # what `run` will choose
+        every = (end - simulation.time) / 200.0
+    frames = f"a frame every {spoken(every, 's')}" if math.isfinite(every) else "frames at start and end"
+    goals = [f"{spoken(end, 's')}"] if math.isfinite(end) else []
+    goals += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
+    start = f"from {spoken(simulation.time, 's')} " if simulation.time > 0.0 else ""
     return [
         ("grains", _grains(simulation.grains, simulation.temperature)),
         *simulation.choices.items(),
         ("forces", ", ".join(_force(f) for f in simulation.forces) or "none: grains fly straight on"),
-        ("time", f"{time}to {spoken(end, 's')}, {frames}"),
+        ("time", f"{start}to {' or '.join(goals)}, {frames}"),
         ("seed", str(simulation.seed)),
         ("folder", str(folder)),
     ]
@@ -101,7 +119,7 @@ def _grains(grains: Any, temperature: float) -> str:
     if grains.body_moment.any():
         size = (grains.body_moment**2).sum(axis=1) ** 0.5
         parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
-    moving = f"moving at {spoken(temperature, 'K')}" if temperature > 0.0 else "at rest"
+    moving = f"kinetic temperature {spoken(temperature, 'K')}" if temperature > 0.0 else "at rest"
     return ", ".join([*parts, moving])
 
 

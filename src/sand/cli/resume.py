@@ -21,31 +21,31 @@ def command(folder: str, until: str | None, as_json: bool, quiet: bool) -> int:
     """Go on with the run in DIR from its newest checkpoint, to its planned end or to --until."""
     asked = options.seconds(until)
     from ..run.build import resume
-    from .launch import launch
+    from .launch import End, launch
 
     place = Path(folder)
     simulation = report.with_notes(lambda: resume(place))
-    end = _end_of(simulation, asked, until, place)
-    if end is None:
+    if asked is not None and asked <= simulation.time:
+        raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, where {folder} stands")
+    if asked is None and _is_there(simulation):
         return _nothing_to_do(simulation, place, quiet=quiet, as_json=as_json)
+    end = None if asked is None else End(asked)
     return launch(lambda: simulation, place, f"resume {folder}", end, quiet=quiet, as_json=as_json)
 
 
-def _end_of(simulation: Any, asked: float | None, until: str | None, folder: Path) -> float | None:
-    """Where to go on to [s]; None if the planned end is reached and no later one is asked for."""
+def _is_there(simulation: Any) -> bool:
+    """True if the planned end is reached."""
+    end, last_step = simulation.planned
+    return simulation.time >= end or simulation.world.steps >= last_step
+
+
+def _stand(simulation: Any) -> str:
     from ..core.units import spoken
 
-    time, planned = simulation.time, simulation.planned_end
-    if asked is None and planned is None:
-        raise BadInput(f"the run in {folder} has no planned end; give one, such as --until '5 us'")
-    if asked is not None and asked <= time:
-        raise BadInput(f"--until = {until!r} is not later than {spoken(time, 's')}, where {folder} stands")
-    end = planned if asked is None else asked
-    return end if end > time else None
+    return spoken(simulation.time, "s")
 
 
 def _nothing_to_do(simulation: Any, folder: Path, *, quiet: bool, as_json: bool) -> int:
-    from ..core.units import spoken
     from ..files.folder import SUMMARY, read_json
 
     if as_json:
@@ -53,7 +53,7 @@ def _nothing_to_do(simulation: Any, folder: Path, *, quiet: bool, as_json: bool)
         report.emit({**(read_json(folder / SUMMARY) if there else {}), "folder": str(folder)})
     elif not quiet:
         click.echo(
-            f"{folder} has reached its planned end, t = {spoken(simulation.planned_end, 's')}; "
+            f"{folder} has reached its planned end, it stands at t = {_stand(simulation)}; "
             f"to go further: {report.resume_line(folder)} --until TIME"
         )
     return 0

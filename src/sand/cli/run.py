@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from . import options
+from . import options, report
 
 
 @click.command("run", short_help="Run the simulation that a case file describes.")
@@ -35,20 +35,20 @@ def command(
     end = options.seconds(until)
     from ..run.build import simulation_of
     from ..run.case import read_case
-    from .launch import launch, refuse_used_folder
+    from .launch import End, launch, refuse_folder
 
     described = read_case(case)
     if end is not None:
-        described.run.until = end
+        described.run.until, described.run.steps = end, None
     if seed is not None:
         described.run.seed = seed
     folder = Path(out or described.run.out or Path(case).stem)
-    refuse_used_folder(folder, Path(case), overwrite=overwrite)
+    refuse_folder(folder, Path(case), overwrite=overwrite)
     return launch(
-        lambda: simulation_of(described, folder, overwrite=overwrite),
+        lambda: report.blame(Path(case), lambda: simulation_of(described, folder, overwrite=overwrite)),
         folder,
         f"run {case}",
-        described.run.until,
+        End(described.run.until, described.run.steps),
         quiet=quiet,
         as_json=as_json,
     )

@@ -52,6 +52,9 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
         if not isinstance(found, Material):
             raise BadInput(f"material of grain {i} is {found!r}; give a sand.Material or the name of a preset")
         numbers[i] = index.setdefault(found, len(index))
+    names = [m.name for m in index]
+    if doubles := sorted({name for name in names if names.count(name) > 1}):
+        raise BadInput(f"two different materials are called '{doubles[0]}'; name one anew: material.but(name='…')")
     return tuple(index), numbers
 
 
@@ -64,8 +67,9 @@ class Grains:
         material: one `sand.Material` (or preset name) for all, or a sequence of N.
         velocity: (N, 3) [m/s]; at rest by default.
         spin: (N, 3) [rad/s], laboratory frame; none by default.
-        moment: (N, 3) [A m²] in the laboratory frame at the start, or one size as text, "6.6e-18 A m^2" or
-            per mass "200 A m^2/kg" (then along +z); none by default.
+        moment: (N, 3) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
+            "6.6e-18 A m^2" or per mass "200 A m^2/kg"; "material" takes each material's own specific moment; none
+            by default.
         charge: scalar or (N,) [C]; none by default.
         mass: scalar or (N,) [kg] > 0; by default density × volume.
 
@@ -104,7 +108,8 @@ class Grains:
             sphere = density * (4.0 / 3.0) * np.pi * arrays["radius"] ** 3
             arrays["mass"] = sphere if mass is None else stored(BY_NAME["mass"], mass, count, positive=True)
             if moment is not None:
-                arrays["body_moment"] = _moments(moment, arrays["mass"], count)
+                specific = np.array([m.specific_moment for m in self.materials])[index]
+                arrays["body_moment"] = _moments(moment, arrays["mass"], specific, count)
         except BadInput as error:
             problems += error.problems
         if problems:
@@ -157,17 +162,23 @@ def _count(position: Any) -> int:
     return int(np.shape(array)[0])
 
 
-def _moments(moment: Any, mass: np.ndarray, count: int) -> np.ndarray:
+def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) -> np.ndarray:
     """(3, N) [A m²] from vectors, or from a size (absolute or per mass), then along +z."""
     if not isinstance(moment, str) and np.ndim(in_unit(moment, "A m^2")) == 2:
         return stored(BY_NAME["body_moment"], moment, count)
     vectors = np.zeros((3, count))
-    vectors[2] = moment_size(moment, mass)
+    vectors[2] = moment_size(moment, mass, specific)
     return vectors
 
 
-def moment_size(moment: Any, mass: np.ndarray) -> np.ndarray:
-    """Sizes (N,) [A m²] of moments given as one number [A m²], or as text, absolute or per mass."""
+def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.0) -> np.ndarray:
+    """Sizes (N,) [A m²] of moments given as one number [A m²], or as text, absolute or per mass.
+
+    Args:
+        specific: moment per mass [A m²/kg] of each grain's material, for "material".
+    """
+    if isinstance(moment, str) and moment == "material":
+        return specific * mass
     size = in_unit(moment, "A m^2")
     if size is None:
         per_mass = in_unit(moment, "A m^2/kg")
@@ -175,6 +186,6 @@ def moment_size(moment: Any, mass: np.ndarray) -> np.ndarray:
     if size is None or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
         raise BadInput(
             f"moment = {moment!r} must be (N, 3) numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
-            "or, per mass, '200 A m^2/kg'"
+            "or, per mass, '200 A m^2/kg', or 'material'"
         )
     return np.broadcast_to(np.asarray(size, dtype=np.float64), mass.shape)

@@ -77,15 +77,18 @@ def cache_folder() -> Path:
 _FOLDER = cache_folder()
 
 
-def kernel(function: Callable) -> Callable:
+def kernel(function: Callable, *, keep: bool = True) -> Callable:
     """Compile `function` on its first call and keep the result in our own cache folder.
 
     numba's global cache folder is put back at once: a user's own kernels go where the user wants.
+
+    Args:
+        keep: False for code that reaches formulas from outside SAND, whose edits our digest does not see.
     """
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        return numba.njit(cache=True, **_COMMON, **_NO_ALIASES)(function)
+        return numba.njit(cache=keep, **_COMMON, **_NO_ALIASES)(function)
     finally:
         numba.config.CACHE_DIR = before
 

@@ -7,6 +7,7 @@ SI.  Orientations are scalar first, as GSD has them.
 |---|---|
 | configuration/step, log/time | step number; true time of the frame [s] |
 | log/scale/length | the reference radius [m] |
+| log/periodic | 1 for each periodic axis, 0 for an open one, whose length in the box is only for drawing |
 | particles/position, diameter; configuration/box | in reference radii |
 | particles/velocity, mass, charge | m/s, kg, C |
 | particles/orientation | rotation parameters, scalar first |
@@ -146,11 +147,11 @@ class Frame:
         self.box = Box((x, y, z))
 
 
-def read_frames(path: Path) -> list[Frame]:
+def read_frames(path: str | Path) -> list[Frame]:
     """All frames of a trajectory.  Raises BadInput for a missing or foreign file."""
     import gsd.hoomd
 
-    if not path.exists():
+    if not Path(path).exists():
         raise BadInput(f"there is no file {path}")
     try:
         with gsd.hoomd.open(str(path), "r") as file:

@@ -15,7 +15,7 @@ from ..forces.base import Force, GrainForce, compose
 from ..forces.contact import Contact
 from ..forces.dipoles import Dipoles
 from ..kernels.dipoles import OFF
-from ..kernels.outside import energy_sum_for
+from ..kernels.outside import energy_sum_for, is_ours
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
 from ..physics.dipole import Cutoff
@@ -144,7 +144,9 @@ def build_engine(grains: Grains, forces: Sequence[Force], box: Box, stepping: Ve
             longest=IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials))),
         ),
     )
-    engine = Engine(world, rules, warnings, driver_for(composed), outside)
+    engine = Engine(
+        world, rules, warnings, driver_for(composed, all(is_ours(force.formula) for force in outside)), outside
+    )
     if contact is not None and fresh:
         _refuse_overlaps(engine, contact)
     return engine

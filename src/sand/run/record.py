@@ -45,11 +45,12 @@ class Record:
         """Begin or go on with the files; called by each `run` with its end."""
         from .build import case_of
 
-        self._ends = (until, last_step)
+        if (until, last_step) != self._ends:
+            self._ends = (until, last_step)
+            text = "as understood by SAND, all defaults filled in, SI units"
+            write_toml(self.folder / files.CASE, case_of(simulation, until, last_step), text)
         if self._trajectory is not None:
             return
-        text = "as understood by SAND, all defaults filled in, SI units"
-        write_toml(self.folder / files.CASE, case_of(simulation, until, last_step), text)
         steps = simulation.world.steps if self._resumed else None
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, steps)
         self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, append=self._resumed)

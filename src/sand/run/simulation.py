@@ -157,8 +157,8 @@ class Simulation:
             raise BadInput("run needs an end: until='5 us' or steps=1000")
         if end < self.time:
             raise BadInput(f"until = {until!r} lies before the present time, {self.time:.6g} s")
-        if self.frame_every is None:
-            self.frame_every = (end - self.time) / 200.0 if 0.0 < end - self.time < math.inf else math.inf
+        if self.frame_every is None and 0.0 < end - self.time < math.inf:
+            self.frame_every = (end - self.time) / 200.0
         self._start()
         if self.record:
             self.record.open(self, end, last)

@@ -40,7 +40,8 @@ def gas(
         box: a Box periodic on all axes (or a length for a cube).
         radius: one [m], or (N,).
         material: a Material or the name of a preset.
-        moment: size of each moment, absolute [A m²] or per mass ("200 A m^2/kg"); directions are isotropic.
+        moment: size of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
+            own; directions are isotropic.
         temperature: T [K] ≥ 0 of velocities and spins.  Velocities are Maxwellian, total momentum 0.
         spins: "kT/2" mean rotational energy per grain as in Dominik & Nübold (2002), section 3;
             "equipartition" (3/2) kT; "none".
@@ -68,7 +69,8 @@ def gas(
     spin = streams[2].normal(size=(number, 3)) * np.sqrt(SPINS[spins] * BOLTZMANN * kelvin / inertia)
     moments = None
     if moment is not None:
-        moments = directions(number, streams[3]) * moment_size(moment, blank.mass)[:, None]
+        specific = np.array([m.specific_moment for m in blank.materials])[blank.material]
+        moments = directions(number, streams[3]) * moment_size(moment, blank.mass, specific)[:, None]
     return Grains(position, radius, material, velocity=velocity, spin=spin, moment=moments)
 
 

@@ -95,8 +95,8 @@ def _crushed(grains, contacts, count, span):
 
 
 @functools.cache
-def driver_for(outside: Callable) -> Callable:
-    """The compiled `advance` for one composed per-grain formula.
+def driver_for(outside: Callable, keep: bool = True) -> Callable:
+    """The compiled `advance` for one composed per-grain formula; `keep` it on disk if all of it is ours.
 
     A world starts at STAGE 1 with a step of 0 s: the second half of such a step finds the pairs and the
     contacts that are there and works out the first loads (what it counts and books is not part of a run).
@@ -159,7 +159,6 @@ def driver_for(outside: Callable) -> Callable:
         count[STAGE] = 0
         return Stop.STEPS_DONE
 
-    @kernel
     def advance(grains, contacts, near, clock, count, lost, rules, until, most_steps):
         """Take up to `most_steps` steps, or as many as bring the time to `until` [s]; returns a Stop."""
         for _ in range(most_steps):
@@ -174,4 +173,4 @@ def driver_for(outside: Callable) -> Callable:
                 return stop
         return Stop.TIME_REACHED if clock[TIME] >= until else Stop.STEPS_DONE
 
-    return advance
+    return kernel(advance, keep=keep)

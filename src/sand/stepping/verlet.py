@@ -14,7 +14,7 @@ class Verlet:
     """Velocity Verlet for translation, spin and rotation parameters; second order, keeps momenta exactly.
 
     Args:
-        steps_per_period: steps per fastest period of any contact, ≥ 10 (25: frequencies are 0.3 % low).
+        steps_per_period: steps per fastest period of any contact, ≥ 10 (25: frequencies come out 0.26 % high).
         step: a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
             otherwise.
         accuracy: part of the magnetic contact energy |U_min| that a step away from contacts may misplace.

@@ -1,0 +1,232 @@
+"""Case files: every mistake found and named, and a case read back is the same case."""
+
+import copy
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+
+import sand
+from sand.core.errors import BadInput
+from sand.run.build import case_of, simulation_of
+from sand.run.case import check_case, read_case
+
+GOOD = tomllib.loads("""
+[run]
+until = "5 ns"
+seed = 4
+[box]
+periodic = "400 nm"
+[grains]
+number = 8
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+temperature = "300 K"
+[forces.contact]
+[forces.dipoles]
+""")
+
+
+def changed(**changes):
+    """The good case with some places changed: `grains__radius="1 K"`; None removes."""
+    content = copy.deepcopy(GOOD)
+    for place, value in changes.items():
+        *sections, key = place.split("__")
+        section = content
+        for name in sections:
+            section = section.setdefault(name, {})
+        if value is None:
+            section.pop(key, None)
+        else:
+            section[key] = value
+    return content
+
+
+def problems_of(content):
+    """What is said of a case, when read or when its simulation is put together."""
+    with pytest.raises(BadInput) as caught:
+        simulation_of(check_case(content, "some.toml"), None)
+    return caught.value.problems
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        # units and numbers
+        ({"grains__radius": "10 ns"}, ["grains.radius", "'10 ns' is not a quantity in m", "'10 nm'"]),
+        ({"grains__radius": "10"}, ["grains.radius", "'10' is not a quantity in m"]),
+        ({"grains__radius": "-10 nm"}, ["grains.radius", "'-10 nm' must be above 0 m"]),
+        ({"grains__radius": 0.0}, ["grains.radius", "must be above 0 m"]),
+        ({"grains__radius": float("nan")}, ["grains.radius", "nan is not finite"]),
+        ({"grains__temperature": float("inf")}, ["grains.temperature", "inf is not finite"]),
+        ({"grains__temperature": "-1 K"}, ["grains.temperature", "must be at least 0 K"]),
+        ({"grains__moment": "200 A m"}, ["grains.moment", "'200 A m'", "A m^2/kg"]),
+        ({"grains__number": 0}, ["grains.number", "greater than or equal to 1"]),
+        ({"grains__number": 2.5}, ["grains.number", "2.5", "integer"]),
+        ({"run__until": "5 m"}, ["run.until", "'5 m' is not a quantity in s"]),
+        ({"run__until": float("nan")}, ["run.until", "nan is not finite"]),
+        ({"run__steps": 0}, ["run.steps", "greater than or equal to 1"]),
+        ({"run__seed": -1}, ["run.seed", "greater than or equal to 0"]),
+        ({"box__periodic": float("nan")}, ["box.periodic", "nan is not finite"]),
+        ({"stepping__step": "3 m"}, ["stepping", "step = '3 m' is not a quantity in s"]),
+        ({"stepping__steps_per_period": 3}, ["stepping", "steps_per_period = 3 must be at least 10"]),
+        # words
+        ({"grains__radus": "10 nm"}, ["grains.radus", "no such key", "did you mean 'radius'?"]),
+        ({"forces__dipoles__cutof": "1 nm"}, ["forces.dipoles.cutof", "did you mean 'cutoff'?"]),
+        ({"stepping__stp": "auto"}, ["stepping.stp", "did you mean 'step'?"]),
+        ({"grain": {"number": 3}}, ["grain:", "did you mean 'grains'?"]),
+        ({"forces__dipole": {}}, ["forces.dipole:", "did you mean 'dipoles'?"]),
+        ({"grains__material": "irn"}, ["grains.material", "unknown material 'irn'", "did you mean 'iron'?"]),
+        ({"grains__material": "unobtainium"}, ["unknown material 'unobtainium'", "allowed: ice, silica"]),
+        ({"grains__kind": "gass"}, ["grains.kind", "'gass'", "'gas'"]),
+        ({"grains__spins": "kT"}, ["grains.spins", "did you mean 'kT/2'?"]),
+        ({"forces__contact__beyond": "clmp"}, ["forces.contact", "did you mean 'clamp'?"]),
+        ({"stepping__method": "verlett"}, ["stepping", "did you mean 'verlet'?"]),
+        ({"materials__mine__densty": 1.0}, ["materials.mine.densty", "did you mean 'density'?"]),
+        ({"materials__mine__like": "iorn"}, ["materials", "did you mean 'iron'?"]),
+        # shapes
+        ({"box__periodic": ["1 um", "1 um"]}, ["box.periodic", "one length or three"]),
+        ({"grains__radius": ["10 nm", "20 nm"]}, ["grains.radius", "is not a quantity in m"]),
+        ({"grains__number": [8]}, ["grains.number", "[8]"]),
+        ({"forces__field__flux_density": [1, 2]}, ["forces.field", "three components, in T"]),
+        ({"run": "5 ns"}, ["run", "'5 ns'"]),
+        ({"forces__contact": True}, ["forces.contact", "True"]),
+        # things that are missing
+        ({"run__until": None}, ["run", "until is missing"]),
+        ({"grains__number": None}, ["grains.number is missing"]),
+        ({"grains__radius": None}, ["grains", "radius is missing"]),
+        ({"run": None}, ["run is missing"]),
+        ({"materials__mine__density": "3 g/cm^3"}, ["mine lacks surface_energy, young_modulus, poisson_ratio"]),
+        # what shows when grains, forces and box come together
+        ({"box__periodic": "30 nm"}, ["box", "too small", "5 diameters"]),
+        ({"box__periodic": "62 nm", "grains__number": 30}, ["no room for grain", "take a larger box or fewer grains"]),
+        ({"box__periodic": None}, ["a gas needs a box"]),
+        ({"box__periodic": ["1 um", "1 um", "open"]}, ["a gas needs a box"]),
+        ({"forces__dipoles__cutoff": "300 nm"}, ["cutoff = 300 nm", "beyond half the box (200 nm)"]),
+        ({"grains__material": "magnetite"}, ["'magnetite' has no surface energy", "surface_energy ="]),
+        ({"grains__kind": "given"}, ["came from a script", "sand resume"]),
+    ],
+)
+def test_one_mistake_is_one_line(changes, parts):
+    """The line says where, what was given, and what is allowed or meant."""
+    problems = problems_of(changed(**changes))
+    assert len(problems) == 1, problems
+    assert "\n" not in problems[0]
+    for part in parts:
+        assert part in problems[0]
+
+
+def test_several_mistakes_are_reported_together(tmp_path):
+    """Every mistake of a file at once: one line each, each with the name of the file and the place."""
+    path = tmp_path / "many.toml"
+    content = changed(
+        run__until="5 m",
+        box__periodic="1 K",
+        grains__radius="10 ns",
+        grains__temprature="3 K",
+        grains__material="irn",
+        forces__dipoles__cutof=1,
+        stepping__step="3 m",
+        stepping__accuracy=-1,
+    )
+    path.write_text(tomli_w.dumps(content))
+    with pytest.raises(BadInput) as caught:
+        read_case(path)
+    problems = caught.value.problems
+    assert len(problems) == 8
+    assert all(line.startswith(f"{path}: ") and "\n" not in line for line in problems)
+    places = ["run.until", "box.periodic", "grains.radius", "grains.temprature", "grains.material", "dipoles.cutof"]
+    for place in [*places, "step = '3 m'", "accuracy = -1"]:
+        assert sum(place in line for line in problems) == 1, place
+
+
+@pytest.mark.parametrize(
+    ("content", "part"),
+    [
+        (b"[run\nuntil = 3", "is not TOML: Expected ']'"),
+        (b"[run]\nuntil = 5 ns\n", "line 2"),
+        (b"[run]\nuntil = 3\nuntil = 4\n", "is not TOML"),
+        (b"\xff\xfe\x00abc", "is not a text file"),
+        (None, "there is no file"),
+    ],
+)
+def test_files_that_are_no_cases(tmp_path, content, part):
+    """Broken grammar with its line, other files, missing files: one line with the file's name."""
+    path = tmp_path / "some.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadInput) as caught:
+        read_case(path)
+    assert len(caught.value.problems) == 1
+    assert part in caught.value.problems[0]
+    assert str(path) in caught.value.problems[0]
+
+
+def test_an_empty_file_lacks_its_sections():
+    """Both sections that must be there are named."""
+    assert len(problems_of({})) == 2
+
+
+def test_magnetite_with_a_surface_energy_runs():
+    """What the message about magnetite asks for is enough."""
+    content = changed(grains__material="mine", materials__mine__like="magnetite")
+    content["materials"]["mine"]["surface_energy"] = "0.1 J/m^2"
+    material = simulation_of(check_case(content, "some.toml"), None).grains.materials[0]
+    assert (material.name, material.surface_energy) == ("mine", 0.1)
+    assert material.density == sand.MAGNETITE.density
+
+
+def test_numbers_are_si_and_text_has_units():
+    """`until = 5e-9` and `until = "5 ns"` are the same case, as are a cube's one length and its three."""
+    text = check_case(GOOD, "some.toml")
+    content = changed(run__until=5e-9, grains__radius=1e-8, box__periodic=[4e-7, 4e-7, 4e-7])
+    assert check_case(content, "some.toml") == text
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"forces__dipoles__cutoff": "none"},
+        {"forces__dipoles": None, "grains__moment": None},
+        {"forces__field__flux_density": "1 mT", "stepping__step": "1 ps"},
+        {"run__frame_every": "1 ns", "run__until": None, "run__steps": 50},
+        {"grains__material": "mine", "materials__mine": {"like": "silica", "surface_energy": "50 mJ/m^2"}},
+    ],
+)
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_the_case_a_run_writes_is_the_case_it_ran(tmp_path, changes):
+    """case.toml read back builds the same grains and forces, moves them to the same bits, and is written the same."""
+    case = check_case(changed(**changes), "some.toml")
+    first = simulation_of(case, tmp_path / "one")
+    first.run(until=case.run.until, steps=case.run.steps)
+    again = read_case(tmp_path / "one" / "case.toml")
+    second = simulation_of(again, tmp_path / "two")
+    second.run(until=again.run.until, steps=again.run.steps)
+    assert same_bits(first, second)
+    assert (tmp_path / "one" / "case.toml").read_bytes() == (tmp_path / "two" / "case.toml").read_bytes()
+    ends = (case.run.until or np.inf, case.run.steps or np.inf)
+    assert case_of(first, *ends) == case_of(second, *ends)
+
+
+def same_bits(one, other):
+    """True if every array of two worlds agrees to the last bit."""
+    a, b = one.world.to_arrays(), other.world.to_arrays()
+    return a.keys() == b.keys() and all(a[name].tobytes() == b[name].tobytes() for name in a)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_case_and_script_are_the_same_physics():
+    """The same numbers given to the constructors in a script move the grains to the same bits."""
+    from_case = simulation_of(check_case(GOOD, "some.toml"), None)
+    box = sand.Box.periodic("400 nm")
+    grains = sand.setup.gas(
+        8, box, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="300 K", seed=4
+    )
+    from_script = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box=box, seed=4)
+    for simulation in (from_case, from_script):
+        simulation.run(steps=3000)
+    assert from_case.time == from_script.time > 0.0
+    assert same_bits(from_case, from_script)

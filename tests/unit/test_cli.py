@@ -1,0 +1,463 @@
+"""The `sand` command: exit codes, what is printed where, interruption and going on."""
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from sand.cli.main import main
+from sand.cli.progress import Progress
+from sand.core.errors import FilesFailed
+from sand.files.checkpoint import newest_checkpoint, read_checkpoint
+from sand.run.build import simulation_of
+from sand.run.case import read_case
+
+CASE = """
+[run]
+until = "20 ns"
+frame_every = "5 ns"
+seed = 3
+[box]
+periodic = "400 nm"
+[grains]
+number = 8
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+temperature = "300 K"
+[forces.contact]
+[forces.dipoles]
+"""
+SAND = [sys.executable, "-m", "sand.cli.main"]
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty folder to work in, with a case file."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(CASE)
+    return tmp_path
+
+
+@pytest.fixture
+def done(place, capsys):
+    """The same after `sand run small.toml`."""
+    assert main(["run", "small.toml", "--quiet"]) == 0
+    capsys.readouterr()
+    return place / "small"
+
+
+def heavy_modules(*words):
+    """The heavy packages that `sand WORDS` has imported by its end, in a fresh interpreter."""
+    code = (
+        "import sys\nfrom sand.cli.main import main\ncode = main(sys.argv[1:])\n"
+        "heavy = {'numpy', 'numba', 'pydantic', 'gsd', 'matplotlib', 'pint', 'scipy', 'tqdm'}\n"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)\nsys.exit(code)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    return ended.stderr.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["cite"], ["--version"], []])
+def test_light_commands_import_nothing_heavy(words):
+    """Help and citations answer at once: no numerical package is loaded for them."""
+    assert heavy_modules(*words) == "[]"
+
+
+def test_info_of_a_run_needs_no_compiler(done):
+    """What a folder holds is read from its small files; neither numba nor the case reader is loaded."""
+    assert heavy_modules("info", str(done)) == "['numpy']"
+
+
+def test_run_tells_what_it_does_and_what_came_of_it(place, capsys):
+    """Grains, box, cut-off with its reason at the start; outcome and the files, the figure too, at the end."""
+    assert main(["run", "small.toml"]) == 0
+    out, err = capsys.readouterr()
+    for part in ("8 of iron, radius 10 nm", "periodic 400 nm", "cut-off", "half the box", "contact (beyond = clamp)"):
+        assert part in out
+    for part in ("done", " ns in ", "mean size S", "largest", "energy drift", "wall time", "figure.png", "ledger.csv"):
+        assert part in out
+    assert "sand: note: contacts of iron" in err
+    assert "%|" not in err  # no progress bar where there is no terminal
+    assert {p.name for p in (place / "small").iterdir()} >= {"case.toml", "summary.json", "figure.png"}
+
+
+def test_run_as_json_prints_the_summary_alone(place, capsys):
+    """--json: one object, the content of summary.json and the folder."""
+    assert main(["run", "small.toml", "--json", "--out", "there"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == {**json.loads((place / "there" / "summary.json").read_text()), "folder": "there"}
+    assert printed["outcome"] == "finished"
+
+
+def test_quiet_run_prints_nothing_to_stdout(place, capsys):
+    """--quiet leaves notes on stderr, nothing else."""
+    assert main(["run", "small.toml", "--quiet"]) == 0
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert all(line.startswith("sand: note: ") for line in err.splitlines())
+
+
+def test_options_replace_what_the_case_says(place, capsys):
+    """--until takes text with a unit or SI seconds, as a case does; --seed and --out replace the case's own."""
+    assert main(["run", "small.toml", "--until", "6 ns", "--seed", "7", "--json"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert main(["run", "small.toml", "--until", "6e-9", "--seed", "7", "--json", "--out", "again"]) == 0
+    second = json.loads(capsys.readouterr().out)
+    assert first["time"] == second["time"] == pytest.approx(6e-9, rel=1e-2)
+    assert first["seed"] == 7
+    case = read_case(place / "again" / "case.toml")
+    assert (case.run.until, case.run.seed) == (6e-9, 7)
+
+
+def test_a_case_may_end_at_a_number_of_steps(place, capsys):
+    """[run] steps: the run takes that many, and is then at its end for `sand resume`, too."""
+    (place / "small.toml").write_text(CASE.replace('until = "20 ns"', "steps = 500"))
+    assert main(["run", "small.toml"]) == 0
+    assert "to step 500" in capsys.readouterr().out
+    assert main(["resume", "small"]) == 0
+    assert "has reached its planned end" in capsys.readouterr().out
+    assert main(["resume", "small", "--until", "20 ns", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["steps"] > 500
+
+
+# --- the user's mistakes ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["run", "nowhere.toml"], "there is no file nowhere.toml"),
+        (["run"], "Missing argument 'CASE.toml'; see sand run --help"),
+        (["rum"], "No such command 'rum'"),
+        (["run", "small.toml", "--untl", "3"], "No such option"),
+        (["run", "small.toml", "--until", "1 kg"], "--until = '1 kg' is not a quantity in s"),
+        (["run", "small.toml", "--until", "-1 us"], "--until = '-1 us' must be above 0 s"),
+        (["run", "small.toml", "--until", "nan"], "--until = nan is not finite"),
+        (["run", "small.toml", "--until", "soon"], "such as '5 us'"),
+        (["run", "small.toml", "--seed", "-1"], "--seed"),
+        (["run", "small.toml", "--seed", "1.5"], "--seed"),
+        (["run", "small.toml", "--out", "small.toml"], "small.toml is a file"),
+        (["run", "small.toml", "--out", "small.toml/deeper"], "small.toml is a file"),
+        (["run", "."], "cannot read ."),
+        (["resume", "nowhere"], "there is no folder nowhere"),
+        (["resume", "."], "case.toml"),
+        (["info", "nowhere"], "there is no file or folder nowhere"),
+        (["info", "."], "not the folder of a run"),
+        (["info", "picture.png"], "give a run's folder"),
+        (["--json"], "No such option"),
+    ],
+)
+def test_mistakes_are_lines_and_exit_code_2(place, capsys, words, part):
+    """Each mistake is one line that names it, on stderr; with --json it is on stdout as well; no traceback."""
+    (place / "picture.png").write_bytes(b"\x89PNG")
+    before = sorted(place.rglob("*"))
+    assert main(words) == 2
+    out, err = capsys.readouterr()
+    assert part in err
+    assert all(line.startswith("sand: ") for line in err.splitlines())
+    assert len(err.splitlines()) == 1
+    if "--json" not in words:
+        assert out == ""
+        assert main([*words, "--json"]) == 2
+        out, err = capsys.readouterr()
+    told = json.loads(out)
+    assert told["exit_code"] == 2
+    assert [f"sand: {line}" for line in told["error"]] == err.splitlines()
+    assert sorted(place.rglob("*")) == before
+
+
+def test_every_mistake_of_a_case_is_a_line(place, capsys):
+    """Two mistakes, two lines, each with the name of the file; no folder is made."""
+    (place / "small.toml").write_text(CASE.replace("10 nm", "10 ns").replace("seed", "sead"))
+    assert main(["run", "small.toml"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert all(line.startswith("sand: small.toml: ") for line in lines)
+    assert not (place / "small").exists()
+
+
+def test_what_shows_only_together_names_the_file_too(place, capsys):
+    """A box too small for its grains is found when the grains are placed; the line names the case all the same."""
+    (place / "small.toml").write_text(CASE.replace("400 nm", "30 nm"))
+    for command in ("run", "info"):
+        assert main([command, "small.toml"]) == 2
+        assert capsys.readouterr().err.startswith("sand: small.toml: a box of 3e-08 m is too small")
+    assert not (place / "small").exists()
+
+
+def test_a_used_folder_is_refused_and_untouched(done, capsys):
+    """An earlier run is never replaced unasked; the line says how to go on with it."""
+    before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in done.iterdir()}
+    assert main(["run", "small.toml"]) == 2
+    err = capsys.readouterr().err
+    assert "--overwrite" in err
+    assert "sand resume small" in err
+    assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in done.iterdir()} == before
+
+
+def test_overwrite_replaces_the_run_and_nothing_else(done, capsys):
+    """--overwrite removes the files of the earlier run, keeps what others put there."""
+    (done / "thoughts.txt").write_text("mine")
+    assert main(["run", "small.toml", "--overwrite", "--seed", "9", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["seed"] == 9
+    assert (done / "thoughts.txt").read_text() == "mine"
+
+
+def test_overwrite_never_replaces_the_case_it_reads(done, capsys):
+    """`sand run small/case.toml --out small --overwrite` would delete its own input: refused."""
+    text = (done / "case.toml").read_text()
+    assert main(["run", "small/case.toml", "--out", "small", "--overwrite"]) == 2
+    assert "would replace the case file" in capsys.readouterr().err
+    assert (done / "case.toml").read_text() == text
+
+
+@pytest.mark.skipif(os.getuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission(place, capsys):
+    """Said in one line before anything is computed."""
+    (place / "locked").mkdir(mode=0o500)
+    assert main(["run", "small.toml", "--out", "locked/run"]) == 2
+    assert "no permission in" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_a_line(place, capsys, monkeypatch):
+    """Files that cannot be written: exit 2, one line, no traceback."""
+
+    def full(*_):
+        raise FilesFailed("cannot write small/summary.json: No space left on device")
+
+    monkeypatch.setattr("sand.run.record.write_json", full)
+    assert main(["run", "small.toml", "--quiet"]) == 2
+    assert "sand: cannot write small/summary.json: No space left" in capsys.readouterr().err
+
+
+# --- faults and interruptions -------------------------------------------------------------------------
+
+
+def test_a_fault_of_ours_is_one_line_unless_debug(place, capsys, monkeypatch):
+    """Exit 1 and how to get more; --debug, before or after the command, lets the traceback out."""
+
+    def broken(_path):
+        raise ZeroDivisionError("float\ndivision")
+
+    monkeypatch.setattr("sand.run.case.read_case", broken)
+    assert main(["run", "small.toml", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert err.startswith("sand: internal error (ZeroDivisionError: float division); run again with --debug")
+    assert json.loads(out)["exit_code"] == 1
+    for words in (["--debug", "run", "small.toml"], ["run", "small.toml", "--debug"]):
+        with pytest.raises(ZeroDivisionError):
+            main(words)
+
+
+def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
+    """Ctrl-C while the case is being read: 130, one line."""
+
+    def slow(_path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sand.run.case.read_case", slow)
+    assert main(["run", "small.toml"]) == 130
+    assert capsys.readouterr().err == "sand: interrupted\n"
+
+
+def test_interrupted_before_the_first_step(place, capsys, monkeypatch):
+    """Ctrl-C while kernels are compiled: 130, and the same command works afterwards."""
+
+    def slow(_self, _until=None, **_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("sand.run.simulation.Simulation.run", slow)
+        assert main(["run", "small.toml", "--quiet"]) == 130
+        assert "interrupted before the first step" in capsys.readouterr().err
+    assert main(["run", "small.toml", "--quiet"]) == 0
+
+
+def test_a_reader_that_goes_away_is_no_fault(place):
+    """`sand info … | head -0`: nothing on stderr."""
+    with subprocess.Popen([*SAND, "cite"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as started:
+        started.stdout.close()
+        assert started.stderr.read() == b""
+        assert started.wait() == 0
+
+
+def test_stopped_by_physics(place, capsys):
+    """A fixed step that is much too long: exit 3, the sentence, the grains, a checkpoint that can be read."""
+    (place / "small.toml").write_text(CASE + '[stepping]\nstep = "10 ns"\n')
+    assert main(["run", "small.toml"]) == 3
+    err = capsys.readouterr().err
+    assert "stopped by physics at t = " in err
+    assert "the fixed step is too long (grains " in err
+    path = err.strip().rsplit(" ", 1)[1]
+    assert read_checkpoint(place / path)[1]["until"] == 2e-8
+    assert main(["run", "small.toml", "--json", "--overwrite"]) == 3
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["outcome"] == "flew_too_far"
+    assert len(summary["grains_concerned"]) >= 1
+    assert main(["info", "small"]) == 0
+    assert "the fixed step is too long (grains" in capsys.readouterr().out
+
+
+def same_state(one, other):
+    """True if the newest checkpoints of two runs hold the same bits."""
+    (a, meta_a), (b, meta_b) = newest_checkpoint(one), newest_checkpoint(other)
+    assert meta_a["steps"] == meta_b["steps"]
+    assert a.keys() == b.keys()
+    return all(a[name].tobytes() == b[name].tobytes() for name in a)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number):
+    """Exit 130 with the time and what to type; then `sand resume` ends in the same bits as one run without a stop."""
+    words = [*SAND, "run", "small.toml", "--until", "1 s"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as started:
+        for _ in range(1200):
+            if started.poll() is not None or list((place / "small").glob("checkpoint-*.npz")):
+                break
+            time.sleep(0.05)
+        time.sleep(0.3)
+        started.send_signal(number)
+        _, err = started.communicate(timeout=60)
+    assert started.returncode == 130, err
+    last = err.splitlines()[-1]
+    assert last.startswith("sand: interrupted at t = ")
+    assert last.endswith("resume with: sand resume small")
+    meta = newest_checkpoint(place / "small")[1]
+    assert meta["steps"] > 0
+    assert main(["info", "small"]) == 0
+    assert "sand resume small" in capsys.readouterr().out
+    end = str(meta["time"] + 5e-8)
+    assert main(["resume", "small", "--until", end, "--quiet"]) == 0
+    assert main(["run", "small.toml", "--until", end, "--out", "whole", "--quiet"]) == 0
+    assert same_state(place / "small", place / "whole")
+
+
+# --- resume and info -------------------------------------------------------------------------------------
+
+
+def test_resume_of_a_finished_run(done, capsys):
+    """Nothing to do is said, with exit 0 and no file changed; a later end goes on; an earlier one is a mistake."""
+    before = (done / "summary.json").read_bytes()
+    assert main(["resume", "small"]) == 0
+    assert "has reached its planned end" in capsys.readouterr().out
+    assert main(["resume", "small", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["outcome"] == "finished"
+    assert main(["resume", "small", "--until", "10 ns"]) == 2
+    assert "is not later than 20" in capsys.readouterr().err
+    assert (done / "summary.json").read_bytes() == before
+    assert main(["resume", "small", "--until", "30 ns"]) == 0
+    assert " to 30 ns, a frame every 5 ns" in capsys.readouterr().out
+
+
+def test_resume_after_damage(done, capsys):
+    """A damaged checkpoint is passed over; with none left that is whole, each is named."""
+    newest = max(done.glob("checkpoint-*.npz"))
+    newest.write_bytes(newest.read_bytes()[:100])
+    assert main(["resume", "small", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["outcome"] == "finished"
+    for path in done.glob("checkpoint-*.npz"):
+        path.write_bytes(b"no")
+    assert main(["resume", "small"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) >= 2
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "part"),
+    [
+        ("", "run", "mean size S"),
+        ("case.toml", "case", "8 of iron"),
+        ("trajectory.gsd", "trajectory", "frames"),
+        ("summary.json", "summary", "mean size S"),
+        ("ledger.csv", "ledger", "dissipated"),
+        ("checkpoint-000000000000000.npz", "checkpoint", "0 s after 0 steps"),
+    ],
+)
+def test_info_knows_every_file_of_a_run(done, capsys, name, kind, part):
+    """For people a screen, for machines one object that says which kind it is."""
+    assert main(["info", str(done / name)]) == 0
+    assert part in capsys.readouterr().out
+    assert main(["info", str(done / name), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["kind"] == kind
+
+
+def test_info_of_a_run_that_was_killed(done, capsys):
+    """Without a summary the ledger says how far it came."""
+    (done / "summary.json").unlink()
+    assert main(["info", "small"]) == 0
+    out = capsys.readouterr().out
+    assert "without having been closed" in out
+    assert " ns after " in out
+    assert "sand resume small" in out
+
+
+@pytest.mark.parametrize("name", ["summary.json", "ledger.csv", "trajectory.gsd", "checkpoint-000000000000000.npz"])
+@pytest.mark.parametrize("content", [b"", b"{", b"{}", b"a,b\n1,2\n", b"\xff\x00"])
+def test_info_of_broken_files(place, capsys, name, content):
+    """A file that is not what its name says: one line with its name, exit 2; the same for a folder that holds it."""
+    (place / "case.toml").write_text(CASE)
+    (place / name).write_bytes(content)
+    assert main(["info", name]) == 2
+    err = capsys.readouterr().err
+    assert name in err
+    assert len(err.splitlines()) == 1
+    if name in ("summary.json", "ledger.csv"):
+        assert main(["info", "."]) == 2
+        assert name in capsys.readouterr().err
+
+
+def test_cite_names_version_and_paper(capsys):
+    """For people and for machines."""
+    assert main(["cite"]) == 0
+    assert "Dominik C., Nübold H. (2002)" in capsys.readouterr().out
+    assert main(["cite", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["version"]
+
+
+# --- progress --------------------------------------------------------------------------------------------
+
+
+class Terminal(io.StringIO):
+    """Takes what is drawn."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("by", ["until", "steps"])
+def test_progress_shows_time_and_numbers(place, by):
+    """Physical time, rate, clusters, S and drift, whether the run goes to a time or to a number of steps."""
+    terminal = Terminal()
+    simulation = simulation_of(read_case("small.toml"), None)
+    ends = {"until": [2e-8, 4e-8], "steps": [400, 400]}[by]
+    bar = Progress(*((4e-8, float("inf")) if by == "until" else (float("inf"), 800)), terminal)
+    simulation.observers.append(bar)
+    for end in ends:
+        simulation.run(**{by: end})
+        time.sleep(0.25)  # the bar is drawn at most ten times a second
+        bar.tick(simulation)
+    bar._bar.refresh()
+    bar.finish()
+    drawn = terminal.getvalue()
+    for part in ("%|", " ns ", " clusters, S = ", "drift ", "s/s" if by == "until" else "steps/s"):
+        assert part in drawn
+
+
+def test_progress_of_a_resumed_run_has_numbers_from_the_start(done):
+    """Between two frames the last row of the ledger serves."""
+    from sand.run.build import resume
+
+    terminal = Terminal()
+    simulation = resume(done)
+    bar = Progress(1e-7, float("inf"), terminal)
+    bar.tick(simulation)
+    bar._bar.refresh()
+    bar.finish()
+    assert " clusters, S = " in terminal.getvalue()
+    assert " 20%" in terminal.getvalue()

@@ -1,0 +1,100 @@
+"""Per-grain forces: the uniform field, and one that a user writes."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.jit import formula
+from sand.forces.base import compose
+from sand.kernels.outside import is_ours
+from sand.physics.surroundings import One, nothing, uniform_field
+from sand.stepping.advance import driver_for
+
+
+class Weight(NamedTuple):
+    g: float
+
+
+@formula
+def weight(time, grain, parameters):
+    """Uniform gravity along −z."""
+    force = (0.0, 0.0, -grain.mass * parameters.g)
+    return force, (0.0, 0.0, 0.0), grain.mass * parameters.g * grain.position[2]
+
+
+class Gravity:
+    """A force as a user would write it in a script."""
+
+    name = "gravity"
+    references = "Galileo 1638"
+    formula = staticmethod(weight)
+
+    def parameters(self):
+        return {}
+
+    def check(self, grains, box):
+        return []
+
+    def numbers(self):
+        return Weight(9.81)
+
+    def flux_density_size(self):
+        return 0.0
+
+
+def test_a_force_of_the_user():
+    """Free fall, z = z0 − g t²/2 exactly (Verlet is exact for it); its energy has its own column and closes."""
+    grains = sand.Grains([[0, 0, 1e-3], [1e-6, 0, 0]], 1e-8, sand.SILICA)
+    sim = sand.Simulation(grains, [Gravity()], frame_every="1 us")
+    sim.run(until="10 us")
+    fall = 0.5 * 9.81 * sim.time**2
+    assert sim.grains.position[:, 2] == pytest.approx([1e-3 - fall, -fall], rel=1e-9)
+    assert sim.ledger["gravity"][0] == pytest.approx(grains.mass[0] * 9.81 * 1e-3)
+    change = np.ptp(sim.ledger["total"])
+    assert change < 1e-9 * sim.ledger["translation"][-1] + 1e-15 * sim.ledger["gravity"][0]
+
+
+def test_compiled_code_with_a_users_formula_is_not_kept():
+    """Its edits are not seen by the digest of our sources: a stale copy would compute the old force."""
+    assert is_ours(uniform_field)
+    assert not is_ours(weight)
+    driver = driver_for(compose([Gravity()])[0], False)
+    if not hasattr(driver, "_cache"):
+        pytest.skip("the compiler is off")
+    assert type(driver._cache).__name__ == "NullCache"
+
+
+def test_composed_forces_add_up():
+    """Two forces in one formula: sums of force, torque and energy, each with its own parameters."""
+    field = sand.Field([0.0, 0.0, 0.5])
+    both, numbers = compose([Gravity(), field])
+    grain = One((0.0, 0.0, 2.0), (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0), 1.0, 3.0, 0.0)
+    force, torque, energy = both(0.0, grain, numbers)
+    assert force == pytest.approx((0, 0, -3 * 9.81))
+    assert torque == pytest.approx((0, -0.5, 0))
+    assert energy == pytest.approx(3 * 9.81 * 2)
+    assert compose([]) == (nothing, ())
+
+
+def test_the_field_is_minus_the_gradient_of_its_energy():
+    """Torque μ×B = −∂U/∂θ for U = −μ·B, by central differences, rounding 1e-9."""
+    b, moment = np.array([0.3, -0.2, 0.9]), np.array([0.5, 1.0, -0.4])
+    numbers = sand.Field(b).numbers()
+
+    def energy(m):
+        return uniform_field(0.0, One((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, tuple(m), 1.0, 1.0, 0.0), numbers)[2]
+
+    one = One((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, tuple(moment), 1.0, 1.0, 0.0)
+    torque = uniform_field(0.0, one, numbers)[1]
+    h = 1e-6
+    slope = [
+        (energy(moment + h * np.cross(e, moment)) - energy(moment - h * np.cross(e, moment))) / (2 * h)
+        for e in np.eye(3)
+    ]
+    assert torque == pytest.approx([-s for s in slope], abs=1e-9)
+    assert sand.Field("1 mT").flux_density == (0.0, 0.0, 1e-3)
+    assert sand.Field([3, 0, 4]).flux_density_size() == pytest.approx(5.0)
+    assert math.isclose(energy(moment), -moment @ b)
