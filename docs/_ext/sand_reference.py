@@ -313,8 +313,7 @@ def materials_page() -> str:
             "moment [A m²/kg]", "source"]
     return (
         "# Materials\n\n" + markdown(material.Material.__doc__) + "\n\n## Presets\n\n" + table(head, rows)
-        + "\n\nThe moment per mass is a number to read (`sand.IRON.specific_moment`); grains have the moment "
-        "that `moment` gives them, and none without.\n"
+        + "\n\nThe moment per mass is what `moment = \"material\"` gives to grains; without a `moment` they have none.\n"
     )
 
 
