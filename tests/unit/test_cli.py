@@ -1,5 +1,6 @@
 """The `sand` command: exit codes, what is printed where, interruption and going on."""
 
+import contextlib
 import io
 import json
 import os
@@ -16,6 +17,7 @@ from sand.core.errors import FilesFailed
 from sand.files.checkpoint import newest_checkpoint, read_checkpoint
 from sand.run.build import simulation_of
 from sand.run.case import read_case
+from sand.run.simulation import Simulation
 
 CASE = """
 [run]
@@ -267,17 +269,35 @@ def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
     assert capsys.readouterr().err == "sand: interrupted\n"
 
 
-def test_interrupted_before_the_first_step(place, capsys, monkeypatch):
-    """Ctrl-C while kernels are compiled: 130, and the same command works afterwards."""
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
+    """Ctrl-C or SIGTERM while kernels are compiled: 130, and the same command works afterwards."""
 
     def slow(_self, _until=None, **_):
-        raise KeyboardInterrupt
+        os.kill(os.getpid(), number)
+        time.sleep(5.0)
 
     with monkeypatch.context() as patch:
         patch.setattr("sand.run.simulation.Simulation.run", slow)
         assert main(["run", "small.toml", "--quiet"]) == 130
         assert "interrupted before the first step" in capsys.readouterr().err
     assert main(["run", "small.toml", "--quiet"]) == 0
+
+
+def test_an_interrupt_lost_in_the_compiler_is_found_again(place, capsys, monkeypatch):
+    """Ctrl-C while the compiler calls back into Python: the exception gets lost there, the run ends all the same."""
+    real = Simulation.run
+
+    def swallow(self, *words, **options):
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(5.0)
+        return real(self, *words, **options)
+
+    monkeypatch.setattr(Simulation, "run", swallow)
+    assert main(["run", "small.toml", "--quiet"]) == 130
+    assert "interrupted before the first step" in capsys.readouterr().err
+    assert not list((place / "small").glob("checkpoint-*"))
 
 
 def test_a_reader_that_goes_away_is_no_fault(place):

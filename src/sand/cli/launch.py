@@ -14,6 +14,7 @@ from ..core.units import spoken
 from ..files.folder import SUMMARY, read_json
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
+from .interrupt import Watch
 from .progress import Progress
 
 
@@ -40,8 +41,9 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
 
     talk = not (quiet or as_json)
     bar = None
-    with compiling(tell):
+    with compiling(tell), Watch() as watch:
         simulation = report.with_notes(make)
+        simulation.observers.append(watch)
         goal = _goal(simulation, end)
         if talk:
             report.show(heading, report.opening(simulation, *goal, folder))
