@@ -6,14 +6,13 @@ import numpy as np
 
 import sand
 from sand.core.constants import MAGNETIC
-from sand.forces.contact import pairing
 from sand.physics.adhesion import rest_overlap, rest_radius
 
 
 def lattice(side: int) -> sand.Simulation:
     """side³ silica grains of 0.6 µm diameter on a cubic lattice, all contacts at rest, a little shaken."""
     radius = 3e-7
-    p = pairing(sand.SILICA, sand.SILICA)
+    p = sand.Contact().pairing(sand.SILICA, sand.SILICA)
     rest = rest_overlap(rest_radius(p.surface_energy, radius / 2, p.modulus), radius / 2)
     grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)
     velocity = 1e-3 * np.random.default_rng(1).normal(size=grid.shape)

@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 import sand
-from sand.forces.contact import pairing
+from sand.forces.contact import Contact
 from sand.physics.adhesion import rest_overlap, rest_radius
 
 
 def rest_distance(a: sand.Material, r1: float, r2: float, b: sand.Material | None = None) -> float:
     """Distance of two centres in equilibrium [m]."""
-    p = pairing(a, b or a)
+    p = Contact().pairing(a, b or a)
     reduced = r1 * r2 / (r1 + r2)
     return r1 + r2 - rest_overlap(rest_radius(p.surface_energy, reduced, p.modulus), reduced)
 

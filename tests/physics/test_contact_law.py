@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sand.core.material import ICE, IRON, SILICA
 from sand.core.vec import add, cross, dot, scale, sub
-from sand.forces.contact import pairing
+from sand.forces.contact import Contact
 from sand.physics import adhesion, tangential
 from sand.physics import contact as law
 from sand.physics.rotation import turn, turned
@@ -28,7 +28,7 @@ def contact_of(ratio, materials=(SILICA, ICE)):
     r1, r2 = 1e-7, ratio * 1e-7
     a, b = materials
     masses = [m.density * 4 / 3 * math.pi * r**3 for m, r in zip(materials, (r1, r2), strict=True)]
-    return r1, r2, law.bond_between(pairing(a, b), r1, r2, *masses)
+    return r1, r2, law.bond_between(Contact().pairing(a, b), r1, r2, *masses)
 
 
 class Pair:
@@ -58,11 +58,13 @@ class Pair:
         return self.r1 + self.r2 - self.pose().distance
 
     def energies(self):
-        return np.array(law.energies(self.pose(), self.overlap(), self.r1, self.r2, self.bond))
+        return np.array(law.energies(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.bond))
+
+    def y(self):
+        return adhesion.root(adhesion.stretch(self.overlap(), self.bond.pull_off_overlap))
 
     def load(self):
-        y = adhesion.root(adhesion.stretch(self.overlap(), self.bond.pull_off_overlap))
-        return law.contact_load(self.pose(), self.overlap(), y, self.r1, self.r2, self.bond)
+        return law.contact_load(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.bond)
 
 
 def slope(pair, change, h):
@@ -245,7 +247,7 @@ def test_constants_of_equal_grains():
     """k_s = 8G*a0, ζ_c = (2−ν)a0/(16π), critical force G a0²/(4π)·…; k_r = 12πγ; M_c = 4Fcξ_c; k_t, φ_c."""
     r1, _, b = contact_of(1.0, (IRON, IRON))
     g, nu, gamma = IRON.shear_modulus, IRON.poisson_ratio, IRON.surface_energy
-    same = pairing(IRON, IRON)
+    same = Contact().pairing(IRON, IRON)
     a0 = adhesion.rest_radius(same.surface_energy, r1 / 2, same.modulus)
     assert b.slide_stiffness == pytest.approx(8 * a0 * g / (2 * (2 - nu)))
     assert b.slide_limit == pytest.approx((2 - nu) * a0 / (16 * math.pi))
@@ -261,10 +263,10 @@ def test_periods_of_20_nm_iron():
     """T_slide = 1.9e-11 s and T_n = 4.3e-11 s for 20 nm (diameter) iron: ω² = 7k_s/m and 2k_n/m."""
     r = 1e-8
     mass = IRON.density * 4 / 3 * math.pi * r**3
-    b = law.bond_between(pairing(IRON, IRON), r, r, mass, mass)
+    b = law.bond_between(Contact().pairing(IRON, IRON), r, r, mass, mass)
     assert 2 * math.pi / math.sqrt(b.fastest) == pytest.approx(1.9e-11, rel=0.02)
     assert b.fastest == pytest.approx(7 * b.slide_stiffness / mass)
-    same = pairing(IRON, IRON)
+    same = Contact().pairing(IRON, IRON)
     a0 = adhesion.rest_radius(same.surface_energy, r / 2, same.modulus)
     k_n = adhesion.normal_stiffness(a0, same.modulus)
     assert 2 * math.pi / math.sqrt(2 * k_n / mass) == pytest.approx(4.3e-11, rel=0.02)

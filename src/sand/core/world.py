@@ -21,8 +21,8 @@ STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2 = ra
 COUNT = ("steps", "stage", "contacts", "pairs", "made", "broken", "moved", "rebuilt", "grain1", "grain2")
 
 # --- places in World.lost (float64): energy dissipated per channel [J] ----------------------------------
-FORMING, BREAKING, SLIDING, ROLLING, TWISTING = range(5)
-LOST = ("forming", "breaking", "sliding", "rolling", "twisting")
+FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS = range(7)
+LOST = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
 
 
 class ContactArrays(NamedTuple):
@@ -34,6 +34,8 @@ class ContactArrays(NamedTuple):
     twist: np.ndarray  # (C,) φ [rad]
     formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
     bond: np.ndarray  # (K, C) constants of the contact law
+    lost: np.ndarray  # (L, C) energy it dissipated so far [J], by channel as in LOST
+    damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
@@ -55,10 +57,11 @@ def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
     """Room for `capacity` contacts with `constants` numbers each."""
     c = max(int(capacity), 16)
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
-    numbers = {k: np.zeros(c) for k in ("twist", "formed", "flag")}
+    numbers = {k: np.zeros(c) for k in ("twist", "formed", "flag", "damped")}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         bond=np.zeros((constants, c)),
+        lost=np.zeros((len(LOST), c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
         **vectors,

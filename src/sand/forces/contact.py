@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -13,26 +13,21 @@ from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
 from ..core.material import Material
+from ..core.units import si
 from ..physics.adhesion import rest_radius
 from ..physics.contact import Pairing
 
 BEYOND = ("clamp", "release")
+STIFFNESS = ("frozen", "dt97")
+DAMPING = ("none", "constant", "viscoelastic")
+MIXING: dict[str, Callable[[float, float], float]] = {
+    "geometric": lambda a, b: math.sqrt(a * b),
+    "harmonic": lambda a, b: 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0,
+    "smaller": min,
+}
+"""Rules for γ_eff of two materials; each gives γ for equal ones and 0 if one has none."""
 JKR_LIMIT = 0.3
 """a0/R above which JKR is at the edge of its validity."""
-
-
-def pairing(a: Material, b: Material) -> Pairing:
-    """What two materials make together.
-
-    γ_eff = √(γ1 γ2), 1/E* = Σ(1−ν²)/E, 1/G* = Σ(2−ν)/G, 1/G′ = Σ 1/G, the smaller ξ_c.
-    """
-    return Pairing(
-        surface_energy=math.sqrt(a.surface_energy * b.surface_energy),
-        modulus=1.0 / sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in (a, b)),
-        shear=1.0 / sum((2.0 - m.poisson_ratio) / m.shear_modulus for m in (a, b)),
-        twist_shear=1.0 / sum(1.0 / m.shear_modulus for m in (a, b)),
-        roll_limit=min(a.rolling_limit, b.rolling_limit),
-    )
 
 
 @dataclass(frozen=True)
@@ -42,44 +37,110 @@ class Contact:
     Args:
         beyond: what happens to a tangential displacement beyond its limit. "clamp" leaves it at the limit;
             "release" sets it to 0, the literal SAND (A.6), which halves the friction of rolling.
+        stiffness: of the tangential springs. "frozen" at the equilibrium radius a0, forces exact gradients;
+            "dt97" lets them follow the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³, which does not conserve
+            energy: what it makes or destroys is booked as `lost_stiffness`.
+        slide_factor, roll_factor, twist_factor: multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012: 1, 8 on
+            rolling, …).
+        rolling_limit: critical rolling displacement ξ_c [m] for all contacts; None: the smaller of the two
+            materials' own.
+        damping: of the normal motion, "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013:
+            F = (2 T_vis E*/ν²) a dδ/dt; ν² is ν1 ν2 for unequal materials).
+        damping_constant: c [kg/s] ≥ 0, for "constant".
+        viscous_time: T_vis [s] ≥ 0, for "viscoelastic"; 1.25e-11 s is for silica.
+        mixing: γ_eff of unequal materials, "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
 
     Raises:
-        BadInput: an unknown word.
+        BadInput: unknown words and numbers out of range, one line each.
     """
 
     beyond: str = "clamp"
+    stiffness: str = "frozen"
+    slide_factor: Any = 1.0
+    roll_factor: Any = 1.0
+    twist_factor: Any = 1.0
+    rolling_limit: Any = None
+    damping: str = "none"
+    damping_constant: Any = 0.0
+    viscous_time: Any = 1.25e-11
+    mixing: str = "geometric"
 
     __pydantic_config__ = FORBID_EXTRA
     name = "contact"
     references = "Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997; Dominik & Nübold 2002, A.5–A.6"
 
     def __post_init__(self) -> None:
-        if self.beyond not in BEYOND:
-            raise BadInput(f"contact: beyond = {self.beyond!r}; {did_you_mean(str(self.beyond), BEYOND)}")
+        problems: list[str] = []
+        words = {"beyond": BEYOND, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
+        for key, allowed in words.items():
+            if getattr(self, key) not in allowed:
+                given = getattr(self, key)
+                problems.append(f"contact: {key} = {given!r}; {did_you_mean(str(given), allowed)}")
+        units = {"slide_factor": "1", "roll_factor": "1", "twist_factor": "1"}
+        units |= {"damping_constant": "kg/s", "viscous_time": "s"}
+        for key, unit in units.items():
+            try:
+                object.__setattr__(self, key, si(getattr(self, key), unit, f"contact: {key}", least=0.0))
+            except BadInput as error:
+                problems += error.problems
+        try:
+            if self.rolling_limit is not None:
+                limit = si(self.rolling_limit, "m", "contact: rolling_limit", above=0.0)
+                object.__setattr__(self, "rolling_limit", limit)
+        except BadInput as error:
+            problems += error.problems
+        if problems:
+            raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
-        return {"beyond": self.beyond}
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+    def pairing(self, a: Material, b: Material) -> Pairing:
+        """What two materials make together under these settings.
+
+        1/E* = Σ(1−ν²)/E, 1/G* = Σ(2−ν)/G, 1/G′ = Σ 1/G, the smaller ξ_c, γ_eff by the mixing rule.
+        """
+        modulus = 1.0 / sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in (a, b))
+        viscous = 2.0 * self.viscous_time * modulus
+        return Pairing(
+            surface_energy=MIXING[self.mixing](a.surface_energy, b.surface_energy),
+            modulus=modulus,
+            shear=1.0 / sum((2.0 - m.poisson_ratio) / m.shear_modulus for m in (a, b)),
+            twist_shear=1.0 / sum(1.0 / m.shear_modulus for m in (a, b)),
+            roll_limit=self.rolling_limit or min(a.rolling_limit, b.rolling_limit),
+            slide_factor=self.slide_factor,
+            roll_factor=self.roll_factor,
+            twist_factor=self.twist_factor,
+            damping=self.damping_constant if self.damping == "constant" else 0.0,
+            damping_per_radius=viscous / (a.poisson_ratio * b.poisson_ratio) if self.damping == "viscoelastic" else 0.0,
+        )
 
     def pairings(self, materials: Sequence[Material]) -> np.ndarray:
-        """The (5, M, M) table of `Pairing` for every two materials."""
-        table = [[pairing(a, b) for b in materials] for a in materials]
+        """The (10, M, M) table of `Pairing` for every two materials."""
+        table = [[self.pairing(a, b) for b in materials] for a in materials]
         return np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0))
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """A warning for each material whose contacts are too wide for JKR."""
         problems = [
-            f"material '{m.name}' has no surface energy above 0, so its grains cannot stick; give one: "
+            f"material '{m.name}' has no surface energy; give one, 0 for none: "
             f'{m.name} with surface_energy = "… J/m^2"'
             for m in grains.materials
-            if not (m.surface_energy or 0.0) > 0.0
+            if m.surface_energy is None
         ]
+        if self.damping == "viscoelastic":
+            problems += [
+                f"material '{m.name}' has poisson_ratio {m.poisson_ratio:g}: viscoelastic damping needs one above 0"
+                for m in grains.materials
+                if not m.poisson_ratio > 0.0
+            ]
         if problems:
             raise BadInput(problems)
         warnings = []
         for number, m in enumerate(grains.materials):
             smallest = float(grains.radius[grains.material == number].min())
             reduced = 0.5 * smallest
-            same = pairing(m, m)
+            same = self.pairing(m, m)
             ratio = rest_radius(same.surface_energy, reduced, same.modulus) / reduced
             if ratio > JKR_LIMIT:
                 warnings.append(

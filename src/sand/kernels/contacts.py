@@ -18,7 +18,23 @@ from ..physics.rotation import turned
 def bond_at(contacts, c):
     """The stored constants of contact c."""
     b = contacts.bond
-    return law_of.Bond(b[0, c], b[1, c], b[2, c], b[3, c], b[4, c], b[5, c], b[6, c], b[7, c], b[8, c], b[9, c])
+    return law_of.Bond(
+        b[0, c],
+        b[1, c],
+        b[2, c],
+        b[3, c],
+        b[4, c],
+        b[5, c],
+        b[6, c],
+        b[7, c],
+        b[8, c],
+        b[9, c],
+        b[10, c],
+        b[11, c],
+        b[12, c],
+        b[13, c],
+        b[14, c],
+    )
 
 
 @loop
@@ -46,7 +62,7 @@ def twist_gain(grains, contacts, c, pose, dt):
 
 
 @loop
-def contact_pass(grains, contacts, count, span, dt):
+def contact_pass(grains, contacts, count, span, law, dt):
     """Twist, loads and flag of every contact; returns how many passed a limit.  Vectorises."""
     flagged = 0.0
     for c in range(count[CONTACTS]):
@@ -59,7 +75,8 @@ def contact_pass(grains, contacts, count, span, dt):
         overlap = r1 + r2 - pose.distance
         s = adhesion.stretch(overlap, bond.pull_off_overlap)
         y = adhesion.root_in_reach(s)
-        push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, bond)
+        now = law_of.stiffened(bond, y, law.follow)
+        push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
         beyond = law_of.beyond_limits(strain, bond) | (s > adhesion.STRETCH_OF_POLYNOMIAL)
         contacts.twist[c] = twist
@@ -72,7 +89,7 @@ def contact_pass(grains, contacts, count, span, dt):
 
 
 @rare
-def write_loads(grains, contacts, span, c):
+def write_loads(grains, contacts, span, law, c):
     """Loads of one contact from its stored pointers and twist, at any compression."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     r1, r2 = grains.radius[i], grains.radius[j]
@@ -80,7 +97,8 @@ def write_loads(grains, contacts, span, c):
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
     y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
-    push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, bond)
+    now = law_of.stiffened(bond, y, law.follow)
+    push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
     put(contacts.push, c, push)
     put(contacts.torque1, c, torque1)
     put(contacts.torque2, c, torque2)
@@ -132,7 +150,7 @@ def contact_step(contacts, count, grains, clock, per_period):
     """The longest step [s] the contacts allow: fastest period / per_period, less above 6 neighbours."""
     fastest, most = 0.0, 0
     for c in range(count[CONTACTS]):
-        fastest = max(fastest, contacts.bond[9, c])
+        fastest = max(fastest, bond_at(contacts, c).fastest)
     for g in range(grains.mass.size):
         most = max(most, int(contacts.start[g + 1]) - int(contacts.start[g]))
     crowd = max(1.0, most / 6.0)

@@ -4,22 +4,24 @@ import math
 
 from ..core.box import nearest_image
 from ..core.jit import loop, rare
-from ..core.vec import accrue, dot, load, load4, put, scale, sub
+from ..core.vec import accrue, axpy, dot, load, load4, put, scale, sub
 from ..core.world import (
     BREAKING,
     BROKEN,
     CONTACTS,
+    DAMPING,
     FORMING,
     MADE,
     MOVED,
     PAIRS,
     ROLLING,
     SLIDING,
+    STIFFNESS,
     TIME,
     TWISTING,
 )
+from ..physics import adhesion, tangential
 from ..physics import contact as law_of
-from ..physics import tangential
 from ..physics.rotation import turn, turned, turned_back
 from .contacts import bond_at, pose_at, twist_gain, write_loads
 from .neighbours import bond_of, forget_touch
@@ -48,11 +50,69 @@ def strain_before(grains, contacts, span, c, pose, bond, dt):
 
 
 @loop
-def book(lost, channels):
-    """Add the energies lost by sliding, rolling, twisting."""
-    lost[SLIDING] += channels[0]
-    lost[ROLLING] += channels[1]
-    lost[TWISTING] += channels[2]
+def book(contacts, lost, c, channel, energy):
+    """Add an energy [J] lost by contact c to the books and to its own record."""
+    lost[channel] += energy
+    contacts.lost[channel, c] += energy
+
+
+@loop
+def book_yielding(contacts, lost, c, energies):
+    """The same for the three tangential modes."""
+    book(contacts, lost, c, SLIDING, energies[0])
+    book(contacts, lost, c, ROLLING, energies[1])
+    book(contacts, lost, c, TWISTING, energies[2])
+
+
+@rare
+def damp(grains, contacts, span, c, dt):
+    """Add the damping force to the loads of contact c; returns the energy [J] it took in the step.
+
+    It acts on the closing speed at the end of the step, foretold with the loads of its start.  Its work is
+    that of the trapezoid rule, as velocity Verlet does it, with the force kept from the step before.
+    """
+    i, j = contacts.pair[0, c], contacts.pair[1, c]
+    bond = bond_at(contacts, c)
+    apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+    distance = math.sqrt(dot(apart, apart))
+    n = scale(1.0 / distance, apart)
+    moving = sub(load(grains.velocity, i), load(grains.velocity, j))
+    pull = sub(scale(1.0 / grains.mass[i], load(grains.force, i)), scale(1.0 / grains.mass[j], load(grains.force, j)))
+    closing = -dot(axpy(0.5 * dt, pull, moving), n)
+    overlap = grains.radius[i] + grains.radius[j] - distance
+    y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+    force = law_of.damping_force(overlap, y, closing, bond)
+    accrue(contacts.push, c, scale(force, n))
+    earlier = axpy(-dt, moving, apart)
+    before = contacts.damped[c] / math.sqrt(dot(earlier, earlier))
+    contacts.damped[c] = force
+    return -0.5 * dt * (before * dot(earlier, moving) + force * dot(n, moving))
+
+
+@rare
+def damp_contacts(grains, contacts, count, lost, span, dt):
+    """Damping of all contacts."""
+    for c in range(count[CONTACTS]):
+        book(contacts, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
+
+
+@rare
+def book_stiffness(grains, contacts, count, lost, span, dt):
+    """What stiffnesses that follow a(δ) took out of the springs of all contacts in this step."""
+    for c in range(count[CONTACTS]):
+        bond = bond_at(contacts, c)
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
+        before = strain_before(grains, contacts, span, c, pose, bond, dt)
+        strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
+        earlier, now = stiffened_at(before.overlap, bond), stiffened_at(strain.overlap, bond)
+        book(contacts, lost, c, STIFFNESS, law_of.lost_to_stiffness(before, strain, earlier, now))
+
+
+@loop
+def stiffened_at(overlap, bond):
+    """The bond with the stiffnesses that follow this overlap."""
+    return law_of.stiffened(bond, adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap)), True)
 
 
 @loop
@@ -72,11 +132,13 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     overlap = grains.radius[i] + grains.radius[j] - pose.distance
     opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    late = -bond.pull_off_overlap - overlap
+    late = -bond.break_overlap - overlap
     since = min(late / opening, dt) if opening > 0.0 else 0.0
     energy, force = law_of.breaking(bond)
-    knock(grains, i, j, pose.n, force * (0.5 * dt - since))
-    lost[BREAKING] += energy
+    knock(grains, i, j, pose.n, (force + contacts.damped[c]) * (0.5 * dt - since))
+    book(contacts, lost, c, BREAKING, energy)
+    # the damping force acted until the break: half a step by Verlet, the rest by the impulse
+    book(contacts, lost, c, DAMPING, -contacts.damped[c] * opening * (dt - since))
     count[BROKEN] += 1
     contacts.flag[c] = 2.0
     forget_touch(near, count, i, j)
@@ -96,21 +158,23 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         if law_of.beyond_limits(strain, bond):
             before = strain_before(grains, contacts, span, c, pose, bond, dt)
-            if strain.overlap < -bond.pull_off_overlap:
+            y = adhesion.root(adhesion.stretch(strain.overlap, bond.pull_off_overlap))
+            now = law_of.stiffened(bond, y, law.follow)
+            if strain.overlap < -bond.break_overlap:
                 zero = (0.0, 0.0, 0.0)
                 gone = law_of.Strain(strain.overlap, zero, zero, 0.0)
-                book(lost, law_of.lost_by_yielding(before, strain, gone, bond))
+                book_yielding(contacts, lost, c, law_of.lost_by_yielding(before, strain, gone, now))
                 break_contact(grains, contacts, near, count, lost, c, pose, bond, dt)
                 parted = True
                 continue
             left = law_of.yielded(strain, bond, law.release)
-            book(lost, law_of.lost_by_yielding(before, strain, left, bond))
+            book_yielding(contacts, lost, c, law_of.lost_by_yielding(before, strain, left, now))
             n1, n2 = tangential.pointers_for(left.slide, left.roll, pose.n, r1, r2)
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
             contacts.twist[c] = left.twist
             count[MOVED] += 1
-        write_loads(grains, contacts, span, c)
+        write_loads(grains, contacts, span, law, c)
     return parted
 
 
@@ -132,6 +196,9 @@ def drop_broken(contacts, count):
                 contacts.torque2[row, kept] = contacts.torque2[row, c]
             for row in range(contacts.bond.shape[0]):
                 contacts.bond[row, kept] = contacts.bond[row, c]
+            for row in range(contacts.lost.shape[0]):
+                contacts.lost[row, kept] = contacts.lost[row, c]
+            contacts.damped[kept] = contacts.damped[c]
             contacts.twist[kept] = contacts.twist[c]
             contacts.formed[kept] = contacts.formed[c]
             contacts.flag[kept] = contacts.flag[c]
@@ -166,10 +233,13 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     contacts.twist[c] = 0.0
     contacts.formed[c] = formed
     contacts.flag[c] = 0.0
+    contacts.damped[c] = 0.0
+    for row in range(contacts.lost.shape[0]):
+        contacts.lost[row, c] = 0.0
     bond = bond_of(grains, law.pairings, i, j)
     for row in range(contacts.bond.shape[0]):
         contacts.bond[row, c] = bond[row]
-    write_loads(grains, contacts, span, c)
+    write_loads(grains, contacts, span, law, c)
     return c
 
 
@@ -192,8 +262,10 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
         closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
         since = min((reach - distance) / closing, dt) if closing > 0.0 else 0.0
         c = add_contact(grains, contacts, count, span, law, i, j, clock[TIME] + dt - since)
+        if law.damped:
+            damp(grains, contacts, span, c, 0.0)
+            book(contacts, lost, c, DAMPING, contacts.damped[c] * closing * since)
         knock(grains, i, j, n, dot(load(contacts.push, c), n) * (since - 0.5 * dt))
-        energy, _ = law_of.forming(bond_at(contacts, c))
-        lost[FORMING] += energy
+        book(contacts, lost, c, FORMING, law_of.forming(bond_at(contacts, c)))
         near.touching[p] = 1
         count[MADE] += 1

@@ -14,8 +14,19 @@ FULL = -1
 
 @loop
 def pairing_of(pairings, a, b):
-    """What materials a and b make together, from the (5, M, M) table."""
-    return Pairing(pairings[0, a, b], pairings[1, a, b], pairings[2, a, b], pairings[3, a, b], pairings[4, a, b])
+    """What materials a and b make together, from the (10, M, M) table."""
+    return Pairing(
+        pairings[0, a, b],
+        pairings[1, a, b],
+        pairings[2, a, b],
+        pairings[3, a, b],
+        pairings[4, a, b],
+        pairings[5, a, b],
+        pairings[6, a, b],
+        pairings[7, a, b],
+        pairings[8, a, b],
+        pairings[9, a, b],
+    )
 
 
 @loop

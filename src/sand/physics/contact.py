@@ -1,7 +1,7 @@
 """The whole contact law: JKR normal force and springs that slide, roll and twist up to a limit.
 
-The stiffnesses are frozen at a₀, so forces are exact gradients of the energy (Dominik & Tielens 1997;
-Dominik & Nübold 2002, appendix A.5).
+By default the stiffnesses are frozen at a₀, so forces are exact gradients of the energy (Dominik & Tielens 1997;
+Dominik & Nübold 2002, appendix A.5).  Without adhesion (γ = 0) a contact is Hertzian and has no springs.
 """
 
 import math
@@ -16,25 +16,35 @@ class Bond(NamedTuple):
     """The constants of one contact; made by `bond_between`, stored as one column per contact."""
 
     reduced_radius: float  # R [m]
+    rest_radius: float  # a₀ [m]
     pull_off_force: float  # F_c [N]
-    pull_off_overlap: float  # δ_c [m]
+    pull_off_overlap: float  # δ_c [m]; without adhesion a length that only keeps formulas finite
+    break_overlap: float  # the contact breaks at δ below minus this [m]: δ_c, or 0 without adhesion
+    hertz: float  # (4/3) E* √R [N/m^1.5] without adhesion, else 0
     slide_stiffness: float  # k_s [N/m]
     roll_stiffness: float  # k_r [N/m]
     twist_stiffness: float  # k_t [N m]
     slide_limit: float  # ζ_c [m]
     roll_limit: float  # ξ_c [m]
     twist_limit: float  # φ_c [rad]
+    damping: float  # c [kg/s], whatever the contact radius
+    damping_per_radius: float  # c/a [kg/(m s)]
     fastest: float  # ω² of the pair's fastest mode [1/s²]
 
 
 class Pairing(NamedTuple):
-    """What two materials make together."""
+    """What two materials make together under the settings of the law."""
 
     surface_energy: float  # γ_eff [J/m²]
     modulus: float  # E* [Pa]
     shear: float  # G* [Pa]
     twist_shear: float  # G′ [Pa]
     roll_limit: float  # ξ_c [m]
+    slide_factor: float  # multipliers on k_s, k_r, k_t
+    roll_factor: float
+    twist_factor: float
+    damping: float  # c [kg/s]
+    damping_per_radius: float  # c/a [kg/(m s)]
 
 
 class Pose(NamedTuple):
@@ -56,33 +66,90 @@ class Strain(NamedTuple):
     twist: float  # φ [rad]
 
 
+HERTZ_RADIUS = 0.3
+"""a/R at which the fastest period of a contact without adhesion is reckoned."""
+DAMPING_SHARE = 4.0
+"""Steps are kept below the time m̄/c of damping by counting it as a mode of frequency 4 c/m̄."""
+
+
 @formula
 def bond_between(pairing, r1, r2, m1, m2):
     """The constants of a contact between grains of radii r1, r2 [m] and masses m1, m2 [kg]."""
     reduced = r1 * r2 / (r1 + r2)
+    sticks = pairing.surface_energy > 0.0
     a0 = adhesion.rest_radius(pairing.surface_energy, reduced, pairing.modulus)
     pull = adhesion.pull_off_force(pairing.surface_energy, reduced)
-    k_s = tangential.slide_stiffness(pairing.shear, a0)
-    k_r = tangential.roll_stiffness(pull, reduced)
-    k_t = tangential.twist_stiffness(pairing.twist_shear, a0)
-    k_n = adhesion.normal_stiffness(a0, pairing.modulus)
+    pull_off_overlap = adhesion.pull_off_overlap(a0, reduced) if sticks else reduced
+    k_s = pairing.slide_factor * tangential.slide_stiffness(pairing.shear, a0)
+    k_r = pairing.roll_factor * tangential.roll_stiffness(pull, reduced)
+    k_t = pairing.twist_factor * tangential.twist_stiffness(pairing.twist_shear, a0)
+    width = a0 if sticks else HERTZ_RADIUS * reduced
+    k_n = adhesion.normal_stiffness(a0, pairing.modulus) if sticks else 2.0 * pairing.modulus * width
+    damping = pairing.damping + pairing.damping_per_radius * width
     # squared frequencies of the four modes of the free pair; I = (2/5) m r²
     light = 1.0 / m1 + 1.0 / m2
-    rolls = 2.5 * reduced * reduced * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
-    twists = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
-    fastest = max(max(k_n * light, 3.5 * k_s * light), max(k_r * rolls, k_t * twists))
+    turns = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
+    fastest = max(max(k_n * light, 3.5 * k_s * light), max(k_r * reduced * reduced, k_t) * turns)
     return Bond(
         reduced,
+        a0,
         pull,
-        adhesion.pull_off_overlap(a0, reduced),
+        pull_off_overlap,
+        pull_off_overlap if sticks else 0.0,
+        0.0 if sticks else 4.0 / 3.0 * pairing.modulus * math.sqrt(reduced),
         k_s,
         k_r,
         k_t,
         tangential.slide_limit(pairing.shear, pairing.twist_shear, a0),
         pairing.roll_limit,
         tangential.TWIST_LIMIT,
-        fastest,
+        pairing.damping,
+        pairing.damping_per_radius,
+        max(fastest, (DAMPING_SHARE * damping * light) ** 2),
     )
+
+
+@formula
+def stiffened(bond, y, follow):
+    """The bond with stiffnesses for y = √(a/a₀): as they are, or k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³ ("dt97")."""
+    y2 = y * y
+    return Bond(
+        bond.reduced_radius,
+        bond.rest_radius,
+        bond.pull_off_force,
+        bond.pull_off_overlap,
+        bond.break_overlap,
+        bond.hertz,
+        bond.slide_stiffness * (y2 if follow else 1.0),
+        bond.roll_stiffness * (y2 * y if follow else 1.0),
+        bond.twist_stiffness * (y2 * y2 * y2 if follow else 1.0),
+        bond.slide_limit,
+        bond.roll_limit,
+        bond.twist_limit,
+        bond.damping,
+        bond.damping_per_radius,
+        bond.fastest,
+    )
+
+
+@formula
+def normal_force(overlap, y, bond):
+    """Normal force [N], push positive: JKR, or Hertz (4/3) E* √R δ^(3/2) without adhesion."""
+    pressed = max(overlap, 0.0)
+    return adhesion.force_at(y, bond.pull_off_force) + bond.hertz * pressed * math.sqrt(pressed)
+
+
+@formula
+def contact_radius(overlap, y, bond):
+    """a [m]: a₀ y² (JKR) or √(Rδ) (Hertz)."""
+    pressed = math.sqrt(bond.reduced_radius * max(overlap, 0.0))
+    return bond.rest_radius * y * y + (pressed if bond.hertz > 0.0 else 0.0)
+
+
+@formula
+def damping_force(overlap, y, closing, bond):
+    """Damping force [N] on grain 1 along n at the rate dδ/dt = closing [m/s]: (c + (c/a) a) dδ/dt."""
+    return (bond.damping + bond.damping_per_radius * contact_radius(overlap, y, bond)) * closing
 
 
 @formula
@@ -97,9 +164,10 @@ def contact_load(pose, overlap, y, r1, r2, bond):
 
     Args:
         y: √(a/a₀) of this overlap, from `adhesion.root` or `root_in_reach`.
+        bond: with the stiffnesses in force, see `stiffened`.
     """
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    normal = adhesion.force_at(y, bond.pull_off_force)
+    normal = normal_force(overlap, y, bond)
     push = axpy(normal, pose.n, scale(bond.slide_stiffness * along / pose.distance, zeta))
     bend = scale(bond.reduced_radius**2 * bond.roll_stiffness, cross(pose.n1, pose.n2))
     turn = axpy(bond.twist_stiffness * pose.twist, pose.n, bend)
@@ -120,7 +188,7 @@ def strain_of(pose, overlap, r1, r2, bond):
 def beyond_limits(strain, bond):
     """True where the contact must move or break."""
     return (
-        (strain.overlap < -bond.pull_off_overlap)
+        (strain.overlap < -bond.break_overlap)
         | (dot(strain.slide, strain.slide) > bond.slide_limit * bond.slide_limit)
         | (dot(strain.roll, strain.roll) > bond.roll_limit * bond.roll_limit)
         | (abs(strain.twist) > bond.twist_limit)
@@ -145,16 +213,23 @@ def yielded(strain, bond, release):
 
 
 @formula
-def energies(pose, overlap, r1, r2, bond):
+def normal_energy(overlap, y, bond):
+    """Energy [J] of the normal mode: JKR, or Hertz (2/5)·(4/3) E* √R δ^(5/2); 0 for surfaces apart."""
+    pressed = max(overlap, 0.0)
+    stored = adhesion.energy_at(y, bond.pull_off_force, bond.pull_off_overlap)
+    return stored + 0.4 * bond.hertz * pressed * pressed * math.sqrt(pressed)
+
+
+@formula
+def energies(pose, overlap, y, r1, r2, bond):
     """Stored energy [J] of the modes: normal, sliding, rolling, twisting.
 
     The rolling energy uses all of n1 + n2, of which the torque −R² k_r n1×n2 is the exact gradient.
     """
     zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
     xi = tangential.rolling(pose.n1, pose.n2, bond.reduced_radius)
-    y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
     return (
-        adhesion.energy_at(y, bond.pull_off_force, bond.pull_off_overlap),
+        normal_energy(overlap, y, bond),
         0.5 * bond.slide_stiffness * dot(zeta, zeta),
         0.5 * bond.roll_stiffness * dot(xi, xi),
         0.5 * bond.twist_stiffness * pose.twist * pose.twist,
@@ -179,11 +254,26 @@ def lost_by_yielding(before, reached, left, bond):
 
 
 @formula
+def lost_to_stiffness(before, reached, earlier, bond):
+    """Energy [J] that changing stiffnesses take out of the springs in a step: ½ (k_before − k) q_before·q_reached.
+
+    Zero for frozen stiffnesses.  Negative where the springs stiffen: "dt97" is not conservative, and this is
+    what it makes or destroys.
+
+    Args:
+        earlier: the bond with the stiffnesses at the start of the step.
+        bond: the bond with those at its end.
+    """
+    slide = (earlier.slide_stiffness - bond.slide_stiffness) * dot(before.slide, reached.slide)
+    roll = (earlier.roll_stiffness - bond.roll_stiffness) * dot(before.roll, reached.roll)
+    twist = (earlier.twist_stiffness - bond.twist_stiffness) * before.twist * reached.twist
+    return 0.5 * (slide + roll + twist)
+
+
+@formula
 def forming(bond):
-    """Energy [J] lost at first touch, where U jumps from 0 to −0.846614 F_c δ_c, and the force there [N]."""
-    y = adhesion.ROOT_AT_TOUCH
-    lost = -adhesion.energy_at(y, bond.pull_off_force, bond.pull_off_overlap)
-    return lost, adhesion.force_at(y, bond.pull_off_force)
+    """Energy [J] lost at first touch, where U jumps from 0 to −0.846614 F_c δ_c; 0 without adhesion."""
+    return -adhesion.energy_at(adhesion.ROOT_AT_TOUCH, bond.pull_off_force, bond.pull_off_overlap)
 
 
 @formula

@@ -10,6 +10,7 @@ from ..core.box import Box
 from ..core.constants import MAGNETIC
 from ..core.errors import BadInput
 from ..core.grains import Grains
+from ..core.material import SILICA
 from ..core.world import CONTACT_STEP, GRAIN1, GRAIN2, MADE, STAGE, STEPS, World, contact_arrays, near_pairs
 from ..forces.base import Force, GrainForce, compose
 from ..forces.contact import Contact
@@ -79,6 +80,7 @@ class Engine:
         self.advance(-math.inf, 1)
         w.count[STEPS] = w.count[MADE] = 0
         w.lost[:] = 0.0
+        w.contacts.lost[:] = 0.0
 
     def outside_energies(self) -> dict[str, float]:
         """Energy [J] of each per-grain force by name."""
@@ -174,10 +176,14 @@ def _refuse_doubles(forces: Sequence[Force]) -> None:
 
 def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactRules:
     law = contact or Contact()
+    # without a Contact nothing ever touches, and materials may lack what contacts need
+    pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
     return ContactRules(
         on=contact is not None,
-        pairings=law.pairings(grains.materials),
+        pairings=pairings,
         release=law.beyond == "release",
+        follow=law.stiffness == "dt97",
+        damped=law.damping != "none",
         per_period=stepping.steps_per_period,
     )
 

@@ -19,17 +19,16 @@ MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") fo
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 
 
-def take_stock(world: World, dipoles: Any, outside: dict[str, float]) -> dict[str, float]:
+def take_stock(world: World, rules: Any, outside: dict[str, float]) -> dict[str, float]:
     """One row of the ledger: all energies [J], losses [J], momenta (SI), numbers of contacts and clusters.
 
     Args:
-        dipoles: the rules of the magnetic sum.
+        rules: of the run, as the driver takes them.
         outside: energy [J] of each per-grain force by name.
     """
     energies = np.empty(len(ENERGIES))
     grains = world.grains.arrays
-    span = world.box.span
-    measure_energies(grains, world.contacts, world.count, span, dipoles, energies)
+    measure_energies(grains, world.contacts, world.count, world.box.span, rules.dipoles, rules.contact.follow, energies)
     contacts = int(world.count[CONTACTS])
     labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts])
     row: dict[str, float] = {"step": world.steps, "time": world.time}

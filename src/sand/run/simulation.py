@@ -184,7 +184,7 @@ class Simulation:
             self._look()
 
     def _stock(self) -> dict[str, float]:
-        return take_stock(self.world, self._engine.rules.dipoles, self._engine.outside_energies())
+        return take_stock(self.world, self._engine.rules, self._engine.outside_energies())
 
     def _look(self) -> None:
         """A row of the ledger, a frame and everyone who looks on."""

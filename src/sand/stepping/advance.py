@@ -25,7 +25,7 @@ from ..core.world import (
 )
 from ..kernels.contacts import contact_pass, contact_step, gather, sort_sides
 from ..kernels.dipoles import dipole_loads
-from ..kernels.events import drop_broken, make_contacts, new_touches, settle_flagged
+from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, new_touches, settle_flagged
 from ..kernels.motion import drift, kick
 from ..kernels.neighbours import FULL, list_is_stale, make_list
 from ..kernels.outside import outside_loads
@@ -49,8 +49,10 @@ class ContactRules(NamedTuple):
     """The contact law's run-time numbers."""
 
     on: bool  # False: grains pass through each other
-    pairings: Any  # (5, M, M) table: what two materials make together
+    pairings: Any  # (10, M, M) table: what two materials make together
     release: bool  # displacement beyond its limit: False clamp, True release
+    follow: bool  # stiffnesses: False frozen at a₀, True following the contact radius
+    damped: bool  # is there any damping
     per_period: float  # steps per fastest period
 
 
@@ -143,10 +145,14 @@ def driver_for(outside: Callable, keep: bool = True) -> Callable:
         fresh = new_touches(grains, near, count, span)
         if count[CONTACTS] + fresh > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
-        flagged = contact_pass(grains, contacts, count, span, dt)
+        flagged = contact_pass(grains, contacts, count, span, law, dt)
+        if law.follow:
+            book_stiffness(grains, contacts, count, lost, span, dt)
         parted = flagged and settle_flagged(grains, contacts, near, count, lost, span, law, dt)
         if parted:
             drop_broken(contacts, count)
+        if law.damped:
+            damp_contacts(grains, contacts, count, lost, span, dt)
         if fresh > 0:
             make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
         if parted or fresh > 0:

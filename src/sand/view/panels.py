@@ -29,7 +29,7 @@ from .style import (
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
 LOSSES = tuple(f"lost_{name}" for name in LOST)
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE)
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW)
 OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 
 DECADES = 6

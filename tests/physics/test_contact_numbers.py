@@ -1,0 +1,201 @@
+"""Numbers that are known in closed form: sticking speeds, periods, friction."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand.physics import tangential
+from sand.physics.adhesion import normal_stiffness, rest_overlap, rest_radius
+from sand.physics.contact import bond_between
+
+from .setups import Imposed, random_aggregate, rest_distance
+from .test_magnetics import swing
+
+LAW = sand.Contact()
+MATERIALS = {m.name: m for m in (sand.ICE, sand.SILICA, sand.IRON)}
+
+
+def head_on(material, r1, r2, speed, steps_per_period=100):
+    """Two grains at rest but for their closing speed; returns the relative speed after, 0 if they stick."""
+    gap = 0.02 * min(r1, r2)
+    masses = [material.density * r**3 for r in (r1, r2)]
+    share = masses[1] / sum(masses)
+    grains = sand.Grains(
+        [[0, 0, 0], [r1 + r2 + gap, 0, 0]],
+        [r1, r2],
+        material,
+        velocity=[[share * speed, 0, 0], [-(1 - share) * speed, 0, 0]],
+    )
+    sim = sand.Simulation(grains, [LAW], stepping=sand.Verlet(steps_per_period=steps_per_period))
+    bond = bond_between(LAW.pairing(material, material), r1, r2, *grains.mass)
+    period = 2 * math.pi / math.sqrt(bond.fastest)
+    sim.run(until=2 * gap / speed + 12 * period)
+    while sim.ledger["made"][-1] and not sim.ledger["broken"][-1] and sim.time < 2 * gap / speed + 40 * period:
+        sim.run(until=sim.time + 5 * period)
+    if not sim.ledger["broken"][-1]:
+        return 0.0
+    return sim.grains.velocity[1, 0] - sim.grains.velocity[0, 0]
+
+
+def sticking_speed(material, r1, r2):
+    """m̄v²/2 = E_cycle = 0.935503 F_cδ_c; for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2)."""
+    masses = [material.density * 4 / 3 * math.pi * r**3 for r in (r1, r2)]
+    bond = bond_between(LAW.pairing(material, material), r1, r2, *masses)
+    reduced_mass = masses[0] * masses[1] / sum(masses)
+    return math.sqrt(2 * 0.935503 * bond.pull_off_force * bond.pull_off_overlap / reduced_mass)
+
+
+@pytest.mark.parametrize("r", [1e-8, 1e-7, 1e-6])
+@pytest.mark.parametrize("name", list(MATERIALS))
+def test_the_sticking_speed_of_equal_grains(name, r):
+    """The program sticks at 0.995 v_s and bounces at 1.005 v_s: the prefactor is 1.639 to 0.5 %."""
+    m = MATERIALS[name]
+    modulus = m.young_modulus / (2 * (1 - m.poisson_ratio**2))
+    speed = 1.6394 * (m.surface_energy / (r / 2)) ** (5 / 6) * modulus ** (-1 / 3) * m.density**-0.5
+    assert speed == pytest.approx(sticking_speed(m, r, r), rel=1e-4)
+    assert head_on(m, r, r, 0.995 * speed) == 0.0
+    assert head_on(m, r, r, 1.005 * speed) > 0.0
+
+
+@pytest.mark.parametrize("factor", [1.05, 1.5, 4.0, 20.0])
+@pytest.mark.parametrize("name", list(MATERIALS))
+@pytest.mark.parametrize(("r1", "r2"), [(1e-8, 1e-8), (1e-6, 1e-6), (1e-7, 4e-7)])
+def test_the_rebound(name, factor, r1, r2):
+    """√(v² − v_s²) to 1 %, unequal radii by the same energy balance."""
+    m = MATERIALS[name]
+    stick = sticking_speed(m, r1, r2)
+    speed = factor * stick
+    assert head_on(m, r1, r2, speed) == pytest.approx(math.sqrt(speed**2 - stick**2), rel=0.01)
+
+
+def pair_at_rest(r=1e-7, **options):
+    d = rest_distance(sand.SILICA, r, r)
+    return sand.Grains([[0, 0, 0], [d, 0, 0]], r, sand.SILICA, **options)
+
+
+R = 1e-7
+MASS = sand.SILICA.density * 4 / 3 * math.pi * R**3
+BOND = bond_between(LAW.pairing(sand.SILICA, sand.SILICA), R, R, MASS, MASS)
+INERTIA = 0.4 * MASS * R**2
+KN = normal_stiffness(BOND.rest_radius, LAW.pairing(sand.SILICA, sand.SILICA).modulus)
+D = rest_distance(sand.SILICA, R, R)
+SIDE = 2 * INERTIA * 1e1 / (MASS * D)
+# each mode of the free pair: ω², how to excite it (1e-3 of a limit), what to watch
+MODES = {
+    "normal": (
+        2 * KN / MASS,
+        {"velocity": [[1e-5, 0, 0], [-1e-5, 0, 0]]},
+        lambda s: s.contacts["overlap"][0] - 2 * R + D,
+    ),
+    "sliding": (
+        BOND.slide_stiffness * (2 / MASS + (D / 2) ** 2 * 2 / INERTIA),
+        # no angular momentum in all: the axis stays
+        {"spin": [[0, 0, 1e1], [0, 0, 1e1]], "velocity": [[0, SIDE, 0], [0, -SIDE, 0]]},
+        lambda s: s.grains.spin[0, 2] + s.grains.spin[1, 2],
+    ),
+    "rolling": (
+        2 * (R / 2) ** 2 * BOND.roll_stiffness / INERTIA,
+        {"spin": [[0, 0, 1e2], [0, 0, -1e2]]},
+        lambda s: s.grains.spin[0, 2] - s.grains.spin[1, 2],
+    ),
+    "twisting": (
+        2 * BOND.twist_stiffness / INERTIA,
+        {"spin": [[1e1, 0, 0], [-1e1, 0, 0]]},
+        lambda s: s.grains.spin[0, 0] - s.grains.spin[1, 0],
+    ),
+}
+
+
+@pytest.mark.parametrize("mode", list(MODES))
+def test_periods_of_the_four_modes(mode):
+    """ω² = 2k_n/m, 7k_s/m, 2R²k_r/I, 2k_t/I to 1e-3 at T/100 of the fastest (Verlet: 1.6e-4).
+
+    Sliding: with D = 2r − δ0 instead of 2r the exact value is k_s (2/m + D²/(2I)); 7k_s/m to (δ0/r).
+    """
+    square, start, watch = MODES[mode]
+    expected = 2 * math.pi / math.sqrt(square)
+    found, _ = swing(
+        pair_at_rest(**start), [LAW], watch, expected, periods=8.2, stepping=sand.Verlet(steps_per_period=100)
+    )
+    assert found == pytest.approx(expected, rel=1e-3)
+
+
+def test_limits_of_force_and_torque():
+    """Critical sliding force G a0²/(4π), rolling moment 4 F_c ξ_c, twisting moment G a0³/(6π) for equal grains."""
+    g = sand.SILICA.shear_modulus
+    assert BOND.slide_stiffness * BOND.slide_limit == pytest.approx(g * BOND.rest_radius**2 / (4 * math.pi))
+    moment = BOND.roll_stiffness * BOND.reduced_radius * BOND.roll_limit
+    assert moment == pytest.approx(4 * BOND.pull_off_force * sand.SILICA.rolling_limit)
+    assert BOND.twist_stiffness * BOND.twist_limit == pytest.approx(g * BOND.rest_radius**3 / (6 * math.pi))
+
+
+@pytest.mark.parametrize(("beyond", "share"), [("clamp", 1.0), ("release", 0.5)])
+def test_a_grain_rolled_round_another_by_90_degrees(beyond, share):
+    """Dissipates k_r ξ_c (πr/2 − ξ_c) clamped (→ 12π²γRξ_c for ξ_c ≪ r), half of it released; 1 % at r = 0.1 µm.
+
+    Grain 2 orbits at rest grain 1 and turns twice as fast as the axis, so that it rolls without sliding.
+    """
+    r = 1e-7
+    roller = Imposed(pair_at_rest(r), sand.Contact(beyond=beyond))
+    d = rest_distance(sand.SILICA, r, r)
+    steps = 40_000
+    angle = math.pi / 2 / steps
+    for k in range(steps):
+        here = k * angle
+        chord = d * np.array([math.cos(here + angle) - math.cos(here), math.sin(here + angle) - math.sin(here), 0])
+        roller.step([np.zeros(3), chord], [[0, 0, 0], [0, 0, 2 * angle]])
+    k_r, limit = BOND.roll_stiffness, BOND.roll_limit
+    expected = share * k_r * limit * (math.pi * r / 2 - limit)
+    assert roller.sim.world.lost[3] == pytest.approx(expected, rel=0.01)
+    rough = 12 * math.pi**2 * sand.SILICA.surface_energy * (r / 2) * limit * share
+    assert expected == pytest.approx(rough, rel=0.01)
+
+
+def test_a_grain_twisted_by_a_full_turn():
+    """Dissipates k_t φ_c (2π − φ_c) clamped, k_t φ_c 2π for small φ_c; both directions."""
+    for sign in (1.0, -1.0):
+        twister = Imposed(pair_at_rest())
+        steps = 20_000
+        for _ in range(steps):
+            twister.step(np.zeros((2, 3)), [[sign * 2 * math.pi / steps, 0, 0], [0, 0, 0]])
+        expected = BOND.twist_stiffness * tangential.TWIST_LIMIT * (2 * math.pi - tangential.TWIST_LIMIT)
+        assert twister.sim.world.lost[4] == pytest.approx(expected, rel=1e-3)
+        assert expected == pytest.approx(BOND.twist_stiffness * tangential.TWIST_LIMIT * 2 * math.pi, rel=0.01)
+
+
+@pytest.mark.parametrize("steps", [5_000])
+def test_rigid_motion_strains_nothing(steps):
+    """An aggregate of unequal grains turned ten times about an odd axis while it flies: every displacement stays
+    below 1e-9 of its limit. Rounding: 1e-16 r a step, random, is 1e-14 r after 5e3."""
+    grains = random_aggregate(12, 21, radii=(5e-8, 1e-7), velocity=None, spin=None)
+    mover = Imposed(grains)
+    axis = np.array([0.48, -0.6, 0.64])
+    angle = 10 * 2 * math.pi / steps
+    drift = np.array([1e-12, 2e-12, -1e-12])
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_rotvec(angle * axis)
+    start = grains.position.copy()
+    before = mover.sim.world.contacts
+    used = mover.sim.world.count[2]
+    assert used == 11
+    for k in range(steps):
+        whole = Rotation.from_rotvec(k * angle * axis)
+        here, there = whole.apply(start), (turn * whole).apply(start)
+        mover.step(there - here + drift, np.tile(angle * axis, (12, 1)))
+    from sand.kernels.contacts import bond_at, pose_at
+    from sand.physics import contact as law
+
+    g = mover.sim.world.grains.arrays
+    for c in range(used):
+        i, j = (int(k) for k in before.pair[:, c])
+        bond = bond_at(before, c)
+        pose = pose_at(g, before, mover.sim.box.span, c, before.twist[c])
+        strain = law.strain_of(pose, 0.0, g.radius[i], g.radius[j], bond)
+        assert np.linalg.norm(strain.slide) < 1e-9 * bond.slide_limit
+        assert np.linalg.norm(strain.roll) < 1e-9 * bond.roll_limit
+        assert abs(strain.twist) < 1e-9 * bond.twist_limit
+    assert mover.sim.world.lost.sum() == 0.0
+    assert rest_overlap(rest_radius(0.025, 5e-8, 2.8e10), 5e-8) > 0

@@ -1,0 +1,166 @@
+"""The options of the contact law: damping, stiffnesses that follow, multipliers, mixing, no adhesion."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand.forces.contact import MIXING
+from sand.physics.contact import bond_between
+
+from .setups import random_aggregate, rest_distance
+
+R = 1e-7
+
+
+def pair(distance, material=sand.SILICA, speed=0.0, r=R, **options):
+    velocity = [[0.5 * speed, 0, 0], [-0.5 * speed, 0, 0]]
+    return sand.Grains([[0, 0, 0], [distance, 0, 0]], r, material, **({"velocity": velocity} | options))
+
+
+def bond_of(contact, material=sand.SILICA, r=R):
+    mass = material.density * 4 / 3 * math.pi * r**3
+    return bond_between(contact.pairing(material, material), r, r, mass, mass), mass
+
+
+@pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
+def test_ringing_decays_as_the_oscillator_does(kind):
+    """m̄ x¨ = −k_n x − c ẋ: energy falls as exp(−c t/m̄), c constant or (2 T_vis E*/ν²) a0; small amplitude, 2 %."""
+    contact = sand.Contact(damping=kind, damping_constant="2e-9 kg/s", viscous_time="2e-14 s")
+    bond, mass = bond_of(contact)
+    c = bond.damping + bond.damping_per_radius * bond.rest_radius
+    grains = pair(rest_distance(sand.SILICA, R, R), speed=0.005)
+    sim = sand.Simulation(grains, [contact], stepping=sand.Verlet(steps_per_period=100))
+    sim.run(until=0.7 * mass / 2 / c)
+    lost = sim.ledger["lost_damping"][-1]
+    start = sim.ledger.rows[0]["translation"]
+    assert 0.3 < lost / start < 0.7
+    assert lost / start == pytest.approx(1 - math.exp(-c * sim.time / (mass / 2)), rel=0.02)
+    assert sim.ledger.drift < 1e-4
+
+
+@pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
+def test_the_books_of_damped_impacts_close_with_the_square_of_the_step(kind):
+    """Aggregates of unequal grains collide with damping: the error falls ≥ 3× per halving (rms of four)."""
+
+    def error(steps_per_period):
+        errors = []
+        for seed in range(4):
+            left, right = (random_aggregate(6, 10 * seed + k, radii=(5e-8, 1e-7), velocity=None) for k in (1, 2))
+            shift = np.array([np.ptp(left.position[:, 0]) + np.ptp(right.position[:, 0]) + 2.1e-7, 0, 0])
+            grains = sand.Grains(
+                np.concatenate([left.position, right.position + shift]),
+                np.concatenate([left.radius, right.radius]),
+                sand.SILICA,
+                velocity=np.repeat([[4.0, 0, 0], [-4.0, 0, 0]], 6, axis=0),
+            )
+            contact = sand.Contact(damping=kind, damping_constant="1e-8 kg/s", viscous_time="1e-13 s")
+            sim = sand.Simulation(grains, [contact], stepping=sand.Verlet(steps_per_period=steps_per_period))
+            sim.run(until=1.1 * shift[0] / 8.0)
+            first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+            assert last["made"] > 0
+            assert last["lost_damping"] > 0.01 * first["translation"]
+            errors.append((last["total"] - first["total"]) / first["translation"])
+        return np.sqrt(np.mean(np.square(errors)))
+
+    errors = [error(n) for n in (25, 50, 100)]
+    assert errors[0] < 3e-3
+    assert errors[2] < errors[0] / 9
+
+
+def test_stiffnesses_that_follow_are_booked():
+    """ "dt97" does not conserve: its springs make or destroy `lost_stiffness`, and with it the ledger closes."""
+    rng = np.random.default_rng(3)
+    grains = random_aggregate(12, 4, radii=(5e-8, 1e-7), velocity=1.5 * rng.normal(size=(12, 3)))
+    totals = []
+    for steps in (50, 100):
+        sim = sand.Simulation(grains, [sand.Contact(stiffness="dt97")], stepping=sand.Verlet(steps_per_period=steps))
+        sim.run(until="20 ns")
+        assert abs(sim.ledger["lost_stiffness"][-1]) > 10 * sim.ledger.drift * sim.ledger["translation"][0]
+        assert sim.ledger["moved"][-1] > 0
+        totals.append(sim.ledger.drift)
+    assert totals[0] < 1e-3
+    assert totals[1] < totals[0] / 2.5
+
+
+def test_each_contact_keeps_its_own_books():
+    """The sum over contacts that never broke equals the ledger's channels, to rounding."""
+    rng = np.random.default_rng(8)
+    grains = random_aggregate(10, 4, radii=(5e-8, 1e-7), velocity=0.1 * rng.normal(size=(10, 3)))
+    sim = sand.Simulation(grains, [sand.Contact(damping="constant", damping_constant="1e-10 kg/s")])
+    sim.run(until="60 ns")
+    assert sim.ledger["broken"][-1] == 0
+    used = sim.world.count[2]
+    assert sim.world.contacts.lost[:, :used].sum(axis=1) == pytest.approx(sim.world.lost, rel=1e-9, abs=1e-30)
+
+
+@pytest.mark.parametrize(("factor", "power"), [("slide_factor", 1.0), ("roll_factor", 1.0), ("twist_factor", 1.0)])
+def test_multipliers_scale_their_own_stiffness(factor, power):
+    """k_s, k_r, k_t alone are multiplied; limits stay."""
+    plain, _ = bond_of(sand.Contact())
+    scaled, _ = bond_of(sand.Contact(**{factor: 2.5}))
+    name = factor.replace("factor", "stiffness")
+    for field in plain._fields:
+        expected = 2.5 if field == name else 1.0
+        if field != "fastest":
+            assert getattr(scaled, field) == pytest.approx(expected * getattr(plain, field))
+
+
+@pytest.mark.parametrize("rule", list(MIXING))
+def test_mixing_rules(rule):
+    """Equal grains give γ, a partner without any gives 0, order does not matter, and it lies between the two."""
+    mix = MIXING[rule]
+    assert mix(0.1, 0.1) == pytest.approx(0.1)
+    assert mix(0.1, 0.0) == 0.0
+    assert mix(0.0, 0.0) == 0.0
+    assert mix(0.1, 0.4) == mix(0.4, 0.1)
+    assert 0.1 <= mix(0.1, 0.4) <= 0.4
+
+
+def test_without_adhesion_grains_bounce_like_hertz():
+    """γ = 0: no sticking, no loss; contact time 2.868 (m̄²/(R E*² v))^(1/5), seen to within the two steps around it."""
+    bare = sand.SILICA.but(name="bare", surface_energy=0.0)
+    speed = 3.0
+    grains = sand.Grains(
+        [[0, 0, 0], [2.001 * R, 0, 0]], R, [bare, sand.SILICA], velocity=[[speed / 2, 0, 0], [-speed / 2, 0, 0]]
+    )
+    touching, steps = [], []
+
+    class Watch(sand.Observer):
+        def see(self, simulation, row):
+            if row["contacts"]:
+                touching.append(row["time"])
+                steps.append(simulation.world.clock[1])
+
+    sim = sand.Simulation(
+        grains, [sand.Contact()], stepping=sand.Verlet(steps_per_period=100), observers=[Watch()], frame_every="1 ps"
+    )
+    sim.run(until="3 ns")
+    last = sim.ledger.rows[-1]
+    assert (last["made"], last["broken"], last["contacts"]) == (1, 1, 0)
+    assert sim.grains.velocity[1, 0] - sim.grains.velocity[0, 0] == pytest.approx(speed, rel=1e-4)
+    assert sim.ledger.dissipated == pytest.approx(0.0, abs=1e-6 * last["translation"])
+    modulus = sand.SILICA.young_modulus / (2 * (1 - sand.SILICA.poisson_ratio**2))
+    expected = 2.868 * ((grains.mass[0] / 2) ** 2 / (R / 2 * modulus**2 * speed)) ** 0.2
+    assert touching[-1] - touching[0] == pytest.approx(expected, abs=2.5 * max(steps[1:]))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"stiffness": "frozn"}, "did you mean 'frozen'"),
+        ({"damping": "viscous"}, "damping = 'viscous'; did you mean 'viscoelastic'"),
+        ({"mixing": "mean"}, "mixing = 'mean'; allowed: geometric"),
+        ({"roll_factor": -1}, "roll_factor = -1 must be at least 0"),
+        ({"rolling_limit": "1 kg"}, "rolling_limit = '1 kg' is not a quantity in m"),
+        ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not a quantity in kg/s"),
+    ],
+)
+def test_bad_settings(settings, message):
+    """One line each; several at once are all told."""
+    with pytest.raises(sand.BadInput, match=message):
+        sand.Contact(**settings)
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Contact(**(settings | {"viscous_time": "1 m"}))
+    assert len(caught.value.problems) == 2
