@@ -33,7 +33,7 @@ _HOMES = {
     "Outcome": "run.outcome",
     "Result": "run.outcome",
 }
-_ROOMS = ("setup", "analysis", "files")
+_ROOMS = ("setup", "theory", "analysis", "files")
 
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from . import analysis as analysis
     from . import files as files
     from . import setup as setup
+    from . import theory as theory
     from .core.box import Box as Box
     from .core.errors import BadInput as BadInput
     from .core.errors import Interrupted as Interrupted

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.forces.contact import MIXING
 from sand.physics.contact import bond_between
+from sand.physics.mixing import MIXING
 
 from .setups import random_aggregate, rest_distance
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,16 +15,11 @@ from ..core.material import Material
 from ..core.units import si
 from ..physics.adhesion import rest_radius
 from ..physics.contact import Pairing
+from ..physics.mixing import MIXING, pairing_between
 
 BEYOND = ("clamp", "release")
 STIFFNESS = ("frozen", "dt97")
 DAMPING = ("none", "constant", "viscoelastic")
-MIXING: dict[str, Callable[[float, float], float]] = {
-    "geometric": lambda a, b: math.sqrt(a * b),
-    "harmonic": lambda a, b: 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0,
-    "smaller": min,
-}
-"""Rules for γ_eff of two materials; each gives γ for equal ones and 0 if one has none."""
 JKR_LIMIT = 0.3
 """a0/R above which JKR is at the edge of its validity."""
 
@@ -96,23 +90,15 @@ class Contact:
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     def pairing(self, a: Material, b: Material) -> Pairing:
-        """What two materials make together under these settings.
-
-        1/E* = Σ(1−ν²)/E, 1/G* = Σ(2−ν)/G, 1/G′ = Σ 1/G, the smaller ξ_c, γ_eff by the mixing rule.
-        """
-        modulus = 1.0 / sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in (a, b))
-        viscous = 2.0 * self.viscous_time * modulus
-        return Pairing(
-            surface_energy=MIXING[self.mixing](a.surface_energy, b.surface_energy),
-            modulus=modulus,
-            shear=1.0 / sum((2.0 - m.poisson_ratio) / m.shear_modulus for m in (a, b)),
-            twist_shear=1.0 / sum(1.0 / m.shear_modulus for m in (a, b)),
-            roll_limit=self.rolling_limit or min(a.rolling_limit, b.rolling_limit),
-            slide_factor=self.slide_factor,
-            roll_factor=self.roll_factor,
-            twist_factor=self.twist_factor,
+        """What two materials make together under these settings."""
+        return pairing_between(
+            a,
+            b,
+            mixing=self.mixing,
+            rolling_limit=self.rolling_limit,
+            factors=(self.slide_factor, self.roll_factor, self.twist_factor),
             damping=self.damping_constant if self.damping == "constant" else 0.0,
-            damping_per_radius=viscous / (a.poisson_ratio * b.poisson_ratio) if self.damping == "viscoelastic" else 0.0,
+            viscous_time=self.viscous_time if self.damping == "viscoelastic" else 0.0,
         )
 
     def pairings(self, materials: Sequence[Material]) -> np.ndarray:

@@ -1,0 +1,5 @@
+"""Closed forms: what one can know without running anything."""
+
+from .contact import ContactNumbers, contact
+
+__all__ = ["ContactNumbers", "contact"]

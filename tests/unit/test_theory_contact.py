@@ -1,0 +1,62 @@
+"""Closed forms of a contact, against the formulas written out."""
+
+import math
+
+import pytest
+
+import sand
+from sand.theory import contact
+
+
+def test_two_silica_grains_of_0_6_um():
+    """Every number from its definition, equal grains: R = r/2, E* = E/(2(1−ν²)), G* = G/(2(2−ν)), G′ = G/2."""
+    m, r = sand.SILICA, 3e-7
+    c = contact(m, r)
+    radius, gamma = r / 2, m.surface_energy
+    modulus = m.young_modulus / (2 * (1 - m.poisson_ratio**2))
+    mass = m.density * 4 / 3 * math.pi * r**3
+    a0 = (9 * math.pi * gamma * radius**2 / modulus) ** (1 / 3)
+    unit = 24.0687 * gamma ** (5 / 3) * radius ** (4 / 3) * modulus ** (-2 / 3)
+    g = m.shear_modulus
+    assert c.rest_radius == pytest.approx(a0)
+    assert c.jkr_ratio == pytest.approx(a0 / radius)
+    assert c.pull_off_force == pytest.approx(3 * math.pi * gamma * radius)
+    assert c.rest_overlap == pytest.approx(a0**2 / (3 * radius))
+    assert c.rest_overlap / c.pull_off_overlap == pytest.approx(1.2114137, abs=1e-7)
+    assert c.break_energy == pytest.approx(1.542585 * unit, rel=1e-5)
+    assert c.cycle_energy == pytest.approx(0.935503 * unit, rel=1e-5)
+    assert c.slide_force == pytest.approx(g * a0**2 / (4 * math.pi))
+    assert c.roll_moment == pytest.approx(4 * c.pull_off_force * 1e-9)
+    assert c.twist_moment == pytest.approx(g * a0**3 / (6 * math.pi))
+    assert c.roll_energy_clamped == pytest.approx(12 * math.pi**2 * gamma * radius * 1e-9)
+    assert c.roll_energy_released == pytest.approx(6 * math.pi**2 * gamma * radius * 1e-9)
+    assert c.normal_period == pytest.approx(2 * math.pi / math.sqrt(2 * 1.2 * modulus * a0 / mass))
+    assert c.slide_period == pytest.approx(2 * math.pi / math.sqrt(7 * c.slide_stiffness / mass))
+    inertia = 0.4 * mass * r**2
+    assert c.roll_period == pytest.approx(2 * math.pi / math.sqrt(2 * radius**2 * c.roll_stiffness / inertia))
+    assert c.twist_period == pytest.approx(2 * math.pi / math.sqrt(2 * c.twist_stiffness / inertia))
+    speed = 1.6394 * (gamma / radius) ** (5 / 6) * modulus ** (-1 / 3) * m.density**-0.5
+    assert c.sticking_speed == pytest.approx(speed, rel=1e-4)
+    assert c.rebound_speed(2 * c.sticking_speed) == pytest.approx(math.sqrt(3) * c.sticking_speed)
+    assert c.rebound_speed("0 m/s") == 0.0
+
+
+def test_two_materials_in_either_order():
+    """Swapping the grains changes nothing; the smaller ξ_c counts; mixing rules order γ_eff."""
+    one = contact("ice", "0.1 um", "silica", "0.3 um")
+    two = contact("silica", "0.3 um", "ice", "0.1 um")
+    for name in one.__dataclass_fields__:
+        assert getattr(one, name) == pytest.approx(getattr(two, name), rel=1e-12)
+    assert one.roll_limit == 8e-10
+    rules = [contact("ice", 1e-7, "silica", mixing=m).pull_off_force for m in ("smaller", "harmonic", "geometric")]
+    assert rules == sorted(rules)
+
+
+def test_bad_input():
+    """One line each."""
+    with pytest.raises(sand.BadInput, match="no surface energy"):
+        contact("magnetite", 1e-7)
+    with pytest.raises(sand.BadInput, match="radius = -1"):
+        contact("ice", -1)
+    with pytest.raises(sand.BadInput, match="mixing = 'mean'"):
+        contact("ice", 1e-7, mixing="mean")
