@@ -106,6 +106,46 @@ def test_unequal_grains_of_two_materials_close_their_books(beyond):
     assert sim.ledger.drift < 1e-3
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.3, 0.7])
+def test_small_grains_touch_at_their_own_step_beside_large_ones(offset):
+    """Two 10 nm iron grains meet at 10 m/s while two 1 µm grains rest in contact elsewhere.
+
+    The step at touch must be the small pair's own; at the large pair's (19 times longer) the books would be off
+    by up to half of the forming energy. 1e-2 is twice what the small pair has alone (ringing, (ω dt)²/8).
+    """
+    big, d = 1e-6, rest_distance(sand.IRON, 1e-6, 1e-6)
+    small = 1e-8
+    position = [[1e-5, 0, 0], [1e-5 + d, 0, 0], [0, 0, 0], [(2.5 + offset) * small, 0, 0]]
+    velocity = [[0, 0, 0], [0, 0, 0], [10.0, 0, 0], [0, 0, 0]]
+    grains = sand.Grains(position, [big, big, small, small], sand.IRON, velocity=velocity)
+    sim = sand.Simulation(grains, [sand.Contact()])
+    sim.run(until="1.5 ns")
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert last["made"] == 1
+    assert abs(last["total"] - first["total"]) < 1e-2 * last["lost_forming"]
+
+
+@pytest.mark.parametrize("r2", [1e-8, 5e-9])
+def test_rolling_far_against_the_grain_size_closes_its_books(r2):
+    """ξ_c = 1 nm on grains of 5 nm: the normal part of n1 + n2 takes part; the error falls with the step.
+
+    A grain is spun up and rolls; the loss is first order here for finite turns, ×4 in steps at least ÷2.5.
+    """
+    d = rest_distance(sand.IRON, 1e-8, r2)
+    errors = []
+    for steps in (50, 200):
+        grains = sand.Grains(
+            [[0, 0, 0], [d, 0, 0]], [1e-8, r2], sand.IRON, spin=[[0, 0, 0], [0, 0, 3e10 * (1e-8 / r2)]]
+        )
+        sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(steps_per_period=steps))
+        sim.run(until="1 ns")
+        last = sim.ledger.rows[-1]
+        assert last["lost_rolling"] + last["lost_sliding"] > 0.1 * sim.ledger["rotation"][0]
+        errors.append(abs(np.ptp(sim.ledger["total"][[0, -1]])) / sim.ledger["rotation"][0])
+    assert errors[1] < max(errors[0] / 2.5, 1e-5)
+    assert errors[1] < 3e-4
+
+
 def test_nothing_is_booked_for_grains_that_touch_at_the_start():
     """A relaxed pair: no losses, no motion but rounding, and the energy of its contact is in the books."""
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)

@@ -98,9 +98,9 @@ def problems_of(content):
         ({"grains__number": None}, ["grains.number is missing"]),
         ({"grains__radius": None}, ["grains", "radius is missing"]),
         ({"run": None}, ["run is missing"]),
-        ({"materials__mine__density": "3 g/cm^3"}, ["mine lacks surface_energy, young_modulus, poisson_ratio"]),
+        ({"materials__mine__density": "3 g/cm^3"}, ["mine lacks young_modulus, poisson_ratio"]),
         # what shows when grains, forces and box come together
-        ({"box__periodic": "30 nm"}, ["box", "too small", "5 diameters"]),
+        ({"box__periodic": "30 nm"}, ["box", "too small", "3 diameters"]),
         ({"box__periodic": "62 nm", "grains__number": 30}, ["no room for grain", "take a larger box or fewer grains"]),
         ({"box__periodic": None}, ["a gas needs a box"]),
         ({"box__periodic": ["1 um", "1 um", "open"]}, ["a gas needs a box"]),

@@ -81,13 +81,21 @@ def test_run_tells_what_it_does_and_what_came_of_it(place, capsys):
     """Grains, box, cut-off with its reason at the start; outcome and the files, the figure too, at the end."""
     assert main(["run", "small.toml"]) == 0
     out, err = capsys.readouterr()
-    for part in ("8 of iron, radius 10 nm", "periodic 400 nm", "cut-off", "half the box", "contact (beyond = clamp)"):
+    for part in ("8 of iron, radius 10 nm", "periodic 400 nm", "cut-off", "half the box", "contact, dipoles"):
         assert part in out
     for part in ("done", " ns in ", "mean size S", "largest", "energy drift", "wall time", "figure.png", "ledger.csv"):
         assert part in out
     assert "sand: note: contacts of iron" in err
     assert "%|" not in err  # no progress bar where there is no terminal
     assert {p.name for p in (place / "small").iterdir()} >= {"case.toml", "summary.json", "figure.png"}
+
+
+def test_settings_that_differ_are_told(place, capsys):
+    """Of each force its name and what the user has set."""
+    (place / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nbeyond = "release"'))
+    (place / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
+    assert main(["info", "small.toml"]) == 0
+    assert "contact (beyond = release), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
 
 
 def test_run_as_json_prints_the_summary_alone(place, capsys):

@@ -19,7 +19,11 @@ def test_labels_are_the_connected_components(seed):
     ours = cluster_labels(n, pairs)
     assert ours.max() + 1 == count
     assert len({(a, b) for a, b in zip(ours, theirs, strict=True)}) == count
-    assert (cluster_labels(n, pairs.T) == ours).all()
+
+
+def test_two_contacts_are_two_rows():
+    """Exactly two contacts: (2, 2) rows are contacts, never columns."""
+    assert cluster_labels(4, np.array([[0, 1], [2, 3]])).tolist() == [0, 0, 1, 1]
 
 
 def test_mean_cluster_size():

@@ -109,12 +109,88 @@ def test_crushed_grains_end_the_run():
 
 
 def test_numbers_that_are_not_finite_end_the_run():
-    """A spin driven to NaN from outside is seen within 16 steps."""
-    sim = struck_chain()
+    """A spin driven to NaN from outside is seen within 16 steps, and its grain is named."""
+    sim = sand.Simulation(sand.Grains(1e-6 * np.arange(15).reshape(5, 3), 1e-8, sand.IRON), [sand.Contact()])
     sim.run(steps=100)
     sim.world.grains.arrays.spin[0, 3] = math.nan
     result = sim.run(steps=200)
     assert result.outcome is sand.Outcome.NOT_FINITE
+    assert result.grains == (3,)
+
+
+def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
+    """6 radians in a step: the rotation parameters would be destroyed; the run stops and names the grain."""
+    sim = sand.Simulation(pair(spin=[[0, 0, 0], [0, 0, 6e9]]), [sand.Contact()], stepping=sand.Verlet(step="1 ns"))
+    result = sim.run(steps=200)
+    assert result.outcome is sand.Outcome.SPUN_TOO_FAR
+    assert result.grains == (1,)
+    assert np.linalg.norm(sim.grains.orientation[1]) == pytest.approx(1.0)
+
+
+def test_steps_are_counted_through_growing_arrays():
+    """run(steps=N) takes N steps, also when the list of pairs outgrows its arrays on the way."""
+    sim = struck_chain(length=30)
+    sim.world.near = type(sim.world.near)(
+        np.zeros((2, 1), np.uint32), np.zeros(1, np.uint8), np.zeros(1), np.full((3, 31), np.inf)
+    )
+    sim.run(steps=32)
+    assert sim.world.steps == 32
+
+
+def test_a_row_is_written_once(tmp_path):
+    """Asking again for a time that is reached adds no row and no frame."""
+    seen = []
+
+    class Count(sand.Observer):
+        def see(self, simulation, row):
+            seen.append(row["step"])
+
+    sim = sand.Simulation(pair(), [sand.Contact()], out=tmp_path / "run", observers=[Count()])
+    sim.run(steps=10)
+    for _ in range(2):
+        sim.run(until=sim.time)
+    lines = (tmp_path / "run" / "ledger.csv").read_text().splitlines()
+    assert [line.split(",")[0] for line in lines[1:]] == ["0", "10"]
+    assert seen == [0, 10]
+
+
+def test_a_torn_ledger_does_not_stop_a_resume(tmp_path):
+    """A kill in the middle of a row: the row is dropped, the run goes on."""
+    sim = sand.Simulation(pair(), [sand.Contact()], out=tmp_path / "run")
+    sim.run(steps=1234)
+    path = tmp_path / "run" / "ledger.csv"
+    path.write_text(path.read_text() + "12,0.1")
+    again = sand.resume(tmp_path / "run")
+    again.run(steps=10)
+    lines = path.read_text().splitlines()
+    assert [line.split(",")[0] for line in lines[1:]] == ["0", "1234", "1244"]
+
+
+def test_moments_that_are_not_there_do_not_make_a_cutoff_of_nothing(tmp_path):
+    """Thermal grains without moments in a periodic box: the cut-off is half the box, and a resume works."""
+    grains = pair(velocity=[[1, 0, 0], [-1, 0, 0]])
+    with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
+        sim = sand.Simulation(grains, [sand.Dipoles()], box="1 um", out=tmp_path / "run")
+    sim.run(steps=10)
+    with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
+        sand.resume(tmp_path / "run").run(steps=10)
+
+
+def test_magnetite_flies_without_a_surface_energy(tmp_path):
+    """Where grains never touch, no surface energy is needed, and a resume works too."""
+    grains = pair(distance=1e-7, material=sand.MAGNETITE, moment="material")
+    sand.Simulation(grains, [sand.Dipoles()], out=tmp_path / "run").run(steps=10)
+    assert sand.resume(tmp_path / "run").run(steps=10).steps == 20
+
+
+def test_grains_do_not_share_memory_with_their_maker():
+    """Arrays are copied: later changes of the user's own arrays, or of a running simulation, do not reach in."""
+    radius, position = np.full(2, 1e-8), np.asfortranarray([[0, 0, 0], [3e-8, 0, 0]])
+    grains = sand.Grains(position, radius, sand.IRON)
+    radius[0] = position[1, 0] = 5.0
+    assert grains.radius[0] == 1e-8
+    assert grains.position[1, 0] == 3e-8
+    assert not np.shares_memory(sand.Grains(grains.position, 1e-8, sand.IRON).position, grains.position)
 
 
 def test_nothing_happens_in_an_empty_world():

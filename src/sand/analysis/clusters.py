@@ -12,13 +12,11 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
 
     Args:
         count: number of grains N.
-        pairs: contacts, (2, C) or (C, 2) grain numbers.
+        pairs: contacts, (C, 2) grain numbers.
 
     Returns:
         (N,) integers 0…K−1.
     """
-    edges = np.asarray(pairs, dtype=np.int64)
-    edges = edges if edges.ndim == 2 and edges.shape[0] == 2 else edges.reshape(-1, 2).T
     parent = list(range(count))
 
     def root(i: int) -> int:
@@ -27,7 +25,7 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
             i = parent[i]
         return i
 
-    for a, b in edges.T.tolist():
+    for a, b in np.asarray(pairs, dtype=np.int64).reshape(-1, 2).tolist():
         a, b = root(a), root(b)
         if a != b:
             parent[max(a, b)] = min(a, b)
@@ -52,10 +50,8 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     Each cluster keeps the image of its lowest grain; the others follow along their contacts.
     """
     count = len(position)
-    edges = np.asarray(pairs, dtype=np.int64)
-    edges = edges if edges.ndim == 2 and edges.shape[0] == 2 else edges.reshape(-1, 2).T
     neighbours: list[list[int]] = [[] for _ in range(count)]
-    for a, b in edges.T.tolist():
+    for a, b in np.asarray(pairs, dtype=np.int64).reshape(-1, 2).tolist():
         neighbours[a].append(b)
         neighbours[b].append(a)
     whole = np.array(position, dtype=np.float64)

@@ -18,7 +18,7 @@ class Watch(Observer):
     """
 
     def __init__(self) -> None:
-        self._asked = False
+        self.asked = False
         self._before: dict[int, Any] = {}
         self._hook = sys.unraisablehook
 
@@ -31,7 +31,7 @@ class Watch(Observer):
         return self
 
     def _raise(self, _number: int, _frame: Any) -> None:
-        self._asked = True
+        self.asked = True
         raise KeyboardInterrupt
 
     def _lost(self, unraisable: Any) -> None:
@@ -40,7 +40,7 @@ class Watch(Observer):
 
     def see(self, simulation: Any, row: dict[str, float]) -> None:
         """The exception that was lost."""
-        if self._asked:
+        if self.asked:
             raise KeyboardInterrupt
 
     def __exit__(self, *_: object) -> None:

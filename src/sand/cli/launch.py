@@ -55,8 +55,10 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
             result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
-        except KeyboardInterrupt:
-            return _cut_off(folder)
+        except (Exception, KeyboardInterrupt) as error:
+            if not (watch.asked or isinstance(error, KeyboardInterrupt)):
+                raise
+            return _cut_off(folder)  # a compiler that is interrupted may fail in any way
         finally:
             if bar is not None:
                 bar.finish()

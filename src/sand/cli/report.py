@@ -124,10 +124,16 @@ def _grains(grains: Any, temperature: float) -> str:
 
 
 def _force(force: Any) -> str:
+    """Its name and what was set by the user; case.toml lists all settings."""
+
     def say(value: Any) -> str:
         return f"{value:.4g}" if isinstance(value, float) else str(value)
 
-    settings = ", ".join(f"{key} = {say(value)}" for key, value in force.parameters().items())
+    try:
+        usual = type(force)().parameters()
+    except TypeError:  # a force that cannot do without settings
+        usual = {}
+    settings = ", ".join(f"{key} = {say(v)}" for key, v in force.parameters().items() if v != usual.get(key))
     return f"{force.name} ({settings})" if settings else force.name
 
 

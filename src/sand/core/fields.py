@@ -88,4 +88,4 @@ def stored(field: Field, values: Any, count: int, *, positive: bool = False) -> 
         )
     if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
         raise BadInput(f"{field.name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0")
-    return np.ascontiguousarray(array.T)
+    return np.array(array.T, order="C")

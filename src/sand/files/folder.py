@@ -135,7 +135,7 @@ class LedgerFile:
         self.path, self.columns = path, list(columns)
         rows: list[str] = []
         if resume_at is not None and path.exists():
-            rows = [line for line in read_text(path).splitlines()[1:] if _step_of(line) <= resume_at]
+            rows = [line for line in _whole_rows(read_text(path)) if int(line.split(",", 1)[0]) <= resume_at]
         replace_file(path, ("\n".join([",".join(self.columns), *rows]) + "\n").encode())
 
     def append(self, row: dict[str, float]) -> None:
@@ -147,17 +147,16 @@ class LedgerFile:
             raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
 
 
-def _step_of(line: str) -> float:
-    try:
-        return int(line.split(",", 1)[0])
-    except ValueError:
-        return float("inf")
+def _whole_rows(text: str) -> list[str]:
+    """The rows below the header; a last one that a kill tore in two is left out."""
+    lines = text.split("\n")[:-1]
+    return [line for line in lines[1:] if line.count(",") == lines[0].count(",")]
 
 
 def read_ledger(path: Path) -> list[dict[str, float]]:
-    """The rows of ledger.csv as numbers.  Raises BadInput."""
-    lines = read_text(path).splitlines()
-    rows = list(csv.DictReader(lines))
+    """The rows of ledger.csv as numbers; a torn last row is left out.  Raises BadInput."""
+    text = read_text(path)
+    rows = list(csv.DictReader([text.split("\n", 1)[0], *_whole_rows(text)]))
     try:
         return [{k: float(v) if k not in ("step",) else int(v) for k, v in row.items()} for row in rows]
     except (TypeError, ValueError):

@@ -107,7 +107,7 @@ class Contact:
         return np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0))
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """A warning for each material whose contacts are too wide for JKR."""
+        """A warning for each pair of materials whose contacts are too wide for JKR."""
         problems = [
             f"material '{m.name}' has no surface energy; give one, 0 for none: "
             f'{m.name} with surface_energy = "… J/m^2"'
@@ -122,15 +122,24 @@ class Contact:
             ]
         if problems:
             raise BadInput(problems)
-        warnings = []
-        for number, m in enumerate(grains.materials):
-            smallest = float(grains.radius[grains.material == number].min())
-            reduced = 0.5 * smallest
-            same = self.pairing(m, m)
-            ratio = rest_radius(same.surface_energy, reduced, same.modulus) / reduced
-            if ratio > JKR_LIMIT:
-                warnings.append(
-                    f"contacts of {m.name} grains of radius {smallest:.3g} m have a0/R = {ratio:.2f}; "
-                    f"JKR assumes a0/R below {JKR_LIMIT}: take forces and energies as estimates"
-                )
-        return warnings
+        smallest = [float(grains.radius[grains.material == k].min()) for k in range(len(grains.materials))]
+        return [
+            text
+            for k, a in enumerate(grains.materials)
+            for j in range(k + 1)
+            if (text := self._too_wide(a, smallest[k], grains.materials[j], smallest[j]))
+        ]
+
+    def _too_wide(self, a: Material, r1: float, b: Material, r2: float) -> str:
+        """A warning if contacts of these grains are at the edge of JKR, else nothing."""
+        reduced = r1 * r2 / (r1 + r2)
+        both = self.pairing(a, b)
+        ratio = rest_radius(both.surface_energy, reduced, both.modulus) / reduced
+        if ratio <= JKR_LIMIT:
+            return ""
+        names = a.name if a is b else f"{a.name} and {b.name}"
+        radii = f"{r1:.3g} m" if r1 == r2 else f"{r1:.3g} and {r2:.3g} m"
+        return (
+            f"contacts of {names} grains of radius {radii} have a0/R = {ratio:.2f}; "
+            f"JKR assumes a0/R below {JKR_LIMIT}: take forces and energies as estimates"
+        )

@@ -75,7 +75,7 @@ class Dipoles:
             return Choice(None, "open box: all pairs")
         half = 0.5 * box.shortest / ROOM
         capture = CAPTURE * thermal_capture(grains)
-        if capture < half:
+        if 0.0 < capture < half:
             return Choice(capture, f"{CAPTURE} b_max at the grains' thermal speed")
         return Choice(half, f"half the box / {ROOM}; {CAPTURE} b_max would be {spoken(capture, 'm')}")
 

@@ -8,6 +8,7 @@ from ..core.vec import across, add, dot, load, load4, put, scale, sub
 from ..core.world import (
     CONTACT_STEP,
     CONTACTS,
+    PAIRS,
 )
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
@@ -78,7 +79,7 @@ def contact_pass(grains, contacts, count, span, law, dt):
         now = law_of.stiffened(bond, y, law.follow)
         push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
-        beyond = law_of.beyond_limits(strain, bond) | (s > adhesion.STRETCH_OF_POLYNOMIAL)
+        beyond = law_of.beyond_limits(strain, pose.n, bond) | (s > adhesion.STRETCH_OF_POLYNOMIAL)
         contacts.twist[c] = twist
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
@@ -146,12 +147,20 @@ def sort_sides(contacts, count, grains):
 
 
 @rare
-def contact_step(contacts, count, grains, clock, per_period):
-    """The longest step [s] the contacts allow: fastest period / per_period, less above 6 neighbours."""
+def contact_step(contacts, near, count, grains, clock, per_period):
+    """The longest step [s] while there are contacts: fastest period / per_period, less above 6 neighbours.
+
+    Pairs that may touch soon count as well, so that a contact of small grains never begins at the step of large
+    ones.  Infinite without contacts: then every closing pair is looked at in every step.
+    """
     fastest, most = 0.0, 0
     for c in range(count[CONTACTS]):
         fastest = max(fastest, bond_at(contacts, c).fastest)
     for g in range(grains.mass.size):
         most = max(most, int(contacts.start[g + 1]) - int(contacts.start[g]))
     crowd = max(1.0, most / 6.0)
-    clock[CONTACT_STEP] = math.inf if fastest == 0.0 else (2.0 * math.pi / math.sqrt(fastest * crowd) / per_period)
+    clock[CONTACT_STEP] = math.inf
+    if fastest > 0.0:
+        clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(fastest * crowd) / per_period
+        for p in range(count[PAIRS]):
+            clock[CONTACT_STEP] = min(clock[CONTACT_STEP], near.step[p])

@@ -2,7 +2,7 @@
 
 from ..core.box import nearest_image
 from ..core.jit import loop
-from ..core.vec import accrue, add, axpy, cross, load, put, sub
+from ..core.vec import accrue, add, cross, load, put, sub
 from ..physics.dipole import pair_load, pair_load_cut
 
 OFF, BARE, CUT = range(3)
@@ -54,8 +54,7 @@ def dipole_loads(grains, span, dipoles):
         cut_sum(grains, span, dipoles.k, dipoles.cutoff)
     if dipoles.way != OFF:
         for i in range(grains.mass.size):
-            turn = cross(load(grains.moment, i), load(grains.field, i))
-            put(grains.torque, i, axpy(1.0, turn, load(grains.torque, i)))
+            accrue(grains.torque, i, cross(load(grains.moment, i), load(grains.field, i)))
 
 
 @loop

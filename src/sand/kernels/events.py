@@ -156,20 +156,23 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
         bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        if law_of.beyond_limits(strain, bond):
+        if law_of.beyond_limits(strain, pose.n, bond):
             before = strain_before(grains, contacts, span, c, pose, bond, dt)
             y = adhesion.root(adhesion.stretch(strain.overlap, bond.pull_off_overlap))
             now = law_of.stiffened(bond, y, law.follow)
             if strain.overlap < -bond.break_overlap:
                 zero = (0.0, 0.0, 0.0)
                 gone = law_of.Strain(strain.overlap, zero, zero, 0.0)
-                book_yielding(contacts, lost, c, law_of.lost_by_yielding(before, strain, gone, now))
+                slid, rolled, twisted = law_of.lost_by_yielding(before, strain, gone, now)
+                book(contacts, lost, c, BREAKING, slid + rolled + twisted)
                 break_contact(grains, contacts, near, count, lost, c, pose, bond, dt)
                 parted = True
                 continue
-            left = law_of.yielded(strain, bond, law.release)
+            wish = law_of.yielded(strain, pose.n, bond, law.release)
+            n1, n2 = tangential.pointers_for(wish.slide, wish.roll, pose.n, r1, r2)
+            moved = law_of.Pose(pose.n, pose.distance, n1, n2, wish.twist)
+            left = law_of.strain_of(moved, strain.overlap, r1, r2, bond)
             book_yielding(contacts, lost, c, law_of.lost_by_yielding(before, strain, left, now))
-            n1, n2 = tangential.pointers_for(left.slide, left.roll, pose.n, r1, r2)
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
             contacts.twist[c] = left.twist

@@ -23,10 +23,3 @@ def drift(grains, span, dt):
         q = turn(load4(grains.orientation, i), scale(dt, load(grains.spin, i)))
         put4(grains.orientation, i, q)
         put(grains.moment, i, turned(q, load(grains.body_moment, i)))
-
-
-@loop
-def moments_follow(grains):
-    """μ = R(ϱ) μ_body."""
-    for i in range(grains.mass.size):
-        put(grains.moment, i, turned(load4(grains.orientation, i), load(grains.body_moment, i)))

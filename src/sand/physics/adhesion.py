@@ -23,7 +23,7 @@ _A = 6.0 * ROOT_AT_BREAK**2
 _B = 4.0 * ROOT_AT_BREAK
 _K = 0.5 / CUBE_ROOT_6
 
-#: p(s) on 0 ≤ s ≤ 3.5 to 4e-8, low order first: Chebyshev fit of tests/reference/jkr_polynomial.py
+#: p(s) on 0 ≤ s ≤ 3.5 to 4e-8, low order first: Chebyshev fit of tests/reference/jkr.py
 POLYNOMIAL = (
     0.38913581804171538,
     -0.09171720130579257,

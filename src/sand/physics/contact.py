@@ -62,7 +62,7 @@ class Strain(NamedTuple):
 
     overlap: float  # δ [m]
     slide: tuple  # ζ [m]
-    roll: tuple  # ξ [m], tangential part
+    roll: tuple  # R (n1 + n2) [m]; its tangential part is ξ
     twist: float  # φ [rad]
 
 
@@ -180,17 +180,17 @@ def contact_load(pose, overlap, y, r1, r2, bond):
 def strain_of(pose, overlap, r1, r2, bond):
     """The four displacements."""
     zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    xi = across(tangential.rolling(pose.n1, pose.n2, bond.reduced_radius), pose.n)
-    return Strain(overlap, zeta, xi, pose.twist)
+    return Strain(overlap, zeta, tangential.rolling(pose.n1, pose.n2, bond.reduced_radius), pose.twist)
 
 
 @formula
-def beyond_limits(strain, bond):
+def beyond_limits(strain, n, bond):
     """True where the contact must move or break."""
+    xi = across(strain.roll, n)
     return (
         (strain.overlap < -bond.break_overlap)
         | (dot(strain.slide, strain.slide) > bond.slide_limit * bond.slide_limit)
-        | (dot(strain.roll, strain.roll) > bond.roll_limit * bond.roll_limit)
+        | (dot(xi, xi) > bond.roll_limit * bond.roll_limit)
         | (abs(strain.twist) > bond.twist_limit)
     )
 
@@ -204,12 +204,16 @@ def _yielded(size, limit, release):
 
 
 @formula
-def yielded(strain, bond, release):
-    """The displacements after the contact has moved: clamped to the limit, or released to 0 (paper, A.6)."""
+def yielded(strain, n, bond, release):
+    """The displacements after the contact has moved: clamped to the limit, or released to 0 (paper, A.6).
+
+    What `roll` has left is the tangential ξ' that the pointers are then made for.
+    """
+    xi = across(strain.roll, n)
     slides = _yielded(math.sqrt(dot(strain.slide, strain.slide)), bond.slide_limit, release)
-    rolls = _yielded(math.sqrt(dot(strain.roll, strain.roll)), bond.roll_limit, release)
+    rolls = _yielded(math.sqrt(dot(xi, xi)), bond.roll_limit, release)
     twists = _yielded(abs(strain.twist), bond.twist_limit, release)
-    return Strain(strain.overlap, scale(slides, strain.slide), scale(rolls, strain.roll), twists * strain.twist)
+    return Strain(strain.overlap, scale(slides, strain.slide), scale(rolls, xi), twists * strain.twist)
 
 
 @formula
@@ -241,7 +245,8 @@ def lost_by_yielding(before, reached, left, bond):
     """Energy [J] lost in a step by sliding, rolling, twisting: ½k (q_before + q_left)·(q_reached − q_left).
 
     It is the work of the mode's force over the step less what stays stored, so that with trapezoidal work
-    (velocity Verlet) nothing is lost from the books.  A broken contact leaves q = 0.
+    (velocity Verlet) nothing is lost from the books.  A broken contact leaves q = 0.  For rolling, q is all of
+    R (n1 + n2), as in the torque and the energy: its normal part matters where ξ_c is not small against r.
     """
     slide = dot(add(before.slide, left.slide), sub(reached.slide, left.slide))
     roll = dot(add(before.roll, left.roll), sub(reached.roll, left.roll))

@@ -91,11 +91,11 @@ class MaterialSection(_Section):
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
             return material_named(self.like).but(name=name, **given)
-        needed = ("density", "surface_energy", "young_modulus", "poisson_ratio")
+        needed = ("density", "young_modulus", "poisson_ratio")
         missing = [key for key in needed if key not in given]
         if missing:
             raise BadInput(f"{name} lacks {', '.join(missing)}; give them, or like = 'iron'")
-        return Material(name, **given)
+        return Material(name, **({"surface_energy": None} | given))
 
 
 class GrainsSection(_Section):

@@ -51,6 +51,7 @@ class Engine:
     def advance(self, until: float, most_steps: int) -> Stop:
         """Up to `most_steps` steps, or to the first at or after `until` [s]; arrays grow as needed."""
         w = self.world
+        last = w.steps + most_steps
         while True:
             stop = Stop(
                 self._advance(
@@ -61,8 +62,8 @@ class Engine:
                     w.count,
                     w.lost,
                     self.rules,
-                    until,
-                    most_steps,
+                    float(until),
+                    last - w.steps,
                 )
             )
             if stop is Stop.CONTACTS_FULL:
@@ -92,7 +93,7 @@ class Engine:
 
     def culprits(self) -> tuple[int, ...]:
         """The grains that the last stop was about."""
-        return tuple(sorted({int(self.world.count[GRAIN1]), int(self.world.count[GRAIN2])}))
+        return tuple(sorted({int(self.world.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))
 
 
 def build_engine(grains: Grains, forces: Sequence[Force], box: Box, stepping: Verlet, *, fresh: bool = True) -> Engine:

@@ -30,7 +30,7 @@ def take_stock(world: World, rules: Any, outside: dict[str, float]) -> dict[str,
     grains = world.grains.arrays
     measure_energies(grains, world.contacts, world.count, world.box.span, rules.dipoles, rules.contact.follow, energies)
     contacts = int(world.count[CONTACTS])
-    labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts])
+    labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts].T)
     row: dict[str, float] = {"step": world.steps, "time": world.time}
     row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | outside
     row |= dict(zip(LOSSES, world.lost.tolist(), strict=True))
@@ -94,7 +94,7 @@ class Ledger:
 
     @property
     def drift(self) -> float:
-        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy)."""
+        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy of any row)."""
         largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
         scale = self.dissipated + largest
         return self._change() / scale if scale > 0.0 else 0.0

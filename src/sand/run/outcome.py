@@ -15,7 +15,8 @@ class Outcome(Enum):
     INTERRUPTED = "interrupted from outside; a checkpoint lets the run go on"
     NOT_FINITE = "a speed or spin is no longer a finite number"
     NO_STEP = "no step can be taken: the physics asks for one too short for the clock"
-    FLEW_TOO_FAR = "a grain would fly more than half its radius in one step: the fixed step is too long"
+    FLEW_TOO_FAR = "a grain would fly more than half the smallest radius in one step: the step is too long"
+    SPUN_TOO_FAR = "a grain would turn by more than half a radian in one step: the step is too long"
     CRUSHED = "two grains overlap by more than the smaller radius: too fast an impact, or too long a step"
 
     @property
@@ -28,6 +29,7 @@ OF_STOP = {
     Stop.NOT_FINITE: Outcome.NOT_FINITE,
     Stop.NO_STEP: Outcome.NO_STEP,
     Stop.FLEW_TOO_FAR: Outcome.FLEW_TOO_FAR,
+    Stop.SPUN_TOO_FAR: Outcome.SPUN_TOO_FAR,
     Stop.CRUSHED: Outcome.CRUSHED,
 }
 

@@ -189,7 +189,8 @@ class Simulation:
     def _look(self) -> None:
         """A row of the ledger, a frame and everyone who looks on."""
         row = self._stock()
-        self.ledger.add(row)
+        if not self.ledger.add(row):
+            return
         if self.record:
             self.record.write(self, row)
         for observer in self.observers:

@@ -91,7 +91,7 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
         raise BadInput(
             f"a box of {lengths.min():.3g} m is too small for grains of radius {radius.max():.3g} m; "
-            "take one of at least 5 diameters"
+            "take one of at least 3 diameters"
         )
     placed = np.empty((len(radius), 3))
     order = np.argsort(-radius, kind="stable")

@@ -43,6 +43,7 @@ class Stop(IntEnum):
     NO_STEP = 5
     FLEW_TOO_FAR = 6
     CRUSHED = 7
+    SPUN_TOO_FAR = 8
 
 
 class ContactRules(NamedTuple):
@@ -74,14 +75,20 @@ class DipoleRules(NamedTuple):
     cutoff: Any
 
 
+LONGEST_TURN = 0.5
+"""Largest turn in one step [rad] for which `rotation.turn` is sound."""
+
+
 @loop
-def _flies_too_far(grains, dt):
-    """The first grain that would fly more than half its radius in one step, or −1."""
+def _moves_too_far(grains, reach, dt):
+    """Stop and grain if one would fly more than half the smallest radius, or turn too far, in one step."""
     for i in range(grains.mass.size):
-        v = load(grains.velocity, i)
-        if dt * dt * dot(v, v) > 0.25 * grains.radius[i] ** 2:
-            return i
-    return -1
+        v, w = load(grains.velocity, i), load(grains.spin, i)
+        if dt * dt * dot(v, v) > 0.25 * reach * reach:
+            return Stop.FLEW_TOO_FAR, i
+        if dt * dt * dot(w, w) > LONGEST_TURN**2:
+            return Stop.SPUN_TOO_FAR, i
+    return Stop.STEPS_DONE, -1
 
 
 @loop
@@ -114,15 +121,16 @@ def driver_for(outside: Callable, keep: bool = True) -> Callable:
     @loop
     def first_half(grains, contacts, near, clock, count, rules):
         """Choose the step, kick half of it, drift; anything but STEPS_DONE: no step was taken."""
+        count[GRAIN1] = count[GRAIN2] = -1
         dt = choose_step(grains, contacts, near, clock, count, rules.span, rules.control)
         if not dt > 0.0:
             return Stop.NOT_FINITE
         if clock[TIME] + dt == clock[TIME]:
             return Stop.NO_STEP
-        stray = _flies_too_far(grains, dt)
-        if stray >= 0:
-            count[GRAIN1] = count[GRAIN2] = stray
-            return Stop.FLEW_TOO_FAR
+        stop, stray = _moves_too_far(grains, rules.control.reach, dt)
+        if stop != Stop.STEPS_DONE:
+            count[GRAIN1] = stray
+            return stop
         if count[STEPS] % CHECK_EVERY == 0:
             c = _crushed(grains, contacts, count, rules.span)
             if c >= 0:
@@ -157,7 +165,8 @@ def driver_for(outside: Callable, keep: bool = True) -> Callable:
             make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
         if parted or fresh > 0:
             sort_sides(contacts, count, grains)
-            contact_step(contacts, count, grains, clock, law.per_period)
+        if parted or fresh > 0 or stale:
+            contact_step(contacts, near, count, grains, clock, law.per_period)
         sum_loads(grains, contacts, clock[TIME] + dt, rules)
         kick(grains, 0.5 * dt)
         clock[TIME] += dt

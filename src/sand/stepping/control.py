@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ..core.box import nearest_image
 from ..core.jit import formula, loop
 from ..core.vec import dot, load, sub
-from ..core.world import CONTACT_STEP, CONTACTS, GRAIN1, LEVEL, PAIRS, STEPS
+from ..core.world import CONTACT_STEP, CONTACTS, GRAIN1, GRAIN2, LEVEL, PAIRS, STEPS
 from ..physics.surroundings import stiffness_of_field
 
 CHECK_EVERY = 16
@@ -51,26 +51,32 @@ def load_step(force, torque, mass, inertia, control):
 
 @loop
 def wanted_step(grains, contacts, near, count, span, control):
-    """The longest step [s] that all but the contacts allow; 0 if something is not finite.
+    """The longest step [s] that all but the contacts allow, and the grains that want it (GRAIN1, GRAIN2).
+
+    0 if a speed or spin is not finite.
 
     Bound grains are left out of the accuracy rule: they ring, and their step is that of contacts.
     """
     wanted = control.longest
+    slowest1 = slowest2 = -1
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
         if not (speed < math.inf and turning < math.inf):
             count[GRAIN1] = i
             return 0.0
+        mine = control.longest
         if speed > 0.0:
-            wanted = min(wanted, REACH_PART * control.reach / speed)
+            mine = min(mine, REACH_PART * control.reach / speed)
         if turning > 0.0:
-            wanted = min(wanted, SPIN_ANGLE / turning)
+            mine = min(mine, SPIN_ANGLE / turning)
         moment, inertia = load(grains.moment, i), grains.inertia[i]
-        wanted = min(wanted, field_step(moment, load(grains.field, i), control.outer_field, inertia))
+        mine = min(mine, field_step(moment, load(grains.field, i), control.outer_field, inertia))
         if contacts.start[i + 1] == contacts.start[i]:
             force, torque = load(grains.force, i), load(grains.torque, i)
-            wanted = min(wanted, load_step(force, torque, grains.mass[i], inertia, control))
+            mine = min(mine, load_step(force, torque, grains.mass[i], inertia, control))
+        if mine < wanted:
+            wanted, slowest1, slowest2 = mine, i, -1
     for p in range(count[PAIRS]):
         if near.touching[p] == 0:
             i, j = near.pair[0, p], near.pair[1, p]
@@ -79,7 +85,10 @@ def wanted_step(grains, contacts, near, count, span, control):
             closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), apart) / distance
             if closing > 0.0:
                 gap = distance - grains.radius[i] - grains.radius[j]
-                wanted = min(wanted, max(near.step[p], CLOSING_PART * gap / closing))
+                ours = max(near.step[p], CLOSING_PART * gap / closing)
+                if ours < wanted:
+                    wanted, slowest1, slowest2 = ours, i, j
+    count[GRAIN1], count[GRAIN2] = slowest1, slowest2
     return wanted
 
 
