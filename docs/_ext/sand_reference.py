@@ -333,10 +333,12 @@ LEDGER = {
     "magnetic": ("J", "dipole–dipole energy of all pairs"),
     "(one per force)": ("J", "energy of each per-grain force under its name, for example `field`"),
     "lost_forming": ("J", "dissipated when contacts formed"),
-    "lost_breaking": ("J", "dissipated when contacts broke"),
+    "lost_breaking": ("J", "dissipated when contacts broke, what their springs held included"),
     "lost_sliding": ("J", "dissipated by sliding beyond the limit"),
     "lost_rolling": ("J", "dissipated by rolling beyond the limit"),
     "lost_twisting": ("J", "dissipated by twisting beyond the limit"),
+    "lost_damping": ("J", "dissipated by the damping of the normal motion"),
+    "lost_stiffness": ("J", "taken out of the springs by stiffnesses that follow the contact radius; may be negative"),
     "total": ("J", "sum of all energies and all losses; constant but for the error of the integrator"),
     "momentum_x": ("kg m/s", "momentum; also `_y`, `_z`"),
     "angular_momentum_x": ("J s", "angular momentum about the origin, spins included; also `_y`, `_z`"),
@@ -396,8 +398,8 @@ def outcomes_page() -> str:
 
 # --- case files ---------------------------------------------------------------------------------------
 CASE_KEYS = {
-    "run.until": "end of the run, simulated time",
-    "run.steps": "end of the run, number of steps",
+    "run.until": "end of the run, simulated time; this or `steps` is needed",
+    "run.steps": "end of the run, number of steps; with both, whichever comes first",
     "run.frame_every": "time between frames and rows of the ledger; a two-hundredth of the run by default",
     "run.seed": "seed of everything random",
     "run.out": "folder of the run",

@@ -110,6 +110,8 @@ def as_box(value: Any) -> Box:
         return Box.open()
     if isinstance(value, (list, tuple)):
         if len(value) != 3:
-            raise BadInput(f"box = {value!r} must be one length or three (None for an open axis)")
+            raise BadInput(
+                f'box = {value!r} must be one length or three; for an open axis give None, in a case file "open"'
+            )
         return Box.periodic(*value)
     return Box.periodic(value)

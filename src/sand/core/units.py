@@ -123,9 +123,9 @@ def si(value: Any, unit: str, name: str, *, above: float | None = None, least: f
     if not math.isfinite(number):
         raise BadInput(f"{shown} is not finite; give a number in {unit}")
     if above is not None and not number > above:
-        raise BadInput(f"{shown} must be above {above:g} {unit}")
+        raise BadInput(f"{shown} must be above {above:g} {unit}".removesuffix(" 1"))
     if least is not None and not number >= least:
-        raise BadInput(f"{shown} must be at least {least:g} {unit}")
+        raise BadInput(f"{shown} must be at least {least:g} {unit}".removesuffix(" 1"))
     return float(number)
 
 

@@ -27,7 +27,8 @@ def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:
 
     Raises:
         BadInput: it exists and is not empty (unless `overwrite`, which removes an earlier run's own files and
-            nothing else), or it cannot be made.
+            nothing else).
+        FilesFailed: it cannot be made or written to.
     """
     folder = Path(path)
     try:
@@ -46,7 +47,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
-        raise BadInput(f"cannot write to folder {folder}: {error.strerror}") from error
+        raise FilesFailed(f"cannot write to folder {folder}: {error.strerror}") from error
     return folder
 
 
@@ -91,7 +92,13 @@ def _plain(value: Any) -> Any:
 
 def read_json(path: Path) -> dict[str, Any]:
     """Raises BadInput for a missing or broken file."""
-    return json.loads(read_text(path))
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError:
+        raise BadInput(f"{path} is not JSON") from None
+    if not isinstance(content, dict):
+        raise BadInput(f"{path} is not a summary of SAND")
+    return content
 
 
 def read_text(path: str | Path) -> str:
@@ -153,11 +160,16 @@ def _whole_rows(text: str) -> list[str]:
     return [line for line in lines[1:] if line.count(",") == lines[0].count(",")]
 
 
+def _number(text: str) -> float:
+    """Counts stay whole numbers."""
+    return int(text) if text.lstrip("-").isdigit() else float(text)
+
+
 def read_ledger(path: Path) -> list[dict[str, float]]:
     """The rows of ledger.csv as numbers; a torn last row is left out.  Raises BadInput."""
     text = read_text(path)
     rows = list(csv.DictReader([text.split("\n", 1)[0], *_whole_rows(text)]))
     try:
-        return [{k: float(v) if k not in ("step",) else int(v) for k, v in row.items()} for row in rows]
+        return [{k: _number(v) for k, v in row.items()} for row in rows]
     except (TypeError, ValueError):
         raise BadInput(f"{path} is not a ledger of SAND") from None

@@ -20,6 +20,7 @@ SI.  Orientations are scalar first, as GSD has them.
 from __future__ import annotations
 
 import time as wall
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ class TrajectoryWriter:
         time: float,
         grains: Grains,
         box: Box,
-        contacts: dict[str, np.ndarray],
+        contacts: Mapping[str, np.ndarray],
     ) -> None:
         """Append one frame; `contacts` holds `pair` (C, 2), `overlap` [m] and `formed` [s].
 
@@ -94,7 +95,7 @@ class TrajectoryWriter:
         self._file.close()
 
 
-def _frame(step: int, time: float, grains: Grains, box: Box, contacts: dict[str, np.ndarray]) -> Any:
+def _frame(step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray]) -> Any:
     import gsd.hoomd
 
     scale = float(grains.radius.mean())

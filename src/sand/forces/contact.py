@@ -12,7 +12,7 @@ from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
 from ..core.material import Material
-from ..core.units import si
+from ..core.units import si, spoken
 from ..physics.adhesion import rest_radius
 from ..physics.contact import Pairing
 from ..physics.mixing import MIXING, pairing_between
@@ -138,7 +138,7 @@ class Contact:
         if ratio <= JKR_LIMIT:
             return ""
         names = a.name if a is b else f"{a.name} and {b.name}"
-        radii = f"{r1:.3g} m" if r1 == r2 else f"{r1:.3g} and {r2:.3g} m"
+        radii = spoken(r1, "m") if r1 == r2 else f"{spoken(r1, 'm')} and {spoken(r2, 'm')}"
         return (
             f"contacts of {names} grains of radius {radii} have a0/R = {ratio:.2f}; "
             f"JKR assumes a0/R below {JKR_LIMIT}: take forces and energies as estimates"

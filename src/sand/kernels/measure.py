@@ -1,7 +1,7 @@
 """Energies for the books.  Looked at between steps, never inside them."""
 
 from ..core.jit import kernel, loop
-from ..core.vec import dot, load
+from ..core.vec import across, dot, load, norm
 from ..core.world import CONTACTS
 from ..physics import adhesion
 from ..physics import contact as law_of
@@ -37,3 +37,52 @@ def measure_energies(grains, contacts, count, span, dipoles, follow, out):
         for mode in range(4):
             out[2 + mode] += stored[mode]
     out[6] = dipole_energy(grains, span, dipoles)
+
+
+CONTACT_ROWS = (
+    ("overlap", "m", "overlap δ, positive in compression"),
+    ("contact_radius", "m", "radius a of the contact"),
+    ("slide", "m", "size of the sliding displacement ζ"),
+    ("roll", "m", "size of the rolling displacement ξ"),
+    ("twist", "rad", "twisting angle φ"),
+    ("stretch_share", "1", "−δ over the stretch δ_c at which the contact breaks; negative in compression"),
+    ("slide_share", "1", "|ζ|/ζ_c"),
+    ("roll_share", "1", "|ξ|/ξ_c"),
+    ("twist_share", "1", "|φ|/φ_c"),
+    ("normal_force", "N", "normal force, push positive, damping included"),
+    ("slide_force", "N", "size of the sliding force"),
+    ("roll_torque", "N m", "size of the rolling torque"),
+    ("twist_torque", "N m", "twisting torque −k_t φ on grain 1 along n"),
+    ("energy_normal", "J", "stored by the normal mode"),
+    ("energy_sliding", "J", "stored by the sliding spring"),
+    ("energy_rolling", "J", "stored by the rolling spring"),
+    ("energy_twisting", "J", "stored by the twisting spring"),
+)
+"""What `measure_contacts` tells of each contact: name, unit, meaning."""
+
+
+@kernel
+def measure_contacts(grains, contacts, count, span, follow, out):
+    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS."""
+    for c in range(count[CONTACTS]):
+        i, j = contacts.pair[0, c], contacts.pair[1, c]
+        r1, r2 = grains.radius[i], grains.radius[j]
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        overlap, plain = r1 + r2 - pose.distance, bond_at(contacts, c)
+        y = adhesion.root(adhesion.stretch(overlap, plain.pull_off_overlap))
+        bond = law_of.stiffened(plain, y, follow)
+        strain = law_of.strain_of(pose, overlap, r1, r2, bond)
+        slide, roll = norm(strain.slide), norm(across(strain.roll, pose.n))
+        stored = law_of.energies(pose, overlap, y, r1, r2, bond)
+        out[0, c], out[1, c] = overlap, law_of.contact_radius(overlap, y, bond)
+        out[2, c], out[3, c], out[4, c] = slide, roll, strain.twist
+        out[5, c] = -overlap / bond.pull_off_overlap
+        out[6, c] = slide / bond.slide_limit if bond.slide_limit > 0.0 else 0.0
+        out[7, c] = roll / bond.roll_limit
+        out[8, c] = abs(strain.twist) / bond.twist_limit
+        out[9, c] = law_of.normal_force(overlap, y, bond) + contacts.damped[c]
+        out[10, c] = bond.slide_stiffness * slide
+        out[11, c] = bond.reduced_radius * bond.roll_stiffness * roll
+        out[12, c] = -bond.twist_stiffness * strain.twist
+        for mode in range(4):
+            out[13 + mode, c] = stored[mode]

@@ -175,6 +175,20 @@ class Case(_Section):
         return {**PRESETS, **own}
 
 
+def _wrong_materials(content: dict[str, Any]) -> list[str]:
+    """Complaints about numbers in [materials], where a mistake elsewhere keeps the case from being built."""
+    problems: list[str] = []
+    own = content.get("materials", {})
+    for name, section in own.items() if isinstance(own, dict) else ():
+        try:
+            MaterialSection.model_validate(section).build(name)
+        except ValidationError:
+            continue  # told with the rest
+        except BadInput as error:
+            problems += error.at("materials").problems
+    return problems
+
+
 def _unknown_materials(content: dict[str, Any]) -> list[str]:
     """Complaints about names in [grains] that are neither presets nor in [materials]."""
     grains, own = content.get("grains"), content.get("materials", {})
@@ -205,6 +219,7 @@ def check_case(content: dict[str, Any], name: str) -> Case:
         case = Case.model_validate(content)
         case.materials_by_name()
     except ValidationError as error:
+        problems += _wrong_materials(content)
         problems += [line for slip in error.errors() for line in complaints(slip, Case, kinds)]
     except BadInput as error:
         problems += error.problems

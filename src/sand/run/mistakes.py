@@ -26,7 +26,11 @@ def complaints(slip: Any, whole: type, extra: dict[type, list[str]]) -> list[str
     if slip["type"] == "missing":
         return [f"{place} is missing; add it"]
     if slip["type"] == "value_error":
-        return [f"{place}: {line}" for line in str(slip["ctx"]["error"]).splitlines()]
+        # settings classes name themselves; said once is enough
+        last = f"{slip['loc'][-1]}: "
+        return [f"{place}: {line.removeprefix(last)}" for line in str(slip["ctx"]["error"]).splitlines()]
+    if slip["type"] in ("dataclass_type", "model_type"):
+        return [f"{place} = {slip['input']!r}: it must be a table, [{place}]"]
     return [f"{place} = {slip['input']!r}: {slip['msg'][0].lower()}{slip['msg'][1:]}"]
 
 

@@ -94,6 +94,7 @@ class Record:
             "last_step": None if math.isinf(self._ends[1]) else int(self._ends[1]),
             "wall_seconds": simulation.wall_seconds,
             "temperature": simulation.temperature,
+            "choices": simulation.choices,
             "clock": CLOCK,
             "count": COUNT,
             "lost": LOST,

@@ -14,12 +14,12 @@ import numpy as np
 from ..core.box import as_box
 from ..core.errors import BadInput, Interrupted
 from ..core.grains import Grains
-from ..core.units import si
-from ..core.world import CONTACTS
+from ..core.units import si, spoken
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
 from ..stepping.advance import Stop
 from ..stepping.verlet import Verlet
+from .contacts import ContactTable
 from .engine import build_engine
 from .ledger import Ledger, take_stock
 from .observers import Observer, Schedule
@@ -72,6 +72,7 @@ class Simulation:
         self.seed = seed
         self.observers = list(observers)
         self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
+        self._chosen: dict[str, str] = {}  # what the start of a resumed run decided
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
         self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
         self.start = grains.copy()
@@ -86,6 +87,7 @@ class Simulation:
             arrays, meta = restart
             self.world.from_arrays(arrays)
             self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
+            self._chosen = meta.get("choices", {})
             if self.record:
                 self.ledger.restore(self.record.earlier_rows(self.world.steps))
         for text in self._engine.warnings:
@@ -102,28 +104,22 @@ class Simulation:
         return self.world.grains
 
     @property
-    def contacts(self) -> dict[str, np.ndarray]:
-        """The contacts as they are now: `pair` (C, 2), `overlap` [m], `twist` [rad], `formed` [s]."""
+    def contacts(self) -> ContactTable:
+        """The contacts as they are now: displacements, shares of their limits, loads, energies, what each lost."""
         self._start()
-        w = self.world
-        used = int(w.count[CONTACTS])
-        pair = np.ascontiguousarray(w.contacts.pair[:, :used].T)
-        return {
-            "pair": pair,
-            "overlap": w.grains.overlaps(pair, w.box),
-            "twist": w.contacts.twist[:used].copy(),
-            "formed": w.contacts.formed[:used].copy(),
-        }
+        return ContactTable(self.world, self._engine.rules.contact.follow)
 
     @property
     def choices(self) -> dict[str, str]:
         """What was decided for the user, and why: boundary, cut-off, step."""
+        if self._chosen:
+            return self._chosen
         told = {"boundary": self.box.describe()}
         for force in self.forces:
             choose = getattr(force, "choose", None)
             if choose is not None:
                 radius, reason = choose(self.start, self.box)
-                told[f"{force.name} cut-off"] = f"{'none' if radius is None else f'{radius:.4g} m'} ({reason})"
+                told[f"{force.name} cut-off"] = f"{'none' if radius is None else spoken(radius, 'm')} ({reason})"
         return told
 
     def loads(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..core.constants import BOLTZMANN
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import Grains, moment_size
 from ..core.material import Material
-from ..core.units import si
+from ..core.units import si, spoken
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
 """Variance of each spin component in units of kT/I: mean rotational energy kT/2 in all, (3/2)kT, or none."""
@@ -90,7 +90,7 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
     gap = CLEARANCE * float(radius.mean())
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
         raise BadInput(
-            f"a box of {lengths.min():.3g} m is too small for grains of radius {radius.max():.3g} m; "
+            f"a box of {spoken(lengths.min(), 'm')} is too small for grains of radius {spoken(radius.max(), 'm')}; "
             "take one of at least 3 diameters"
         )
     placed = np.empty((len(radius), 3))

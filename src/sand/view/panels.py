@@ -120,7 +120,8 @@ def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
 def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """Losses by channel; channels too small for the frame, or without any loss, are named only."""
     t = ledger["time"] / time.size
-    channels = {name: values / unit.size for name, values in losses(ledger).items()}
+    # what stiffnesses that follow the contact take out may be negative; its size is drawn
+    channels = {name: np.abs(values) / unit.size for name, values in losses(ledger).items()}
     axes.set_ylabel(f"lost ({unit.name})")
     top = max(map(peak, channels.values()))
     if top == 0.0:
