@@ -27,8 +27,7 @@ def escaped(text: str) -> str:
     """Plain text as Markdown; what stands in `backticks` stays code."""
     parts = re.split(r"(`[^`]+`)", text)
     return "".join(
-        p if p.startswith("`") and p.endswith("`") else re.sub(r"([\\*_|<>$\[\]{}#~])", r"\\\1", p)
-        for p in parts
+        p if p.startswith("`") and p.endswith("`") else re.sub(r"([\\*_|<>$\[\]{}#~])", r"\\\1", p) for p in parts
     )
 
 
@@ -155,9 +154,7 @@ def signature(thing: Any, name: str) -> str:
     except (TypeError, ValueError):
         return name
     empty = inspect.Parameter.empty
-    kept = [
-        p.replace(annotation=empty) for key, p in given.parameters.items() if key not in ("self", "cls")
-    ]
+    kept = [p.replace(annotation=empty) for key, p in given.parameters.items() if key not in ("self", "cls")]
     text = name + str(given.replace(parameters=kept, return_annotation=inspect.Signature.empty))
     return re.sub(r"<class '[\w.]*?(\w+)'>", r"\1", text)
 
@@ -170,9 +167,8 @@ def _members(kind: type) -> list[str]:
         inner = thing.__func__ if isinstance(thing, (classmethod, staticmethod)) else thing
         if isinstance(inner, property):
             out += [f"### `.{name}`", markdown(inner.__doc__) or f"`{kind.__name__}.{name}`"]
-        elif isinstance(inner, types.FunctionType) and not isinstance(thing, staticmethod):
-            if inner.__doc__:
-                out += [f"### `.{signature(inner, name)}`", markdown(inner.__doc__)]
+        elif isinstance(inner, types.FunctionType) and not isinstance(thing, staticmethod) and inner.__doc__:
+            out += [f"### `.{signature(inner, name)}`", markdown(inner.__doc__)]
     return out
 
 
@@ -279,8 +275,14 @@ def fields_page() -> str:
     from sand.core import fields
 
     rows = [
-        [f"`{f.name}`", f.symbol.replace("_", r"\_"), "(N,)" if f.width == 1 else f"(N, {f.width})",
-         cell(f.unit), f.kind, cell(f.meaning)]
+        [
+            f"`{f.name}`",
+            f.symbol.replace("_", r"\_"),
+            "(N,)" if f.width == 1 else f"(N, {f.width})",
+            cell(f.unit),
+            f.kind,
+            cell(f.meaning),
+        ]
         for f in fields.FIELDS
     ]
     kinds = "`fixed` is set once, `moving` changes at each step, `load` is worked out from the others."
@@ -305,15 +307,36 @@ def materials_page() -> str:
         note = notes.get(name.upper()) or f"the same as {_same(material, m)}"
         gamma = "give it" if m.surface_energy is None else f"{m.surface_energy:g}"
         code = f"`sand.{name.upper()}`" if name.upper() in notes else ""
-        rows.append([
-            f"`{name}`", code, f"{m.density:g}", gamma, f"{m.young_modulus / 1e9:g}", f"{m.poisson_ratio:g}",
-            f"{m.rolling_limit * 1e10:g}", f"{m.specific_moment:g}", cell(note),
-        ])
-    head = ["name", "in scripts", "ρ [kg/m³]", "γ [J/m²]", "E [GPa]", "ν", "ξ_c [Å]".replace("_", r"\_"),
-            "moment [A m²/kg]", "source"]
+        rows.append(
+            [
+                f"`{name}`",
+                code,
+                f"{m.density:g}",
+                gamma,
+                f"{m.young_modulus / 1e9:g}",
+                f"{m.poisson_ratio:g}",
+                f"{m.rolling_limit * 1e10:g}",
+                f"{m.specific_moment:g}",
+                cell(note),
+            ]
+        )
+    head = [
+        "name",
+        "in scripts",
+        "ρ [kg/m³]",
+        "γ [J/m²]",
+        "E [GPa]",
+        "ν",
+        "ξ_c [Å]".replace("_", r"\_"),
+        "moment [A m²/kg]",
+        "source",
+    ]
     return (
-        "# Materials\n\n" + markdown(material.Material.__doc__) + "\n\n## Presets\n\n" + table(head, rows)
-        + "\n\nThe moment per mass is what `moment = \"material\"` gives to grains; without a `moment` they have none.\n"
+        "# Materials\n\n"
+        + markdown(material.Material.__doc__)
+        + "\n\n## Presets\n\n"
+        + table(head, rows)
+        + '\n\nThe moment per mass is what `moment = "material"` gives to grains; without a `moment` they have none.\n'
     )
 
 
@@ -326,7 +349,7 @@ LEDGER = {
     "time": ("s", "simulated time"),
     "translation": ("J", "kinetic energy of the centres, Σ ½ m v²"),
     "rotation": ("J", "kinetic energy of the spins, Σ ½ I ω²"),
-    "normal": ("J", "stored in the contacts by the normal (JKR) mode; negative when they hold together"),
+    "normal": ("J", "stored in the contacts by the normal mode; negative when they hold together"),
     "sliding": ("J", "stored by the sliding springs"),
     "rolling": ("J", "stored by the rolling springs"),
     "twisting": ("J", "stored by the twisting springs"),
@@ -363,7 +386,7 @@ def ledger_page() -> str:
     drift = markdown(ledger.Ledger.drift.__doc__)
     per_kt = markdown(ledger.Ledger.drift_per_kT.__doc__)
     return (
-        "# The ledger\n\n`simulation.ledger[\"total\"]` is one column over time; `ledger.csv` in the run's folder "
+        '# The ledger\n\n`simulation.ledger["total"]` is one column over time; `ledger.csv` in the run\'s folder '
         "has the same columns, with every number written so that it reads back to the last bit.\n\n"
         + table(["column", "unit", "meaning"], rows)
         + f"\n\n`ledger.drift`: {drift}\n\n`ledger.drift_per_kT(temperature, grains)`: {per_kt}\n"
@@ -389,7 +412,8 @@ def outcomes_page() -> str:
         code = 3 if outcome.is_physics else 130 if outcome is Outcome.INTERRUPTED else 0
         rows.append([f"`{outcome.name}`", cell(outcome.value), str(code)])
     return (
-        "# How a run can end\n\n" + table(["outcome", "what the user reads", "exit code"], rows)
+        "# How a run can end\n\n"
+        + table(["outcome", "what the user reads", "exit code"], rows)
         + "\n\nAn outcome of the physics (exit code 3) returns a result and leaves a checkpoint; an interruption "
         "writes the checkpoint and raises `sand.Interrupted`. A mistake of the user is `sand.BadInput` "
         "(exit code 2), before anything is run.\n\n## `Result`\n\n" + markdown(Result.__doc__) + "\n"
@@ -408,7 +432,7 @@ CASE_KEYS = {
     "grains.number": "number of grains",
     "grains.radius": "radius of each grain",
     "grains.material": "a preset or a name from [materials]",
-    "grains.moment": '[A m^2] size of each moment, absolute or per mass ("200 A m^2/kg"); none by default',
+    "grains.moment": '[A m^2] size of each, absolute or per mass ("200 A m^2/kg"), or "material"; none by default',
     "grains.temperature": "temperature of velocities and spins",
     "grains.spins": "mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`",
     "materials.NAME.like": "preset to start from; without it the first four numbers below are needed",
@@ -509,8 +533,9 @@ def _settings(kind: Any, head: list[str], rows: list[list[str]] | None = None) -
     for field in dataclasses.fields(kind):
         needed = field.default is dataclasses.MISSING
         note = notes[field.name]
-        rows.append([f"`{field.name}`", "**required**" if needed else _default(field.default),
-                     cell(_bracketed(note)), note])
+        rows.append(
+            [f"`{field.name}`", "**required**" if needed else _default(field.default), cell(_bracketed(note)), note]
+        )
     return table(head, rows)
 
 
@@ -519,8 +544,11 @@ def formulas_page() -> str:
     """Every formula of sand.physics, module by module."""
     import sand.physics
 
-    out = ["# Formulas", markdown(sand.physics.__doc__),
-           "Each is an ordinary Python function of floats and 3-tuples, and is also what the compiled loops call."]
+    out = [
+        "# Formulas",
+        markdown(sand.physics.__doc__),
+        "Each is an ordinary Python function of floats and 3-tuples, and is also what the compiled loops call.",
+    ]
     for info in pkgutil.iter_modules(sand.physics.__path__):
         module = importlib.import_module(f"sand.physics.{info.name}")
         out += [f"## `sand.physics.{info.name}`", markdown(module.__doc__)]

@@ -154,6 +154,7 @@ def test_without_adhesion_grains_bounce_like_hertz():
         ({"mixing": "mean"}, "mixing = 'mean'; allowed: geometric"),
         ({"roll_factor": -1}, "roll_factor = -1 must be at least 0"),
         ({"rolling_limit": "1 kg"}, "rolling_limit = '1 kg' is not a quantity in m"),
+        ({"damping": "constant"}, "needs a damping_constant above 0"),
         ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not a quantity in kg/s"),
     ],
 )
@@ -162,5 +163,5 @@ def test_bad_settings(settings, message):
     with pytest.raises(sand.BadInput, match=message):
         sand.Contact(**settings)
     with pytest.raises(sand.BadInput) as caught:
-        sand.Contact(**(settings | {"viscous_time": "1 m"}))
-    assert len(caught.value.problems) == 2
+        sand.Contact(**({"damping_constant": -1.0} | settings | {"viscous_time": "1 m"}))
+    assert len(caught.value.problems) >= 2

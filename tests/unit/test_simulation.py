@@ -131,7 +131,7 @@ def test_steps_are_counted_through_growing_arrays():
     """run(steps=N) takes N steps, also when the list of pairs outgrows its arrays on the way."""
     sim = struck_chain(length=30)
     sim.world.near = type(sim.world.near)(
-        np.zeros((2, 1), np.uint32), np.zeros(1, np.uint8), np.zeros(1), np.full((3, 31), np.inf)
+        np.zeros((2, 1), np.uint32), np.zeros(1, np.uint8), np.zeros(1), np.zeros(1), np.full((3, 31), np.inf)
     )
     sim.run(steps=32)
     assert sim.world.steps == 32

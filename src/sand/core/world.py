@@ -49,7 +49,8 @@ class NearPairs(NamedTuple):
 
     pair: np.ndarray  # (2, P) uint32
     touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
-    step: np.ndarray  # (P,) the step their contact would need [s]
+    step: np.ndarray  # (P,) the step their contact needs [s]
+    length: np.ndarray  # (P,) δ_c of their contact [m]
     anchor: np.ndarray  # (3, N) positions when the list was made [m]
 
 
@@ -72,7 +73,9 @@ def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
 def near_pairs(grains: int, capacity: int) -> NearPairs:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
     p = max(int(capacity), 16)
-    return NearPairs(np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p), np.full((3, grains), np.inf))
+    return NearPairs(
+        np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p), np.zeros(p), np.full((3, grains), np.inf)
+    )
 
 
 def _grown(arrays: Any, per_grain: tuple[str, ...]) -> Any:

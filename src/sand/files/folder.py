@@ -12,14 +12,15 @@ from typing import Any
 
 from ..core.errors import BadInput, FilesFailed
 
-CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE = (
+CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION = (
     "case.toml",
     "trajectory.gsd",
     "ledger.csv",
     "summary.json",
     "figure.png",
+    "collision.json",
 )
-OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE)
+OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION)
 
 
 def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:

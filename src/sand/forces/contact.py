@@ -34,8 +34,8 @@ class Contact:
         stiffness: of the tangential springs. "frozen" at the equilibrium radius a0, forces exact gradients;
             "dt97" lets them follow the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³, which does not conserve
             energy: what it makes or destroys is booked as `lost_stiffness`.
-        slide_factor, roll_factor, twist_factor: multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012: 1, 8 on
-            rolling, …).
+        slide_factor, roll_factor, twist_factor: multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012 take 2.5, 8
+            and 1).
         rolling_limit: critical rolling displacement ξ_c [m] for all contacts; None: the smaller of the two
             materials' own.
         damping: of the normal motion, "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013:
@@ -83,6 +83,8 @@ class Contact:
                 object.__setattr__(self, "rolling_limit", limit)
         except BadInput as error:
             problems += error.problems
+        if not problems and self.damping == "constant" and self.damping_constant == 0.0:
+            problems.append("contact: damping = 'constant' needs a damping_constant above 0, such as '1e-9 kg/s'")
         if problems:
             raise BadInput(problems)
 

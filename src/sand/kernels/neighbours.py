@@ -77,8 +77,9 @@ def make_list(grains, contacts, near, count, span, reach, law):
                 near.pair[0, found] = i
                 near.pair[1, found] = j
                 near.touching[found] = 1 if in_contact(contacts, i, j) else 0
-                fastest = bond_of(grains, law.pairings, i, j).fastest
-                near.step[found] = 2.0 * math.pi / math.sqrt(fastest) / law.per_period
+                bond = bond_of(grains, law.pairings, i, j)
+                near.step[found] = 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period
+                near.length[found] = bond.break_overlap
                 found += 1
     for i in range(grains.mass.size):
         put(near.anchor, i, load(grains.position, i))

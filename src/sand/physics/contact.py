@@ -100,7 +100,8 @@ def bond_between(pairing, r1, r2, m1, m2):
         k_s,
         k_r,
         k_t,
-        tangential.slide_limit(pairing.shear, pairing.twist_shear, a0),
+        # without springs nothing slides beyond a limit; 0 would flag rounding
+        tangential.slide_limit(pairing.shear, pairing.twist_shear, a0) if sticks else reduced,
         pairing.roll_limit,
         tangential.TWIST_LIMIT,
         pairing.damping,

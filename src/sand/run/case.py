@@ -142,6 +142,16 @@ class ForcesSection(_Section):
         return [f for f in (self.contact, self.dipoles, self.field) if f is not None]
 
 
+def integrator(value: Any) -> Any:
+    """[stepping] without its `method`, which picks the integrator (one so far)."""
+    if isinstance(value, dict) and "method" in value:
+        value = dict(value)
+        method = value.pop("method")
+        if method not in INTEGRATORS:
+            raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
+    return value
+
+
 class Case(_Section):
     """A whole case file."""
 
@@ -155,12 +165,7 @@ class Case(_Section):
     @field_validator("stepping", mode="before")
     @classmethod
     def _method(cls, value: Any) -> Any:
-        if isinstance(value, dict) and "method" in value:
-            value = dict(value)
-            method = value.pop("method")
-            if method not in INTEGRATORS:
-                raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
-        return value
+        return integrator(value)
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the case's own materials by name.  Raises BadInput."""
@@ -175,7 +180,7 @@ class Case(_Section):
         return {**PRESETS, **own}
 
 
-def _wrong_materials(content: dict[str, Any]) -> list[str]:
+def wrong_materials(content: dict[str, Any]) -> list[str]:
     """Complaints about numbers in [materials], where a mistake elsewhere keeps the case from being built."""
     problems: list[str] = []
     own = content.get("materials", {})
@@ -219,7 +224,7 @@ def check_case(content: dict[str, Any], name: str) -> Case:
         case = Case.model_validate(content)
         case.materials_by_name()
     except ValidationError as error:
-        problems += _wrong_materials(content)
+        problems += wrong_materials(content)
         problems += [line for slip in error.errors() for line in complaints(slip, Case, kinds)]
     except BadInput as error:
         problems += error.problems

@@ -21,7 +21,7 @@ from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
 from ..physics.dipole import Cutoff
 from ..stepping.advance import ContactRules, DipoleRules, Rules, Stop, driver_for
-from ..stepping.control import Control
+from ..stepping.control import IMPACT_PART, Control
 from ..stepping.verlet import Verlet
 
 SPREAD = 8
@@ -144,6 +144,7 @@ def build_engine(grains: Grains, forces: Sequence[Force], box: Box, stepping: Ve
             energy_scale=dipoles.energy_scale(grains) if dipoles else 0.0,
             accuracy=stepping.accuracy,
             outer_field=math.fsum(f.flux_density_size() for f in outside),
+            impact=IMPACT_PART / stepping.steps_per_period,
             longest=IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials))),
         ),
     )

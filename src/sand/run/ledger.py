@@ -89,8 +89,9 @@ class Ledger:
 
     @property
     def dissipated(self) -> float:
-        """Energy lost in all channels so far [J], forming included."""
-        return math.fsum(self.rows[-1][name] for name in LOSSES) if self.rows else 0.0
+        """Energy dissipated in all channels so far [J], forming included; what stiffnesses make or destroy is not."""
+        channels = [name for name in LOSSES if name != "lost_stiffness"]
+        return math.fsum(self.rows[-1][name] for name in channels) if self.rows else 0.0
 
     @property
     def drift(self) -> float:

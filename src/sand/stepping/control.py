@@ -19,6 +19,8 @@ FIELD_ANGLE = 0.03
 """Largest phase √(μB/I) dt of a moment swinging in its field; Verlet then errs by 4e-5 in its frequency."""
 CLOSING_PART = 0.2
 """Largest part of the gap that two grains about to touch may close in one step."""
+IMPACT_PART = 25.0
+"""Largest way two grains in contact, or about to be, may move past each other in one step, in δ_c / per_period."""
 REACH_PART = 1.0 / 16.0
 """Largest part of the list's reach that a grain may fly in one step; keeps `list_is_stale` safe."""
 
@@ -32,6 +34,7 @@ class Control(NamedTuple):
     accuracy: float  # part of it that a step may misplace
     outer_field: float  # size of the external flux density [T]
     longest: float  # for worlds in which nothing happens [s]
+    impact: float  # largest way past each other in one step, in δ_c
 
 
 @formula
@@ -78,16 +81,21 @@ def wanted_step(grains, contacts, near, count, span, control):
         if mine < wanted:
             wanted, slowest1, slowest2 = mine, i, -1
     for p in range(count[PAIRS]):
+        i, j = near.pair[0, p], near.pair[1, p]
+        moving = sub(load(grains.velocity, i), load(grains.velocity, j))
+        # at rest against each other, they may take the step of their contact
+        ours = near.step[p]
+        speed = math.sqrt(dot(moving, moving))
+        if near.length[p] > 0.0 and speed * ours > control.impact * near.length[p]:
+            ours = control.impact * near.length[p] / speed
         if near.touching[p] == 0:
-            i, j = near.pair[0, p], near.pair[1, p]
             apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             distance = math.sqrt(dot(apart, apart))
-            closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), apart) / distance
-            if closing > 0.0:
-                gap = distance - grains.radius[i] - grains.radius[j]
-                ours = max(near.step[p], CLOSING_PART * gap / closing)
-                if ours < wanted:
-                    wanted, slowest1, slowest2 = ours, i, j
+            closing = -dot(moving, apart) / distance
+            gap = distance - grains.radius[i] - grains.radius[j]
+            ours = max(ours, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
+        if ours < wanted:
+            wanted, slowest1, slowest2 = ours, i, j
     count[GRAIN1], count[GRAIN2] = slowest1, slowest2
     return wanted
 

@@ -29,7 +29,7 @@ class ContactNumbers:
         slide_limit, roll_limit: ζ_c, ξ_c [m]; twist_limit: φ_c [rad].
         slide_force: critical sliding force k_s ζ_c [N]; roll_moment: k_r R ξ_c = 4F_cξ_c and twist_moment:
             k_t φ_c [N m].
-        roll_energy_clamped, roll_energy_released: to roll one grain by 90° round the other [J], for equal spheres
+        roll_energy_clamped, roll_energy_released: to roll along πR, for equal spheres one by 90° round the other [J]:
             12π²γRξ_c and 6π²γRξ_c (the literature's E_roll = 6π²γRξ_c is the latter).
         normal_period, slide_period, roll_period, twist_period: of the free pair [s].
         sticking_speed: relative speed below which undamped grains stick head-on, m̄v²/2 = cycle_energy [m/s];

@@ -136,10 +136,11 @@ def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     axes.set_ylim(max(least / 2.0, top * 10.0**-DECADES), top * 2.5)
     _log_ticks(axes)
     legend_above(axes)
-    none = ", ".join(name for name, values in channels.items() if not peak(values))
+    options = ("damping", "stiffness")  # off by default: not worth a word
+    none = ", ".join(name for name, values in channels.items() if not peak(values) and name not in options)
     tiny = ", ".join(name for name, values in channels.items() if name not in drawn and peak(values))
     note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)
-    axes.text(0.0, 1.03, note, transform=axes.transAxes, va="bottom", size=7, color=FAINT)
+    axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=FAINT)
 
 
 def draw_balance(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:

@@ -1,0 +1,1 @@
+"""Published figures and common measurements, each as one function."""

@@ -1,0 +1,151 @@
+"""Case files of collisions."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from ..core.errors import BadInput, did_you_mean
+from ..core.grains import Grains, moment_size
+from ..core.material import PRESETS, Material
+from ..files.folder import read_toml
+from ..run.case import INTEGRATORS, ForcesSection, MaterialSection, integrator, quantity, wrong_materials
+from ..run.mistakes import complaints
+from ..setup.aggregates import KINDS
+from ..stepping.verlet import Verlet
+from .collision import Collision, collide
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+
+
+class BodySection(_Section):
+    """[target] and [projectile]: a grain, a chain, a lattice, or a ballistic aggregate (another for each seed)."""
+
+    kind: Literal["grain", "chain", "lattice", "pca"]
+    grains: Annotated[int, Field(ge=1, strict=True)] | None = None
+    shape: list[Annotated[int, Field(ge=1, strict=True)]] | None = None
+    radius: quantity("m", above=0.0)  # type: ignore[valid-type]
+    material: str = "silica"
+    moment: Any = None
+
+    @field_validator("moment")
+    @classmethod
+    def _moment(cls, value: Any) -> Any:
+        if value is not None:
+            import numpy as np
+
+            moment_size(value, np.ones(1))
+        return value
+
+    @model_validator(mode="after")
+    def _whole(self) -> BodySection:
+        if self.kind in ("chain", "pca") and self.grains is None:
+            raise ValueError(f"grains is missing: how many does the {self.kind} have?")
+        if self.kind == "lattice" and (self.shape is None or len(self.shape) != 3):
+            raise ValueError("shape is missing: three whole numbers, such as [5, 5, 5]")
+        if self.moment is not None and self.kind in ("lattice", "pca"):
+            raise ValueError(f"moment: a {self.kind} has no moments yet; leave it out")
+        return self
+
+    def build(self, materials: dict[str, Material], seed: int) -> Grains:
+        """Raises BadInput."""
+        given: dict[str, Any] = {"radius": self.radius, "material": materials[self.material]}
+        if self.kind == "lattice":
+            return KINDS["lattice"](*(self.shape or ()), **given)
+        if self.kind == "pca":
+            return KINDS["pca"](self.grains, seed=seed, **given)
+        given["moment"] = self.moment
+        return KINDS["grain"](**given) if self.kind == "grain" else KINDS["chain"](self.grains, **given)
+
+
+class ImpactSection(_Section):
+    """[impact]: how they meet, and how often."""
+
+    speed: quantity("m/s", above=0.0)  # type: ignore[valid-type]
+    impact_parameter: Any = 0.0
+    along: Literal["x", "y", "z"] = "x"
+    turn: bool = True
+    seeds: list[Annotated[int, Field(ge=0, strict=True)]] = [1]
+    out: str | None = None
+
+
+class CollisionCase(_Section):
+    """A whole case file of `sand collide`."""
+
+    target: BodySection
+    projectile: BodySection
+    impact: ImpactSection
+    materials: dict[str, MaterialSection] = {}
+    forces: ForcesSection = ForcesSection()
+    stepping: Verlet = Verlet()
+
+    @field_validator("stepping", mode="before")
+    @classmethod
+    def _method(cls, value: Any) -> Any:
+        return integrator(value)
+
+    def run(self, seed: int, **options: Any) -> tuple[Collision, Any]:
+        """One collision; with `turn` the bodies are turned at random by the seed.  Raises BadInput."""
+        materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        return collide(
+            self.target.build(materials, 2 * seed),
+            self.projectile.build(materials, 2 * seed + 1),
+            speed=self.impact.speed,
+            impact_parameter=self.impact.impact_parameter,
+            along=self.impact.along,
+            seed=seed if self.impact.turn else None,
+            forces=self.forces.build() or None,
+            stepping=self.stepping,
+            **options,
+        )
+
+
+def read_collision(path: str | Path) -> CollisionCase:
+    """Read and check a case file of `sand collide`.
+
+    Raises:
+        BadInput: every mistake of the file, one line each, with its place.
+    """
+    content = read_toml(path)
+    problems = wrong_materials(content)
+    own = content.get("materials", {})
+    known = [*PRESETS, *(own if isinstance(own, dict) else [])]
+    for body in ("target", "projectile"):
+        given = content.get(body)
+        name = given.get("material", "silica") if isinstance(given, dict) else "silica"
+        if str(name) not in known:
+            problems.append(f"{body}.material: unknown material '{name}'; {did_you_mean(str(name), known)}")
+    case = None
+    try:
+        case = CollisionCase.model_validate(content)
+    except ValidationError as error:
+        extra: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
+        problems += [line for slip in error.errors() for line in complaints(slip, CollisionCase, extra)]
+    if problems or case is None:
+        raise BadInput(f"{path}: {problem}" for problem in problems)
+    return case
+
+
+def run_seed(text: str, seed: int) -> dict[str, Any]:
+    """One collision of a case given as JSON, its outcome as a dictionary: what worker processes run."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return CollisionCase.model_validate(json.loads(text)).run(seed)[0].to_dict()
+
+
+def run_seeds(case: dict[str, Any], seeds: list[int], executor: Any = None) -> list[dict[str, Any]]:
+    """The outcomes for many seeds in their order, on any `concurrent.futures.Executor` or here.
+
+    Args:
+        case: content of a case file that `read_collision` has accepted.
+    """
+    work = partial(run_seed, json.dumps(case))
+    return list(executor.map(work, seeds)) if executor is not None else [work(seed) for seed in seeds]

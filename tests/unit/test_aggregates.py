@@ -1,0 +1,108 @@
+"""Aggregates and encounters: contacts at rest, no overlaps, aimed where they should be."""
+
+import numpy as np
+import pytest
+
+import sand
+from sand.setup import chain, encounter, grain, lattice, pca, turned_at_random
+from sand.setup.aggregates import rest_distance
+
+R, M = 3e-7, sand.SILICA
+
+
+def distances(grains):
+    d = np.linalg.norm(grains.position[:, None] - grains.position[None], axis=-1)
+    return d[np.triu_indices(len(grains), 1)]
+
+
+def test_a_chain():
+    """N − 1 contacts at 2r − δ0, straight along x, centred, moments along it."""
+    body = chain(7, radius=R, material=M, moment="1 A m^2/kg")
+    assert np.diff(body.position[:, 0]) == pytest.approx(rest_distance(M, R))
+    assert not body.position[:, 1:].any()
+    assert body.position.mean() == pytest.approx(0.0, abs=1e-20)
+    assert body.moment[:, 0] == pytest.approx(body.mass)
+    assert not body.moment[:, 1:].any()
+
+
+def test_a_lattice():
+    """3·5·5·4 = 300 contacts of a 5³ cube, nothing closer."""
+    d = distances(lattice(5, radius=R, material=M))
+    assert np.isclose(d, rest_distance(M, R), rtol=1e-9, atol=0.0).sum() == 300
+    assert d.min() == pytest.approx(rest_distance(M, R))
+
+
+def test_ballistic_particle_cluster_aggregates():
+    """N − 1 contacts at rest distance (each newcomer touches one), no overlap, one cluster, seeded, compact-ish."""
+    body = pca(200, radius=R, material=M, seed=4)
+    d = distances(body)
+    rest = rest_distance(M, R)
+    assert d.min() >= rest * (1 - 1e-12)
+    assert np.isclose(d, rest, rtol=1e-9, atol=0.0).sum() == 199
+    assert (pca(200, radius=R, material=M, seed=4).position == body.position).all()
+    assert (pca(200, radius=R, material=M, seed=5).position != body.position).any()
+    gyration = np.sqrt((body.position**2).sum(axis=1).mean())
+    assert 4 * R < gyration < 14 * R
+
+
+def test_they_rest():
+    """A simulation of a lattice and an aggregate stays at rest: contacts as many as counted, no force but rounding."""
+    for body, contacts in ((lattice(3, radius=R, material=M), 54), (pca(50, radius=R, material=M, seed=1), 49)):
+        sim = sand.Simulation(body, [sand.Contact()])
+        assert len(sim.contacts["pair"]) == contacts
+        assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
+
+
+@pytest.mark.parametrize("b", ["0 b", "0.5 b", "0.9 b"])
+def test_an_encounter(b):
+    """Centre of mass at rest, relative speed as asked, offset as asked, no contact at the start, then it meets."""
+    target, projectile = pca(20, radius=R, material=M, seed=1), pca(10, radius=R, material=M, seed=2)
+    met = encounter(target, projectile, speed="5 m/s", impact_parameter=b)
+    g, n = met.grains, met.target
+    assert n == 20
+    momentum = (g.mass[:, None] * g.velocity).sum(axis=0)
+    assert np.abs(momentum).max() < 1e-12 * g.mass.sum() * 5
+    assert g.velocity[n:].mean(axis=0) - g.velocity[:n].mean(axis=0) == pytest.approx([5.0, 0, 0])
+    gap = np.linalg.norm(g.position[:n, None] - g.position[None, n:], axis=-1) - 2 * R
+    assert gap.min() >= 0.5 * R * (1 - 1e-9)
+    reach = sum(np.linalg.norm(x.position - x.position.mean(axis=0), axis=1).max() + R for x in (target, projectile))
+    offset = g.position[n:].mean(axis=0) - g.position[:n].mean(axis=0)
+    assert offset[1] == pytest.approx(float(b[:-2]) * reach, abs=1e-15)
+    assert offset[2] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_turning_keeps_the_body():
+    """Distances, sizes of moments and the centre stay; the same seed turns the same way."""
+    body = chain(4, radius=R, material=M, moment="1 A m^2/kg")
+    one, two = (turned_at_random(body, np.random.default_rng(3)) for _ in range(2))
+    assert distances(one) == pytest.approx(distances(body))
+    assert np.linalg.norm(one.moment, axis=1) == pytest.approx(body.mass)
+    axis = (one.position[1] - one.position[0]) / np.linalg.norm(one.position[1] - one.position[0])
+    assert one.moment[0] / body.mass[0] == pytest.approx(axis)
+    assert (one.position == two.position).all()
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: chain(0, radius=R, material=M), "grains of a chain = 0 must be .* at least 1"),
+        (lambda: chain(3, radius=-1.0, material=M), "radius = -1.0 must be above 0"),
+        (lambda: lattice(2, 0, radius=R, material=M), "side of a lattice = 0"),
+        (lambda: pca(2.5, radius=R, material=M), "grains of an aggregate = 2.5"),
+        (lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=0.0), "speed = 0.0"),
+        (
+            lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=1.0, along="w"),
+            "along = 'w'",
+        ),
+        (
+            lambda: encounter(
+                grain(radius=R, material=M), grain(radius=R, material=M), speed=1.0, impact_parameter="-1 m"
+            ),
+            "impact_parameter = '-1 m'",
+        ),
+    ],
+)
+def test_bad_input(build, message):
+    """One line each."""
+    with pytest.raises(sand.BadInput, match=message):
+        build()

@@ -1,0 +1,152 @@
+"""Collisions: outcomes that are known, many seeds, case files and the command."""
+
+import json
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.experiments.collision import collide, collide_many
+from sand.experiments.collision_case import read_collision, run_seeds
+from sand.setup import chain, grain, pca
+from sand.theory import contact
+
+R = 1e-7
+
+
+def two(seed):
+    """Grains that do not depend on the seed."""
+    return grain(radius=R, material="silica"), grain(radius=R, material="silica")
+
+
+def test_two_grains_stick_or_bounce():
+    """Below v_s one body is left; above it two that part at √(v² − v_s²) (1 %), and E_cycle is lost."""
+    numbers = contact("silica", R)
+    slow, _ = collide(*two(0), speed=0.9 * numbers.sticking_speed)
+    assert (slow.outcome, slow.fragments, slow.largest_remnant) == ("stick", (2,), 1.0)
+    fast, _ = collide(*two(0), speed=2 * numbers.sticking_speed)
+    assert (fast.outcome, fast.fragments) == ("bounce", (1, 1))
+    assert fast.rebound == pytest.approx(numbers.rebound_speed(2 * numbers.sticking_speed), rel=0.01)
+    assert sum(fast.lost.values()) == pytest.approx(numbers.cycle_energy, rel=1e-3)
+    assert fast.impact_energy == pytest.approx(4 * numbers.cycle_energy, rel=1e-3)
+    assert (fast.made, fast.broken, fast.contacts_before, fast.contacts_after) == (1, 1, 0, 0)
+    assert fast.quiet
+
+
+def test_a_fast_grain_breaks_a_chain():
+    """100 m/s against 7 grains of 0.2 µm: more than two pieces, every grain accounted for."""
+    result, sim = collide(
+        chain(7, radius=R, material="silica"), grain(radius=R, material="silica"), speed=100.0, along="y"
+    )
+    assert result.outcome == "fragment"
+    assert sum(result.fragments) == 8
+    assert result.contacts_before == 6
+    assert result.gyration_before[1] == 0.0
+    chain_gyration = np.sqrt((sim.start.position[:7, 0] ** 2).mean())
+    assert result.gyration_before[0] == pytest.approx(chain_gyration, rel=1e-6)
+
+
+def test_a_miss():
+    """An offset beyond the reach: two bodies as before, nothing lost."""
+    result, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b")
+    assert (result.outcome, result.made, result.rebound) == ("bounce", 0, pytest.approx(1.0))
+    assert sum(result.lost.values()) == 0.0
+
+
+def aggregates(seed):
+    """Two small ones for a seed."""
+    return (pca(8, radius=R, material="silica", seed=2 * seed), pca(8, radius=R, material="silica", seed=2 * seed + 1))
+
+
+def test_any_executor_gives_the_same_numbers():
+    """Here, in threads, in processes: the same results in the order of the seeds."""
+    here = collide_many(aggregates, [3, 1, 2], speed=2.0)
+    assert [r.seed for r in here] == [3, 1, 2]
+    assert here[0] != here[1]
+    with ThreadPoolExecutor(2) as pool:
+        assert collide_many(aggregates, [3, 1, 2], pool, speed=2.0) == here
+
+
+CASE = """
+[target]
+kind = "pca"
+grains = 8
+radius = "0.1 um"
+[projectile]
+kind = "grain"
+radius = "0.1 um"
+[impact]
+speed = "2 m/s"
+seeds = [1, 2]
+[forces.contact]
+"""
+
+
+def test_a_case_in_processes(tmp_path):
+    """Workers read the case themselves and give what the parent would."""
+    path = tmp_path / "hit.toml"
+    path.write_text(CASE)
+    read_collision(path)
+    from sand.files.folder import read_toml
+
+    here = run_seeds(read_toml(path), [1, 2])
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert run_seeds(read_toml(path), [1, 2], pool) == here
+
+
+def test_the_command(tmp_path, capsys, monkeypatch):
+    """Many seeds: collision.json and a figure; one seed: a whole run's folder; an old folder is refused."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hit.toml").write_text(CASE)
+    assert main(["collide", "hit.toml", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["collisions"]) == 2
+    assert sum(told["counts"].values()) == 2
+    assert (tmp_path / "hit" / "figure.png").stat().st_size > 0
+    assert json.loads((tmp_path / "hit" / "collision.json").read_text()) == told
+    assert main(["collide", "hit.toml"]) == 2
+    assert "not empty" in capsys.readouterr().err
+    assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one"]) == 0
+    assert "seed 2" in capsys.readouterr().out
+    assert (tmp_path / "one" / "trajectory.gsd").exists()
+    assert json.loads((tmp_path / "one" / "collision.json").read_text())["collisions"][0] == told["collisions"][1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('kind = "pca"\ngrains = 8', 'kind = "chain"\ngrains = 0', "target.grains = 0"),
+        ('kind = "pca"\ngrains = 8', 'kind = "chain"', "target: grains is missing: how many does the chain have?"),
+        ('kind = "pca"', 'kind = "blob"', "target.kind = 'blob'"),
+        ('"2 m/s"', '"2 m"', "impact.speed: speed = '2 m' is not a quantity in m/s|impact.speed: "),
+        ('"2 m/s"', '"0 m/s"', "above 0"),
+        ("seeds = [1, 2]", "sedes = [1, 2]", "impact.sedes: there is no such key; did you mean 'seeds'?"),
+        ("[forces.contact]", '[forces.contact]\nbeyond = "clmp"', "did you mean 'clamp'"),
+        (
+            'radius = "0.1 um"\n[impact]',
+            'radius = "0.1 um"\nmaterial = "silicon"\n[impact]',
+            "unknown material 'silicon'",
+        ),
+    ],
+)
+def test_bad_cases(tmp_path, old, new, message):
+    """One line each, with file and place."""
+    path = tmp_path / "bad.toml"
+    assert old in CASE
+    path.write_text(CASE.replace(old, new))
+    with pytest.raises(sand.BadInput, match=message) as caught:
+        read_collision(path)
+    assert all(problem.startswith(str(path)) for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("seeds", ["x", "3-", "5-1", "1,,2", "-1"])
+def test_bad_seeds(tmp_path, capsys, seeds):
+    """One line, exit 2."""
+    path = tmp_path / "hit.toml"
+    path.write_text(CASE)
+    assert main(["collide", str(path), f"--seeds={seeds}", "--out", str(tmp_path / "out")]) == 2
+    assert "--seeds" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
