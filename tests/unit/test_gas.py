@@ -58,7 +58,7 @@ def test_same_seed_same_grains():
     ("changes", "message"),
     [
         ({"number": 0}, "number = 0"),
-        ({"number": 3_000}, "no room for grain"),
+        ({"number": 60, "box": "80 nm"}, "no room for grain"),
         ({"box": "40 nm"}, "too small"),
         ({"box": None}, "periodic on all three axes"),
         ({"spins": "kt"}, "spins = 'kt'"),
