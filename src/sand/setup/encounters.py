@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -81,21 +82,26 @@ def encounter(
     masses = target.mass.sum(), projectile.mass.sum()
     share = masses[0] / sum(masses)
     gap = GAP * min(target.radius.min(), projectile.radius.min())
-    return Encounter(
-        Grains(
-            np.concatenate([target.position, projectile.position + shift]),
-            np.concatenate([target.radius, projectile.radius]),
-            [b.materials[k] for b in (target, projectile) for k in b.material],
-            velocity=np.concatenate(
-                [target.velocity - (1 - share) * v * direction, projectile.velocity + share * v * direction]
-            ),
-            spin=np.concatenate([target.spin, projectile.spin]),
-            moment=np.concatenate([target.moment, projectile.moment]),
-            charge=np.concatenate([target.charge, projectile.charge]),
-            mass=np.concatenate([target.mass, projectile.mass]),
-        ),
-        len(target),
-        float(gap / v),
+    away = [np.zeros(3), shift]
+    thrown = [-(1 - share) * v * direction, share * v * direction]
+    return Encounter(joined([target, projectile], away, thrown), len(target), float(gap / v))
+
+
+def joined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities: Sequence[np.ndarray]) -> Grains:
+    """All bodies as one set of grains, each moved by its shift [m], with its velocity [m/s] added."""
+
+    def all_of(name: str) -> np.ndarray:
+        return np.concatenate([getattr(body, name) for body in bodies])
+
+    return Grains(
+        np.concatenate([b.position + shift for b, shift in zip(bodies, shifts, strict=True)]),
+        all_of("radius"),
+        [body.materials[k] for body in bodies for k in body.material],
+        velocity=np.concatenate([b.velocity + more for b, more in zip(bodies, velocities, strict=True)]),
+        spin=all_of("spin"),
+        moment=all_of("moment"),
+        charge=all_of("charge"),
+        mass=all_of("mass"),
     )
 
 
