@@ -11,6 +11,7 @@ import sand
 from sand.cli.main import main
 from sand.experiments.collision import collide, collide_many
 from sand.experiments.collision_case import read_collision, run_seeds
+from sand.files.bodies import read_body
 from sand.setup import chain, grain, pca
 from sand.theory import contact
 
@@ -150,3 +151,44 @@ def test_bad_seeds(tmp_path, capsys, seeds):
     assert main(["collide", str(path), f"--seeds={seeds}", "--out", str(tmp_path / "out")]) == 2
     assert "--seeds" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_bodies_from_files(tmp_path):
+    """Plain columns in nanometres, and the last frame of a trajectory, collide like built bodies."""
+    built = pca(8, radius=R, material="silica", seed=3)
+    lines = "\n".join(" ".join(f"{1e9 * x:.17g}" for x in row) for row in built.position)
+    (tmp_path / "body.txt").write_text(f"# x y z in nm\n\n{lines}\n")
+    body = read_body(tmp_path / "body.txt", sand.SILICA, R, "1 nm")
+    assert body.position == pytest.approx(built.position, abs=1e-18)
+    sim = sand.Simulation(built, [sand.Contact()], out=tmp_path / "run")
+    sim.run(steps=10)
+    again = read_body(tmp_path / "run" / "trajectory.gsd", sand.SILICA)
+    assert again.position == pytest.approx(built.position, abs=1e-6 * R)
+    assert again.radius == pytest.approx(built.radius)
+    path = tmp_path / "hit.toml"
+    old = 'kind = "pca"\ngrains = 8\nradius = "0.1 um"'
+    path.write_text(
+        CASE.replace(old, f'kind = "file"\npath = "{tmp_path}/body.txt"\nlength = "1 nm"\nradius = "0.1 um"')
+    )
+    outcome, _ = read_collision(path).run(1)
+    assert outcome.contacts_before == 7
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 2\n", r"line 1: '1 2' is not x y z"),
+        ("1 2 3\n1 2 3 4\n", r"line 2: "),
+        ("1 2 nan\n", r"line 1: '1 2 nan'"),
+        ("# nothing\n", "holds no grain"),
+        ("1 2 3\n", "has no radii"),
+        ("a b c\n" * 20, "line 10"),
+    ],
+)
+def test_bad_bodies(tmp_path, text, message):
+    """File, line and what is allowed; ten lines at most."""
+    path = tmp_path / "body.txt"
+    path.write_text(text)
+    with pytest.raises(sand.BadInput, match=message) as caught:
+        read_body(path, sand.SILICA)
+    assert len(caught.value.problems) <= 10

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import Grains, moment_size
 from ..core.material import PRESETS, Material
+from ..files.bodies import read_body
 from ..files.folder import read_toml
 from ..run.case import INTEGRATORS, ForcesSection, MaterialSection, integrator, quantity, wrong_materials
 from ..run.mistakes import complaints
@@ -25,12 +26,14 @@ class _Section(BaseModel):
 
 
 class BodySection(_Section):
-    """[target] and [projectile]: a grain, a chain, a lattice, or a ballistic aggregate (another for each seed)."""
+    """[target] and [projectile]: a grain, chain, lattice, ballistic aggregate (another for each seed), or a file."""
 
-    kind: Literal["grain", "chain", "lattice", "pca"]
+    kind: Literal["grain", "chain", "lattice", "pca", "file"]
+    path: str | None = None
+    length: str = "1 m"
     grains: Annotated[int, Field(ge=1, strict=True)] | None = None
     shape: list[Annotated[int, Field(ge=1, strict=True)]] | None = None
-    radius: quantity("m", above=0.0)  # type: ignore[valid-type]
+    radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
     material: str = "silica"
     moment: Any = None
 
@@ -45,17 +48,23 @@ class BodySection(_Section):
 
     @model_validator(mode="after")
     def _whole(self) -> BodySection:
+        if self.kind == "file" and self.path is None:
+            raise ValueError("path is missing: which file holds the grains?")
+        if self.kind != "file" and self.radius is None:
+            raise ValueError("radius is missing; add it, for example radius = '0.1 um'")
         if self.kind in ("chain", "pca") and self.grains is None:
             raise ValueError(f"grains is missing: how many does the {self.kind} have?")
         if self.kind == "lattice" and (self.shape is None or len(self.shape) != 3):
             raise ValueError("shape is missing: three whole numbers, such as [5, 5, 5]")
-        if self.moment is not None and self.kind in ("lattice", "pca"):
+        if self.moment is not None and self.kind in ("lattice", "pca", "file"):
             raise ValueError(f"moment: a {self.kind} has no moments yet; leave it out")
         return self
 
     def build(self, materials: dict[str, Material], seed: int) -> Grains:
         """Raises BadInput."""
         given: dict[str, Any] = {"radius": self.radius, "material": materials[self.material]}
+        if self.kind == "file":
+            return read_body(str(self.path), materials[self.material], self.radius, self.length)
         if self.kind == "lattice":
             return KINDS["lattice"](*(self.shape or ()), **given)
         if self.kind == "pca":
