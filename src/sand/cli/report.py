@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import click
 
 from ..core.errors import BadInput
-from ..files.folder import OURS
+from ..files.folder import OURS, plain
 
 T = TypeVar("T")
 Rows = list[tuple[str, str]]
@@ -26,19 +26,7 @@ def note(text: str) -> None:
 
 def emit(content: dict[str, Any]) -> None:
     """The one JSON object of --json; NaN and infinities become null."""
-    click.echo(json.dumps(_plain(content), indent=2, allow_nan=False))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
-    return value
+    click.echo(json.dumps(plain(content), indent=2, allow_nan=False))
 
 
 def show(heading: str, rows: Rows) -> None:

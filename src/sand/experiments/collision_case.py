@@ -7,25 +7,21 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import Grains, moment_size
 from ..core.material import PRESETS, Material
 from ..files.bodies import read_body
 from ..files.folder import read_toml
-from ..run.case import INTEGRATORS, ForcesSection, MaterialSection, integrator, quantity, wrong_materials
+from ..run.case import INTEGRATORS, ForcesSection, MaterialSection, Section, integrator, quantity, wrong_materials
 from ..run.mistakes import complaints
 from ..setup.aggregates import KINDS
 from ..stepping.verlet import Verlet
 from .collision import Collision, collide
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
-
-
-class BodySection(_Section):
+class BodySection(Section):
     """[target] and [projectile]: a grain, chain, lattice, ballistic aggregate (another for each seed), or a file."""
 
     kind: Literal["grain", "chain", "lattice", "pca", "file"]
@@ -73,24 +69,24 @@ class BodySection(_Section):
         return KINDS["grain"](**given) if self.kind == "grain" else KINDS["chain"](self.grains, **given)
 
 
-class ImpactSection(_Section):
+class ImpactSection(Section):
     """[impact]: how they meet, and how often."""
 
     speed: quantity("m/s", above=0.0)  # type: ignore[valid-type]
     impact_parameter: Any = 0.0
     along: Literal["x", "y", "z"] = "x"
     turn: bool = True
-    seeds: list[Annotated[int, Field(ge=0, strict=True)]] = [1]
+    seeds: list[Annotated[int, Field(ge=0, strict=True)]] = Field(default_factory=lambda: [1])
     out: str | None = None
 
 
-class CollisionCase(_Section):
+class CollisionCase(Section):
     """A whole case file of `sand collide`."""
 
     target: BodySection
     projectile: BodySection
     impact: ImpactSection
-    materials: dict[str, MaterialSection] = {}
+    materials: dict[str, MaterialSection] = Field(default_factory=dict)
     forces: ForcesSection = ForcesSection()
     stepping: Verlet = Verlet()
 

@@ -76,16 +76,17 @@ def replace_file(path: Path, content: bytes) -> None:
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Readable JSON; NaN and infinities become null."""
-    replace_file(path, (json.dumps(_plain(content), indent=2, allow_nan=False) + "\n").encode())
+    replace_file(path, (json.dumps(plain(content), indent=2, allow_nan=False) + "\n").encode())
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """What JSON can hold: NumPy arrays and numbers become lists and numbers, NaN and infinities null."""
     if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
+        return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if hasattr(value, "item"):
-        value = value.item()
+        return [plain(v) for v in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
     if isinstance(value, float) and not abs(value) < float("inf"):
         return None
     return value

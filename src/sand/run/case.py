@@ -42,11 +42,13 @@ def quantity(unit: str, **bounds: float) -> Any:
     return Annotated[Any, BeforeValidator(read)]
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
+    """A table of a case file; an unknown key in it is a mistake."""
+
     model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 
-class RunSection(_Section):
+class RunSection(Section):
     """[run]: how long (a time, or a number of steps), how often, which seed, where to."""
 
     until: quantity("s", above=0.0) | None = None  # type: ignore[valid-type]
@@ -62,7 +64,7 @@ class RunSection(_Section):
         return self
 
 
-class BoxSection(_Section):
+class BoxSection(Section):
     """[box]: periodic = one length or three, "open" for an open axis; nothing: open space."""
 
     periodic: Any = None
@@ -75,7 +77,7 @@ class BoxSection(_Section):
         return as_box(value)
 
 
-class MaterialSection(_Section):
+class MaterialSection(Section):
     """[materials.NAME]: a new material, or changes to the one it is `like`."""
 
     like: str | None = None
@@ -98,7 +100,7 @@ class MaterialSection(_Section):
         return Material(name, **({"surface_energy": None} | given))
 
 
-class GrainsSection(_Section):
+class GrainsSection(Section):
     """[grains]: a gas of grains; "given" marks runs whose grains came from a script."""
 
     kind: Literal["gas", "given"] = "gas"
@@ -130,7 +132,7 @@ class GrainsSection(_Section):
         return self
 
 
-class ForcesSection(_Section):
+class ForcesSection(Section):
     """[forces.*]: each table switches one force on."""
 
     contact: Contact | None = None
@@ -152,7 +154,7 @@ def integrator(value: Any) -> Any:
     return value
 
 
-class Case(_Section):
+class Case(Section):
     """A whole case file."""
 
     run: RunSection
