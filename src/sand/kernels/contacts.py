@@ -16,9 +16,8 @@ from ..physics.rotation import turned
 
 
 @loop
-def bond_at(contacts, c):
-    """The stored constants of contact c."""
-    b = contacts.bond
+def bond_at(b, c):
+    """The stored constants of contact c, from the (K, C) array of bonds."""
     return law_of.Bond(
         b[0, c],
         b[1, c],
@@ -68,7 +67,7 @@ def contact_pass(grains, contacts, count, span, law, dt):
     flagged = 0.0
     for c in range(count[CONTACTS]):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = bond_at(contacts, c)
+        bond = bond_at(contacts.bond, c)
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, 0.0)
         twist = contacts.twist[c] + twist_gain(grains, contacts, c, pose, dt)
@@ -94,7 +93,7 @@ def write_loads(grains, contacts, span, law, c):
     """Loads of one contact from its stored pointers and twist, at any compression."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     r1, r2 = grains.radius[i], grains.radius[j]
-    bond = bond_at(contacts, c)
+    bond = bond_at(contacts.bond, c)
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
     y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
@@ -123,9 +122,9 @@ def gather(grains, contacts):
 
 
 @rare
-def sort_sides(contacts, count, grains):
+def sort_sides(contacts, count, n):
     """Rebuild the list of contacts per grain, each grain's in the order of the contacts."""
-    n, total = grains.mass.size, count[CONTACTS]
+    total = count[CONTACTS]
     start, side = contacts.start, contacts.side
     for g in range(n + 1):
         start[g] = 0
@@ -147,7 +146,7 @@ def sort_sides(contacts, count, grains):
 
 
 @rare
-def contact_step(contacts, near, count, grains, clock, per_period):
+def contact_step(contacts, near, count, n, clock, per_period):
     """The longest step [s] while there are contacts: fastest period / per_period, less above 6 neighbours.
 
     Pairs that may touch soon count as well, so that a contact of small grains never begins at the step of large
@@ -155,8 +154,8 @@ def contact_step(contacts, near, count, grains, clock, per_period):
     """
     fastest, most = 0.0, 0
     for c in range(count[CONTACTS]):
-        fastest = max(fastest, bond_at(contacts, c).fastest)
-    for g in range(grains.mass.size):
+        fastest = max(fastest, bond_at(contacts.bond, c).fastest)
+    for g in range(n):
         most = max(most, int(contacts.start[g + 1]) - int(contacts.start[g]))
     crowd = max(1.0, most / 6.0)
     clock[CONTACT_STEP] = math.inf

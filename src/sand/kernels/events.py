@@ -50,18 +50,18 @@ def strain_before(grains, contacts, span, c, pose, bond, dt):
 
 
 @loop
-def book(contacts, lost, c, channel, energy):
-    """Add an energy [J] lost by contact c to the books and to its own record."""
+def book(own, lost, c, channel, energy):
+    """Add an energy [J] lost by contact c to the books and to its own record, `own` (L, C)."""
     lost[channel] += energy
-    contacts.lost[channel, c] += energy
+    own[channel, c] += energy
 
 
 @loop
-def book_yielding(contacts, lost, c, energies):
+def book_yielding(own, lost, c, energies):
     """The same for the three tangential modes."""
-    book(contacts, lost, c, SLIDING, energies[0])
-    book(contacts, lost, c, ROLLING, energies[1])
-    book(contacts, lost, c, TWISTING, energies[2])
+    book(own, lost, c, SLIDING, energies[0])
+    book(own, lost, c, ROLLING, energies[1])
+    book(own, lost, c, TWISTING, energies[2])
 
 
 @rare
@@ -72,7 +72,7 @@ def damp(grains, contacts, span, c, dt):
     that of the trapezoid rule, as velocity Verlet does it, with the force kept from the step before.
     """
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    bond = bond_at(contacts, c)
+    bond = bond_at(contacts.bond, c)
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(apart, apart))
     n = scale(1.0 / distance, apart)
@@ -93,20 +93,20 @@ def damp(grains, contacts, span, c, dt):
 def damp_contacts(grains, contacts, count, lost, span, dt):
     """Damping of all contacts."""
     for c in range(count[CONTACTS]):
-        book(contacts, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
+        book(contacts.lost, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
 
 
 @rare
 def book_stiffness(grains, contacts, count, lost, span, dt):
     """What stiffnesses that follow a(δ) took out of the springs of all contacts in this step."""
     for c in range(count[CONTACTS]):
-        bond = bond_at(contacts, c)
+        bond = bond_at(contacts.bond, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
         before = strain_before(grains, contacts, span, c, pose, bond, dt)
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         earlier, now = stiffened_at(before.overlap, bond), stiffened_at(strain.overlap, bond)
-        book(contacts, lost, c, STIFFNESS, law_of.lost_to_stiffness(before, strain, earlier, now))
+        book(contacts.lost, lost, c, STIFFNESS, law_of.lost_to_stiffness(before, strain, earlier, now))
 
 
 @loop
@@ -136,9 +136,9 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     since = min(late / opening, dt) if opening > 0.0 else 0.0
     energy, force = law_of.breaking(bond)
     knock(grains, i, j, pose.n, (force + contacts.damped[c]) * (0.5 * dt - since))
-    book(contacts, lost, c, BREAKING, energy)
+    book(contacts.lost, lost, c, BREAKING, energy)
     # the damping force acted until the break: half a step by Verlet, the rest by the impulse
-    book(contacts, lost, c, DAMPING, -contacts.damped[c] * opening * (dt - since))
+    book(contacts.lost, lost, c, DAMPING, -contacts.damped[c] * opening * (dt - since))
     count[BROKEN] += 1
     contacts.flag[c] = 2.0
     forget_touch(near, count, i, j)
@@ -153,7 +153,7 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
             continue
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
-        bond = bond_at(contacts, c)
+        bond = bond_at(contacts.bond, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         if law_of.beyond_limits(strain, pose.n, bond):
@@ -164,7 +164,7 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
                 zero = (0.0, 0.0, 0.0)
                 gone = law_of.Strain(strain.overlap, zero, zero, 0.0)
                 slid, rolled, twisted = law_of.lost_by_yielding(before, strain, gone, now)
-                book(contacts, lost, c, BREAKING, slid + rolled + twisted)
+                book(contacts.lost, lost, c, BREAKING, slid + rolled + twisted)
                 break_contact(grains, contacts, near, count, lost, c, pose, bond, dt)
                 parted = True
                 continue
@@ -172,7 +172,7 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
             n1, n2 = tangential.pointers_for(wish.slide, wish.roll, pose.n, r1, r2)
             moved = law_of.Pose(pose.n, pose.distance, n1, n2, wish.twist)
             left = law_of.strain_of(moved, strain.overlap, r1, r2, bond)
-            book_yielding(contacts, lost, c, law_of.lost_by_yielding(before, strain, left, now))
+            book_yielding(contacts.lost, lost, c, law_of.lost_by_yielding(before, strain, left, now))
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
             contacts.twist[c] = left.twist
@@ -267,8 +267,8 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
         c = add_contact(grains, contacts, count, span, law, i, j, clock[TIME] + dt - since)
         if law.damped:
             damp(grains, contacts, span, c, 0.0)
-            book(contacts, lost, c, DAMPING, contacts.damped[c] * closing * since)
+            book(contacts.lost, lost, c, DAMPING, contacts.damped[c] * closing * since)
         knock(grains, i, j, n, dot(load(contacts.push, c), n) * (since - 0.5 * dt))
-        book(contacts, lost, c, FORMING, law_of.forming(bond_at(contacts, c)))
+        book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts.bond, c)))
         near.touching[p] = 1
         count[MADE] += 1

@@ -122,7 +122,7 @@ def driver_for(outside: Callable, keep: bool = True) -> Callable:
     def first_half(grains, contacts, near, clock, count, rules):
         """Choose the step, kick half of it, drift; anything but STEPS_DONE: no step was taken."""
         count[GRAIN1] = count[GRAIN2] = -1
-        dt = choose_step(grains, contacts, near, clock, count, rules.span, rules.control)
+        dt = choose_step(grains, contacts.start, near, clock, count, rules.span, rules.control)
         if not dt > 0.0:
             return Stop.NOT_FINITE
         if clock[TIME] + dt == clock[TIME]:
@@ -164,9 +164,9 @@ def driver_for(outside: Callable, keep: bool = True) -> Callable:
         if fresh > 0:
             make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
         if parted or fresh > 0:
-            sort_sides(contacts, count, grains)
+            sort_sides(contacts, count, grains.mass.size)
         if parted or fresh > 0 or stale:
-            contact_step(contacts, near, count, grains, clock, law.per_period)
+            contact_step(contacts, near, count, grains.mass.size, clock, law.per_period)
         sum_loads(grains, contacts, clock[TIME] + dt, rules)
         kick(grains, 0.5 * dt)
         clock[TIME] += dt

@@ -53,8 +53,10 @@ def load_step(force, torque, mass, inertia, control):
 
 
 @loop
-def wanted_step(grains, contacts, near, count, span, control):
+def wanted_step(grains, start, near, count, span, control):
     """The longest step [s] that all but the contacts allow, and the grains that want it (GRAIN1, GRAIN2).
+
+    `start` (N + 1,) tells who has contacts (core.world.ContactArrays).
 
     0 if a speed or spin is not finite.
 
@@ -75,7 +77,7 @@ def wanted_step(grains, contacts, near, count, span, control):
             mine = min(mine, SPIN_ANGLE / turning)
         moment, inertia = load(grains.moment, i), grains.inertia[i]
         mine = min(mine, field_step(moment, load(grains.field, i), control.outer_field, inertia))
-        if contacts.start[i + 1] == contacts.start[i]:
+        if start[i + 1] == start[i]:
             force, torque = load(grains.force, i), load(grains.torque, i)
             mine = min(mine, load_step(force, torque, grains.mass[i], inertia, control))
         if mine < wanted:
@@ -101,14 +103,14 @@ def wanted_step(grains, contacts, near, count, span, control):
 
 
 @loop
-def choose_step(grains, contacts, near, clock, count, span, control):
+def choose_step(grains, start, near, clock, count, span, control):
     """The next step [s], or 0 if there is none: that of the contacts, or less if something else needs less.
 
     Steps that are not the contacts' are powers of two of a second and change seldom, because every change
     costs velocity Verlet a little energy.
     """
     if count[CONTACTS] == 0 or count[STEPS] % CHECK_EVERY == 0:
-        wanted = wanted_step(grains, contacts, near, count, span, control)
+        wanted = wanted_step(grains, start, near, count, span, control)
         if not wanted > 0.0:
             return 0.0
         level = clock[LEVEL] if clock[LEVEL] > 0.0 else 1.0
