@@ -257,3 +257,15 @@ def test_when_frames_are_due():
     assert schedule.due == pytest.approx(0.4)
     assert Schedule(0.1, 7.05).due == pytest.approx(7.1)
     assert Schedule(math.inf, 0.0).due == math.inf
+
+
+def test_bound_grains_take_the_whole_step_of_their_contact():
+    """A ringing pair steps by its fastest period / 25, not by a power of two below it; unless it is struck hard."""
+    d = rest_distance(sand.SILICA, 1e-7, 1e-7)
+    period = sand.theory.contact("silica", 1e-7).slide_period
+    for speed, whole in ((0.01, True), (50.0, False)):
+        grains = sand.Grains([[0, 0, 0], [d, 0, 0]], 1e-7, sand.SILICA, velocity=[[speed, 0, 0], [0, 0, 0]])
+        sim = sand.Simulation(grains, [sand.Contact()])
+        sim.run(steps=5)
+        step = sim.world.clock[1]
+        assert step == pytest.approx(period / 25, rel=1e-12) if whole else step < 0.5 * period / 25

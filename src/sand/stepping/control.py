@@ -85,17 +85,19 @@ def wanted_step(grains, start, near, count, span, control):
     for p in range(count[PAIRS]):
         i, j = near.pair[0, p], near.pair[1, p]
         moving = sub(load(grains.velocity, i), load(grains.velocity, j))
-        # at rest against each other, they may take the step of their contact
-        ours = near.step[p]
+        need = near.step[p]
         speed = math.sqrt(dot(moving, moving))
-        if near.length[p] > 0.0 and speed * ours > control.impact * near.length[p]:
-            ours = control.impact * near.length[p] / speed
+        fast = near.length[p] > 0.0 and speed * need > control.impact * near.length[p]
+        if fast:
+            need = control.impact * near.length[p] / speed
+        # slow pairs in contact are served by the step of the contacts
+        ours = need if fast else math.inf
         if near.touching[p] == 0:
             apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
             distance = math.sqrt(dot(apart, apart))
             closing = -dot(moving, apart) / distance
             gap = distance - grains.radius[i] - grains.radius[j]
-            ours = max(ours, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
+            ours = max(need, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
         if ours < wanted:
             wanted, slowest1, slowest2 = ours, i, j
     count[GRAIN1], count[GRAIN2] = slowest1, slowest2
