@@ -53,7 +53,7 @@ def test_a_fast_grain_breaks_a_chain():
 def test_a_miss():
     """An offset beyond the reach: two bodies as before, nothing lost."""
     result, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b")
-    assert (result.outcome, result.made, result.rebound) == ("bounce", 0, pytest.approx(1.0))
+    assert (result.outcome, result.made, result.rebound) == ("miss", 0, pytest.approx(1.0))
     assert sum(result.lost.values()) == 0.0
 
 

@@ -81,7 +81,7 @@ def read_seeds(text: str) -> list[int]:
     seeds: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not (first.isdigit() and (last.isdigit() or not dash)) or int(last or first) - int(first) > 100_000:
+        if not (first.isdecimal() and (last.isdecimal() or not dash)) or int(last or first) - int(first) > 100_000:
             raise BadInput(f"--seeds {text!r} must be whole numbers such as '3', '1,2,5' or '1-20'")
         seeds += range(int(first), int(last or first) + 1)
     if not seeds:

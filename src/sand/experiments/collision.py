@@ -33,7 +33,7 @@ class Collision:
     """The outcome of one collision; SI.
 
     Attributes:
-        outcome: "stick" (one body), "bounce" (two bodies, both of as many grains as before), or "fragment".
+        outcome: "stick" (one body), "bounce" (two bodies of the same grains as before), "miss", or "fragment".
         speed, impact_parameter: as asked; seed: of the orientations, None for as given.
         fragments: grains of each body at the end, largest first.
         largest_remnant: mass of the largest body over all mass.
@@ -176,7 +176,7 @@ def _judge(
     flight = simulation.start.velocity[-1] - simulation.start.velocity[0]
     flight = flight / np.linalg.norm(flight)
     return Collision(
-        outcome=_outcome(labels, len(target), len(projectile)),
+        outcome=_outcome(labels, len(target), int(row["made"])),
         speed=speed,
         impact_parameter=float(np.linalg.norm(offset - (offset @ flight) * flight)),
         seed=seed,
@@ -199,12 +199,14 @@ def _judge(
     )
 
 
-def _outcome(labels: np.ndarray, first: int, second: int) -> str:
+def _outcome(labels: np.ndarray, first: int, made: int) -> str:
     bodies = int(labels.max()) + 1
     if bodies == 1:
         return "stick"
     same = bodies == 2 and len(set(labels[:first].tolist())) == 1 and len(set(labels[first:].tolist())) == 1
-    return "bounce" if same and second > 0 else "fragment"
+    if not same:
+        return "fragment"
+    return "bounce" if made else "miss"
 
 
 def _rebound(grains: Grains, labels: np.ndarray, order: np.ndarray) -> float:

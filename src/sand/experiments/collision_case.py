@@ -76,7 +76,7 @@ class ImpactSection(Section):
     impact_parameter: Any = 0.0
     along: Literal["x", "y", "z"] = "x"
     turn: bool = True
-    seeds: list[Annotated[int, Field(ge=0, strict=True)]] = Field(default_factory=lambda: [1])
+    seeds: list[Annotated[int, Field(ge=0, strict=True)]] = Field(default_factory=lambda: [1], min_length=1)
     out: str | None = None
 
 

@@ -120,10 +120,11 @@ def _direction(along: Any) -> np.ndarray:
 def _offset(given: Any, whole: float) -> float:
     if isinstance(given, str) and given.strip().endswith("b"):
         try:
-            return float(given.strip()[:-1]) * whole
+            offset: Any = float(given.strip()[:-1]) * whole
         except ValueError:
-            pass
-    offset = in_unit(given, "m")
+            offset = None
+    else:
+        offset = in_unit(given, "m")
     if offset is None or np.ndim(offset) != 0 or not 0.0 <= offset < np.inf:
         raise BadInput(
             f"impact_parameter = {given!r} must be a length ≥ 0 such as '10 nm', or a part of the reach, '0.5 b'"

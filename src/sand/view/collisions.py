@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from .figure import DPI, RunFigure
 from .style import styled
 
-COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00"}
+COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00", "miss": "#999999"}
 
 
 def collision_figure(results: list[dict[str, Any]]) -> Figure:
