@@ -170,9 +170,11 @@ def _judge(
     counts = np.bincount(labels)
     largest = labels == order[0]
     m1, m2 = float(target.mass.sum()), float(projectile.mass.sum())
-    offset = simulation.start.position[len(target) :].mean(axis=0) - simulation.start.position[: len(target)].mean(
-        axis=0
-    )
+    begun, n = simulation.start, len(target)
+    centres = [
+        np.average(begun.position[part], axis=0, weights=begun.mass[part]) for part in (slice(n), slice(n, None))
+    ]
+    offset = centres[1] - centres[0]
     flight = simulation.start.velocity[-1] - simulation.start.velocity[0]
     flight = flight / np.linalg.norm(flight)
     return Collision(
