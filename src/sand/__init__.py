@@ -25,8 +25,14 @@ _HOMES = {
     "Interrupted": "core.errors",
     "Contact": "forces.contact",
     "Dipoles": "forces.dipoles",
+    "Charges": "forces.central",
+    "Attraction": "forces.central",
+    "Gas": "forces.gas",
     "Field": "forces.field",
+    "Gravity": "forces.gravity",
+    "ElectricField": "forces.electric",
     "Verlet": "stepping.verlet",
+    "Neighbours": "stepping.neighbours",
     "Simulation": "run.simulation",
     "resume": "run.build",
     "Observer": "run.observers",
@@ -54,14 +60,20 @@ if TYPE_CHECKING:
     from .core.material import MAGNETITE as MAGNETITE
     from .core.material import SILICA as SILICA
     from .core.material import Material as Material
+    from .forces.central import Attraction as Attraction
+    from .forces.central import Charges as Charges
     from .forces.contact import Contact as Contact
     from .forces.dipoles import Dipoles as Dipoles
+    from .forces.electric import ElectricField as ElectricField
     from .forces.field import Field as Field
+    from .forces.gas import Gas as Gas
+    from .forces.gravity import Gravity as Gravity
     from .run.build import resume as resume
     from .run.observers import Observer as Observer
     from .run.outcome import Outcome as Outcome
     from .run.outcome import Result as Result
     from .run.simulation import Simulation as Simulation
+    from .stepping.neighbours import Neighbours as Neighbours
     from .stepping.verlet import Verlet as Verlet
 
 

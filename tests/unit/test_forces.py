@@ -12,6 +12,7 @@ from sand.forces.base import compose
 from sand.kernels.outside import is_ours
 from sand.physics.surroundings import One, nothing, uniform_field
 from sand.stepping.advance import driver_for
+from sand.stepping.rules import Plan
 
 
 class Weight(NamedTuple):
@@ -61,7 +62,7 @@ def test_compiled_code_with_a_users_formula_is_not_kept():
     """Its edits are not seen by the digest of our sources: a stale copy would compute the old force."""
     assert is_ours(uniform_field)
     assert not is_ours(weight)
-    driver = driver_for(compose([Gravity()])[0], False)
+    driver = driver_for(Plan(outside=compose([Gravity()])[0], keep=False))
     if not hasattr(driver, "_cache"):
         pytest.skip("the compiler is off")
     assert type(driver._cache).__name__ == "NullCache"

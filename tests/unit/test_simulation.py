@@ -84,7 +84,7 @@ def test_the_cutoff_is_stated_with_its_reason():
     hot = pair(moment="200 A m^2/kg", velocity=[[1.0, 0, 0], [-1.0, 0, 0]])
     assert "open box" in sand.Simulation(hot, [sand.Dipoles()]).choices["dipoles cut-off"]
     small = sand.Simulation(hot, [sand.Dipoles()], box="0.2 um").choices["dipoles cut-off"]
-    assert small.startswith("74.07 nm (half the box / 1.35")  # 0.5 × 200 nm / 1.35
+    assert small.startswith("74.07 nm (smooth, half the box / 1.35")  # 0.5 × 200 nm / 1.35
     large = sand.Simulation(hot, [sand.Dipoles()], box="1 mm").choices["dipoles cut-off"]
     assert "1.5 b_max" in large
 

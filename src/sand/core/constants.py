@@ -7,3 +7,9 @@ BOLTZMANN = 1.380649e-23
 
 MAGNETIC = 1.25663706212e-6 / (4.0 * math.pi)
 """k = μ0/4π [T m/A]; 1e-7 to ten digits"""
+
+COULOMB = 1.0 / (4.0 * math.pi * 8.8541878128e-12)
+"""1/(4πε₀) [N m²/C²]"""
+
+GRAVITATION = 6.67430e-11
+"""G [N m²/kg²]"""

@@ -13,16 +13,19 @@ from .errors import BadInput
 from .grains import GrainArrays, Grains
 
 # --- places in World.clock (float64) ---------------------------------------------------------------
-TIME, STEP, LEVEL, CONTACT_STEP = range(4)
-CLOCK = ("time", "step", "level", "contact_step")
+TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED = range(9)
+CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", "calm", "kicked")
 
 # --- places in World.count (int64) -----------------------------------------------------------------
-STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2 = range(10)
-COUNT = ("steps", "stage", "contacts", "pairs", "made", "broken", "moved", "rebuilt", "grain1", "grain2")
+_NAMES = "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected"
+COUNT = tuple(_NAMES.split())
+(STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
+LOOKED, GROWN, REJECTED = range(12, 15)
 
-# --- places in World.lost (float64): energy dissipated per channel [J] ----------------------------------
-FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS = range(7)
-LOST = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
+# --- places in World.lost (float64): energy that left the grains, per channel [J] -----------------------
+FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
+LOST_IN_CONTACTS = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
+LOST = (*LOST_IN_CONTACTS, "gas", "outside")
 
 
 class ContactArrays(NamedTuple):
@@ -34,12 +37,13 @@ class ContactArrays(NamedTuple):
     twist: np.ndarray  # (C,) φ [rad]
     formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
     bond: np.ndarray  # (K, C) constants of the contact law
-    lost: np.ndarray  # (L, C) energy it dissipated so far [J], by channel as in LOST
+    lost: np.ndarray  # (L, C) energy it dissipated so far [J], by channel as in LOST_IN_CONTACTS
     damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) 1.0 where a limit was passed in this step
+    flag: np.ndarray  # (C,) 1.0 where a limit was passed in this step, 2.0 where the contact broke
+    bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
     side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
 
@@ -54,6 +58,47 @@ class NearPairs(NamedTuple):
     anchor: np.ndarray  # (3, N) positions when the list was made [m]
 
 
+class FarArrays(NamedTuple):
+    """What long-range forces need: the list of pairs within reach, and the loads of their last summation.
+
+    The list is one-sided, each pair stands in the rows of both its grains, and is kept in the order of cells:
+    grain order[s] has place s.  It is a function of the anchors alone.
+    """
+
+    anchor: np.ndarray  # (3, N) positions when the list was made [m]
+    order: np.ndarray  # (N,) uint32: the grain at each place
+    start: np.ndarray  # (N+1,) uint32: where each place's row of `mate` begins
+    mate: np.ndarray  # (P,) uint32: places of the neighbours
+    home: np.ndarray  # (N,) uint32: cell of each grain
+    cell: np.ndarray  # (M+1,) uint32: first place of each cell
+    here: np.ndarray  # (3, N) positions by place [m]
+    source: np.ndarray  # (3, N) moments, or charges in the first row, by place
+    force: np.ndarray  # (3, N) far forces [N]
+    torque: np.ndarray  # (3, N) far torques [N m]
+    held_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
+    held_torque: np.ndarray  # (3, N) [N m]
+    force_rate: np.ndarray  # (3, N) their rates of change [N/s]
+    torque_rate: np.ndarray  # (3, N) [N m/s]
+    past_position: np.ndarray  # (3, N) at the last summation, or the one before [m]
+    past_moment: np.ndarray  # (3, N) [A m²]
+    path: np.ndarray  # (3, N) displacement since the last summation, summed over time [m s]
+
+
+KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment")
+"""The far arrays that a checkpoint holds; the others follow from them."""
+CELLS_PER_GRAIN = 4
+"""Most cells per grain; where grains are sparse, cells are larger than they need be."""
+
+
+def far_arrays(grains: int, capacity: int) -> FarArrays:
+    """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list."""
+    vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
+    vectors["anchor"] = np.full((3, grains), np.inf)
+    sizes = {"order": grains, "start": grains + 1, "mate": max(int(capacity), 16), "home": grains}
+    sizes["cell"] = CELLS_PER_GRAIN * grains + 28
+    return FarArrays(**(vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}))
+
+
 def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
     """Room for `capacity` contacts with `constants` numbers each."""
     c = max(int(capacity), 16)
@@ -62,7 +107,8 @@ def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         bond=np.zeros((constants, c)),
-        lost=np.zeros((len(LOST), c)),
+        bonded=np.zeros(c, np.uint8),
+        lost=np.zeros((len(LOST_IN_CONTACTS), c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
         **vectors,
@@ -99,6 +145,7 @@ class World:
     box: Box
     contacts: ContactArrays
     near: NearPairs
+    far: FarArrays
     clock: np.ndarray = field(default_factory=lambda: np.zeros(len(CLOCK)))
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
@@ -124,6 +171,10 @@ class World:
         """Twice the room for near pairs."""
         self.near = _grown(self.near, ("anchor",))
 
+    def grow_rows(self) -> None:
+        """Twice the room for neighbours within the reach of long-range forces; what is there is not kept."""
+        self.far = self.far._replace(mate=np.zeros(2 * self.far.mate.size, np.uint32))
+
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Every number of the state by name, for a checkpoint; unused columns are left out."""
         used = {"contacts": int(self.count[CONTACTS]), "near": int(self.count[PAIRS])}
@@ -133,7 +184,7 @@ class World:
             for name, array in getattr(self, group)._asdict().items():
                 n = used[group] * (2 if name == "side" else 1)
                 out[f"{group}/{name}"] = array if name in per_grain else array[..., :n]
-        return out
+        return out | {f"far/{name}": getattr(self.far, name) for name in KEPT_FAR}
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
         """Take over the numbers of `to_arrays`; the grains' number and materials are this world's own.
@@ -154,6 +205,8 @@ class World:
                 given = saved.get(f"{group}/{name}")
                 n = array.shape[-1] if given is None else given.shape[-1]
                 _take(array[..., :n], saved, f"{group}/{name}")
+        for name in KEPT_FAR:
+            _take(getattr(self.far, name), saved, f"far/{name}")
 
 
 def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
@@ -166,8 +219,10 @@ def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
 
 __all__ = [name for name in dir() if name.isupper()] + [
     "ContactArrays",
+    "FarArrays",
     "NearPairs",
     "World",
     "contact_arrays",
+    "far_arrays",
     "near_pairs",
 ]

@@ -7,7 +7,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from ..core.box import Box
 from ..core.grains import Grains
+from ..kernels.far import NO_FAR_FORCE, FarSums, far_together
 from ..physics.surroundings import nothing, together
+from .cutoff import Choice
 
 
 @runtime_checkable
@@ -31,7 +33,18 @@ class Force(Protocol):
 
 @runtime_checkable
 class GrainForce(Force, Protocol):
-    """A force that acts on one grain at a time (physics/surroundings.py has the formulas)."""
+    """A force that acts on one grain at a time (physics/surroundings.py has the formulas).
+
+    Three more members are looked for; without them a force has neither a clock nor a place, nor a step of its own:
+
+    `timed`  True if the energy depends on time explicitly: what its source does is then booked as work.
+    `moored`  True if the energy depends on the position: crossing a periodic boundary is then booked as work.
+    `longest_step()`  longest step [s] that resolves how the force itself varies in time; `math.inf` if it does not.
+
+    Attributes:
+        formula: `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], made by
+            `sand.core.jit.formula`.
+    """
 
     formula: Callable
 
@@ -39,7 +52,33 @@ class GrainForce(Force, Protocol):
         """What the formula gets as `parameters`: a NamedTuple of floats."""
 
     def flux_density_size(self) -> float:
-        """Size of the magnetic flux density it brings [T]; limits the step."""
+        """Largest size over all times of the magnetic flux density it brings [T]; limits the step."""
+
+
+@runtime_checkable
+class FarForce(Force, Protocol):
+    """A force between all grains, near and far (kernels/dipoles.py and kernels/central.py have the loops).
+
+    Attributes:
+        column: the name of its energy in the ledger.
+    """
+
+    column: str
+
+    def choose(self, grains: Grains, box: Box) -> Choice:
+        """Its cut-off, with the reason."""
+
+    def sums(self, box: Box, listed: bool) -> FarSums:
+        """The loops that sum it: over listed pairs, or over all."""
+
+    def numbers(self, grains: Grains, box: Box) -> Any:
+        """What the loops get: a NamedTuple."""
+
+    def acts_on(self, grains: Grains) -> bool:
+        """False if no grain feels it."""
+
+    def energy_scale(self, grains: Grains) -> float:
+        """What two grains in touch may have at stake [J]; limits the step."""
 
 
 def compose(forces: Sequence[GrainForce]) -> tuple[Callable, Any]:
@@ -49,6 +88,15 @@ def compose(forces: Sequence[GrainForce]) -> tuple[Callable, Any]:
         formula = _pair(force.formula, formula)
         numbers = (force.numbers(), numbers)  # type: ignore[assignment]
     return formula, numbers
+
+
+def compose_far(sums: Sequence[FarSums], numbers: Sequence[Any]) -> tuple[FarSums, Any]:
+    """One set of loops and one nested tuple of numbers for a list of long-range forces, in order."""
+    whole, nested = NO_FAR_FORCE, ()
+    for each, own in zip(reversed(sums), reversed(numbers), strict=True):
+        whole = far_together(each, whole)
+        nested = (own, nested)  # type: ignore[assignment]
+    return whole, nested
 
 
 _PAIRS: dict[tuple[Callable, Callable], Callable] = {}

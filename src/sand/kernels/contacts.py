@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from ..core.box import nearest_image
 from ..core.jit import loop, rare
 from ..core.vec import across, add, dot, load, load4, put, scale, sub
@@ -163,3 +165,5 @@ def contact_step(contacts, near, count, n, clock, per_period):
         clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(fastest * crowd) / per_period
         for p in range(count[PAIRS]):
             clock[CONTACT_STEP] = min(clock[CONTACT_STEP], near.step[p])
+        # few digits, so that sums of steps are exact: cycles of long-range forces then keep momenta to rounding
+        clock[CONTACT_STEP] = np.float64(np.float32(clock[CONTACT_STEP]))

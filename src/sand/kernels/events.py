@@ -93,7 +93,8 @@ def damp(grains, contacts, span, c, dt):
 def damp_contacts(grains, contacts, count, lost, span, dt):
     """Damping of all contacts."""
     for c in range(count[CONTACTS]):
-        book(contacts.lost, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
+        if contacts.flag[c] != 2.0:
+            book(contacts.lost, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
 
 
 @rare
@@ -141,6 +142,10 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     book(contacts.lost, lost, c, DAMPING, -contacts.damped[c] * opening * (dt - since))
     count[BROKEN] += 1
     contacts.flag[c] = 2.0
+    put(contacts.push, c, (0.0, 0.0, 0.0))
+    put(contacts.torque1, c, (0.0, 0.0, 0.0))
+    put(contacts.torque2, c, (0.0, 0.0, 0.0))
+    contacts.damped[c] = 0.0
     forget_touch(near, count, i, j)
 
 
@@ -205,6 +210,7 @@ def drop_broken(contacts, count):
             contacts.twist[kept] = contacts.twist[c]
             contacts.formed[kept] = contacts.formed[c]
             contacts.flag[kept] = contacts.flag[c]
+            contacts.bonded[kept] = contacts.bonded[c]
         kept += 1
     count[CONTACTS] = kept
 
@@ -236,6 +242,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     contacts.twist[c] = 0.0
     contacts.formed[c] = formed
     contacts.flag[c] = 0.0
+    contacts.bonded[c] = 0
     contacts.damped[c] = 0.0
     for row in range(contacts.lost.shape[0]):
         contacts.lost[row, c] = 0.0

@@ -6,9 +6,8 @@ from ..core.world import CONTACTS
 from ..physics import adhesion
 from ..physics import contact as law_of
 from .contacts import bond_at, pose_at
-from .dipoles import dipole_energy
 
-ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting", "magnetic")
+ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
 
 
 @loop
@@ -22,7 +21,7 @@ def _kinetic(grains):
 
 
 @kernel
-def measure_energies(grains, contacts, count, span, dipoles, follow, out):
+def measure_energies(grains, contacts, count, span, follow, out):
     """Fill `out` with the energies [J] named in ENERGIES."""
     out[0], out[1] = _kinetic(grains)
     for mode in range(4):
@@ -36,7 +35,6 @@ def measure_energies(grains, contacts, count, span, dipoles, follow, out):
         stored = law_of.energies(pose, overlap, y, r1, r2, law_of.stiffened(bond, y, follow))
         for mode in range(4):
             out[2 + mode] += stored[mode]
-    out[6] = dipole_energy(grains, span, dipoles)
 
 
 CONTACT_ROWS = (

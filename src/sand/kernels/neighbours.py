@@ -2,14 +2,14 @@
 
 import math
 
+import numpy as np
+
 from ..core.box import nearest_image
 from ..core.jit import loop, rare
 from ..core.vec import dot, load, put, sub
 from ..core.world import PAIRS, REBUILT
 from ..physics.contact import Pairing, bond_between
-
-FULL = -1
-"""Answer of `make_list` when the arrays are too short."""
+from .cells import FULL
 
 
 @loop
@@ -37,22 +37,6 @@ def bond_of(grains, pairings, i, j):
 
 
 @loop
-def list_is_stale(grains, near, span, reach):
-    """True once a grain has moved a quarter of `reach` [m] since the list was made.
-
-    Two grains then close in by at most half of it; the other half is the next step's, so that no pair can
-    touch before it is listed.
-    """
-    limit = (0.25 * reach) ** 2
-    strayed = 0.0
-    for i in range(grains.mass.size):
-        moved = nearest_image(sub(load(grains.position, i), load(near.anchor, i)), span)
-        # written so that an anchor at infinity (no list yet) counts as strayed
-        strayed += 0.0 if dot(moved, moved) <= limit else 1.0
-    return strayed > 0.0
-
-
-@loop
 def in_contact(contacts, i, j):
     """True if grains i and j share a contact."""
     for s in range(contacts.start[i], contacts.start[i + 1]):
@@ -62,25 +46,40 @@ def in_contact(contacts, i, j):
     return False
 
 
+@loop
+def list_if_near(grains, contacts, near, span, reach, law, i, j, found):
+    """Append the pair i > j if its gap is below `reach` [m]; the number of pairs then, or FULL."""
+    apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+    limit = grains.radius[i] + grains.radius[j] + reach
+    if not dot(apart, apart) < limit * limit:
+        return found
+    if found == near.pair.shape[1]:
+        return FULL
+    near.pair[0, found] = i
+    near.pair[1, found] = j
+    near.touching[found] = 1 if in_contact(contacts, i, j) else 0
+    bond = bond_of(grains, law.pairings, i, j)
+    near.step[found] = 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period
+    near.length[found] = bond.break_overlap
+    return found + 1
+
+
 @rare
-def make_list(grains, contacts, near, count, span, reach, law):
-    """List all pairs with a gap below `reach` [m]; all pairs are looked at.  FULL if there is no room."""
+def make_near_list(grains, contacts, near, far, count, span, reach, law, listed):
+    """List the pairs with a gap below `reach` [m], out of all pairs or out of those listed already (`far`).
+
+    FULL if there is no room.
+    """
     found = 0
-    for i in range(grains.mass.size if law.on else 0):
-        here, r1 = load(grains.position, i), grains.radius[i]
-        for j in range(i):
-            apart = nearest_image(sub(here, load(grains.position, j)), span)
-            limit = r1 + grains.radius[j] + reach
-            if dot(apart, apart) < limit * limit:
-                if found == near.pair.shape[1]:
+    for k in range(grains.mass.size if law.on else 0):
+        first, last = (far.start[k], far.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
+        i = far.order[k] if listed else np.uint32(k)
+        for m in range(first, last):
+            j = far.order[far.mate[m]] if listed else np.uint32(m)
+            if j < i:
+                found = list_if_near(grains, contacts, near, span, reach, law, i, j, found)
+                if found == FULL:
                     return FULL
-                near.pair[0, found] = i
-                near.pair[1, found] = j
-                near.touching[found] = 1 if in_contact(contacts, i, j) else 0
-                bond = bond_of(grains, law.pairings, i, j)
-                near.step[found] = 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period
-                near.length[found] = bond.break_overlap
-                found += 1
     for i in range(grains.mass.size):
         put(near.anchor, i, load(grains.position, i))
     count[PAIRS] = found

@@ -2,8 +2,9 @@
 
 import functools
 
+from ..core.box import nearest_image
 from ..core.jit import kernel, loop
-from ..core.vec import accrue, load
+from ..core.vec import accrue, load, put
 from ..physics.surroundings import One
 
 
@@ -34,17 +35,46 @@ def outside_loads(formula_of_grain):
     return add_loads
 
 
-@functools.cache
-def energy_sum_for(formula_of_grain):
-    """The compiled sum of the energy [J] of one formula over all grains."""
+def outside_energy(formula_of_grain):
+    """The loop that sums the energy [J] of one composed formula over all grains."""
 
+    @loop
     def sum_energy(grains, time, parameters):
         total = 0.0
         for i in range(grains.mass.size):
             total += formula_of_grain(time, grain_at(grains, i), parameters)[2]
         return total
 
-    return kernel(sum_energy, keep=is_ours(formula_of_grain))
+    return sum_energy
+
+
+def outside_wrap(formula_of_grain):
+    """The loop that brings grains back into a periodic box; returns the energy [J] they gain by that."""
+
+    @loop
+    def wrap(grains, span, time, parameters):
+        gained = 0.0
+        for i in range(grains.mass.size):
+            away = load(grains.position, i)
+            home = nearest_image(away, span)
+            if home != away:
+                before = formula_of_grain(time, grain_at(grains, i), parameters)[2]
+                put(grains.position, i, home)
+                gained += formula_of_grain(time, grain_at(grains, i), parameters)[2] - before
+        return gained
+
+    return wrap
+
+
+@functools.cache
+def outside_shares_for(formula_of_grain):
+    """The compiled loop that fills `shares` (N,) with the energy [J] of one formula at each grain."""
+
+    def fill_shares(grains, time, parameters, shares):
+        for i in range(grains.mass.size):
+            shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
+
+    return kernel(fill_shares, keep=is_ours(formula_of_grain))
 
 
 def is_ours(formula_of_grain):

@@ -11,7 +11,7 @@ from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..files.checkpoint import newest_checkpoint
 from ..files.folder import CASE
-from ..forces.dipoles import Dipoles
+from ..forces.base import FarForce
 from ..setup.gas import gas
 from .case import Case, read_case
 from .simulation import Simulation
@@ -47,6 +47,7 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
         case.forces.build(),
         box=case.box.periodic,
         stepping=case.stepping,
+        neighbours=case.neighbours,
         seed=case.run.seed,
         out=out,
         frame_every=case.run.frame_every,
@@ -75,7 +76,7 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
     forces = {}
     for force in simulation.forces:
         forces[force.name] = dict(force.parameters())
-        if isinstance(force, Dipoles):
+        if isinstance(force, FarForce):
             radius = force.choose(simulation.start, simulation.box).radius
             forces[force.name]["cutoff"] = "none" if radius is None else radius
     lengths = ["open" if v is None else v for v in simulation.box.lengths]
@@ -88,6 +89,7 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
         },
         "forces": forces,
         "stepping": simulation.stepping.parameters(),
+        "neighbours": simulation.neighbours.parameters(),
     }
 
 
@@ -127,6 +129,7 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         case.forces.build(),
         box=case.box.periodic,
         stepping=case.stepping,
+        neighbours=case.neighbours,
         seed=case.run.seed,
         out=place,
         frame_every=case.run.frame_every,

@@ -23,10 +23,15 @@ from ..core.grains import moment_size
 from ..core.material import PRESETS, Material, material_named
 from ..core.units import si
 from ..files.folder import read_toml
+from ..forces.central import Attraction, Charges
 from ..forces.contact import Contact
 from ..forces.dipoles import Dipoles
+from ..forces.electric import ElectricField
 from ..forces.field import Field as MagneticField
+from ..forces.gas import Gas
+from ..forces.gravity import Gravity
 from ..setup.gas import SPINS
+from ..stepping.neighbours import Neighbours
 from ..stepping.verlet import Verlet
 from .mistakes import complaints
 
@@ -138,10 +143,15 @@ class ForcesSection(Section):
     contact: Contact | None = None
     dipoles: Dipoles | None = None
     field: MagneticField | None = None
+    gravity: Gravity | None = None
+    electric: ElectricField | None = None
+    charges: Charges | None = None
+    attraction: Attraction | None = None
+    gas: Gas | None = None
 
     def build(self) -> list[Any]:
         """The forces that are given, in a fixed order."""
-        return [f for f in (self.contact, self.dipoles, self.field) if f is not None]
+        return [given for key in type(self).model_fields if (given := getattr(self, key)) is not None]
 
 
 def integrator(value: Any) -> Any:
@@ -163,6 +173,7 @@ class Case(Section):
     materials: dict[str, MaterialSection] = {}
     forces: ForcesSection = ForcesSection()
     stepping: Verlet = Verlet()
+    neighbours: Neighbours = Neighbours()
 
     @field_validator("stepping", mode="before")
     @classmethod

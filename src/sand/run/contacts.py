@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.world import CONTACTS, LOST, World
+from ..core.world import CONTACTS, LOST_IN_CONTACTS, World
 from ..kernels.measure import CONTACT_ROWS, measure_contacts
 
 COLUMNS = (
@@ -17,7 +17,7 @@ COLUMNS = (
     ("force", "N", "force on the first grain; the second one's is the opposite"),
     ("torque1", "N m", "torque on the first grain"),
     ("torque2", "N m", "torque on the second grain"),
-    *((f"lost_{name}", "J", f"dissipated so far: {name}") for name in LOST if name != "breaking"),
+    *((f"lost_{name}", "J", f"dissipated so far: {name}") for name in LOST_IN_CONTACTS if name != "breaking"),
 )
 """Name, unit and meaning of every column."""
 
@@ -40,7 +40,7 @@ class ContactTable(Mapping[str, np.ndarray]):
         self._columns |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
         for name, stored in (("force", "push"), ("torque1", "torque1"), ("torque2", "torque2")):
             self._columns[name] = getattr(contacts, stored)[:, :used].T.copy()
-        for k, name in enumerate(LOST):
+        for k, name in enumerate(LOST_IN_CONTACTS):
             if name != "breaking":
                 self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy()
 

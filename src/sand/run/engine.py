@@ -1,35 +1,22 @@
-"""From objects to the numbers the compiled driver takes."""
+"""A world and the compiled code that moves it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
-from ..core.box import Box
-from ..core.constants import MAGNETIC
-from ..core.errors import BadInput
-from ..core.grains import Grains
-from ..core.material import SILICA
-from ..core.world import CONTACT_STEP, GRAIN1, GRAIN2, MADE, STAGE, STEPS, World, contact_arrays, near_pairs
-from ..forces.base import Force, GrainForce, compose
-from ..forces.contact import Contact
-from ..forces.dipoles import Dipoles
-from ..kernels.dipoles import OFF
-from ..kernels.outside import energy_sum_for, is_ours
-from ..physics.adhesion import rest_overlap, rest_radius
-from ..physics.contact import Bond
-from ..physics.dipole import Cutoff
-from ..stepping.advance import ContactRules, DipoleRules, Rules, Stop, driver_for
-from ..stepping.control import IMPACT_PART, Control
-from ..stepping.verlet import Verlet
+import numpy as np
 
-SPREAD = 8
-"""Columns for contacts and near pairs per grain to begin with; they grow when needed."""
-IDLE = 1e5
-"""Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
-MOST_OVERLAP = (2.0, 1e-3)
-"""Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
+from ..core.world import CONTACT_STEP, FAR_SUMS, GRAIN1, GRAIN2, GROWN, LOOKED, MADE, STAGE, STEPS, World
+from ..forces.base import FarForce, GrainForce
+from ..kernels.cells import FULL, remake_far_list
+from ..kernels.far import shares_for
+from ..kernels.outside import outside_shares_for
+from ..stepping.advance import driver_for
+from ..stepping.control import GROW_EVERY
+from ..stepping.rules import Plan, Rules, Stop
 
 
 @dataclass
@@ -40,36 +27,36 @@ class Engine:
         world: the state.
         rules: everything that does not change, as the kernels take it.
         warnings: what the forces had to say about these grains.
+        far: the long-range forces that some grain feels, with their loops and numbers.
+        outside: the per-grain forces.
+        search: how neighbours are found, in words.
     """
 
     world: World
     rules: Rules
     warnings: list[str]
-    _advance: Callable
-    _outside: Sequence[GrainForce]
+    outside: Sequence[GrainForce]
+    far: Sequence[tuple[FarForce, Any, Any]]
+    search: str
+    _plan: Plan
+    _advance: Callable = field(init=False)
 
-    def advance(self, until: float, most_steps: int) -> Stop:
-        """Up to `most_steps` steps, or to the first at or after `until` [s]; arrays grow as needed."""
+    def __post_init__(self) -> None:
+        self._advance = driver_for(self._plan)
+
+    def advance(self, until: float, most_steps: float) -> Stop:
+        """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
         w = self.world
-        last = w.steps + most_steps
+        last = min(w.steps + most_steps, 2**62)
         while True:
-            stop = Stop(
-                self._advance(
-                    w.grains.arrays,
-                    w.contacts,
-                    w.near,
-                    w.clock,
-                    w.count,
-                    w.lost,
-                    self.rules,
-                    float(until),
-                    last - w.steps,
-                )
-            )
+            arrays = (w.grains.arrays, w.contacts, w.near, w.far, w.clock, w.count, w.lost)
+            stop = Stop(self._advance(*arrays, self.rules, float(until), int(last)))
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
                 w.grow_pairs()
+            elif stop is Stop.LIST_FULL:
+                w.grow_rows()
             else:
                 return stop
 
@@ -77,149 +64,37 @@ class Engine:
         """Contacts of grains that touch at the start, nothing booked, and the first loads."""
         w = self.world
         w.count[STAGE] = 1
+        w.count[LOOKED] = w.count[GROWN] = -GROW_EVERY
         w.clock[CONTACT_STEP] = math.inf
         self.advance(-math.inf, 1)
-        w.count[STEPS] = w.count[MADE] = 0
+        w.count[STEPS] = w.count[MADE] = w.count[FAR_SUMS] = 0
         w.lost[:] = 0.0
         w.contacts.lost[:] = 0.0
 
-    def outside_energies(self) -> dict[str, float]:
-        """Energy [J] of each per-grain force by name."""
+    def take_up(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
         w = self.world
-        return {
-            force.name: energy_sum_for(force.formula)(w.grains.arrays, w.time, force.numbers())
-            for force in self._outside
-        }
+        w.from_arrays(saved)
+        if self.rules.search.listed and np.isfinite(w.far.anchor).all():
+            while remake_far_list(w.far, self.rules.span, self.rules.search.reach) == FULL:
+                w.grow_rows()
+
+    def energies_at_grains(self) -> dict[str, np.ndarray]:
+        """Energy [J] of each grain, (N,), by force: half of each pair's, and what per-grain forces give."""
+        w = self.world
+        shares = {force.column: np.zeros(len(w.grains)) for force, _, _ in self.far}
+        for force, sums, numbers in self.far:
+            shares_for(sums.energies)(w.grains.arrays, w.far, self.rules.span, numbers, shares[force.column])
+        for outer in self.outside:
+            shares[outer.name] = np.zeros(len(w.grains))
+            fill = outside_shares_for(outer.formula)
+            fill(w.grains.arrays, w.time, outer.numbers(), shares[outer.name])
+        return shares
+
+    def force_energies(self) -> dict[str, float]:
+        """Energy [J] of all long-range and per-grain forces by column of the ledger."""
+        return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
 
     def culprits(self) -> tuple[int, ...]:
         """The grains that the last stop was about."""
         return tuple(sorted({int(self.world.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))
-
-
-def build_engine(grains: Grains, forces: Sequence[Force], box: Box, stepping: Verlet, *, fresh: bool = True) -> Engine:
-    """Check that everything fits together and translate it.
-
-    Args:
-        fresh: a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
-
-    Raises:
-        BadInput: every problem at once.
-    """
-    problems: list[str] = []
-    warnings: list[str] = []
-    _refuse_doubles(forces)
-    for force in forces:
-        try:
-            warnings += force.check(grains, box)
-        except BadInput as error:
-            problems += error.problems
-    contact = next((f for f in forces if isinstance(f, Contact)), None)
-    dipoles = next((f for f in forces if isinstance(f, Dipoles)), None)
-    outside = [f for f in forces if isinstance(f, GrainForce)]
-    reach = float(grains.radius.min())
-    least = 2.0 * (2.0 * float(grains.radius.max()) + reach)
-    if box.shortest < least:
-        problems.append(
-            f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
-            "or a grain would meet two images of its neighbour"
-        )
-    if problems:
-        raise BadInput(problems)
-    world = World(
-        grains.copy(),
-        box,
-        contact_arrays(len(grains), SPREAD * len(grains), len(Bond._fields)),
-        near_pairs(len(grains), SPREAD * len(grains)),
-    )
-    world.grains.arrays.position[...] = box.wrap(grains.position).T
-    composed, numbers = compose(outside)
-    rules = Rules(
-        box.span,
-        _contact_rules(contact, grains, stepping),
-        _dipole_rules(dipoles, grains, box),
-        numbers,
-        Control(
-            fixed=0.0 if stepping.step == "auto" else stepping.step,
-            reach=reach,
-            energy_scale=dipoles.energy_scale(grains) if dipoles else 0.0,
-            accuracy=stepping.accuracy,
-            outer_field=math.fsum(f.flux_density_size() for f in outside),
-            impact=IMPACT_PART / stepping.steps_per_period,
-            longest=IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials))),
-        ),
-    )
-    engine = Engine(
-        world, rules, warnings, driver_for(composed, all(is_ours(force.formula) for force in outside)), outside
-    )
-    if contact is not None and fresh:
-        _refuse_overlaps(engine, contact)
-    return engine
-
-
-def sound_crossing(grains: Grains, number: int) -> float:
-    """r √(ρ/E) [s] of the smallest grain of one material."""
-    material = grains.materials[number]
-    radius = float(grains.radius[grains.material == number].min())
-    return radius * math.sqrt(material.density / material.young_modulus)
-
-
-def _refuse_doubles(forces: Sequence[Force]) -> None:
-    names = [getattr(force, "name", None) for force in forces]
-    problems = [
-        f"forces: {force!r} is not a force; give sand.Contact(), sand.Dipoles(), …"
-        for force, name in zip(forces, names, strict=True)
-        if not isinstance(name, str) or not isinstance(force, Force)
-    ]
-    doubles = sorted({str(n) for n in names if n is not None and names.count(n) > 1})
-    problems += [f"forces: '{name}' is given more than once; keep one" for name in doubles]
-    if problems:
-        raise BadInput(problems)
-
-
-def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactRules:
-    law = contact or Contact()
-    # without a Contact nothing ever touches, and materials may lack what contacts need
-    pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
-    return ContactRules(
-        on=contact is not None,
-        pairings=pairings,
-        release=law.beyond == "release",
-        follow=law.stiffness == "dt97",
-        damped=law.damping != "none",
-        per_period=stepping.steps_per_period,
-    )
-
-
-def _dipole_rules(dipoles: Dipoles | None, grains: Grains, box: Box) -> DipoleRules:
-    way, cutoff = dipoles.way(grains, box) if dipoles else (OFF, Cutoff(math.inf, 0.0))
-    return DipoleRules(way, MAGNETIC, cutoff)
-
-
-def _refuse_overlaps(engine: Engine, contact: Contact) -> None:
-    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start."""
-    import numpy as np
-    from scipy.spatial import cKDTree
-
-    grains, box = engine.world.grains, engine.world.box
-    position, radius = grains.position, grains.radius
-    lengths = np.array([v if v is not None else 0.0 for v in box.lengths])
-    shifted = np.where(lengths > 0.0, np.mod(position + 0.5 * lengths, np.where(lengths > 0.0, lengths, 1.0)), position)
-    tree = cKDTree(shifted, boxsize=lengths)
-    pairs = tree.query_pairs(2.0 * float(radius.max()), output_type="ndarray")
-    overlap = grains.overlaps(pairs, box)
-    table = contact.pairings(grains.materials)
-    problems = []
-    for (i, j), delta in zip(pairs[overlap > 0.0], overlap[overlap > 0.0], strict=True):
-        reduced = radius[i] * radius[j] / (radius[i] + radius[j])
-        gamma, modulus = table[:2, grains.material[i], grains.material[j]]
-        rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
-        limit = max(MOST_OVERLAP[0] * rest, MOST_OVERLAP[1] * min(radius[i], radius[j]))
-        if delta > limit:
-            problems.append(
-                f"grains {i} and {j} overlap by {delta:.3g} m at the start; at most {limit:.3g} m may be: "
-                "move them apart"
-            )
-    if len(problems) > 10:
-        problems[10:] = [f"… and {len(problems) - 10} more overlapping pairs"]
-    if problems:
-        raise BadInput(problems)

@@ -14,27 +14,29 @@ from ..core.grains import Grains
 from ..core.world import BROKEN, CONTACTS, LOST, MADE, MOVED, World
 from ..kernels.measure import ENERGIES, measure_energies
 
+MAGNETIC = "magnetic"
+"""A column that every ledger has, with dipoles or without."""
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 
 
-def take_stock(world: World, rules: Any, outside: dict[str, float]) -> dict[str, float]:
+def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, float]:
     """One row of the ledger: all energies [J], losses [J], momenta (SI), numbers of contacts and clusters.
 
     Args:
         rules: of the run, as the driver takes them.
-        outside: energy [J] of each per-grain force by name.
+        forces: energy [J] of each long-range and per-grain force by column.
     """
     energies = np.empty(len(ENERGIES))
     grains = world.grains.arrays
-    measure_energies(grains, world.contacts, world.count, world.box.span, rules.dipoles, rules.contact.follow, energies)
+    measure_energies(grains, world.contacts, world.count, world.box.span, rules.contact.follow, energies)
     contacts = int(world.count[CONTACTS])
     labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts].T)
     row: dict[str, float] = {"step": world.steps, "time": world.time}
-    row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | outside
+    row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, world.lost.tolist(), strict=True))
-    row["total"] = math.fsum([*energies.tolist(), *outside.values(), *world.lost.tolist()])
+    row["total"] = math.fsum([*energies.tolist(), *forces.values(), *world.lost.tolist()])
     row |= dict(zip(MOMENTA, momenta(world.grains), strict=True))
     row |= {
         "contacts": contacts,
@@ -59,11 +61,12 @@ class Ledger:
     """The rows written so far, oldest first.
 
     Args:
-        outside: names of the per-grain forces, one energy column each.
+        forces: columns of the long-range and per-grain forces, one energy each.
     """
 
-    def __init__(self, outside: Sequence[str] = ()):
-        self.columns = ("step", "time", *ENERGIES, *outside, *LOSSES, "total", *MOMENTA, *NUMBERS)
+    def __init__(self, forces: Sequence[str] = ()):
+        others = [name for name in forces if name != MAGNETIC]
+        self.columns = ("step", "time", *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS)
         self.rows: list[dict[str, float]] = []
 
     def add(self, row: dict[str, float]) -> bool:
@@ -89,9 +92,16 @@ class Ledger:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated in all channels so far [J], forming included; what stiffnesses make or destroy is not."""
-        channels = [name for name in LOSSES if name != "lost_stiffness"]
-        return math.fsum(self.rows[-1][name] for name in channels) if self.rows else 0.0
+        """Energy dissipated so far [J], forming included.
+
+        What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took
+        more than it gave.
+        """
+        if not self.rows:
+            return 0.0
+        last = self.rows[-1]
+        channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
+        return math.fsum([*(last[name] for name in channels), max(last["lost_gas"], 0.0)])
 
     @property
     def drift(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..stepping.advance import Stop
+from ..stepping.rules import Stop
 
 
 class Outcome(Enum):

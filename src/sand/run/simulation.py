@@ -17,15 +17,16 @@ from ..core.grains import Grains
 from ..core.units import si, spoken
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
-from ..stepping.advance import Stop
+from ..stepping.neighbours import Neighbours
+from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
 from .contacts import ContactTable
-from .engine import build_engine
 from .ledger import Ledger, take_stock
 from .observers import Observer, Schedule
 from .outcome import OF_STOP, Outcome, Result
 from .record import Record
 from .signals import Signals
+from .translate import build_engine
 
 BURST = 0.1
 """Wall time [s] the compiled driver stays away from Python, about."""
@@ -39,6 +40,7 @@ class Simulation:
         forces: a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once.
         box: a Box, or a length for a periodic cube; open by default.
         stepping: the integrator, `sand.Verlet()` by default.
+        neighbours: how pairs within reach are found, `sand.Neighbours()` by default.
         seed: of random forces; kept with the run.
         out: folder for the run's files, made at the first `run`; None keeps everything in memory.
         overwrite: allow `out` to hold an earlier run, whose files are then replaced.
@@ -57,6 +59,7 @@ class Simulation:
         *,
         box: Any = None,
         stepping: Verlet | None = None,
+        neighbours: Neighbours | None = None,
         seed: int | None = None,
         out: str | Path | None = None,
         overwrite: bool = False,
@@ -69,6 +72,7 @@ class Simulation:
         self.forces = list(forces)
         self.box = as_box(box)
         self.stepping = stepping or Verlet()
+        self.neighbours = neighbours or Neighbours()
         self.seed = seed
         self.observers = list(observers)
         self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
@@ -76,16 +80,19 @@ class Simulation:
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
         self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
         self.start = grains.copy()
-        self._engine = build_engine(grains, self.forces, self.box, self.stepping, fresh=restart is None)
+        self._engine = build_engine(
+            grains, self.forces, self.box, self.stepping, self.neighbours, self.seed or 0, fresh=restart is None
+        )
         self.world = self._engine.world
         self.temperature = kinetic_temperature(grains)
-        self.ledger = Ledger([force.name for force in self._engine._outside])
+        columns = [force.column for force, _, _ in self._engine.far] + [f.name for f in self._engine.outside]
+        self.ledger = Ledger(columns)
         self.record = Record(out, overwrite, resumed=restart is not None) if out is not None else None
         self.wall_seconds = 0.0
         self._begun = restart is not None
         if restart is not None:
             arrays, meta = restart
-            self.world.from_arrays(arrays)
+            self._engine.take_up(arrays)
             self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
             self._chosen = meta.get("choices", {})
             if self.record:
@@ -120,13 +127,13 @@ class Simulation:
             if choose is not None:
                 radius, reason = choose(self.start, self.box)
                 told[f"{force.name} cut-off"] = f"{'none' if radius is None else spoken(radius, 'm')} ({reason})"
-        return told
+        return told | {"neighbours": self._engine.search}
 
     def loads(self) -> dict[str, Any]:
         """Force (N, 3) [N], torque (N, 3) [N m], field (N, 3) [T], energies by name [J]; no step is taken."""
         self._start()
         row = self._stock()
-        names = ("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.outside_energies())
+        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.force_energies()))
         return {
             "force": self.grains.force.copy(),
             "torque": self.grains.torque.copy(),
@@ -180,7 +187,7 @@ class Simulation:
             self._look()
 
     def _stock(self) -> dict[str, float]:
-        return take_stock(self.world, self._engine.rules, self._engine.outside_energies())
+        return take_stock(self.world, self._engine.rules, self._engine.force_energies())
 
     def _look(self) -> None:
         """A row of the ledger, a frame and everyone who looks on."""
@@ -197,8 +204,8 @@ class Simulation:
         burst = 64
         while True:
             began = wall.monotonic()
-            left = int(min(burst, last - self.world.steps))
-            stop = self._engine.advance(min(end, frames.due), max(left, 0))
+            left = max(min(burst, last - self.world.steps), 0)
+            stop = self._engine.advance(min(end, frames.due), left)
             spent = wall.monotonic() - began
             if left == burst:
                 burst = max(64, min(int(burst * min(BURST / max(spent, 1e-9), 2.0)), 10**7))

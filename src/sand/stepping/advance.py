@@ -1,191 +1,203 @@
 """The compiled driver: thousands of velocity Verlet steps per call from Python.
 
-One step:  choose dt → kick dt/2, drift and turn dt → near pairs checked → contacts: pass, break or move, form
-→ forces (contacts, dipoles, per grain) → kick dt/2.  The driver comes back for the end of the time asked for,
-for longer arrays, or because no step can be taken.  It may come back in the middle of a step (STAGE) and goes
-on from there, so that growing arrays changes no number.
+One step:  choose dt → kick dt/2, drift and turn dt → lists of pairs checked → contacts: pass, break or move, form
+→ forces (contacts, far, per grain) → kick dt/2.  Far forces are summed once in a cycle of one or more steps; a
+contact that forms or breaks ends the cycle.  The driver comes back between two cycles, for the end of the time
+asked for or because no step can be taken, and in the middle of a step (STAGE) for longer arrays; it goes on from
+there, so that growing arrays changes no number.
 """
 
 import functools
 from collections.abc import Callable
-from enum import IntEnum
-from typing import Any, NamedTuple
 
-from ..core.box import nearest_image
 from ..core.jit import kernel, loop
-from ..core.vec import dot, load, sub
-from ..core.world import (
-    CONTACTS,
-    GRAIN1,
-    GRAIN2,
-    STAGE,
-    STEP,
-    STEPS,
-    TIME,
+from ..core.world import CONTACTS, CYCLE, FAR_SUMS, LEFT, STAGE, STEP, STEPS, TIME
+from ..kernels.contacts import gather
+from ..kernels.events import new_touches
+from ..kernels.far import (
+    add_far_loads,
+    add_foretold_loads,
+    add_held_loads,
+    bonded_loops,
+    clear_far_loads,
+    follow_path,
+    keep_angular_momentum,
+    kick_far,
+    renew_held_loads,
 )
-from ..kernels.contacts import contact_pass, contact_step, gather, sort_sides
-from ..kernels.dipoles import dipole_loads
-from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, new_touches, settle_flagged
-from ..kernels.motion import drift, kick
-from ..kernels.neighbours import FULL, list_is_stale, make_list
-from ..kernels.outside import outside_loads
-from .control import CHECK_EVERY, choose_step
-
-
-class Stop(IntEnum):
-    """Why the driver came back."""
-
-    STEPS_DONE = 0
-    TIME_REACHED = 1
-    CONTACTS_FULL = 2
-    PAIRS_FULL = 3
-    NOT_FINITE = 4
-    NO_STEP = 5
-    FLEW_TOO_FAR = 6
-    CRUSHED = 7
-    SPUN_TOO_FAR = 8
-
-
-class ContactRules(NamedTuple):
-    """The contact law's run-time numbers."""
-
-    on: bool  # False: grains pass through each other
-    pairings: Any  # (10, M, M) table: what two materials make together
-    release: bool  # displacement beyond its limit: False clamp, True release
-    follow: bool  # stiffnesses: False frozen at a₀, True following the contact radius
-    damped: bool  # is there any damping
-    per_period: float  # steps per fastest period
-
-
-class Rules(NamedTuple):
-    """All that does not change during a run."""
-
-    span: Any
-    contact: ContactRules
-    dipoles: Any
-    outside: Any
-    control: Any
-
-
-class DipoleRules(NamedTuple):
-    """How magnetic loads are summed."""
-
-    way: int
-    k: float
-    cutoff: Any
-
-
-LONGEST_TURN = 0.5
-"""Largest turn in one step [rad] for which `rotation.turn` is sound."""
+from ..kernels.motion import kick
+from .control import cycle_steps
+from .parts import (
+    bury_broken,
+    no_gas,
+    no_rates,
+    outside_loops,
+    possible_step,
+    rates_loop,
+    stir_gas,
+    update_contacts,
+    update_lists,
+)
+from .rules import Plan, Stop
 
 
 @loop
-def _moves_too_far(grains, reach, dt):
-    """Stop and grain if one would fly more than half the smallest radius, or turn too far, in one step."""
-    for i in range(grains.mass.size):
-        v, w = load(grains.velocity, i), load(grains.spin, i)
-        if dt * dt * dot(v, v) > 0.25 * reach * reach:
-            return Stop.FLEW_TOO_FAR, i
-        if dt * dt * dot(w, w) > LONGEST_TURN**2:
-            return Stop.SPUN_TOO_FAR, i
-    return Stop.STEPS_DONE, -1
+def _nothing_between(grains, far, elapsed):
+    """In a cycle of one step nothing lies between two sums."""
 
 
 @loop
-def _crushed(grains, contacts, count, span):
-    """The first contact in which a centre lies inside the other grain, or −1."""
-    for c in range(count[CONTACTS]):
-        i, j = contacts.pair[0, c], contacts.pair[1, c]
-        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        limit = max(grains.radius[i], grains.radius[j])
-        if dot(apart, apart) < limit * limit:
-            return c
-    return -1
+def _no_begin(grains, far, clock, dt):
+    """Far loads act with all others."""
+
+
+@loop
+def _no_inner(grains, far, span, clock, dt):
+    """As above."""
+
+
+@loop
+def _no_end(grains, far, span, clock, elapsed, dt):
+    """As above."""
+
+
+@loop
+def _begin_impulse(grains, far, clock, dt):
+    """The first of a cycle's two impulses; half a step of the far loads is given with all others."""
+    renew_held_loads(grains, far)
+    if clock[CYCLE] > dt:
+        kick_far(grains, far, 0.5 * (clock[CYCLE] - dt))
+
+
+@loop
+def _inside_impulses(grains, far, span, clock, dt):
+    """Between two steps of a cycle, the last of clock[STEP] and the next of dt seconds."""
+    follow_path(grains, far, span, 0.5 * (clock[STEP] + dt))
+
+
+@loop
+def _end_impulse(grains, far, span, clock, elapsed, dt):
+    """The second impulse: half the cycle was given at its begin, half a step just now."""
+    if clock[CYCLE] > dt:
+        kick_far(grains, far, elapsed - 0.5 * clock[CYCLE] - 0.5 * dt)
+        follow_path(grains, far, span, 0.5 * dt)
+        keep_angular_momentum(grains, far, span, elapsed - 0.5 * clock[CYCLE])
+
+
+@loop
+def _no_bonded(grains, contacts, count, far, span, numbers, due):
+    """Pairs in contact are not apart from the others."""
+
+
+@loop
+def _no_change(grains, contacts, count, far, span, numbers):
+    """As above."""
+
+
+_IMPULSES = (_begin_impulse, _inside_impulses, _end_impulse)
+_NO_IMPULSES = (_no_begin, _no_inner, _no_end)
 
 
 @functools.cache
-def driver_for(outside: Callable, keep: bool = True) -> Callable:
-    """The compiled `advance` for one composed per-grain formula; `keep` it on disk if all of it is ours.
+def loads_loop(plan: Plan) -> Callable:
+    """The loop that sums forces and torques at the end of a step: the far ones if `due`, else what stands for them."""
+    add_outside, _ = outside_loops(plan.outside)
+    far_loads = plan.far.loads
+    between = add_foretold_loads if plan.foretell else add_held_loads if plan.impulse else _nothing_between
+    add_bonded = bonded_loops(plan.far.pair)[0] if plan.split else _no_bonded
+
+    @loop
+    def sum_loads(grains, contacts, far, clock, count, rules, due, elapsed):
+        gather(grains, contacts)
+        add_outside(grains, clock[TIME] + clock[STEP], rules.outside)
+        if due:
+            clear_far_loads(far)
+            far_loads(grains, far, rules.span, rules.far)
+            count[FAR_SUMS] += 1
+        add_bonded(grains, contacts, count, far, rules.span, rules.far, due)
+        if due:
+            add_far_loads(grains, far)
+        else:
+            between(grains, far, elapsed)
+
+    return sum_loads
+
+
+@functools.cache
+def driver_for(plan: Plan) -> Callable:
+    """The compiled `advance` for one plan.
 
     A world starts at STAGE 1 with a step of 0 s: the second half of such a step finds the pairs and the
     contacts that are there and works out the first loads (what it counts and books is not part of a run).
     """
-    add_outside = outside_loads(outside)
+    _, drift_booked = outside_loops(plan.outside)
+    sum_loads = loads_loop(plan)
+    set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
+    change_sides = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
+    begin, inside, end = _IMPULSES if plan.impulse else _NO_IMPULSES
+    stir = stir_gas if plan.gas else no_gas
 
     @loop
-    def sum_loads(grains, contacts, time, rules):
-        gather(grains, contacts)
-        dipole_loads(grains, rules.span, rules.dipoles)
-        add_outside(grains, time, rules.outside)
-
-    @loop
-    def first_half(grains, contacts, near, clock, count, rules):
+    def first_half(grains, contacts, near, far, clock, count, lost, rules):
         """Choose the step, kick half of it, drift; anything but STEPS_DONE: no step was taken."""
-        count[GRAIN1] = count[GRAIN2] = -1
-        dt = choose_step(grains, contacts.start, near, clock, count, rules.span, rules.control)
-        if not dt > 0.0:
-            return Stop.NOT_FINITE
-        if clock[TIME] + dt == clock[TIME]:
-            return Stop.NO_STEP
-        stop, stray = _moves_too_far(grains, rules.control.reach, dt)
+        dt, stop = possible_step(grains, contacts, near, clock, count, rules)
         if stop != Stop.STEPS_DONE:
-            count[GRAIN1] = stray
             return stop
-        if count[STEPS] % CHECK_EVERY == 0:
-            c = _crushed(grains, contacts, count, rules.span)
-            if c >= 0:
-                count[GRAIN1], count[GRAIN2] = contacts.pair[0, c], contacts.pair[1, c]
-                return Stop.CRUSHED
+        if clock[LEFT] == 0.0:
+            cycle = dt * cycle_steps(clock, count, rules.beat, dt)
+            set_rates(grains, contacts, far, clock, rules, cycle if cycle > dt else 0.0)
+            clock[CYCLE] = clock[LEFT] = cycle
+            begin(grains, far, clock, dt)
+        else:
+            inside(grains, far, rules.span, clock, dt)
         kick(grains, 0.5 * dt)
-        drift(grains, rules.span, dt)
+        drift_booked(grains, clock, lost, rules, dt)
+        clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
         clock[STEP] = dt
         count[STAGE] = 1
         return Stop.STEPS_DONE
 
     @loop
-    def second_half(grains, contacts, near, clock, count, lost, rules):
+    def second_half(grains, contacts, near, far, clock, count, lost, rules):
         """Contacts, loads, the other half kick; may be entered again after arrays have grown."""
-        span, law, dt = rules.span, rules.contact, clock[STEP]
-        reach = rules.control.reach
-        stale = list_is_stale(grains, near, span, reach)
-        if stale and make_list(grains, contacts, near, count, span, reach, law) == FULL:
-            return Stop.PAIRS_FULL
-        fresh = new_touches(grains, near, count, span)
+        stop, stale = update_lists(grains, contacts, near, far, count, rules)
+        if stop != Stop.STEPS_DONE:
+            return stop
+        fresh = new_touches(grains, near, count, rules.span)
         if count[CONTACTS] + fresh > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
-        flagged = contact_pass(grains, contacts, count, span, law, dt)
-        if law.follow:
-            book_stiffness(grains, contacts, count, lost, span, dt)
-        parted = flagged and settle_flagged(grains, contacts, near, count, lost, span, law, dt)
-        if parted:
-            drop_broken(contacts, count)
-        if law.damped:
-            damp_contacts(grains, contacts, count, lost, span, dt)
-        if fresh > 0:
-            make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
-        if parted or fresh > 0:
-            sort_sides(contacts, count, grains.mass.size)
-        if parted or fresh > 0 or stale:
-            contact_step(contacts, near, count, grains.mass.size, clock, law.per_period)
-        sum_loads(grains, contacts, clock[TIME] + dt, rules)
+        parted = update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh)
+        dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
+        due = clock[LEFT] == 0.0 or parted or fresh > 0
+        sum_loads(grains, contacts, far, clock, count, rules, due, elapsed)
         kick(grains, 0.5 * dt)
+        if due:
+            end(grains, far, rules.span, clock, elapsed, dt)
+            change_sides(grains, contacts, count, far, rules.span, rules.far)
+            clock[LEFT], clock[CYCLE] = 0.0, elapsed
+        if parted:
+            bury_broken(grains, contacts, near, clock, count, rules)
         clock[TIME] += dt
         count[STEPS] += 1
         count[STAGE] = 0
+        if due:
+            stir(grains, clock, count, lost, rules)
         return Stop.STEPS_DONE
 
-    def advance(grains, contacts, near, clock, count, lost, rules, until, most_steps):
-        """Take up to `most_steps` steps, or as many as bring the time to `until` [s]; returns a Stop."""
-        for _ in range(most_steps):
+    def advance(grains, contacts, near, far, clock, count, lost, rules, until, last):
+        """Steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""
+        while True:
             if count[STAGE] == 0:
-                if clock[TIME] >= until:
-                    return Stop.TIME_REACHED
-                stop = first_half(grains, contacts, near, clock, count, rules)
+                if clock[LEFT] == 0.0:
+                    if clock[TIME] >= until:
+                        return Stop.TIME_REACHED
+                    if count[STEPS] >= last:
+                        return Stop.STEPS_DONE
+                stop = first_half(grains, contacts, near, far, clock, count, lost, rules)
                 if stop != Stop.STEPS_DONE:
                     return stop
-            stop = second_half(grains, contacts, near, clock, count, lost, rules)
+            stop = second_half(grains, contacts, near, far, clock, count, lost, rules)
             if stop != Stop.STEPS_DONE:
                 return stop
-        return Stop.TIME_REACHED if clock[TIME] >= until else Stop.STEPS_DONE
 
-    return kernel(advance, keep=keep)
+    return kernel(advance, keep=plan.keep)

@@ -6,13 +6,28 @@ from typing import NamedTuple
 from ..core.box import nearest_image
 from ..core.jit import formula, loop
 from ..core.vec import dot, load, sub
-from ..core.world import CONTACT_STEP, CONTACTS, GRAIN1, GRAIN2, LEVEL, PAIRS, STEPS
+from ..core.world import (
+    CALM,
+    CONTACT_STEP,
+    CONTACTS,
+    CYCLE,
+    FAR_LEVEL,
+    GRAIN1,
+    GRAIN2,
+    GROWN,
+    LEFT,
+    LEVEL,
+    LOOKED,
+    PAIRS,
+    STEP,
+    STEPS,
+)
 from ..physics.surroundings import stiffness_of_field
 
 CHECK_EVERY = 16
 """Steps between two looks at the physics while contacts set the step."""
 GROW_EVERY = 64
-"""The step is halved at once but doubled only at multiples of this many steps, so that it does not flap."""
+"""The step is halved at once but doubled only after this many steps, so that it does not flap."""
 SPIN_ANGLE = 0.05
 """Largest turn of a grain in one step [rad]."""
 FIELD_ANGLE = 0.03
@@ -53,35 +68,41 @@ def load_step(force, torque, mass, inertia, control):
 
 
 @loop
-def wanted_step(grains, start, near, count, span, control):
-    """The longest step [s] that all but the contacts allow, and the grains that want it (GRAIN1, GRAIN2).
+def calm_steps(grains, start, count, control):
+    """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
 
-    `start` (N + 1,) tells who has contacts (core.world.ContactArrays).
+    GRAIN1 becomes the grain that wants the step. `start` (N + 1,) tells who has contacts
+    (core.world.ContactArrays).
 
-    0 if a speed or spin is not finite.
-
-    Bound grains are left out of the accuracy rule: they ring, and their step is that of contacts.
+    Bound grains ring: their step is that of contacts, and only how they fly and spin is looked at.  Free grains
+    limit the cycle as they limit the step, but for the part of the list's reach they fly.
     """
-    wanted = control.longest
-    slowest1 = slowest2 = -1
+    wanted = cycle = control.longest
+    slowest = -1
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
         if not (speed < math.inf and turning < math.inf):
             count[GRAIN1] = i
-            return 0.0
-        mine = control.longest
-        if speed > 0.0:
-            mine = min(mine, REACH_PART * control.reach / speed)
-        if turning > 0.0:
-            mine = min(mine, SPIN_ANGLE / turning)
+            return 0.0, 0.0
+        mine = SPIN_ANGLE / turning if turning > 0.0 else math.inf
         moment, inertia = load(grains.moment, i), grains.inertia[i]
         mine = min(mine, field_step(moment, load(grains.field, i), control.outer_field, inertia))
         if start[i + 1] == start[i]:
             force, torque = load(grains.force, i), load(grains.torque, i)
             mine = min(mine, load_step(force, torque, grains.mass[i], inertia, control))
+            cycle = min(cycle, mine)
+        if speed > 0.0:
+            mine = min(mine, REACH_PART * control.reach / speed)
         if mine < wanted:
-            wanted, slowest1, slowest2 = mine, i, -1
+            wanted, slowest = mine, i
+    count[GRAIN1], count[GRAIN2] = slowest, -1
+    return wanted, cycle
+
+
+@loop
+def closing_step(grains, near, count, span, control, wanted):
+    """The longest step [s], at most `wanted`, that pairs about to touch or in contact allow."""
     for p in range(count[PAIRS]):
         i, j = near.pair[0, p], near.pair[1, p]
         moving = sub(load(grains.velocity, i), load(grains.velocity, j))
@@ -99,9 +120,20 @@ def wanted_step(grains, start, near, count, span, control):
             gap = distance - grains.radius[i] - grains.radius[j]
             ours = max(need, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
         if ours < wanted:
-            wanted, slowest1, slowest2 = ours, i, j
-    count[GRAIN1], count[GRAIN2] = slowest1, slowest2
+            wanted = ours
+            count[GRAIN1], count[GRAIN2] = i, j
     return wanted
+
+
+@loop
+def levelled(level, wanted, may_grow):
+    """The power of two of a second at or below `wanted`, or the old level where that is below and may not grow."""
+    level = level if level > 0.0 else 1.0
+    while level > wanted:
+        level *= 0.5
+    while may_grow and 2.0 * level <= wanted:
+        level *= 2.0
+    return level
 
 
 @loop
@@ -109,19 +141,33 @@ def choose_step(grains, start, near, clock, count, span, control):
     """The next step [s], or 0 if there is none: that of the contacts, or less if something else needs less.
 
     Steps that are not the contacts' are powers of two of a second and change seldom, because every change
-    costs velocity Verlet a little energy.
+    costs velocity Verlet a little energy.  Inside a cycle the far loads are not at hand, and only pairs are looked
+    at.
     """
-    if count[CONTACTS] == 0 or count[STEPS] % CHECK_EVERY == 0:
-        wanted = wanted_step(grains, start, near, count, span, control)
+    between = clock[LEFT] == 0.0
+    alone = count[CONTACTS] == 0
+    if alone or count[STEPS] - count[LOOKED] >= CHECK_EVERY or (between and clock[CYCLE] > clock[STEP]):
+        may_grow = count[STEPS] - count[GROWN] >= GROW_EVERY
+        if between:
+            clock[CALM], cycle = calm_steps(grains, start, count, control)
+            if not clock[CALM] > 0.0:
+                return 0.0
+            clock[FAR_LEVEL] = levelled(clock[FAR_LEVEL], cycle, may_grow)
+        wanted = closing_step(grains, near, count, span, control, clock[CALM])
         if not wanted > 0.0:
             return 0.0
-        level = clock[LEVEL] if clock[LEVEL] > 0.0 else 1.0
-        while level > wanted:
-            level *= 0.5
-        if count[STEPS] % GROW_EVERY == 0:
-            while 2.0 * level <= wanted:
-                level *= 2.0
-        clock[LEVEL] = level
+        clock[LEVEL] = levelled(clock[LEVEL], wanted, may_grow)
+        count[LOOKED] = count[STEPS]
+        if may_grow:
+            count[GROWN] = count[STEPS]
     if control.fixed > 0.0:
         return control.fixed
     return min(clock[LEVEL], clock[CONTACT_STEP])
+
+
+@loop
+def cycle_steps(clock, count, beat, dt):
+    """How many steps [of dt] may lie between two sums of the far loads: 1 where nothing touches."""
+    if count[CONTACTS] == 0:
+        return 1
+    return max(1, min(beat.most, int(clock[FAR_LEVEL] / dt)))

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.errors import FORBID_EXTRA, BadInput
+from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.units import si
+from .rules import Beat
+
+FAR = ("every step", "impulse", "taylor", "taylor-literal")
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,13 @@ class Verlet:
         step: a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
             otherwise.
         accuracy: part of the magnetic contact energy |U_min| that a step away from contacts may misplace.
+        far: how long-range forces act while grains touch. "impulse" sums them once in a cycle of steps; what of them
+            changes acts at the two ends of the cycle (r-RESPA), what lasts in every step, as does the force between
+            two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
+            bound grains with their mean motion; "taylor-literal" is SAND's own, bound grains with the velocity and
+            spin of the moment, ringing included; "every step" sums them in every step.
+        far_steps: most steps in a cycle, k_max ≥ 1. A cycle is shorter where the long-range forces change faster,
+            and has one step where nothing touches.
 
     Raises:
         BadInput: out of range.
@@ -26,6 +36,8 @@ class Verlet:
     steps_per_period: Any = 25.0
     step: Any = "auto"
     accuracy: Any = 1e-8
+    far: str = "impulse"
+    far_steps: int = 70
 
     __pydantic_config__ = FORBID_EXTRA
     name = "verlet"
@@ -43,6 +55,10 @@ class Verlet:
         take("accuracy", "1", above=0.0)
         if self.step != "auto":
             take("step", "s", above=0.0)
+        if self.far not in FAR:
+            problems.append(f"stepping: far = {self.far!r}; {did_you_mean(str(self.far), FAR)}")
+        if isinstance(self.far_steps, bool) or not isinstance(self.far_steps, int) or self.far_steps < 1:
+            problems.append(f"stepping: far_steps = {self.far_steps!r} must be a whole number of at least 1")
         if problems:
             raise BadInput(problems)
 
@@ -53,4 +69,11 @@ class Verlet:
             "steps_per_period": self.steps_per_period,
             "step": self.step,
             "accuracy": self.accuracy,
+            "far": self.far,
+            "far_steps": self.far_steps,
         }
+
+    def beat(self, distant: bool) -> Beat:
+        """How often far loads are summed, for the driver; every step if there are none."""
+        many = distant and self.far != "every step"
+        return Beat(self.far_steps if many else 1, self.far == "taylor-literal")

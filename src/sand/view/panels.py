@@ -29,7 +29,7 @@ from .style import (
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
 LOSSES = tuple(f"lost_{name}" for name in LOST)
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW)
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, INK, FAINT)
 OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 
 DECADES = 6
@@ -120,7 +120,7 @@ def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
 def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """Losses by channel; channels too small for the frame, or without any loss, are named only."""
     t = ledger["time"] / time.size
-    # what stiffnesses that follow the contact take out may be negative; its size is drawn
+    # what following stiffnesses, a gas and outside forces take may be negative; its size is drawn
     channels = {name: np.abs(values) / unit.size for name, values in losses(ledger).items()}
     axes.set_ylabel(f"lost ({unit.name})")
     top = max(map(peak, channels.values()))
@@ -136,7 +136,7 @@ def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     axes.set_ylim(max(least / 2.0, top * 10.0**-DECADES), top * 2.5)
     _log_ticks(axes)
     legend_above(axes)
-    options = ("damping", "stiffness")  # off by default: not worth a word
+    options = ("damping", "stiffness", "gas", "outside")  # off by default: not worth a word
     none = ", ".join(name for name, values in channels.items() if not peak(values) and name not in options)
     tiny = ", ".join(name for name, values in channels.items() if name not in drawn and peak(values))
     note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)

@@ -1,0 +1,119 @@
+"""Forces along the line of centres: charges repel or attract, masses attract."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..core.box import Box
+from ..core.constants import COULOMB, GRAVITATION
+from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..core.grains import Grains
+from ..kernels.central import ALL, LISTED, CentralRules
+from ..kernels.far import FarSums
+from .cutoff import CUTS, ROOM, Choice, cutoff_for, cutoff_given, spoken_cut
+
+
+@dataclass(frozen=True)
+class Charges:
+    """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
+
+    Charges sit at the centres; what they induce in their neighbours is left out.
+
+    Args:
+        cutoff: "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
+            [m]. "auto" is None in an open box and (L/2)/1.35 in a periodic one: a cut Coulomb force is a model of
+            screening, not of an infinite plasma.
+        cut: "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp".
+
+    Raises:
+        BadInput: a cut-off that is neither; later, one beyond half the box.
+    """
+
+    cutoff: Any = "auto"
+    cut: str = "smooth"
+
+    __pydantic_config__ = FORBID_EXTRA
+    name: ClassVar[str] = "charges"
+    column: ClassVar[str] = "coulomb"
+    references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4"
+    constant: ClassVar[float] = COULOMB
+
+    def __post_init__(self) -> None:
+        problems = []
+        if self.cut not in CUTS:
+            problems.append(f"{self.name}: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
+        if self.cutoff != "auto":
+            try:
+                object.__setattr__(self, "cutoff", cutoff_given(self.cutoff, self.name))
+            except BadInput as error:
+                problems += error.problems
+        if problems:
+            raise BadInput(problems)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"cutoff": "none" if self.cutoff is None else self.cutoff, "cut": self.cut}
+
+    def strengths(self, grains: Grains) -> np.ndarray:
+        """What attracts or repels, (N,): charges [C]."""
+        return grains.charge
+
+    def choose(self, grains: Grains, box: Box) -> Choice:
+        """The cut-off in force, with its reason.  Raises BadInput if it does not fit into the box."""
+        if self.cutoff != "auto":
+            return spoken_cut(self.cutoff, self.cut, box, self.name)
+        if box.is_open:
+            return Choice(None, "open box: all pairs")
+        return Choice(0.5 * box.shortest / ROOM, f"{self.cut}, half the box / {ROOM}")
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Warns when nothing is charged, or when nearest images are summed without a cut."""
+        choice = self.choose(grains, box)
+        warnings = []
+        if not self.acts_on(grains):
+            warnings.append(f"{self.name} are switched on but no grain is charged")
+        if choice.radius is None and not box.is_open:
+            warnings.append(f"{self.name}: cutoff = none in a periodic box: energy jumps when images change")
+        return warnings
+
+    def sums(self, box: Box, listed: bool) -> FarSums:
+        """The loops that sum it: over listed pairs, or over all."""
+        return LISTED if listed else ALL
+
+    def numbers(self, grains: Grains, box: Box) -> CentralRules:
+        """What the loops get."""
+        radius = self.choose(grains, box).radius
+        return CentralRules(self.constant, cutoff_for(radius, self.cut), self.strengths(grains).copy())
+
+    def acts_on(self, grains: Grains) -> bool:
+        """False if no grain feels it."""
+        return bool(self.strengths(grains).any())
+
+    def energy_scale(self, grains: Grains) -> float:
+        """k q²/(2r) [J] of the strongest grain with its like at touch."""
+        return float(abs(self.constant) * np.max(self.strengths(grains) ** 2 / (2.0 * grains.radius)))
+
+
+@dataclass(frozen=True)
+class Attraction(Charges):
+    """Newtonian attraction between the grains, U = −G m1 m2/r; rarely matters below kilometres.
+
+    Args:
+        cutoff: "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
+            [m]. "auto" is None in an open box and (L/2)/1.35 in a periodic one.
+        cut: "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp".
+
+    Raises:
+        BadInput: a cut-off that is neither; later, one beyond half the box.
+    """
+
+    name: ClassVar[str] = "attraction"
+    column: ClassVar[str] = "gravitation"
+    references: ClassVar[str] = "Newton 1687"
+    constant: ClassVar[float] = -GRAVITATION
+
+    def strengths(self, grains: Grains) -> np.ndarray:
+        """What attracts, (N,): masses [kg]."""
+        return grains.mass

@@ -1,0 +1,240 @@
+"""Long-range forces together: one sum of loads, of rates and of energies, and what multiple time steps need."""
+
+import functools
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..core.box import nearest_image
+from ..core.jit import kernel, loop
+from ..core.vec import accrue, add, axpy, cross, dot, load, put, scale, sub
+from ..core.world import CONTACTS
+
+HELD_CHANGE = 0.5
+"""Change of a grain's far load, in parts of it, at which its held part follows.
+
+A chain of 20 at rest and one that rings were tried with 0.2, 0.5 and 1 (no held part): 0.2 lets the energy of the
+ringing one drift, 1 makes the impulses shake the calm one; see docs/physics/long-range.md.
+"""
+
+
+class FarSums(NamedTuple):
+    """The loops of one long-range force; each gets (grains, far, span, its numbers)."""
+
+    loads: Callable  # adds to far.force and far.torque
+    rates: Callable  # adds to far.force_rate and far.torque_rate
+    energies: Callable  # adds half the energy of each pair to each grain's entry of a fifth argument, (N,)
+    pair: Callable  # (grains, span, numbers, i, j): force on i, torques on i and on j, of one pair
+
+
+@loop
+def _no_sum(grains, far, span, numbers):
+    pass
+
+
+@loop
+def _no_energies(grains, far, span, numbers, shares):
+    pass
+
+
+@loop
+def _no_pair(grains, span, numbers, i, j):
+    return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+
+NO_FAR_FORCE = FarSums(_no_sum, _no_sum, _no_energies, _no_pair)
+
+
+@functools.cache
+def far_together(first: FarSums, rest: FarSums) -> FarSums:
+    """The sums of two; `numbers` is the pair of theirs.  Energies are asked for one by one (`shares_for`)."""
+    first_loads, rest_loads, first_rates, rest_rates = first.loads, rest.loads, first.rates, rest.rates
+    first_pair, rest_pair = first.pair, rest.pair
+
+    @loop
+    def loads(grains, far, span, numbers):
+        first_loads(grains, far, span, numbers[0])
+        rest_loads(grains, far, span, numbers[1])
+
+    @loop
+    def rates(grains, far, span, numbers):
+        first_rates(grains, far, span, numbers[0])
+        rest_rates(grains, far, span, numbers[1])
+
+    @loop
+    def pair(grains, span, numbers, i, j):
+        force1, here1, there1 = first_pair(grains, span, numbers[0], i, j)
+        force2, here2, there2 = rest_pair(grains, span, numbers[1], i, j)
+        return add(force1, force2), add(here1, here2), add(there1, there2)
+
+    return FarSums(loads, rates, _no_energies, pair)
+
+
+@functools.cache
+def shares_for(energies: Callable) -> Callable:
+    """The compiled sum of each grain's part of the energy [J] of one long-range force."""
+
+    def fill_shares(grains, far, span, numbers, shares):
+        energies(grains, far, span, numbers, shares)
+
+    return kernel(fill_shares)
+
+
+@loop
+def clear_far_loads(far):
+    """No far loads."""
+    for i in range(far.force.shape[1]):
+        put(far.force, i, (0.0, 0.0, 0.0))
+        put(far.torque, i, (0.0, 0.0, 0.0))
+
+
+@loop
+def add_far_loads(grains, far):
+    """The far loads as last summed, on top of what the grains carry."""
+    for i in range(grains.mass.size):
+        accrue(grains.force, i, load(far.force, i))
+        accrue(grains.torque, i, load(far.torque, i))
+
+
+@loop
+def add_held_loads(grains, far, since):
+    """The held part of the far loads, which acts in every step.
+
+    A load that does not change can be split off without any error, and impulses of what is left shake a cluster
+    at rest much less.
+    """
+    for i in range(grains.mass.size):
+        accrue(grains.force, i, load(far.held_force, i))
+        accrue(grains.torque, i, load(far.held_torque, i))
+
+
+@loop
+def renew_held_loads(grains, far):
+    """At the begin of a cycle: let the held part of a grain's far loads follow where they have become too different."""
+    for i in range(grains.mass.size):
+        force, torque = load(far.force, i), load(far.torque, i)
+        change = sub(force, load(far.held_force, i))
+        if dot(change, change) > HELD_CHANGE**2 * dot(force, force):
+            put(far.held_force, i, force)
+        change = sub(torque, load(far.held_torque, i))
+        if dot(change, change) > HELD_CHANGE**2 * dot(torque, torque):
+            put(far.held_torque, i, torque)
+        put(far.past_position, i, load(grains.position, i))
+        put(far.path, i, (0.0, 0.0, 0.0))
+
+
+@loop
+def follow_path(grains, far, span, weight):
+    """Sum up the displacement since the begin of the cycle where the held force acts for `weight` seconds."""
+    for i in range(grains.mass.size):
+        moved = nearest_image(sub(load(grains.position, i), load(far.past_position, i)), span)
+        accrue(far.path, i, scale(weight, moved))
+
+
+@loop
+def keep_angular_momentum(grains, far, span, weight):
+    """Give each grain the spin that its held force F̄ took from the sum of all angular momenta.
+
+    Far loads leave L alone where they are summed, at x_n and x_{n+1}.  The held force acts at the places between as
+    well, and the impulse of `weight` w that takes its place at the end acts at x_{n+1}: what is left over is
+    (∫(x − x_n) dt − w (x_{n+1} − x_n)) × F̄.
+    """
+    for i in range(grains.mass.size):
+        moved = nearest_image(sub(load(grains.position, i), load(far.past_position, i)), span)
+        excess = cross(axpy(-weight, moved, load(far.path, i)), load(far.held_force, i))
+        accrue(grains.spin, i, scale(-1.0 / grains.inertia[i], excess))
+
+
+@loop
+def add_foretold_loads(grains, far, since):
+    """F + Ḟ t and M + Ṁ t (Eq. 51), t the time [s] since the last summation."""
+    for i in range(grains.mass.size):
+        accrue(grains.force, i, axpy(since, load(far.force_rate, i), load(far.force, i)))
+        accrue(grains.torque, i, axpy(since, load(far.torque_rate, i), load(far.torque, i)))
+
+
+@loop
+def kick_far(grains, far, dt):
+    """v += ΔF dt/m, ω += ΔM dt/I with what the far loads differ from their held part."""
+    for i in range(grains.mass.size):
+        force = sub(load(far.force, i), load(far.held_force, i))
+        torque = sub(load(far.torque, i), load(far.held_torque, i))
+        accrue(grains.velocity, i, scale(dt / grains.mass[i], force))
+        accrue(grains.spin, i, scale(dt / grains.inertia[i], torque))
+
+
+@functools.cache
+def bonded_loops(pair: Callable) -> tuple[Callable, Callable]:
+    """Far loads of pairs in contact apart from all others: they ring with their contact, the others hardly.
+
+    The first loop adds them to what the grains carry, and takes them out of the far loads just summed if `due`.
+    The second lets contacts change sides between two cycles: new ones (`bonded` 0) come out of the far loads,
+    dead ones (flag 2) go back to them.
+    """
+
+    @loop
+    def add_bonded(grains, contacts, count, far, span, numbers, due):
+        for c in range(count[CONTACTS]):
+            if contacts.bonded[c] == 1:
+                i, j = contacts.pair[0, c], contacts.pair[1, c]
+                force, torque1, torque2 = pair(grains, span, numbers, i, j)
+                accrue(grains.force, i, force)
+                accrue(grains.force, j, scale(-1.0, force))
+                accrue(grains.torque, i, torque1)
+                accrue(grains.torque, j, torque2)
+                if due:
+                    accrue(far.force, i, scale(-1.0, force))
+                    accrue(far.force, j, force)
+                    accrue(far.torque, i, scale(-1.0, torque1))
+                    accrue(far.torque, j, scale(-1.0, torque2))
+
+    @loop
+    def change_sides(grains, contacts, count, far, span, numbers):
+        for c in range(count[CONTACTS]):
+            dead = contacts.flag[c] == 2.0
+            if dead or contacts.bonded[c] == 0:
+                i, j = contacts.pair[0, c], contacts.pair[1, c]
+                force, torque1, torque2 = pair(grains, span, numbers, i, j)
+                sign = 1.0 if dead else -1.0
+                if not (dead and contacts.bonded[c] == 0):
+                    accrue(far.force, i, scale(sign, force))
+                    accrue(far.force, j, scale(-sign, force))
+                    accrue(far.torque, i, scale(sign, torque1))
+                    accrue(far.torque, j, scale(sign, torque2))
+                contacts.bonded[c] = 1
+
+    return add_bonded, change_sides
+
+
+@loop
+def remember(grains, far):
+    """Keep positions and moments of this summation for the mean rates of the next."""
+    for i in range(grains.mass.size):
+        put(far.past_position, i, load(grains.position, i))
+        put(far.past_moment, i, load(grains.moment, i))
+
+
+@loop
+def set_paces(grains, far, start, span, cycle, literal):
+    """Turn `past_position` and `past_moment` into ṙ and μ̇.
+
+    Grains in contact ring within the time that is to be foretold: their mean rates since the summation before the
+    last, `cycle` [s] ago, stand for the drift.  Free grains, and all of them if `literal`, take v and ω×μ.
+    """
+    for i in range(grains.mass.size):
+        if literal or start[i + 1] == start[i]:
+            put(far.past_position, i, load(grains.velocity, i))
+            put(far.past_moment, i, cross(load(grains.spin, i), load(grains.moment, i)))
+        else:
+            rate = 1.0 / cycle if cycle > 0.0 else 0.0
+            moved = nearest_image(sub(load(grains.position, i), load(far.past_position, i)), span)
+            turned = sub(load(grains.moment, i), load(far.past_moment, i))
+            put(far.past_position, i, scale(rate, moved))
+            put(far.past_moment, i, scale(rate, turned))
+
+
+@loop
+def clear_rates(far):
+    """No rates."""
+    for i in range(far.force.shape[1]):
+        put(far.force_rate, i, (0.0, 0.0, 0.0))
+        put(far.torque_rate, i, (0.0, 0.0, 0.0))

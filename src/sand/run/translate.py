@@ -1,0 +1,230 @@
+"""From objects to the numbers the compiled driver takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.box import Box
+from ..core.errors import BadInput
+from ..core.grains import Grains
+from ..core.material import SILICA
+from ..core.world import World, contact_arrays, far_arrays, near_pairs
+from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
+from ..forces.contact import Contact
+from ..forces.gas import Gas
+from ..kernels.gas import VACUUM
+from ..kernels.outside import is_ours
+from ..physics.adhesion import rest_overlap, rest_radius
+from ..physics.contact import Bond
+from ..stepping.control import IMPACT_PART, Control
+from ..stepping.neighbours import Found, Neighbours
+from ..stepping.rules import Books, ContactRules, Plan, Rules, Stirring
+from ..stepping.verlet import Verlet
+from .engine import Engine
+
+SPREAD = 8
+"""Columns for contacts and near pairs per grain to begin with; they grow when needed."""
+IDLE = 1e5
+"""Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
+MOST_OVERLAP = (2.0, 1e-3)
+"""Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
+STIR_PART = 0.05
+"""Time between two kicks of the gas, in shortest stopping times; free grains then diffuse 2e-4 too fast."""
+
+
+class Given(NamedTuple):
+    """The forces by kind."""
+
+    contact: Contact | None
+    distant: list[FarForce]  # those that some grain feels
+    outside: list[GrainForce]
+    gas: list[Gas]  # one or none
+
+
+def build_engine(
+    grains: Grains,
+    forces: Sequence[Force],
+    box: Box,
+    stepping: Verlet,
+    neighbours: Neighbours,
+    seed: int = 0,
+    *,
+    fresh: bool = True,
+) -> Engine:
+    """Check that everything fits together and translate it.
+
+    Args:
+        seed: of random kicks.
+        fresh: a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
+
+    Raises:
+        BadInput: every problem at once.
+    """
+    warnings = _checked(grains, forces, box)
+    given = Given(
+        next((f for f in forces if isinstance(f, Contact)), None),
+        [f for f in forces if isinstance(f, FarForce) and f.acts_on(grains)],
+        [f for f in forces if isinstance(f, GrainForce)],
+        [f for f in forces if isinstance(f, Gas)],
+    )
+    reach = float(grains.radius.min())
+    cutoffs = [f.choose(grains, box).radius for f in given.distant]
+    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None])
+    far = [
+        (f, f.sums(box, found.search.listed and r is not None), f.numbers(grains, box))
+        for f, r in zip(given.distant, cutoffs, strict=True)
+    ]
+    composed, numbers = compose(given.outside)
+    sums, far_numbers = compose_far([sums for _, sums, _ in far], [own for _, _, own in far])
+    rules = Rules(
+        box.span,
+        _contact_rules(given.contact, grains, stepping),
+        far_numbers,
+        numbers,
+        found.search,
+        stepping.beat(bool(far)),
+        _books(given.outside, box),
+        _stirring(given.gas, grains, seed),
+        _control(grains, stepping, given, reach),
+    )
+    plan = Plan(
+        composed,
+        sums,
+        split=bool(far) and stepping.far in ("impulse", "taylor"),
+        impulse=bool(far) and stepping.far == "impulse",
+        foretell=bool(far) and stepping.far.startswith("taylor"),
+        gas=bool(given.gas),
+        keep=all(is_ours(f.formula) for f in given.outside),
+    )
+    engine = Engine(_world(grains, box, found), rules, warnings, given.outside, far, found.reason, plan)
+    if given.contact is not None and fresh:
+        _refuse_overlaps(engine, given.contact)
+    return engine
+
+
+def _world(grains: Grains, box: Box, found: Found) -> World:
+    """The grains in their box, with room for contacts and pairs."""
+    count = len(grains)
+    world = World(
+        grains.copy(),
+        box,
+        contact_arrays(count, SPREAD * count, len(Bond._fields)),
+        near_pairs(count, SPREAD * count),
+        far_arrays(count, SPREAD * count if found.search.listed else 0),
+    )
+    world.grains.arrays.position[...] = box.wrap(grains.position).T
+    return world
+
+
+def _books(outside: Sequence[GrainForce], box: Box) -> Books:
+    moored = any(getattr(f, "moored", False) for f in outside)
+    return Books(any(getattr(f, "timed", False) for f in outside), moored and not box.is_open)
+
+
+def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> Stirring:
+    if not gas:
+        return Stirring(math.inf, seed, VACUUM)
+    return Stirring(STIR_PART * gas[0].shortest_time(grains), seed, gas[0].rules())
+
+
+def _checked(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """The forces' warnings.  Raises BadInput for everything that does not fit together."""
+    problems: list[str] = []
+    warnings: list[str] = []
+    _refuse_doubles(forces)
+    for force in forces:
+        try:
+            warnings += force.check(grains, box)
+        except BadInput as error:
+            problems += error.problems
+    least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
+    if box.shortest < least:
+        problems.append(
+            f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
+            "or a grain would meet two images of its neighbour"
+        )
+    if problems:
+        raise BadInput(problems)
+    return warnings
+
+
+def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> Control:
+    """What the choice of the step needs."""
+    steps = [own() for f in given.outside if (own := getattr(f, "longest_step", None)) is not None]
+    idle = IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials)))
+    return Control(
+        fixed=0.0 if stepping.step == "auto" else stepping.step,
+        reach=reach,
+        energy_scale=max((f.energy_scale(grains) for f in given.distant), default=0.0),
+        accuracy=stepping.accuracy,
+        outer_field=math.fsum(f.flux_density_size() for f in given.outside),
+        impact=IMPACT_PART / stepping.steps_per_period,
+        longest=min([idle, *steps, *(STIR_PART * gas.shortest_time(grains) for gas in given.gas)]),
+    )
+
+
+def sound_crossing(grains: Grains, number: int) -> float:
+    """r √(ρ/E) [s] of the smallest grain of one material."""
+    material = grains.materials[number]
+    radius = float(grains.radius[grains.material == number].min())
+    return radius * math.sqrt(material.density / material.young_modulus)
+
+
+def _refuse_doubles(forces: Sequence[Force]) -> None:
+    names = [getattr(force, "name", None) for force in forces]
+    problems = [
+        f"forces: {force!r} is not a force; give sand.Contact(), sand.Dipoles(), …"
+        for force, name in zip(forces, names, strict=True)
+        if not isinstance(name, str) or not isinstance(force, Force)
+    ]
+    doubles = sorted({str(n) for n in names if n is not None and names.count(n) > 1})
+    problems += [f"forces: '{name}' is given more than once; keep one" for name in doubles]
+    if problems:
+        raise BadInput(problems)
+
+
+def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactRules:
+    law = contact or Contact()
+    # without a Contact nothing ever touches, and materials may lack what contacts need
+    pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
+    return ContactRules(
+        on=contact is not None,
+        pairings=pairings,
+        release=law.beyond == "release",
+        follow=law.stiffness == "dt97",
+        damped=law.damping != "none",
+        per_period=stepping.steps_per_period,
+    )
+
+
+def _refuse_overlaps(engine: Engine, contact: Contact) -> None:
+    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start."""
+    from scipy.spatial import cKDTree
+
+    grains, box = engine.world.grains, engine.world.box
+    position, radius = grains.position, grains.radius
+    lengths = np.array([v if v is not None else 0.0 for v in box.lengths])
+    shifted = np.where(lengths > 0.0, np.mod(position + 0.5 * lengths, np.where(lengths > 0.0, lengths, 1.0)), position)
+    tree = cKDTree(shifted, boxsize=lengths)
+    pairs = tree.query_pairs(2.0 * float(radius.max()), output_type="ndarray")
+    overlap = grains.overlaps(pairs, box)
+    table = contact.pairings(grains.materials)
+    problems = []
+    for (i, j), delta in zip(pairs[overlap > 0.0], overlap[overlap > 0.0], strict=True):
+        reduced = radius[i] * radius[j] / (radius[i] + radius[j])
+        gamma, modulus = table[:2, grains.material[i], grains.material[j]]
+        rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
+        limit = max(MOST_OVERLAP[0] * rest, MOST_OVERLAP[1] * min(radius[i], radius[j]))
+        if delta > limit:
+            problems.append(
+                f"grains {i} and {j} overlap by {delta:.3g} m at the start; at most {limit:.3g} m may be: "
+                "move them apart"
+            )
+    if len(problems) > 10:
+        problems[10:] = [f"… and {len(problems) - 10} more overlapping pairs"]
+    if problems:
+        raise BadInput(problems)

@@ -1,0 +1,95 @@
+"""How neighbours are looked for: the user's choice and what becomes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from ..core.box import Box
+from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..core.grains import Grains
+from ..core.units import si, spoken
+from ..kernels.cells import Search, three_cells_fit
+
+SEARCHES = ("auto", "cells", "all pairs")
+MARGIN = 0.35
+"""Margin of the list over the cut-off, Δr/r_c; the paper has 0.3–0.4."""
+LIST_FROM = 64
+"""Fewest grains for which "auto" makes a list."""
+
+
+class Found(NamedTuple):
+    """The search in force, and why."""
+
+    search: Search
+    reason: str
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """How pairs within reach are found, for contacts and for long-range forces alike.
+
+    Args:
+        search: "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
+            "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if three of them fit
+            into each periodic side of the box.
+        margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.35 of the cut-off. The list
+            is made anew when a grain is more than Δr/2 from where it was; a wide margin makes long but lasting
+            lists. No choice changes a result by more than rounding.
+
+    Raises:
+        BadInput: an unknown word, or a margin that is not a length above 0.
+    """
+
+    search: str = "auto"
+    margin: Any = "auto"
+
+    __pydantic_config__ = FORBID_EXTRA
+
+    def __post_init__(self) -> None:
+        problems = []
+        if self.search not in SEARCHES:
+            problems.append(f"neighbours: search = {self.search!r}; {did_you_mean(str(self.search), SEARCHES)}")
+        if self.margin != "auto":
+            try:
+                object.__setattr__(self, "margin", si(self.margin, "m", "neighbours: margin", above=0.0))
+            except BadInput as error:
+                problems += error.problems
+        if problems:
+            raise BadInput(problems)
+
+    def parameters(self) -> dict[str, Any]:
+        """Its settings in SI."""
+        return {"search": self.search, "margin": self.margin}
+
+    def choose(self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float]) -> Found:
+        """The search for these grains.
+
+        Args:
+            reach: gap [m] up to which pairs count as near a contact.
+            cutoffs: radii [m] of the long-range forces that have one.
+        """
+        touch = 2.0 * float(grains.radius.max()) + reach
+        widest = max(cutoffs, default=0.0)
+        # the list of near pairs is made out of this one, and its own margin is half its reach
+        margin = MARGIN * widest if self.margin == "auto" else self.margin
+        margin = margin if widest > 0.0 else 0.5 * reach
+        whole = max(widest, touch) + margin
+        nothing = Search(False, whole, margin)
+        if self.search == "all pairs":
+            return Found(nothing, "all pairs, asked for")
+        if not three_cells_fit(box.lengths, whole):
+            asked = " (cells asked for)" if self.search == "cells" else ""
+            return Found(
+                nothing,
+                f"all pairs{asked}: the box, {spoken(box.shortest, 'm')}, is less than three cells of "
+                f"{spoken(whole, 'm')} wide",
+            )
+        if self.search == "auto" and len(grains) < LIST_FROM:
+            return Found(nothing, f"all pairs: fewer than {LIST_FROM} grains")
+        purpose = f"cut-off {spoken(widest, 'm')}" if widest > touch else f"contacts {spoken(touch, 'm')}"
+        return Found(
+            Search(True, whole, margin),
+            f"cells and a list of pairs closer than {spoken(whole, 'm')} ({purpose}, margin {spoken(margin, 'm')})",
+        )

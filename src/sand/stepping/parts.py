@@ -1,0 +1,171 @@
+"""What the steps of the driver are made of: lists, contacts, outside forces, gas."""
+
+import functools
+import math
+from collections.abc import Callable
+
+from ..core.box import Span, nearest_image
+from ..core.jit import loop
+from ..core.vec import dot, load, sub
+from ..core.world import CONTACTS, CYCLE, GAS, GRAIN1, GRAIN2, KICKED, LEFT, OUTSIDE, STEP, STEPS, TIME
+from ..kernels.cells import FULL, list_is_stale, make_far_list
+from ..kernels.contacts import contact_pass, contact_step, sort_sides
+from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, settle_flagged
+from ..kernels.far import clear_rates, remember, set_paces
+from ..kernels.gas import gas_kick
+from ..kernels.motion import drift
+from ..kernels.neighbours import make_near_list
+from ..kernels.outside import outside_energy, outside_loads, outside_wrap
+from .control import CHECK_EVERY, choose_step
+from .rules import Stop
+
+LONGEST_TURN = 0.5
+"""Largest turn in one step [rad] for which `rotation.turn` is sound."""
+OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A box without walls, for moves that are wrapped later."""
+
+
+@loop
+def _moves_too_far(grains, reach, dt):
+    """Stop and grain if one would fly more than half the smallest radius, or turn too far, in one step."""
+    for i in range(grains.mass.size):
+        v, w = load(grains.velocity, i), load(grains.spin, i)
+        if dt * dt * dot(v, v) > 0.25 * reach * reach:
+            return Stop.FLEW_TOO_FAR, i
+        if dt * dt * dot(w, w) > LONGEST_TURN**2:
+            return Stop.SPUN_TOO_FAR, i
+    return Stop.STEPS_DONE, -1
+
+
+@loop
+def _crushed(grains, contacts, count, span):
+    """The first contact in which a centre lies inside the other grain, or −1."""
+    for c in range(count[CONTACTS]):
+        i, j = contacts.pair[0, c], contacts.pair[1, c]
+        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+        limit = max(grains.radius[i], grains.radius[j])
+        if dot(apart, apart) < limit * limit:
+            return c
+    return -1
+
+
+@loop
+def possible_step(grains, contacts, near, clock, count, rules):
+    """The step to take now [s], and STEPS_DONE or why there is none."""
+    count[GRAIN1] = count[GRAIN2] = -1
+    dt = choose_step(grains, contacts.start, near, clock, count, rules.span, rules.control)
+    if not dt > 0.0:
+        return 0.0, Stop.NOT_FINITE
+    if clock[LEFT] > 0.0:  # inside a cycle: whole steps that fill it
+        dt = clock[LEFT] / math.ceil(clock[LEFT] / dt - 1e-6)
+    if clock[TIME] + dt == clock[TIME]:
+        return 0.0, Stop.NO_STEP
+    stop, stray = _moves_too_far(grains, rules.control.reach, dt)
+    if stop != Stop.STEPS_DONE:
+        count[GRAIN1] = stray
+        return 0.0, stop
+    if count[STEPS] % CHECK_EVERY == 0:
+        c = _crushed(grains, contacts, count, rules.span)
+        if c >= 0:
+            count[GRAIN1], count[GRAIN2] = contacts.pair[0, c], contacts.pair[1, c]
+            return 0.0, Stop.CRUSHED
+    return dt, Stop.STEPS_DONE
+
+
+@loop
+def update_lists(grains, contacts, near, far, count, rules):
+    """Make anew the lists that are too old for what this step needs; FULL stops ask for longer arrays."""
+    span, search, reach = rules.span, rules.search, rules.control.reach
+    stale = rules.contact.on and list_is_stale(grains, near.anchor, span, 0.25 * reach)
+    old = search.listed and list_is_stale(grains, far.anchor, span, 0.5 * search.margin)
+    if old and make_far_list(grains, far, count, span, search) == FULL:
+        return Stop.LIST_FULL, stale
+    if stale:
+        made = make_near_list(grains, contacts, near, far, count, span, reach, rules.contact, search.listed)
+        if made == FULL:
+            return Stop.PAIRS_FULL, stale
+    return Stop.STEPS_DONE, stale
+
+
+@loop
+def update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh):
+    """Loads of all contacts; those beyond a limit break or move, `fresh` new ones form.  True if any broke."""
+    span, law, dt = rules.span, rules.contact, clock[STEP]
+    flagged = contact_pass(grains, contacts, count, span, law, dt)
+    if law.follow:
+        book_stiffness(grains, contacts, count, lost, span, dt)
+    parted = flagged and settle_flagged(grains, contacts, near, count, lost, span, law, dt)
+    if law.damped:
+        damp_contacts(grains, contacts, count, lost, span, dt)
+    if fresh > 0:
+        make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
+    if fresh > 0:
+        sort_sides(contacts, count, grains.mass.size)
+    if fresh > 0 or stale:
+        contact_step(contacts, near, count, grains.mass.size, clock, law.per_period)
+    return parted
+
+
+@loop
+def bury_broken(grains, contacts, near, clock, count, rules):
+    """Take broken contacts out of the arrays; until now they stood there without loads."""
+    drop_broken(contacts, count)
+    sort_sides(contacts, count, grains.mass.size)
+    contact_step(contacts, near, count, grains.mass.size, clock, rules.contact.per_period)
+
+
+@functools.cache
+def outside_loops(outside: Callable) -> tuple[Callable, Callable]:
+    """Loads of the per-grain forces, and a drift that books what time and periodic boundaries do to their energy."""
+    add_loads, energy, wrap = outside_loads(outside), outside_energy(outside), outside_wrap(outside)
+
+    @loop
+    def drift_booked(grains, clock, lost, rules, dt):
+        now, then = clock[TIME], clock[TIME] + dt
+        gained = 0.0
+        if rules.books.timed:
+            gained += 0.5 * (energy(grains, then, rules.outside) - energy(grains, now, rules.outside))
+        drift(grains, OPEN if rules.books.moored else rules.span, dt)
+        if rules.books.timed:
+            gained += 0.5 * (energy(grains, then, rules.outside) - energy(grains, now, rules.outside))
+        if rules.books.moored:
+            gained += wrap(grains, rules.span, then, rules.outside)
+        lost[OUTSIDE] -= gained
+
+    return add_loads, drift_booked
+
+
+@loop
+def no_rates(grains, contacts, far, clock, rules, cycle):
+    pass
+
+
+@functools.cache
+def rates_loop(sum_rates: Callable) -> Callable:
+    """The loop that prepares the Taylor series at the begin of a cycle of `cycle` seconds."""
+
+    @loop
+    def set_rates(grains, contacts, far, clock, rules, cycle):
+        if cycle > 0.0:
+            # a mean over much less time than what is to be foretold is no drift
+            past = clock[CYCLE] if clock[CYCLE] >= 0.5 * cycle else 0.0
+            set_paces(grains, far, contacts.start, rules.span, past, rules.beat.literal)
+            clear_rates(far)
+            sum_rates(grains, far, rules.span, rules.far)
+        remember(grains, far)
+
+    return set_rates
+
+
+@loop
+def no_gas(grains, clock, count, lost, rules):
+    pass
+
+
+@loop
+def stir_gas(grains, clock, count, lost, rules):
+    """Drag and kicks for the time since the last ones, once that is a fair part of the stopping time."""
+    elapsed = clock[TIME] - clock[KICKED]
+    if elapsed >= rules.gas.period:
+        lost[GAS] += gas_kick(grains, rules.gas.seed, count[STEPS], elapsed, rules.gas.gas)
+        clock[KICKED] = clock[TIME]
