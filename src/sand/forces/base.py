@@ -35,10 +35,11 @@ class Force(Protocol):
 class GrainForce(Force, Protocol):
     """A force that acts on one grain at a time (physics/surroundings.py has the formulas).
 
-    Three more members are looked for; without them a force has neither a clock nor a place, nor a step of its own:
+    Four more members are looked for; without them a force has neither a clock nor a place, nor a step of its own:
 
     `timed`  True if the energy depends on time explicitly: what its source does is then booked as work.
     `moored`  True if the energy depends on the position: crossing a periodic boundary is then booked as work.
+    `flux_density_at(time)`  the flux density it brings [T], for `Simulation.at_grains`.
     `longest_step()`  longest step [s] that resolves how the force itself varies in time; `math.inf` if it does not.
 
     Attributes:

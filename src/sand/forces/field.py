@@ -13,7 +13,7 @@ from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
 from ..core.units import si
 from ..core.vec import across, add, cross, dot, norm, scale, sub
-from ..physics.surroundings import FieldInTime, UniformField, field_in_time, uniform_field
+from ..physics.surroundings import FieldInTime, UniformField, field_in_time, flux_density_at, uniform_field
 from .vectors import along_z, three
 
 SHAPES: dict[str, tuple[str, ...]] = {
@@ -200,6 +200,11 @@ class Field:
         n = self._normal()
         first = across(self.amplitude, n)
         return first, cross(n, first)
+
+    def flux_density_at(self, time: float) -> tuple[float, float, float]:
+        """B [T] at a time [s]."""
+        x, y, z = self.numbers() if self.shape == "constant" else flux_density_at(time, self.numbers())
+        return x, y, z
 
     def flux_density_size(self) -> float:
         """The largest |B(t)| [T] of all times, reached or not."""

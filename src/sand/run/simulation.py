@@ -20,6 +20,7 @@ from ..forces.dipoles import kinetic_temperature
 from ..stepping.neighbours import Neighbours
 from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
+from .at_grains import at_grains
 from .contacts import ContactTable
 from .ledger import Ledger, take_stock
 from .observers import Observer, Schedule
@@ -141,12 +142,21 @@ class Simulation:
             "energy": {name: row[name] for name in names},
         }
 
+    def at_grains(self) -> dict[str, np.ndarray]:
+        """Flux density (N, 3) [T] and energies (N,) [J] at each grain, by name; energies sum to the ledger's columns.
+
+        `kinetic`, `contacts`, and one for each force: half of each pair's energy goes to each of its grains.
+        """
+        self._start()
+        return at_grains(self._engine)
+
     def run(self, until: Any = None, *, steps: int | None = None) -> Result:
         """Go on until a time, or for a number of steps, whichever comes first.
 
         Args:
             until: absolute time [s]; the run ends at the first step at or after it. Resumed runs know theirs.
-            steps: number of steps from now, ≥ 1.
+            steps: number of steps from now, ≥ 1; where long-range forces act in cycles (`Verlet.far`) the run goes on
+                to the end of the last cycle.
 
         Raises:
             BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
