@@ -9,6 +9,7 @@ import warnings
 
 from sand.run.record import versions
 
+from .long_range import growth, savings, tell
 from .rows import all_rows
 
 
@@ -17,8 +18,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="smaller worlds, less repetition")
     parser.add_argument("--json", action="store_true", help="one JSON object")
+    parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    if options.long_range:
+        rows, grown = savings((100, 1000) if options.quick else (100, 1000, 10_000)), growth()
+        print(json.dumps({"rows": rows, "growth": grown})) if options.json else tell(rows, grown)
+        return
     rows = all_rows(options.quick)
     if options.json:
         print(json.dumps({"machine": platform.processor() or platform.machine(), "versions": versions(), "rows": rows}))

@@ -9,14 +9,18 @@ from sand.core.constants import MAGNETIC
 from sand.physics.adhesion import rest_overlap, rest_radius
 
 
+def rest_distance(material: sand.Material, radius: float) -> float:
+    """Distance [m] of two equal grains whose contact is at rest."""
+    p = sand.Contact().pairing(material, material)
+    return 2 * radius - rest_overlap(rest_radius(p.surface_energy, radius / 2, p.modulus), radius / 2)
+
+
 def lattice(side: int) -> sand.Simulation:
     """side³ silica grains of 0.6 µm diameter on a cubic lattice, all contacts at rest, a little shaken."""
     radius = 3e-7
-    p = sand.Contact().pairing(sand.SILICA, sand.SILICA)
-    rest = rest_overlap(rest_radius(p.surface_energy, radius / 2, p.modulus), radius / 2)
     grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)
     velocity = 1e-3 * np.random.default_rng(1).normal(size=grid.shape)
-    grains = sand.Grains(grid * (2 * radius - rest), radius, sand.SILICA, velocity=velocity)
+    grains = sand.Grains(grid * rest_distance(sand.SILICA, radius), radius, sand.SILICA, velocity=velocity)
     return sand.Simulation(grains, [sand.Contact()])
 
 

@@ -54,7 +54,7 @@ def test_the_sticking_speed_of_equal_grains(name, r):
     m = MATERIALS[name]
     modulus = m.young_modulus / (2 * (1 - m.poisson_ratio**2))
     speed = 1.6394 * (m.surface_energy / (r / 2)) ** (5 / 6) * modulus ** (-1 / 3) * m.density**-0.5
-    assert speed == pytest.approx(sticking_speed(m, r, r), rel=1e-4)
+    assert speed == pytest.approx(sticking_speed(m, r, r), rel=1e-4, abs=0.0)
     assert head_on(m, r, r, 0.995 * speed) == 0.0
     assert head_on(m, r, r, 1.005 * speed) > 0.0
 
@@ -67,7 +67,7 @@ def test_the_rebound(name, factor, r1, r2):
     m = MATERIALS[name]
     stick = sticking_speed(m, r1, r2)
     speed = factor * stick
-    assert head_on(m, r1, r2, speed) == pytest.approx(math.sqrt(speed**2 - stick**2), rel=0.01)
+    assert head_on(m, r1, r2, speed) == pytest.approx(math.sqrt(speed**2 - stick**2), rel=0.01, abs=0.0)
 
 
 def pair_at_rest(r=1e-7, **options):
@@ -119,16 +119,20 @@ def test_periods_of_the_four_modes(mode):
     found, _ = swing(
         pair_at_rest(**start), [LAW], watch, expected, periods=8.2, stepping=sand.Verlet(steps_per_period=100)
     )
-    assert found == pytest.approx(expected, rel=1e-3)
+    assert found == pytest.approx(expected, rel=1e-3, abs=0.0)
 
 
 def test_limits_of_force_and_torque():
     """Critical sliding force G a0²/(4π), rolling moment 4 F_c ξ_c, twisting moment G a0³/(6π) for equal grains."""
     g = sand.SILICA.shear_modulus
-    assert BOND.slide_stiffness * BOND.slide_limit == pytest.approx(g * BOND.rest_radius**2 / (4 * math.pi))
+    assert BOND.slide_stiffness * BOND.slide_limit == pytest.approx(
+        g * BOND.rest_radius**2 / (4 * math.pi), rel=1e-6, abs=0.0
+    )
     moment = BOND.roll_stiffness * BOND.reduced_radius * BOND.roll_limit
-    assert moment == pytest.approx(4 * BOND.pull_off_force * sand.SILICA.rolling_limit)
-    assert BOND.twist_stiffness * BOND.twist_limit == pytest.approx(g * BOND.rest_radius**3 / (6 * math.pi))
+    assert moment == pytest.approx(4 * BOND.pull_off_force * sand.SILICA.rolling_limit, rel=1e-6, abs=0.0)
+    assert BOND.twist_stiffness * BOND.twist_limit == pytest.approx(
+        g * BOND.rest_radius**3 / (6 * math.pi), rel=1e-6, abs=0.0
+    )
 
 
 @pytest.mark.parametrize(("beyond", "share"), [("clamp", 1.0), ("release", 0.5)])
@@ -148,9 +152,9 @@ def test_a_grain_rolled_round_another_by_90_degrees(beyond, share):
         roller.step([np.zeros(3), chord], [[0, 0, 0], [0, 0, 2 * angle]])
     k_r, limit = BOND.roll_stiffness, BOND.roll_limit
     expected = share * k_r * limit * (math.pi * r / 2 - limit)
-    assert roller.sim.world.lost[3] == pytest.approx(expected, rel=0.01)
+    assert roller.sim.world.lost[3] == pytest.approx(expected, rel=0.01, abs=0.0)
     rough = 12 * math.pi**2 * sand.SILICA.surface_energy * (r / 2) * limit * share
-    assert expected == pytest.approx(rough, rel=0.01)
+    assert expected == pytest.approx(rough, rel=0.01, abs=0.0)
 
 
 def test_a_grain_twisted_by_a_full_turn():
@@ -161,8 +165,8 @@ def test_a_grain_twisted_by_a_full_turn():
         for _ in range(steps):
             twister.step(np.zeros((2, 3)), [[sign * 2 * math.pi / steps, 0, 0], [0, 0, 0]])
         expected = BOND.twist_stiffness * tangential.TWIST_LIMIT * (2 * math.pi - tangential.TWIST_LIMIT)
-        assert twister.sim.world.lost[4] == pytest.approx(expected, rel=1e-3)
-        assert expected == pytest.approx(BOND.twist_stiffness * tangential.TWIST_LIMIT * 2 * math.pi, rel=0.01)
+        assert twister.sim.world.lost[4] == pytest.approx(expected, rel=1e-3, abs=0.0)
+        assert expected == pytest.approx(BOND.twist_stiffness * tangential.TWIST_LIMIT * 2 * math.pi, rel=0.01, abs=0.0)
 
 
 @pytest.mark.parametrize("steps", [5_000])

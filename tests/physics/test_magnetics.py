@@ -46,7 +46,7 @@ def test_a_single_grain_swings_about_the_field():
     grains = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=moment)
     expected = 2 * math.pi / math.sqrt(size * 1e-3 / grains.inertia[0])
     found, sim = swing(grains, [sand.Field("1 mT")], lambda s: s.grains.moment[0, 0], expected)
-    assert found == pytest.approx(expected, rel=1e-4)
+    assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
     assert sim.ledger.drift < 1e-4
 
 
@@ -60,7 +60,7 @@ def test_two_far_grains_swing_in_each_others_field():
         grains = sand.Grains([[0, 0, 0], [apart, 0, 0]], r, sand.IRON, moment=moment)
         expected = 2 * math.pi / math.sqrt(factor * MAGNETIC * size**2 / apart**3 / grains.inertia[0])
         found, _ = swing(grains, [sand.Dipoles()], lambda s: s.grains.moment[0, 1], expected, periods=4.2)
-        assert found == pytest.approx(expected, rel=1e-4)
+        assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
 
 
 def test_a_quiet_bound_pair_turns_about_the_field():
@@ -85,7 +85,7 @@ def test_a_quiet_bound_pair_turns_about_the_field():
 
     found, _ = swing(grains, [sand.Contact(), sand.Dipoles(), sand.Field([field, 0, 0])], angle, expected, periods=4.2)
     # the pull of the dipoles shortens D by ~1e-5 of itself; pendulum: tilt²/16 = 2.5e-5
-    assert found == pytest.approx(expected, rel=1e-4)
+    assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
 
 
 def final_state(step, world):
@@ -155,5 +155,5 @@ def test_loads_against_brute_force_with_images():
             energy += 0.5 * weight * u
     assert loads["force"] == pytest.approx(force, abs=1e-12 * np.abs(force).max())
     assert loads["torque"] == pytest.approx(torque, abs=1e-12 * np.abs(torque).max())
-    assert loads["energy"]["magnetic"] == pytest.approx(energy, rel=1e-11)
+    assert loads["energy"]["magnetic"] == pytest.approx(energy, rel=1e-11, abs=0.0)
     assert np.abs(loads["force"].sum(axis=0)).max() < 1e-12 * np.abs(force).sum()

@@ -18,10 +18,10 @@ def distances(grains):
 def test_a_chain():
     """N − 1 contacts at 2r − δ0, straight along x, centred, moments along it."""
     body = chain(7, radius=R, material=M, moment="1 A m^2/kg")
-    assert np.diff(body.position[:, 0]) == pytest.approx(rest_distance(M, R))
+    assert np.diff(body.position[:, 0]) == pytest.approx(rest_distance(M, R), rel=1e-6, abs=0.0)
     assert not body.position[:, 1:].any()
     assert body.position.mean() == pytest.approx(0.0, abs=1e-20)
-    assert body.moment[:, 0] == pytest.approx(body.mass)
+    assert body.moment[:, 0] == pytest.approx(body.mass, rel=1e-6, abs=0.0)
     assert not body.moment[:, 1:].any()
 
 
@@ -29,7 +29,7 @@ def test_a_lattice():
     """3·5·5·4 = 300 contacts of a 5³ cube, nothing closer."""
     d = distances(lattice(5, radius=R, material=M))
     assert np.isclose(d, rest_distance(M, R), rtol=1e-9, atol=0.0).sum() == 300
-    assert d.min() == pytest.approx(rest_distance(M, R))
+    assert d.min() == pytest.approx(rest_distance(M, R), rel=1e-6, abs=0.0)
 
 
 def test_ballistic_particle_cluster_aggregates():
@@ -62,7 +62,7 @@ def test_an_encounter(b):
     assert n == 20
     momentum = (g.mass[:, None] * g.velocity).sum(axis=0)
     assert np.abs(momentum).max() < 1e-12 * g.mass.sum() * 5
-    assert g.velocity[n:].mean(axis=0) - g.velocity[:n].mean(axis=0) == pytest.approx([5.0, 0, 0])
+    assert g.velocity[n:].mean(axis=0) - g.velocity[:n].mean(axis=0) == pytest.approx([5.0, 0, 0], rel=1e-6, abs=0.0)
     gap = np.linalg.norm(g.position[:n, None] - g.position[None, n:], axis=-1) - 2 * R
     assert gap.min() >= 0.5 * R * (1 - 1e-9)
     reach = sum(np.linalg.norm(x.position - x.position.mean(axis=0), axis=1).max() + R for x in (target, projectile))
@@ -75,10 +75,10 @@ def test_turning_keeps_the_body():
     """Distances, sizes of moments and the centre stay; the same seed turns the same way."""
     body = chain(4, radius=R, material=M, moment="1 A m^2/kg")
     one, two = (turned_at_random(body, np.random.default_rng(3)) for _ in range(2))
-    assert distances(one) == pytest.approx(distances(body))
-    assert np.linalg.norm(one.moment, axis=1) == pytest.approx(body.mass)
+    assert distances(one) == pytest.approx(distances(body), rel=1e-6, abs=0.0)
+    assert np.linalg.norm(one.moment, axis=1) == pytest.approx(body.mass, rel=1e-6, abs=0.0)
     axis = (one.position[1] - one.position[0]) / np.linalg.norm(one.position[1] - one.position[0])
-    assert one.moment[0] / body.mass[0] == pytest.approx(axis)
+    assert one.moment[0] / body.mass[0] == pytest.approx(axis, rel=1e-6, abs=0.0)
     assert (one.position == two.position).all()
 
 

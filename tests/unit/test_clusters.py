@@ -30,7 +30,7 @@ def test_mean_cluster_size():
     """Eq. 17 by hand: sizes 3, 1, 1 give (9+1+1)/5; nobody touching gives 1."""
     labels = cluster_labels(5, np.array([[0, 1], [1, 2]]))
     assert cluster_sizes(labels).tolist() == [3, 1, 1]
-    assert mean_cluster_size(labels) == pytest.approx(11 / 5)
+    assert mean_cluster_size(labels) == pytest.approx(11 / 5, rel=1e-6, abs=0.0)
     assert mean_cluster_size(cluster_labels(4, np.zeros((0, 2), int))) == 1.0
 
 
@@ -41,4 +41,4 @@ def test_clusters_are_made_whole():
     cut = box.wrap(chain)
     assert cut[2, 0] < 0
     whole = unwrapped(cut, np.array([[0, 1], [1, 2], [2, 3]]), box)
-    assert whole == pytest.approx(chain)
+    assert whole == pytest.approx(chain, rel=1e-6, abs=0.0)

@@ -41,25 +41,25 @@ def test_every_column_row_by_row(stiffness):
         xi = bond.reduced_radius * (np.array(pose.n1) + np.array(pose.n2))
         roll = np.linalg.norm(xi - (xi @ n) * n)
         row = {name: table[name][c] for name in table}
-        assert row["overlap"] == pytest.approx(overlap, rel=1e-6)
-        assert row["contact_radius"] == pytest.approx(bond.rest_radius * y**2, rel=1e-6)
+        assert row["overlap"] == pytest.approx(overlap, rel=1e-6, abs=0.0)
+        assert row["contact_radius"] == pytest.approx(bond.rest_radius * y**2, rel=1e-6, abs=0.0)
         assert row["slide_share"] == pytest.approx(slide / bond.slide_limit, rel=1e-6, abs=1e-9)
         assert row["roll_share"] == pytest.approx(roll / bond.roll_limit, rel=1e-6, abs=1e-9)
-        assert row["twist_share"] == pytest.approx(abs(w.contacts.twist[c]) / bond.twist_limit)
-        assert row["stretch_share"] == pytest.approx(-overlap / bond.pull_off_overlap, rel=1e-6)
+        assert row["twist_share"] == pytest.approx(abs(w.contacts.twist[c]) / bond.twist_limit, rel=1e-6, abs=0.0)
+        assert row["stretch_share"] == pytest.approx(-overlap / bond.pull_off_overlap, rel=1e-6, abs=0.0)
         assert row["energy_sliding"] == pytest.approx(0.5 * bond.slide_stiffness * slide**2, rel=1e-6, abs=1e-28)
-        assert row["force"] @ n == pytest.approx(row["normal_force"], rel=1e-6)
+        assert row["force"] @ n == pytest.approx(row["normal_force"], rel=1e-6, abs=0.0)
         across = row["force"] - (row["force"] @ n) * n
         assert np.linalg.norm(across) == pytest.approx(row["slide_force"], rel=1e-2, abs=1e-16)
-        assert row["twist_torque"] == pytest.approx(-bond.twist_stiffness * row["twist"], rel=1e-12)
-        assert row["roll_torque"] == pytest.approx(bond.roll_stiffness * bond.reduced_radius * roll, rel=1e-6)
+        assert row["twist_torque"] == pytest.approx(-bond.twist_stiffness * row["twist"], rel=1e-12, abs=0.0)
+        assert row["roll_torque"] == pytest.approx(bond.roll_stiffness * bond.reduced_radius * roll, rel=1e-6, abs=0.0)
         force[i] += row["force"]
         force[j] -= row["force"]
     assert force == pytest.approx(sim.grains.force, abs=1e-9 * np.abs(force).max())
     assert (table["slide_share"] <= 1 + 1e-9).all()
     energies = sim.loads()["energy"]
     for mode in ("normal", "sliding", "rolling", "twisting"):
-        assert table[f"energy_{mode}"].sum() == pytest.approx(energies[mode], rel=1e-9)
+        assert table[f"energy_{mode}"].sum() == pytest.approx(energies[mode], rel=1e-9, abs=0.0)
 
 
 def test_as_a_data_frame_and_a_dataset():

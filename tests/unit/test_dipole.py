@@ -23,11 +23,11 @@ def loads(apart, m1, m2, cut):
 def test_head_to_tail_pair_pulls_with_six_k_over_r_to_the_fourth():
     """On one axis: F = 6 k m1 m2/r⁴ attractive, U = −2 k m1 m2/r³, B at 1 = 2 k m2/r³ (Eqs. 6, 7)."""
     force, b1, b2, energy = dipole.pair_load((2.0, 0, 0), (1.0, 0, 0), (3.0, 0, 0), 1e-7)
-    assert force == pytest.approx((-6e-7 * 3 / 16, 0, 0), rel=1e-14)
-    assert energy == pytest.approx(-2e-7 * 3 / 8, rel=1e-14)
-    assert b1 == pytest.approx((2e-7 * 3 / 8, 0, 0), rel=1e-14)
-    assert b2 == pytest.approx((2e-7 / 8, 0, 0), rel=1e-14)
-    assert dipole.contact_energy(1.0, 3.0, 2.0, 1e-7) == pytest.approx(-energy, rel=1e-14)
+    assert force == pytest.approx((-6e-7 * 3 / 16, 0, 0), rel=1e-14, abs=0.0)
+    assert energy == pytest.approx(-2e-7 * 3 / 8, rel=1e-14, abs=0.0)
+    assert b1 == pytest.approx((2e-7 * 3 / 8, 0, 0), rel=1e-14, abs=0.0)
+    assert b2 == pytest.approx((2e-7 / 8, 0, 0), rel=1e-14, abs=0.0)
+    assert dipole.contact_energy(1.0, 3.0, 2.0, 1e-7) == pytest.approx(-energy, rel=1e-14, abs=0.0)
 
 
 def test_force_equals_the_papers_matrix_form():
@@ -83,11 +83,11 @@ def test_the_cut_is_smooth_and_complete():
     assert dipole.cut_weight(inside, CUT) == (1.0, 0.0)
     assert dipole.cut_weight(outside, CUT) == (0.0, 0.0)
     middle = dipole.cut_weight(0.5 * (1.5**2 + 0.5**2), CUT)
-    assert middle[0] == pytest.approx(0.5)
+    assert middle[0] == pytest.approx(0.5, rel=1e-6, abs=0.0)
     h = 1e-6
     for square in (0.7, 1.2, 2.0):
         slope = (dipole.cut_weight(square + h, CUT)[0] - dipole.cut_weight(square - h, CUT)[0]) / (2 * h)
-        assert dipole.cut_weight(square, CUT)[1] == pytest.approx(-2 * slope, rel=1e-8)
+        assert dipole.cut_weight(square, CUT)[1] == pytest.approx(-2 * slope, rel=1e-8, abs=0.0)
     assert dipole.cut_weight(0.5**2 + 1e-8, CUT)[1] == pytest.approx(0.0, abs=1e-7)
 
 
@@ -98,12 +98,12 @@ def test_scales_of_20_nm_iron():
     moment = 200 * mass
     thermal = math.sqrt(BOLTZMANN * 100 / mass)
     b = dipole.capture_radius(moment, moment, mass / 2, thermal / 16, MAGNETIC)
-    assert b / r == pytest.approx(256, rel=0.01)
+    assert b / r == pytest.approx(256, rel=0.01, abs=0.0)
     reach = dipole.interaction_radius(moment, 2 * r, 100.0, MAGNETIC, BOLTZMANN)
     mu0 = 4 * math.pi * MAGNETIC
-    assert reach == pytest.approx((2 * mu0 / (math.pi * BOLTZMANN * 100) * moment**2) ** (1 / 3), rel=1e-12)
+    assert reach == pytest.approx((2 * mu0 / (math.pi * BOLTZMANN * 100) * moment**2) ** (1 / 3), rel=1e-12, abs=0.0)
     b_thermal = dipole.capture_radius(moment, moment, mass / 2, thermal, MAGNETIC)
-    assert b_thermal / reach == pytest.approx(1.375, abs=0.001)
+    assert b_thermal / reach == pytest.approx(1.375, rel=1e-6, abs=0.001)
 
 
 def test_capture_radius_is_where_the_barrier_equals_the_energy():
@@ -112,4 +112,4 @@ def test_capture_radius_is_where_the_barrier_equals_the_energy():
     b = dipole.capture_radius(1.0, 1.0, reduced, speed, 1.0)
     r = np.linspace(0.2, 10, 2_000_000)
     top = (0.5 * reduced * b**2 * speed**2 / r**2 - alpha / r**3).max()
-    assert top == pytest.approx(0.5 * reduced * speed**2, rel=1e-9)
+    assert top == pytest.approx(0.5 * reduced * speed**2, rel=1e-9, abs=0.0)

@@ -157,7 +157,7 @@ def test_units_are_natural():
     assert time_unit(ledger).size == 1e-9
     assert energy_unit(ledger, 0.0, 5).name == "aJ"
     assert energy_unit(ledger, 0.0, 5).size == 1e-18
-    assert energy_unit(ledger, 50.0, 5).size == pytest.approx(5 * BOLTZMANN * 50.0)
+    assert energy_unit(ledger, 50.0, 5).size == pytest.approx(5 * BOLTZMANN * 50.0, rel=1e-6, abs=0.0)
 
 
 # --- grains ------------------------------------------------------------------------------------------
@@ -178,7 +178,7 @@ def test_projection_is_a_rotation():
     """Rows right, up and eye are orthonormal and right-handed, and z shows upwards."""
     rotation = camera()
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
-    assert np.linalg.det(rotation) == pytest.approx(1.0)
+    assert np.linalg.det(rotation) == pytest.approx(1.0, rel=1e-6, abs=0.0)
     assert rotation[0, 2] == 0.0 and rotation[1, 2] > 0.9
 
 
@@ -198,7 +198,7 @@ def test_picture_shows_each_grain_at_its_place(grown):
         assert np.argmax(seen) == np.argmax(true) or np.ptp(true) < 0.1
     alone = Balls(bare.centre[3:], bare.radius[3:], bare.colour[3:], bare.arrow[3:])
     area = draw(alone, window, 400, 400)[..., 3].sum()
-    assert area == pytest.approx(np.pi * (5e-9 * scale) ** 2, rel=0.02)
+    assert area == pytest.approx(np.pi * (5e-9 * scale) ** 2, rel=0.02, abs=0.0)
 
 
 def test_nearer_grains_hide_farther_ones():
@@ -236,7 +236,7 @@ def test_arrows_are_in_proportion(grown):
     moment = np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 0.0, 0.0]]) * 1e-18
     grains = sand.Grains(grown.grains.position, 1e-9, sand.SILICA, moment=moment)
     size = np.linalg.norm(scene_of(grains, np.empty((0, 2)), grown.box).arrow, axis=1)
-    assert size[0] == pytest.approx(2 * size[1])
+    assert size[0] == pytest.approx(2 * size[1], rel=1e-6, abs=0.0)
     assert size[0] > size[1] > size[2] > 0.0 == size[3]
 
 

@@ -117,7 +117,7 @@ def test_the_trajectory_holds_what_the_world_held(tmp_path):
     assert last.step == sim.world.steps
     assert last.position == pytest.approx(sim.grains.position, abs=1e-6 * 1e-8 * 20)
     assert (last.moment == sim.grains.moment).all()
-    assert last.radius == pytest.approx(sim.grains.radius)
+    assert last.radius == pytest.approx(sim.grains.radius, rel=1e-6, abs=0.0)
     assert (last.pair == sim.contacts["pair"]).all()
     assert last.box.is_open
     with gsd.hoomd.open(str(tmp_path / "run" / "trajectory.gsd"), "r") as file:

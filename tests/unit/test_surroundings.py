@@ -63,11 +63,11 @@ def test_weight_and_electric_force_by_hand():
     grain = one((0.0, 0.0, 2.0), mass=3.0, charge=-5.0)
     down, up = sand.Gravity("9.81 m/s^2"), sand.ElectricField("2 V/m")
     force, _, energy = surroundings.uniform_gravity(0.0, grain, down.numbers())
-    assert force == pytest.approx((0, 0, -3 * 9.81))
-    assert energy == pytest.approx(3 * 9.81 * 2)  # above the origin: positive
+    assert force == pytest.approx((0, 0, -3 * 9.81), rel=1e-6, abs=0.0)
+    assert energy == pytest.approx(3 * 9.81 * 2, rel=1e-6, abs=0.0)  # above the origin: positive
     force, _, energy = surroundings.uniform_electric(0.0, grain, up.numbers())
-    assert force == pytest.approx((0, 0, -10))
-    assert energy == pytest.approx(20)
+    assert force == pytest.approx((0, 0, -10), rel=1e-6, abs=0.0)
+    assert energy == pytest.approx(20, rel=1e-6, abs=0.0)
     for push in (down, up):
         assert push.formula(0.0, one(mass=3.0, charge=-5.0), push.numbers())[2] == 0.0
 
@@ -135,7 +135,9 @@ def test_a_rotating_field_turns_right_handed_about_its_axis():
     check_at(ahead, (0, 0.25), ([0, 2, 0], [-2, 0, 0]))
     diagonal = sand.Field(0, amplitude=[1, -1, 0], axis=[1, 1, 1], **turn)
     check_at(diagonal, (0, 1 / 3, 2 / 3), ([1, -1, 0], [0, 1, -1], [-1, 0, 1]))
-    assert [np.linalg.norm(b_at(diagonal, t)) for t in (1e-7, 3e-7, 8e-7)] == pytest.approx([math.sqrt(2)] * 3)
+    assert [np.linalg.norm(b_at(diagonal, t)) for t in (1e-7, 3e-7, 8e-7)] == pytest.approx(
+        [math.sqrt(2)] * 3, rel=1e-6, abs=0.0
+    )
 
 
 def test_a_ramp_rests_at_both_ends():
@@ -175,7 +177,7 @@ def test_the_size_bounds_the_field_at_all_times_and_is_reached(field):
     sizes = [np.linalg.norm(b_at(field, t)) for t in np.linspace(0.0, 4e-6, 20001)]
     bound = field.flux_density_size()
     assert max(sizes) <= bound * (1 + 10 * EPS)
-    assert max(sizes) == pytest.approx(bound, rel=1e-6)
+    assert max(sizes) == pytest.approx(bound, rel=1e-6, abs=0.0)
 
 
 # --- what forces tell of themselves -----------------------------------------------------------------
@@ -183,7 +185,9 @@ def test_fields_that_change_in_time_say_so():
     """Work is booked and the step limited where B changes; the constant field keeps its cheap formula."""
     assert [f.formula for f in FIELDS] == [uniform_field, field_in_time, field_in_time, field_in_time]
     assert [f.timed for f in FIELDS] == [False, True, True, True]
-    assert [f.longest_step() for f in FIELDS] == pytest.approx([math.inf, MICRO / 200, MICRO / 200, 2e-8])
+    assert [f.longest_step() for f in FIELDS] == pytest.approx(
+        [math.inf, MICRO / 200, MICRO / 200, 2e-8], rel=1e-6, abs=0.0
+    )
     assert flux_density_at(0.0, RAMP.numbers()) == (0.0, 0.0, 1.0)
 
 
@@ -228,7 +232,7 @@ def test_sizes_and_units():
     assert sand.ElectricField("1 kV/cm").strength == (0.0, 0.0, 1e5)
     quantity = pint.UnitRegistry().Quantity
     assert sand.Field(quantity(2.0, "mT")) == sand.Field(quantity([0.0, 0.0, 2.0], "mT")) == sand.Field("2 mT")
-    assert SWING.phase == pytest.approx(math.pi / 6)
+    assert SWING.phase == pytest.approx(math.pi / 6, rel=1e-6, abs=0.0)
     assert (SWING.frequency, TURN.phase, RAMP.end) == (1e6, 0.0, 3e-6)
 
 

@@ -29,7 +29,7 @@ from sand.core.units import in_unit, si, spoken
 )
 def test_text_with_units(text, unit, value):
     """Decimal prefixes come out to the last bit."""
-    assert in_unit(text, unit) == pytest.approx(value, rel=1e-15)
+    assert in_unit(text, unit) == pytest.approx(value, rel=1e-15, abs=0.0)
 
 
 def test_decimal_prefixes_are_exact():
@@ -75,7 +75,7 @@ def test_ranges_and_numbers_that_are_none():
 def test_quantities_of_pint():
     """Of any registry."""
     registry = pint.UnitRegistry()
-    assert in_unit(3 * registry.micrometer, "m") == pytest.approx(3e-6)
+    assert in_unit(3 * registry.micrometer, "m") == pytest.approx(3e-6, rel=1e-6, abs=0.0)
     assert in_unit(3 * registry.second, "m") is None
 
 

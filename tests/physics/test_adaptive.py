@@ -1,0 +1,405 @@
+"""Adaptive Runge–Kutta steps: errors, reversal, a referee for Verlet, touches, books, sameness, settings."""
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+from scipy.integrate import solve_ivp
+
+import sand
+from sand.core.constants import MAGNETIC
+from sand.core.errors import BadInput
+from sand.core.world import CONTACTS, FLIGHT, MADE, REJECTED
+from sand.run.build import case_of, simulation_of
+from sand.run.case import check_case
+
+R = 1e-8
+SIZE = 200 * sand.IRON.density * 4 / 3 * math.pi * R**3
+"""μ of a grain [A m²]."""
+SPEED = 10.0
+"""[m/s], about √(U/m) of two grains at touch."""
+
+
+def scattering(**options):
+    """Two spinning grains that pass at 2.5 r of each other's surface in about 20 ns."""
+    spin = 1e8 * np.random.default_rng(2).normal(size=(2, 3))
+    return sand.Grains(
+        [[0, 0, 0], [6e-8, 4e-8, 0]], R, sand.IRON, moment=SIZE * np.eye(3)[:2], spin=spin,
+        velocity=[[SPEED, 0, 0], [0, 0, 0]], **options,
+    )  # fmt: skip
+
+
+def flight(grains, stepping=None, **options):
+    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=stepping or sand.Adaptive(), **options)
+
+
+def land(sim, end):
+    """Go on to exactly `end` [s], which runs never do: the step to be tried next is cut from outside."""
+    sim.loads()
+    clock = sim.world.clock
+    while sim.time < end * (1 - 1e-15):
+        clock[FLIGHT] = min(clock[FLIGHT] or 1e-12, end - sim.time)
+        sim.run(steps=1)
+    assert sim.time == pytest.approx(end, rel=1e-14)
+    return sim
+
+
+def state_of(grains):
+    """Positions, velocities, moments, spins in units of r, SPEED, μ and 1e9 rad/s: about 1 each."""
+    return np.array([grains.position / R, grains.velocity / SPEED, grains.moment / SIZE, grains.spin / 1e9])
+
+
+def exact(grains, end):
+    """Two dipoles by DOP853 (order 8, rtol 1e-13), moments as vectors that turn: μ̇ = ω×μ; own formulas in NumPy."""
+    unit = R / SPEED
+    mass, inertia = grains.mass[0], grains.inertia[0]
+
+    def rates(_, y):
+        x, v, (a, b), w = y.reshape(4, 2, 3)
+        apart = R * (x[0] - x[1])
+        d = np.linalg.norm(apart)
+        n, k = apart / d, MAGNETIC * SIZE**2
+        force = 3 * k / d**4 * ((a @ n) * b + (b @ n) * a + (a @ b - 5 * (a @ n) * (b @ n)) * n)
+        torque = k / d**3 * np.array([np.cross(a, 3 * n * (b @ n) - b), np.cross(b, 3 * n * (a @ n) - a)])
+        pull = np.array([force, -force]) / mass * unit / SPEED
+        return np.array([v, pull, np.cross(1e9 * unit * w, [a, b]), torque / inertia * unit / 1e9]).ravel()
+
+    done = solve_ivp(rates, (0, end / unit), state_of(grains).ravel(), method="DOP853", rtol=1e-13, atol=1e-14)
+    return done.y[:, -1].reshape(4, 2, 3)
+
+
+def test_the_error_follows_the_tolerance_over_six_decades():
+    """Steps h ∝ tol^(1/5) with errors h⁶ each: in all h⁵ ∝ tol.  Error < 4 tol, falling by 10 (5 … 20) per decade.
+
+    The other road is SciPy's DOP853, good to about 1e-13.
+    """
+    tolerances = 10.0 ** -np.arange(4, 12)
+    errors = []
+    for tolerance in tolerances:
+        sim = flight(scattering(), sand.Adaptive(tolerance=tolerance))
+        sim.run(until="20 ns")
+        assert sim.world.count[MADE] == 0
+        errors.append(np.abs(state_of(sim.grains) - exact(sim.start, sim.time)).max())
+    ratios = np.divide(errors[:-1], errors[1:])
+    assert (np.array(errors) < 4 * tolerances).all()
+    assert (ratios[1:] > 5).all()
+    assert (ratios[1:] < 20).all()
+
+
+def test_each_error_is_prescribed_by_itself():
+    """Three errors out of reach, one tight: the steps are those of the tight one, and shorter for a tighter one."""
+    loose = {"position_error": 1.0, "velocity_error": 1e9, "turn_error": 1e9, "spin_error": 1e30}
+    auto = flight(scattering()).stepping
+    most = flight(scattering(), sand.Adaptive(**loose)).run(until="20 ns").steps
+    for key in loose:
+        steps = [
+            flight(scattering(), sand.Adaptive(**(loose | {key: part * getattr(auto, key)}))).run(until="20 ns").steps
+            for part in (1.0, 1e-3)
+        ]
+        assert most < steps[0] < steps[1]
+        # order 5: (1e-3)^(-1/5) = 4; the first and the last steps are not quite those of the error
+        assert 2.5 < steps[1] / steps[0] < 5
+
+
+def test_scattering_run_back_comes_home():
+    """Velocities and spins reversed at the end, the same time back: the start to 1e-6, of r, speed, μ, ω.
+
+    The errors of both ways are about the tolerance, 1e-9, times the growth of a scattering, less than 100 here.
+    """
+    there = land(flight(scattering()), 2e-8)
+    g = there.grains
+    back = sand.Grains(
+        g.position, R, sand.IRON, moment=g.moment, velocity=-g.velocity, spin=-g.spin,
+    )  # fmt: skip
+    home = land(flight(back), 2e-8).grains
+    found, start = state_of(home), state_of(there.start)
+    assert np.abs(found - start * np.array([1, -1, 1, -1])[:, None, None]).max() < 1e-6
+    assert np.abs(state_of(g)[0] - start[0]).max() > 10
+
+
+def test_verlet_converges_to_it_with_order_two():
+    """The error of Verlet with steps of 1/8, 1/16, 1/32 of 0.2 ns against the adaptive run falls by 4 each: 1.9 … 2.1.
+
+    The adaptive error, 1e-9, is a thousandth of the smallest of these.
+    """
+    end = 100 * 2e-10
+    exactly = state_of(land(flight(scattering()), end).grains)
+    errors = []
+    for parts in (8, 16, 32):
+        sim = flight(scattering(), sand.Verlet(step=2e-10 / parts))
+        sim.run(steps=100 * parts)
+        errors.append(np.abs(state_of(sim.grains) - exactly).max())
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert ((orders > 1.9) & (orders < 2.1)).all()
+
+
+def approaching(offset, *, radii=(1e-8, 1.7e-8), way=1.3e-6, speed=SPEED):
+    """A grain flying along x past another at rest; moments so small that nothing is felt (the code stays the same)."""
+    return sand.Grains(
+        [[0, 0, 0], [way, offset, 0]], radii, sand.IRON, velocity=[[speed, 0, 0], [0, 0, 0]],
+        moment=1e-28 * np.eye(3)[:2],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.9, 1 - 1e-4])
+def test_touch_comes_at_the_analytic_time(part):
+    """Impact parameter b = part (r1 + r2): touch at t = (L − √((r1 + r2)² − b²))/v to 1e-9.
+
+    An overlap of 1e-12 (r1 + r2) is a way of that over √(1 − part²), 1e-10 (r1 + r2) here.
+    """
+    reach = 2.7e-8
+    sim = flight(approaching(part * reach))
+    sim.run(until="140 ns")
+    assert sim.world.count[MADE] == 1
+    assert sim.world.contacts.formed[0] == pytest.approx((1.3e-6 - reach * math.sqrt(1 - part**2)) / SPEED, rel=1e-9)
+
+
+def test_a_grazing_pass_is_seen_and_a_miss_is_none():
+    """b = (1 ∓ 1e-6)(r1 + r2), all of it within one step: a touch, none.  Dipoles this small turn nothing by 1e-6."""
+    for side, made in ((-1, 1), (1, 0)):
+        sim = flight(approaching(2.7e-8 * (1 + side * 1e-6)))
+        sim.run(until="200 ns")
+        assert sim.world.count[MADE] == made
+        if not made:
+            longest = sim._engine.rules.control.longest
+            assert sim.world.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
+
+
+def test_after_the_touch_the_books_close_as_with_verlet():
+    """Two iron grains stick at 10 m/s: change of the total at most that of a run by Verlet alone, plus the tolerance.
+
+    Up to the touch Verlet errs by its accuracy, 1e-8, the adaptive run by 1e-9 or so; from then on both are the same.
+    """
+    drifts = []
+    for stepping in (sand.Adaptive(), sand.Verlet()):
+        grains = sand.Grains(
+            [[0, 0, 0], [5e-8, 5e-9, 0]], R, sand.IRON, moment=SIZE * np.eye(3)[:2], velocity=[[SPEED, 0, 0], [0, 0, 0]]
+        )
+        sim = flight(grains, stepping, frame_every="0.1 ns")
+        sim.run(until="6 ns")
+        assert sim.world.count[CONTACTS] == 1
+        drifts.append(np.abs(sim.ledger["total"] - sim.ledger["total"][0]).max() / sim.ledger.dissipated)
+    assert drifts[0] < 1.5 * drifts[1] + 1e-8
+
+
+def test_a_contact_that_breaks_gives_the_world_back():
+    """Silica at 20 m/s touches, bounces off, and flies on in long steps; made = broken = 1."""
+    moment = 1e-28 * np.eye(3)[:2]
+    grains = sand.Grains([[0, 0, 0], [5e-8, 0, 0]], R, sand.SILICA, moment=moment, velocity=[[20.0, 0, 0], [0, 0, 0]])
+    sim = flight(grains)
+    sim.run(until="100 ns")
+    row = sim.ledger.rows[-1]
+    assert (row["made"], row["broken"], row["contacts"]) == (1, 1, 0)
+    assert sim.world.clock[FLIGHT] == sim._engine.rules.control.longest
+    assert sim.ledger.drift < 1e-3
+
+
+def test_momenta():
+    """P to rounding of its parts; L, a quadratic invariant, to the errors of all steps; so E, and with the tolerance.
+
+    A step misplaces Σ (m |v| Δx + m |x| Δv + I Δω) of L at most.
+    """
+    rng = np.random.default_rng(5)
+    corners = np.array([[x, y, z] for x in range(2) for y in range(2) for z in range(2)])
+    moment = rng.normal(size=(8, 3))
+    moment *= SIZE / np.linalg.norm(moment, axis=1)[:, None]
+    place = 7e-8 * corners + 5e-9 * rng.normal(size=(8, 3))
+    grains = sand.Grains(place, R, sand.IRON, moment=moment, velocity=rng.normal(size=(8, 3)))
+    changes = []
+    for tolerance in (1e-9, 1e-12):
+        sim = flight(grains, sand.Adaptive(tolerance=tolerance))
+        steps = sim.run(until="4 ns").steps
+        assert sim.world.count[MADE] == 0
+        ledger, s, g = sim.ledger, sim.stepping, sim.grains
+        p, angular = (np.array([ledger[f"{k}_{a}"] for a in "xyz"]) for k in ("momentum", "angular_momentum"))
+        speed, reach = np.linalg.norm(g.velocity, axis=1), np.linalg.norm(g.position, axis=1)
+        assert np.abs(p - p[:, :1]).max() < 1e-14 * (g.mass * speed).sum()
+        allowed = (g.mass * (speed * s.position_error + reach * s.velocity_error) + g.inertia * s.spin_error).sum()
+        changes.append([np.abs(angular - angular[:, :1]).max(), np.abs(ledger["total"] - ledger["total"][0]).max()])
+        assert changes[-1][0] < steps * allowed
+    assert (np.array(changes[1]) < 0.01 * np.array(changes[0])).all()
+
+
+BOX = "0.6 um"
+
+
+def in_a_field(grains, stepping=None, margin="auto", **options):
+    """In a periodic box, with lists and a field that turns."""
+    field = sand.Field([0, 0, "1 mT"], shape="rotating", amplitude=["20 mT", 0, 0], axis=[0, 0, 1], frequency="20 MHz")
+    return sand.Simulation(
+        grains, [sand.Contact(), sand.Dipoles(cutoff="0.1 um"), field], box=BOX, stepping=stepping or sand.Adaptive(),
+        neighbours=sand.Neighbours(search="cells", margin=margin), **options,
+    )  # fmt: skip
+
+
+def test_the_work_of_a_turning_field():
+    """One grain: I ω̇ = μ×B, μ̇ = ω×μ, Ẇ = −μ·Ḃ by DOP853: W = −lost_outside, and the total stays, to 1e-7 of μB.
+
+    Some hundred steps, each wrong by the tolerance, 1e-9.
+    """
+    grains = sand.Grains([[0, 0, 0]], R, sand.IRON, moment=[[SIZE, 0, SIZE]], spin=[[1e7, 2e7, 0]])
+    sim = in_a_field(grains)
+    sim.run(until="100 ns")
+    unit, omega, inertia = 1e-8, 2 * math.pi * 2e7, grains.inertia[0]
+
+    def rates(t, y):
+        c, s = 0.02 * math.cos(omega * t * unit), 0.02 * math.sin(omega * t * unit)
+        torque = SIZE * np.cross(y[:3], [c, s, 1e-3])
+        work = -SIZE * y[:3] @ [-omega * s, omega * c, 0.0]
+        return [*np.cross(y[3:6], y[:3]), *(torque / inertia * unit**2), work * unit / (0.02 * SIZE)]
+
+    start = [1, 0, 1, *(unit * grains.spin[0]), 0.0]
+    done = solve_ivp(rates, (0, sim.time / unit), start, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    row, scale = sim.ledger.rows[-1], 0.02 * SIZE
+    assert np.abs(sim.grains.moment[0] / SIZE - done[:3]).max() < 1e-7
+    assert abs(done[6]) > 0.1
+    assert row["lost_outside"] == pytest.approx(-scale * done[6], abs=1e-7 * scale)
+    assert np.abs(sim.ledger["total"] - sim.ledger["total"][0]).max() < 1e-7 * scale
+
+
+def hot_gas():
+    return sand.setup.gas(64, BOX, radius=R, material=sand.IRON, moment="200 A m^2/kg", temperature="3e5 K", seed=3)
+
+
+def test_no_pair_is_missed_by_a_list():
+    """64 fast grains with a margin of 20 and of 60 nm: the same first touch, the same places to 1e-6 r.
+
+    A list used too long lacks pairs; their loads are 1e-3 of what two grains at touch feel, or more.
+    """
+    ends = []
+    for margin in ("20 nm", "60 nm"):
+        sim = in_a_field(hot_gas(), margin=margin)
+        while sim.world.count[MADE] == 0:
+            sim.run(steps=1)
+        ends.append(sim)
+    a, b = ends
+    assert a.world.count[10] > b.world.count[10] > 1  # lists made
+    assert a.world.contacts.pair[:, 0].tolist() == b.world.contacts.pair[:, 0].tolist()
+    assert a.time == pytest.approx(b.time, rel=1e-8)
+    apart = np.array([sand.Box.periodic(BOX).nearest(x) for x in a.grains.position - b.grains.position])
+    assert np.abs(apart).max() < 1e-6 * R
+    # nobody overlaps but the two that touched
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(np.mod(a.grains.position + 3e-7, 6e-7), boxsize=6e-7)
+    assert len(tree.query_pairs(2 * R * (1 - 1e-9))) == 0
+
+
+def four():
+    """Grains of which the first two touch after 6 ns or so."""
+    rng = np.random.default_rng(8)
+    return sand.Grains(
+        [[0, 0, 0], [8e-8, 4e-9, 0], [0, 9e-8, 0], [0, 0, 1.1e-7]], R, sand.IRON,
+        moment=SIZE * np.array([[1, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        velocity=[[SPEED, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]], spin=1e8 * rng.normal(size=(4, 3)),
+    )  # fmt: skip
+
+
+def bits(sim):
+    return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
+
+
+def test_pieces_and_cadence_change_no_bit():
+    """Whole, in pieces, watched often: the same state; grains fly, touch, and go on with Verlet."""
+    ends = []
+    for pieces, every in (((600,), "1 s"), ((1, 2, 3, 594), "1 s"), ((600,), "0.01 ns")):
+        sim = flight(four(), frame_every=every)
+        for steps in pieces:
+            sim.run(steps=steps)
+        assert sim.world.count[CONTACTS] > 0
+        ends.append(bits(sim))
+    assert ends[0] == ends[1] == ends[2]
+
+
+@pytest.mark.parametrize("stop", [20, 400])
+def test_resume_is_bit_for_bit(tmp_path, stop):
+    """Stopped in free flight, and with a contact: the resumed run ends as the whole one, with the same errors."""
+    whole = flight(four(), frame_every="1 ns")
+    whole.run(steps=600)
+    flight(four(), out=tmp_path / "run", frame_every="1 ns").run(steps=stop)
+    rest = sand.resume(tmp_path / "run")
+    assert (rest.world.count[CONTACTS] > 0) == (stop > 100)
+    assert rest.stepping == whole.stepping
+    rest.run(steps=600 - stop)
+    assert bits(rest) == bits(whole)
+
+
+def test_rejected_steps_are_counted_and_change_nothing_else():
+    """A first step far too long is rejected until it fits; the end differs by no more than the tolerance does."""
+    sim = flight(scattering())
+    sim.loads()
+    sim.world.clock[FLIGHT] = 1e-8
+    sim.run(steps=1)
+    assert sim.world.count[REJECTED] > 1
+    assert sim.world.clock[FLIGHT] < 1e-9
+    land(sim, 2e-8)
+    assert np.abs(state_of(sim.grains) - exact(sim.start, 2e-8)).max() < 4e-9
+
+
+def test_what_no_step_can_follow_stops_the_run():
+    """Opposite dipoles without contacts fall through each other, ∝ 1/r³: an outcome, and finite numbers."""
+    along = SIZE * np.array([[1.0, 0, 0], [1.0, 0, 0]])
+    grains = sand.Grains([[0, 0, 0], [4e-8, 0, 0]], R, sand.IRON, moment=along)
+    sim = flight(grains)
+    sim._engine.rules = sim._engine.rules._replace(contact=sim._engine.rules.contact._replace(on=False))
+    result = sim.run(until="1 us")
+    assert result.outcome is sand.Outcome.NO_STEP
+    assert result.grains != ()
+    assert np.isfinite(sim.grains.position).all()
+
+
+def test_settings():
+    """Every mistake, one line each."""
+    with pytest.raises(BadInput) as caught:
+        sand.Adaptive(tolerance=0, position_error="1 s", velocity_error=-1, turn_error="tight", touching="verlet")
+    lines = caught.value.problems
+    assert len(lines) == 5
+    for key, line in zip(
+        ("tolerance", "position_error", "velocity_error", "turn_error", "touching"), lines, strict=True
+    ):
+        assert f"stepping: {key}" in line
+    settled = flight(sand.Grains([[0, 0, 0], [1e-7, 0, 0]], R, sand.IRON, moment=1e-28 * np.eye(3)[:2])).stepping
+    assert settled.position_error == 1e-9 * R
+    assert settled.velocity_error > 0
+    assert settled.spin_error > 0
+    given = flight(scattering(), sand.Adaptive(position_error="1 pm", spin_error="1e3 rad/s")).stepping
+    assert (given.position_error, given.spin_error) == (pytest.approx(1e-12), 1e3)
+
+
+CASE = """
+[run]
+until = "1 ns"
+[box]
+periodic = "400 nm"
+[grains]
+number = 3
+moment = "200 A m^2/kg"
+radius = "10 nm"
+[forces.dipoles]
+[stepping]
+method = "adaptive"
+"""
+
+
+def test_case_files():
+    """[stepping] method = "adaptive" there and back; unknown words are told apart by method."""
+    content = tomllib.loads(CASE + 'spin_error = "1e3 rad/s"\n[stepping.touching]\nsteps_per_period = 50\n')
+    sim = simulation_of(check_case(content, "some.toml"), None)
+    assert sim.stepping.spin_error == 1e3
+    assert sim.stepping.touching == sand.Verlet(steps_per_period=50)
+    again = check_case(tomllib.loads(tomli_w.dumps(case_of(sim, 1e-9, math.inf))), "case.toml")
+    assert again.stepping == sim.stepping
+    for text, said in (
+        ("tolerence = 1e-9", ["stepping.tolerence", "did you mean 'tolerance'?"]),
+        ("step = 1e-9", ["stepping.step", "no such key"]),
+        ("tolerance = -1", ["stepping: tolerance = -1 must be above 0"]),
+        ("[stepping.touching]\nfar_stepps = 3", ["stepping.touching.far_stepps", "did you mean 'far_steps'?"]),
+    ):
+        with pytest.raises(BadInput) as caught:
+            check_case(tomllib.loads(CASE + text), "some.toml")
+        assert len(caught.value.problems) == 1
+        assert all(part in caught.value.problems[0] for part in said), caught.value.problems
+    with pytest.raises(BadInput, match="did you mean 'adaptive'"):
+        check_case(tomllib.loads(CASE.replace('"adaptive"', '"adaptiv"')), "some.toml")
