@@ -197,8 +197,8 @@ def brownian(count, temperature="300 K", seed=1, **options):
 def test_brownian_grains():
     """⟨x²⟩ = 2 (kT/m) τ² (t/τ − 1 + e^(−t/τ)) per axis, ⟨v(0)v(t)⟩ = (kT/m) e^(−t/τ), ½mv² and ½Iω² each (3/2)kT.
 
-    All to 3σ; 4000 grains × 3 axes: σ of a variance √(2/12000) = 1.3 %, of the autocorrelation √(1/12000).  Kicks each τ/20 make
-    the diffusion 2e-4 too fast (p²/12τ²), below that.
+    All to 3σ; 4000 grains × 3 axes: σ of a variance √(2/12000) = 1.3 %, of the autocorrelation √(1/12000).  Kicks each
+    τ/20 make the diffusion 2e-4 too fast (p²/12τ²), below that.
     """
     count = 4000
     sim, gas, _ = brownian(count)

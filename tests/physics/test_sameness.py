@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import CONTACTS, FAR_SUMS
+from sand.core.world import CONTACTS, FAR_SUMS, LISTED
 
 from .setups import random_aggregate, struck_chain
 
@@ -56,6 +56,28 @@ def test_running_in_pieces_changes_nothing():
     assert whole.world.count[CONTACTS] > 0
     assert whole.world.count[FAR_SUMS] < 0.7 * whole.world.steps
     assert state(whole) == state(pieces)
+
+
+def test_a_listed_run_goes_on_from_its_saved_state():
+    """The list is made from the anchors in the saved state: cut where it is old, and the same bits come out."""
+
+    def start(**options):
+        grains = sand.setup.gas(
+            80, "1.2 um", radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="1000 K", seed=2
+        )
+        forces = [sand.Contact(), sand.Dipoles(cutoff="0.25 um")]
+        return sand.Simulation(grains, forces, box="1.2 um", seed=2, **options)
+
+    whole = start()
+    assert whole._engine.rules.search.listed
+    whole.run(steps=3000)
+    saved = {name: array.copy() for name, array in whole.world.to_arrays().items()}
+    lists = whole.world.count[LISTED]
+    whole.run(steps=6000)
+    assert whole.world.count[LISTED] > lists > 1
+    again = start(restart=(saved, {"temperature": 1000.0, "wall_seconds": 0.0}))
+    again.run(steps=6000)
+    assert state(whole) == state(again)
 
 
 def test_growing_arrays_changes_nothing():

@@ -38,6 +38,7 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
         radius=section.radius,
         material=library[section.material],
         moment=section.moment,
+        charge=section.charge,
         temperature=section.temperature,
         spins=section.spins,
         seed=case.run.seed,

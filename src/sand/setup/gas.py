@@ -29,6 +29,7 @@ def gas(
     radius: Any,
     material: Material | str,
     moment: Any = None,
+    charge: Any = None,
     temperature: Any = "0 K",
     spins: str = "kT/2",
     seed: int = 0,
@@ -42,6 +43,7 @@ def gas(
         material: a Material or the name of a preset.
         moment: size of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
             own; directions are isotropic.
+        charge: of each grain [C], one number or (N,); none by default.
         temperature: T [K] ≥ 0 of velocities and spins.  Velocities are Maxwellian, total momentum 0.
         spins: "kT/2" mean rotational energy per grain as in Dominik & Nübold (2002), section 3;
             "equipartition" (3/2) kT; "none".
@@ -61,7 +63,7 @@ def gas(
         raise BadInput(f"seed = {seed!r} must be a whole number of at least 0")
     kelvin = si(temperature, "K", "temperature", least=0.0)
     streams = [np.random.default_rng(s) for s in np.random.SeedSequence(int(seed)).spawn(4)]
-    blank = Grains(np.zeros((number, 3)), radius, material)
+    blank = Grains(np.zeros((number, 3)), radius, material, charge=charge)
     position = scatter(blank.radius, space, streams[0])
     mass, inertia = blank.mass[:, None], blank.arrays.inertia[:, None]
     velocity = streams[1].normal(size=(number, 3)) * np.sqrt(BOLTZMANN * kelvin / mass)
@@ -71,7 +73,7 @@ def gas(
     if moment is not None:
         specific = np.array([m.specific_moment for m in blank.materials])[blank.material]
         moments = directions(number, streams[3]) * moment_size(moment, blank.mass, specific)[:, None]
-    return Grains(position, radius, material, velocity=velocity, spin=spin, moment=moments)
+    return Grains(position, radius, material, velocity=velocity, spin=spin, moment=moments, charge=charge)
 
 
 def directions(count: int, rng: np.random.Generator) -> np.ndarray:
