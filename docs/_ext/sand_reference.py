@@ -353,8 +353,12 @@ LEDGER = {
     "sliding": ("J", "stored by the sliding springs"),
     "rolling": ("J", "stored by the rolling springs"),
     "twisting": ("J", "stored by the twisting springs"),
-    "magnetic": ("J", "dipole–dipole energy of all pairs"),
-    "(one per force)": ("J", "energy of each per-grain force under its name, for example `field`"),
+    "magnetic": ("J", "dipole–dipole energy of all pairs; 0 without dipoles"),
+    "(one per force)": (
+        "J",
+        "energy of each other long-range force (`coulomb`, `gravitation`) and of each per-grain force under its name "
+        "(`field`, `gravity`, `electric`)",
+    ),
     "lost_forming": ("J", "dissipated when contacts formed"),
     "lost_breaking": ("J", "dissipated when contacts broke, what their springs held included"),
     "lost_sliding": ("J", "dissipated by sliding beyond the limit"),
@@ -362,6 +366,12 @@ LEDGER = {
     "lost_twisting": ("J", "dissipated by twisting beyond the limit"),
     "lost_damping": ("J", "dissipated by the damping of the normal motion"),
     "lost_stiffness": ("J", "taken out of the springs by stiffnesses that follow the contact radius; may be negative"),
+    "lost_gas": ("J", "given to the gas by drag and blows; negative where it heats the grains or its wind drives them"),
+    "lost_outside": (
+        "J",
+        "work done on the sources of outside forces, where fields change or grains cross periodic boundaries; negative "
+        "where they gave energy",
+    ),
     "total": ("J", "sum of all energies and all losses; constant but for the error of the integrator"),
     "momentum_x": ("kg m/s", "momentum; also `_y`, `_z`"),
     "angular_momentum_x": ("J s", "angular momentum about the origin, spins included; also `_y`, `_z`"),
@@ -423,9 +433,9 @@ def outcomes_page() -> str:
 # --- case files ---------------------------------------------------------------------------------------
 CASE_KEYS = {
     "run.until": "end of the run, simulated time; this or `steps` is needed",
-    "run.steps": "end of the run, number of steps; with both, whichever comes first",
+    "run.steps": "end of the run, number of steps; with both, whichever comes first. A cycle of long-range forces is taken to its end",
     "run.frame_every": "time between frames and rows of the ledger; a two-hundredth of the run by default",
-    "run.seed": "seed of everything random",
+    "run.seed": "seed of everything random: the grains, and the blows of a gas",
     "run.out": "folder of the run",
     "box.periodic": '[m] one length for a cube, or three, with "open" for an open axis; without it, open space',
     "grains.kind": "`gas`: grains at random places; `given`: marks the case file of a run from a script",
@@ -456,6 +466,8 @@ def _bracketed(note: str) -> str:
 
 
 def _default(value: Any) -> str:
+    if value is dataclasses.MISSING:  # made anew for each
+        return "see text"
     if value is None:
         return "none"
     if isinstance(value, (str, int, float)):
@@ -510,10 +522,18 @@ def case_page() -> str:
                 for key, inner in kind.model_fields.items():
                     law = next(t for t in typing.get_args(inner.annotation) if t is not type(None))
                     out += [f"### `[forces.{key}]`", escaped(first_sentence(law.__doc__)), _settings(law, head)]
+            elif name == "stepping":
+                words = ", ".join(f'`"{m}"`' for m in case.INTEGRATORS)
+                out += [f"## `[{name}]`", "The integrator, by `method`; each has keys of its own."]
+                for word, law in case.INTEGRATORS.items():
+                    first = [["`method`", '`"verlet"`', "", f'`"{word}"`, one of {words}']]
+                    out += [
+                        f'### `method = "{word}"`',
+                        escaped(first_sentence(law.__doc__)),
+                        _settings(law, head, first),
+                    ]
             elif dataclasses.is_dataclass(kind):
-                methods = ", ".join(f'`"{m}"`' for m in case.INTEGRATORS)
-                first = [["`method`", '`"verlet"`', "", f"the integrator: {methods}"]]
-                out += [f"## `[{name}]`", escaped(first_sentence(kind.__doc__)), _settings(kind, head, first)]
+                out += [f"## `[{name}]`", escaped(first_sentence(kind.__doc__)), _settings(kind, head)]
             else:
                 note = "" if not field.is_required() else " This section is required."
                 out += [f"## `[{name}]`", of_section(kind.__doc__) + note]
@@ -531,7 +551,7 @@ def _settings(kind: Any, head: list[str], rows: list[list[str]] | None = None) -
     notes = argument_notes(kind.__doc__)
     rows = list(rows or [])
     for field in dataclasses.fields(kind):
-        needed = field.default is dataclasses.MISSING
+        needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         note = notes[field.name]
         rows.append(
             [f"`{field.name}`", "**required**" if needed else _default(field.default), cell(_bracketed(note)), note]

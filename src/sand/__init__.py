@@ -32,6 +32,7 @@ _HOMES = {
     "Gravity": "forces.gravity",
     "ElectricField": "forces.electric",
     "Verlet": "stepping.verlet",
+    "Adaptive": "stepping.adaptive",
     "Neighbours": "stepping.neighbours",
     "Simulation": "run.simulation",
     "resume": "run.build",
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from .run.outcome import Outcome as Outcome
     from .run.outcome import Result as Result
     from .run.simulation import Simulation as Simulation
+    from .stepping.adaptive import Adaptive as Adaptive
     from .stepping.neighbours import Neighbours as Neighbours
     from .stepping.verlet import Verlet as Verlet
 

@@ -66,6 +66,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
             80, "1.2 um", radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="1000 K", seed=2
         )
         forces = [sand.Contact(), sand.Dipoles(cutoff="0.25 um")]
+        options |= {"neighbours": sand.Neighbours(margin="20 nm")}
         return sand.Simulation(grains, forces, box="1.2 um", seed=2, **options)
 
     whole = start()

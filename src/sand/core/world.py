@@ -13,8 +13,8 @@ from .errors import BadInput
 from .grains import GrainArrays, Grains
 
 # --- places in World.clock (float64) ---------------------------------------------------------------
-TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED = range(9)
-CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", "calm", "kicked")
+TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED, FLIGHT = range(10)
+CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", "calm", "kicked", "flight")
 
 # --- places in World.count (int64) -----------------------------------------------------------------
 _NAMES = "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected"
@@ -84,6 +84,14 @@ class FarArrays(NamedTuple):
     path: np.ndarray  # (3, N) displacement since the last summation, summed over time [m s]
 
 
+class StageArrays(NamedTuple):
+    """Room for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Never saved."""
+
+    start: np.ndarray  # (13, N) the state that a step begins with
+    rate: np.ndarray  # (7, 13, N) its rates of change at each stage
+    power: np.ndarray  # (7,) of the outside forces at each stage [W]
+
+
 KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment")
 """The far arrays that a checkpoint holds; the others follow from them."""
 CELLS_PER_GRAIN = 4
@@ -124,6 +132,11 @@ def near_pairs(grains: int, capacity: int) -> NearPairs:
     )
 
 
+def stage_arrays(grains: int) -> StageArrays:
+    """Room for so many grains; 0 where no Runge–Kutta step is taken."""
+    return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
+
+
 def _grown(arrays: Any, per_grain: tuple[str, ...]) -> Any:
     """The same columns in arrays twice as long."""
     longer = {}
@@ -149,6 +162,7 @@ class World:
     clock: np.ndarray = field(default_factory=lambda: np.zeros(len(CLOCK)))
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
+    stages: StageArrays = field(default_factory=lambda: stage_arrays(0))
 
     @property
     def time(self) -> float:
@@ -221,8 +235,10 @@ __all__ = [name for name in dir() if name.isupper()] + [
     "ContactArrays",
     "FarArrays",
     "NearPairs",
+    "StageArrays",
     "World",
     "contact_arrays",
     "far_arrays",
     "near_pairs",
+    "stage_arrays",
 ]

@@ -20,6 +20,7 @@ from ..forces.base import Force
 from ..forces.contact import Contact
 from ..run.simulation import Simulation
 from ..setup.encounters import encounter, turned_at_random
+from ..stepping.adaptive import Adaptive
 from ..stepping.verlet import Verlet
 
 QUIET = 3
@@ -86,7 +87,7 @@ def collide(
     along: Any = "x",
     seed: int | None = None,
     forces: Sequence[Force] | None = None,
-    stepping: Verlet | None = None,
+    stepping: Verlet | Adaptive | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
     observers: Sequence[Any] = (),

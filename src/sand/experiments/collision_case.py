@@ -14,7 +14,16 @@ from ..core.grains import Grains, moment_size
 from ..core.material import PRESETS, Material
 from ..files.bodies import read_body
 from ..files.folder import read_toml
-from ..run.case import INTEGRATORS, ForcesSection, MaterialSection, Section, integrator, quantity, wrong_materials
+from ..run.case import (
+    INTEGRATORS,
+    ForcesSection,
+    MaterialSection,
+    Section,
+    integrator,
+    quantity,
+    with_integrator,
+    wrong_materials,
+)
 from ..run.mistakes import complaints
 from ..setup.aggregates import KINDS
 from ..stepping.verlet import Verlet
@@ -126,12 +135,12 @@ def read_collision(path: str | Path) -> CollisionCase:
         name = given.get("material", "silica") if isinstance(given, dict) else "silica"
         if str(name) not in known:
             problems.append(f"{body}.material: unknown material '{name}'; {did_you_mean(str(name), known)}")
-    case = None
+    case, model = None, with_integrator(CollisionCase, content)
     try:
-        case = CollisionCase.model_validate(content)
+        case = model.model_validate(content)
     except ValidationError as error:
         extra: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
-        problems += [line for slip in error.errors() for line in complaints(slip, CollisionCase, extra)]
+        problems += [line for slip in error.errors() for line in complaints(slip, model, extra)]
     if problems or case is None:
         raise BadInput(f"{path}: {problem}" for problem in problems)
     return case
@@ -143,7 +152,8 @@ def run_seed(text: str, seed: int) -> dict[str, Any]:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return CollisionCase.model_validate(json.loads(text)).run(seed)[0].to_dict()
+        content = json.loads(text)
+        return with_integrator(CollisionCase, content).model_validate(content).run(seed)[0].to_dict()
 
 
 def run_seeds(case: dict[str, Any], seeds: list[int], executor: Any = None) -> list[dict[str, Any]]:

@@ -203,7 +203,9 @@ class Field:
 
     def flux_density_at(self, time: float) -> tuple[float, float, float]:
         """B [T] at a time [s]."""
-        x, y, z = self.numbers() if self.shape == "constant" else flux_density_at(time, self.numbers())
+        if self.shape == "constant":
+            return self.flux_density
+        x, y, z = flux_density_at(time, self.numbers())
         return x, y, z
 
     def flux_density_size(self) -> float:

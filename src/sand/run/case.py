@@ -13,6 +13,7 @@ from pydantic import (
     Field,
     ValidationError,
     ValidationInfo,
+    create_model,
     field_validator,
     model_validator,
 )
@@ -31,11 +32,12 @@ from ..forces.field import Field as MagneticField
 from ..forces.gas import Gas
 from ..forces.gravity import Gravity
 from ..setup.gas import SPINS
+from ..stepping.adaptive import Adaptive
 from ..stepping.neighbours import Neighbours
 from ..stepping.verlet import Verlet
 from .mistakes import complaints
 
-INTEGRATORS = {"verlet": Verlet}
+INTEGRATORS: dict[str, type] = {"verlet": Verlet, "adaptive": Adaptive}
 
 
 def quantity(unit: str, **bounds: float) -> Any:
@@ -113,6 +115,7 @@ class GrainsSection(Section):
     radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
     material: str | list[str] = "iron"
     moment: Any = None
+    charge: quantity("C") | None = None  # type: ignore[valid-type]
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
     spins: str = "kT/2"
 
@@ -155,13 +158,22 @@ class ForcesSection(Section):
 
 
 def integrator(value: Any) -> Any:
-    """[stepping] without its `method`, which picks the integrator (one so far)."""
+    """[stepping] without its `method`, which has picked the model by then (`with_integrator`)."""
     if isinstance(value, dict) and "method" in value:
         value = dict(value)
         method = value.pop("method")
         if method not in INTEGRATORS:
             raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
     return value
+
+
+def with_integrator(model: type[Any], content: dict[str, Any]) -> type[Any]:
+    """The model of a case file whose [stepping] has the keys of the method that `content` names."""
+    given = content.get("stepping")
+    kind = INTEGRATORS.get(str(given.get("method", "verlet"))) if isinstance(given, dict) else None
+    if kind is None or kind is model.model_fields["stepping"].annotation:
+        return model
+    return create_model(model.__name__, __base__=model, stepping=(kind, kind()))
 
 
 class Case(Section):
@@ -232,13 +244,14 @@ def read_case(path: str | Path) -> Case:
 def check_case(content: dict[str, Any], name: str) -> Case:
     """A Case from a dictionary; `name` stands in front of each complaint.  Raises BadInput."""
     kinds: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
+    model = with_integrator(Case, content)
     problems = _unknown_materials(content)
     try:
-        case = Case.model_validate(content)
+        case = model.model_validate(content)
         case.materials_by_name()
     except ValidationError as error:
         problems += wrong_materials(content)
-        problems += [line for slip in error.errors() for line in complaints(slip, Case, kinds)]
+        problems += [line for slip in error.errors() for line in complaints(slip, model, kinds)]
     except BadInput as error:
         problems += error.problems
     if problems:

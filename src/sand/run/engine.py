@@ -14,9 +14,12 @@ from ..forces.base import FarForce, GrainForce
 from ..kernels.cells import FULL, remake_far_list
 from ..kernels.far import shares_for
 from ..kernels.outside import outside_shares_for
+from ..stepping.adaptive import Adaptive
 from ..stepping.advance import driver_for
 from ..stepping.control import GROW_EVERY
+from ..stepping.flight import flight_driver_for
 from ..stepping.rules import Plan, Rules, Stop
+from ..stepping.verlet import Verlet
 
 
 @dataclass
@@ -30,6 +33,7 @@ class Engine:
         far: the long-range forces that some grain feels, with their loops and numbers.
         outside: the per-grain forces.
         search: how neighbours are found, in words.
+        stepping: the integrator, with a number for everything that depends on the grains at the start.
     """
 
     world: World
@@ -38,18 +42,20 @@ class Engine:
     outside: Sequence[GrainForce]
     far: Sequence[tuple[FarForce, Any, Any]]
     search: str
+    stepping: Verlet | Adaptive
     _plan: Plan
     _advance: Callable = field(init=False)
 
     def __post_init__(self) -> None:
-        self._advance = driver_for(self._plan)
+        self._advance = flight_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
 
     def advance(self, until: float, most_steps: float) -> Stop:
         """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
         w = self.world
         last = min(w.steps + most_steps, 2**62)
         while True:
-            arrays = (w.grains.arrays, w.contacts, w.near, w.far, w.clock, w.count, w.lost)
+            stages = (w.stages,) if self._plan.adaptive else ()
+            arrays = (w.grains.arrays, w.contacts, w.near, w.far, *stages, w.clock, w.count, w.lost)
             stop = Stop(self._advance(*arrays, self.rules, float(until), int(last)))
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()

@@ -54,6 +54,7 @@ def _annotations(kind: Any, extra: dict[type, list[str]]) -> dict[str, Any]:
         if isinstance(candidate, type) and issubclass(candidate, BaseModel):
             return {k: f.annotation for k, f in candidate.model_fields.items()}
         if dataclasses.is_dataclass(candidate):
-            own = [f.name for f in dataclasses.fields(candidate)]
-            return dict.fromkeys([*extra.get(typing.cast(type, candidate), []), *own])
+            hints = typing.get_type_hints(candidate)
+            own = {f.name: hints[f.name] for f in dataclasses.fields(candidate)}
+            return dict.fromkeys(extra.get(typing.cast(type, candidate), [])) | own
     return {}

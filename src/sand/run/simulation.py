@@ -17,6 +17,7 @@ from ..core.grains import Grains
 from ..core.units import si, spoken
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
+from ..stepping.adaptive import Adaptive
 from ..stepping.neighbours import Neighbours
 from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
@@ -40,7 +41,7 @@ class Simulation:
         grains: the start; copied.
         forces: a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once.
         box: a Box, or a length for a periodic cube; open by default.
-        stepping: the integrator, `sand.Verlet()` by default.
+        stepping: the integrator, `sand.Verlet()` by default, or `sand.Adaptive()`.
         neighbours: how pairs within reach are found, `sand.Neighbours()` by default.
         seed: of random forces; kept with the run.
         out: folder for the run's files, made at the first `run`; None keeps everything in memory.
@@ -59,7 +60,7 @@ class Simulation:
         forces: Sequence[Force] = (),
         *,
         box: Any = None,
-        stepping: Verlet | None = None,
+        stepping: Verlet | Adaptive | None = None,
         neighbours: Neighbours | None = None,
         seed: int | None = None,
         out: str | Path | None = None,
@@ -72,7 +73,6 @@ class Simulation:
             raise BadInput(f"grains = {grains!r}; give sand.Grains(…) or sand.setup.gas(…)")
         self.forces = list(forces)
         self.box = as_box(box)
-        self.stepping = stepping or Verlet()
         self.neighbours = neighbours or Neighbours()
         self.seed = seed
         self.observers = list(observers)
@@ -82,8 +82,9 @@ class Simulation:
         self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
         self.start = grains.copy()
         self._engine = build_engine(
-            grains, self.forces, self.box, self.stepping, self.neighbours, self.seed or 0, fresh=restart is None
+            grains, self.forces, self.box, stepping or Verlet(), self.neighbours, self.seed or 0, fresh=restart is None
         )
+        self.stepping = self._engine.stepping
         self.world = self._engine.world
         self.temperature = kinetic_temperature(grains)
         columns = [force.column for force, _, _ in self._engine.far] + [f.name for f in self._engine.outside]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,14 +12,16 @@ from ..core.box import Box
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.material import SILICA
-from ..core.world import World, contact_arrays, far_arrays, near_pairs
+from ..core.world import World, contact_arrays, far_arrays, near_pairs, stage_arrays
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact
 from ..forces.gas import Gas
+from ..kernels.far import FarSums
 from ..kernels.gas import VACUUM
 from ..kernels.outside import is_ours
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
+from ..stepping.adaptive import Adaptive
 from ..stepping.control import IMPACT_PART, Control
 from ..stepping.neighbours import Found, Neighbours
 from ..stepping.rules import Books, ContactRules, Plan, Rules, Stirring
@@ -49,7 +51,7 @@ def build_engine(
     grains: Grains,
     forces: Sequence[Force],
     box: Box,
-    stepping: Verlet,
+    stepping: Verlet | Adaptive,
     neighbours: Neighbours,
     seed: int = 0,
     *,
@@ -78,36 +80,50 @@ def build_engine(
         (f, f.sums(box, found.search.listed and r is not None), f.numbers(grains, box))
         for f, r in zip(given.distant, cutoffs, strict=True)
     ]
+    verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
+    control = _control(grains, verlet, given, reach)
+    if isinstance(stepping, Adaptive):
+        stepping = stepping.settled(grains, control)
     composed, numbers = compose(given.outside)
     sums, far_numbers = compose_far([sums for _, sums, _ in far], [own for _, _, own in far])
     rules = Rules(
         box.span,
-        _contact_rules(given.contact, grains, stepping),
+        _contact_rules(given.contact, grains, verlet),
         far_numbers,
         numbers,
         found.search,
-        stepping.beat(bool(far)),
+        verlet.beat(bool(far)),
         _books(given.outside, box),
         _stirring(given.gas, grains, seed),
-        _control(grains, stepping, given, reach),
+        control,
+        stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
     )
-    plan = Plan(
-        composed,
-        sums,
-        split=bool(far) and stepping.far in ("impulse", "taylor"),
-        impulse=bool(far) and stepping.far == "impulse",
-        foretell=bool(far) and stepping.far.startswith("taylor"),
-        gas=bool(given.gas),
-        keep=all(is_ours(f.formula) for f in given.outside),
-    )
-    engine = Engine(_world(grains, box, found), rules, warnings, given.outside, far, found.reason, plan)
+    plan = _plan(given, composed, sums, verlet, isinstance(stepping, Adaptive))
+    world = _world(grains, box, found, plan.adaptive)
+    engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
     if given.contact is not None and fresh:
         _refuse_overlaps(engine, given.contact)
     return engine
 
 
-def _world(grains: Grains, box: Box, found: Found) -> World:
-    """The grains in their box, with room for contacts and pairs."""
+def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
+    """What the driver is compiled from."""
+    # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
+    way = verlet.far if given.distant and given.contact and verlet.far_steps > 1 else "every step"
+    return Plan(
+        outside,
+        sums,
+        split=way in ("impulse", "taylor"),
+        impulse=way == "impulse",
+        foretell=way.startswith("taylor"),
+        gas=bool(given.gas),
+        adaptive=adaptive,
+        keep=all(is_ours(f.formula) for f in given.outside),
+    )
+
+
+def _world(grains: Grains, box: Box, found: Found, staged: bool) -> World:
+    """The grains in their box, with room for contacts and pairs, and for stages if there are any."""
     count = len(grains)
     world = World(
         grains.copy(),
@@ -115,9 +131,22 @@ def _world(grains: Grains, box: Box, found: Found) -> World:
         contact_arrays(count, SPREAD * count, len(Bond._fields)),
         near_pairs(count, SPREAD * count),
         far_arrays(count, SPREAD * count if found.search.listed else 0),
+        stages=stage_arrays(count if staged else 0),
     )
     world.grains.arrays.position[...] = box.wrap(grains.position).T
     return world
+
+
+def _stride(grains: Grains, box: Box, found: Found) -> float:
+    """The longest way [m] that a grain may go in one Runge–Kutta step, so that no pair is missed.
+
+    With a list, Δr/4, as `stepping.touch.first_touch` argues.  Without, an image of a grain other than the nearest
+    must not come to touch: it is half a box side away, and two grains close that less r1 + r2 together.  A tenth is
+    kept back for what lies between two stages.
+    """
+    if found.search.listed:
+        return 0.9 * 0.25 * found.search.margin
+    return 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
 
 
 def _books(outside: Sequence[GrainForce], box: Box) -> Books:

@@ -124,11 +124,10 @@ def loads_loop(plan: Plan) -> Callable:
 
 
 @functools.cache
-def driver_for(plan: Plan) -> Callable:
-    """The compiled `advance` for one plan.
+def halves_for(plan: Plan) -> tuple[Callable, Callable]:
+    """The two halves of a velocity Verlet step for one plan.
 
-    A world starts at STAGE 1 with a step of 0 s: the second half of such a step finds the pairs and the
-    contacts that are there and works out the first loads (what it counts and books is not part of a run).
+    The second half of a step of 0 s finds the pairs and the contacts that are there and works out the loads.
     """
     _, drift_booked = outside_loops(plan.outside)
     sum_loads = loads_loop(plan)
@@ -183,6 +182,17 @@ def driver_for(plan: Plan) -> Callable:
         if due:
             stir(grains, clock, count, lost, rules)
         return Stop.STEPS_DONE
+
+    return first_half, second_half
+
+
+@functools.cache
+def driver_for(plan: Plan) -> Callable:
+    """The compiled `advance` for one plan.
+
+    A world starts at STAGE 1 with a step of 0 s (what that counts and books is not part of a run).
+    """
+    first_half, second_half = halves_for(plan)
 
     def advance(grains, contacts, near, far, clock, count, lost, rules, until, last):
         """Steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""

@@ -32,6 +32,7 @@ class Plan(NamedTuple):
     impulse: bool = False  # far loads as impulses at both ends of a cycle, but for a held part
     foretell: bool = False  # far loads by Taylor series inside a cycle
     gas: bool = False  # drag and Brownian kicks
+    adaptive: bool = False  # Runge–Kutta steps while nothing touches
     keep: bool = True  # the compiled code on disk, if all of it is ours
 
 
@@ -80,3 +81,4 @@ class Rules(NamedTuple):
     books: Books
     gas: Any
     control: Any
+    precision: Any = ()  # adaptive.Precision, where there are Runge–Kutta steps
