@@ -63,7 +63,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 
     def start(**options):
         grains = sand.setup.gas(
-            80, "1.2 um", radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="1000 K", seed=2
+            80, "1.2 um", radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="3e5 K", seed=2
         )
         forces = [sand.Contact(), sand.Dipoles(cutoff="0.25 um")]
         options |= {"neighbours": sand.Neighbours(margin="20 nm")}
@@ -76,7 +76,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
     lists = whole.world.count[LISTED]
     whole.run(steps=6000)
     assert whole.world.count[LISTED] > lists > 1
-    again = start(restart=(saved, {"temperature": 1000.0, "wall_seconds": 0.0}))
+    again = start(restart=(saved, {"temperature": 3e5, "wall_seconds": 0.0}))
     again.run(steps=6000)
     assert state(whole) == state(again)
 
