@@ -17,10 +17,12 @@ TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED, FLIGHT = 
 CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", "calm", "kicked", "flight")
 
 # --- places in World.count (int64) -----------------------------------------------------------------
-_NAMES = "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected"
+_NAMES = (
+    "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected needed"
+)
 COUNT = tuple(_NAMES.split())
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
-LOOKED, GROWN, REJECTED = range(12, 15)
+LOOKED, GROWN, REJECTED, NEEDED = range(12, 16)
 
 # --- places in World.lost (float64): energy that left the grains, per channel [J] -----------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
