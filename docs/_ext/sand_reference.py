@@ -6,9 +6,11 @@ build fails as soon as it no longer fits the source: nothing can be forgotten, n
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib
 import inspect
+import itertools
 import pkgutil
 import re
 import types
@@ -433,7 +435,7 @@ def outcomes_page() -> str:
 # --- case files ---------------------------------------------------------------------------------------
 CASE_KEYS = {
     "run.until": "end of the run, simulated time; this or `steps` is needed",
-    "run.steps": "end of the run, number of steps; with both, whichever comes first. A cycle of long-range forces is taken to its end",
+    "run.steps": "end of the run, number of steps, and then to the end of the cycle; with both, whichever comes first",
     "run.frame_every": "time between frames and rows of the ledger; a two-hundredth of the run by default",
     "run.seed": "seed of everything random: the grains, and the blows of a gas",
     "run.out": "folder of the run",
@@ -443,10 +445,22 @@ CASE_KEYS = {
     "grains.radius": "radius of each grain",
     "grains.material": "a preset or a name from [materials]",
     "grains.moment": '[A m^2] size of each, absolute or per mass ("200 A m^2/kg"), or "material"; none by default',
+    "grains.charge": "[C] charge of each grain; none by default",
     "grains.temperature": "temperature of velocities and spins",
     "grains.spins": "mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`",
     "materials.NAME.like": "preset to start from; without it the first four numbers below are needed",
 }
+FORCE_PAGES = {
+    "contact": "contacts",
+    "dipoles": "dipoles",
+    "field": "surroundings",
+    "gravity": "surroundings",
+    "electric": "surroundings",
+    "charges": "long-range",
+    "attraction": "long-range",
+    "gas": "gas",
+}
+"""Where each force is described."""
 
 
 def _unit_in(annotation: Any, metadata: tuple = ()) -> str:
@@ -470,6 +484,8 @@ def _default(value: Any) -> str:
         return "see text"
     if value is None:
         return "none"
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
     if isinstance(value, (str, int, float)):
         return f"`{value!r}`".replace("'", '"')
     return "see text"
@@ -519,9 +535,13 @@ def case_page() -> str:
                 out += [table(head, rows)]
             elif name == "forces":
                 out += ["## `[forces.*]`", of_section(kind.__doc__)]
+                if sorted(kind.model_fields) != sorted(FORCE_PAGES):
+                    raise ValueError("FORCE_PAGES does not name the forces of a case file")
                 for key, inner in kind.model_fields.items():
                     law = next(t for t in typing.get_args(inner.annotation) if t is not type(None))
-                    out += [f"### `[forces.{key}]`", escaped(first_sentence(law.__doc__)), _settings(law, head)]
+                    page = f"[More](../../physics/{FORCE_PAGES[key]}.md)."
+                    out += [f"### `[forces.{key}]`", f"{escaped(first_sentence(law.__doc__))} {page}"]
+                    out += [_settings(law, head)]
             elif name == "stepping":
                 words = ", ".join(f'`"{m}"`' for m in case.INTEGRATORS)
                 out += [f"## `[{name}]`", "The integrator, by `method`; each has keys of its own."]
@@ -560,6 +580,16 @@ def _settings(kind: Any, head: list[str], rows: list[list[str]] | None = None) -
 
 
 # --- formulas ------------------------------------------------------------------------------------------
+def constants(module: types.ModuleType) -> list[tuple[str, str]]:
+    """Names in capitals that have a docstring below, with it."""
+    found = []
+    for node, below in itertools.pairwise(ast.parse(inspect.getsource(module)).body):
+        named = isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id.isupper()
+        if named and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+            found.append((node.targets[0].id, str(below.value.value)))
+    return found
+
+
 def formulas_page() -> str:
     """Every formula of sand.physics, module by module."""
     import sand.physics
@@ -572,9 +602,10 @@ def formulas_page() -> str:
     for info in pkgutil.iter_modules(sand.physics.__path__):
         module = importlib.import_module(f"sand.physics.{info.name}")
         out += [f"## `sand.physics.{info.name}`", markdown(module.__doc__)]
-        source = inspect.getsource(module)
-        for name, note in re.findall(r'^([A-Z_]+) = [^\n]*\n"""(.*?)"""', source, re.M | re.S):
-            out += [f"* `{name}` = {getattr(module, name):.12g}: {escaped(' '.join(note.split()))}"]
+        for name, note in constants(module):
+            value = getattr(module, name)
+            if isinstance(value, (int, float)):
+                out += [f"* `{name}` = {value:.12g}: {escaped(' '.join(note.split()))}"]
         for name, thing in vars(module).items():
             if name.startswith("_") or getattr(thing, "__module__", None) != module.__name__:
                 continue
