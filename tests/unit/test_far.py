@@ -49,7 +49,7 @@ def test_taylor_rates_are_finite_differences(name, seed):
 def test_taylor_torque_is_the_whole_product_rule():
     """Ṁ = μ̇×B + μ×Ḃ, as the run keeps it, = difference quotient of μ×B along a real flight, first order in its time.
 
-    The paper's Eq. 53 (μ̇×B + μ×Ḃ with one moment of each missing) would be off by 100 %.
+    The paper's Eq. 53 has the moment of the other grain there.
     """
     rng = np.random.default_rng(2)
     grains = sand.Grains(

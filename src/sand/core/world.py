@@ -94,7 +94,7 @@ class StageArrays(NamedTuple):
     power: np.ndarray  # (7,) of the outside forces at each stage [W]
 
 
-KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment")
+KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""

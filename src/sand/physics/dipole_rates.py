@@ -1,6 +1,6 @@
 """Rates of change of dipole loads: the first-order Taylor terms of Eqs. 51–56 of the paper, corrected.
 
-Eq. 53 as printed lacks the cross products' second moment, Eq. 54 its Jacobians of B (docs: misprints).  With
+Eq. 53 as printed has the moment of the wrong grain, Eq. 54 the Jacobians of F (docs: misprints).  With
 `apart` r = x1 − x2 and the rates ṙ, μ̇1, μ̇2 the chain rule through Eqs. 35 and 39 gives the same as the
 Jacobians, dF = (∂F/∂r) ṙ + (∂F/∂μ1) μ̇1 + (∂F/∂μ2) μ̇2, without building them.
 """

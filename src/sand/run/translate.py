@@ -109,7 +109,7 @@ def build_engine(
 def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
     """What the driver is compiled from."""
     # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
-    way = verlet.far if given.distant and given.contact and verlet.far_steps > 1 else "every step"
+    way = verlet.far if given.distant and given.contact and verlet.most_steps > 1 else "every step"
     return Plan(
         outside,
         sums,

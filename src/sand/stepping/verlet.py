@@ -9,6 +9,10 @@ from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.units import si
 from .rules import Beat
 
+BELOW_RESONANCE = 0.48
+"""Longest cycle of impulses in fastest periods: at half a period the first of them would push in step."""
+LITERAL_STEPS = 70
+"""k_max of the paper."""
 FAR = ("every step", "impulse", "taylor", "taylor-literal")
 
 
@@ -20,15 +24,17 @@ class Verlet:
         steps_per_period: steps per fastest period of any contact, ≥ 10 (25: frequencies come out 0.26 % high).
         step: a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
             otherwise.
-        accuracy: part of the magnetic contact energy |U_min| that a step away from contacts may misplace.
+        accuracy: part of the largest energy that a long-range force puts at stake, |U_min| for dipoles, that a step
+            away from contacts may misplace.
         far: how long-range forces act while grains touch. "impulse" sums them once in a cycle of steps; what of them
             changes acts at the two ends of the cycle (r-RESPA), what lasts in every step, as does the force between
             two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
             bound grains with their mean motion; "taylor-literal" is SAND's own, bound grains with the velocity and
             spin of the moment, ringing included; "every step" sums them in every step.
-        far_steps: most steps in a cycle, k_max ≥ 1. 12 steps are just less than half the fastest period of a contact:
-            longer cycles, such as the paper's 70, meet the ringing in step and slowly heat it. A cycle is shorter
-            where the long-range forces change faster, and has one step where nothing touches.
+        far_steps: most steps in a cycle, k_max ≥ 1, or "auto": as many as stay below half the fastest period of a
+            contact, 12 of 25, for "impulse"; 70, the paper's, for the Taylor series. Impulses at the ends of longer
+            cycles meet the ringing in step and slowly heat it. A cycle is shorter where the long-range forces change
+            faster, and has one step where nothing touches.
 
     Raises:
         BadInput: out of range.
@@ -38,7 +44,7 @@ class Verlet:
     step: Any = "auto"
     accuracy: Any = 1e-8
     far: str = "impulse"
-    far_steps: int = 12
+    far_steps: Any = "auto"
 
     __pydantic_config__ = FORBID_EXTRA
     name = "verlet"
@@ -58,8 +64,9 @@ class Verlet:
             take("step", "s", above=0.0)
         if self.far not in FAR:
             problems.append(f"stepping: far = {self.far!r}; {did_you_mean(str(self.far), FAR)}")
-        if isinstance(self.far_steps, bool) or not isinstance(self.far_steps, int) or self.far_steps < 1:
-            problems.append(f"stepping: far_steps = {self.far_steps!r} must be a whole number of at least 1")
+        whole = isinstance(self.far_steps, int) and not isinstance(self.far_steps, bool)
+        if self.far_steps != "auto" and not (whole and self.far_steps >= 1):
+            problems.append(f'stepping: far_steps = {self.far_steps!r} must be a whole number of at least 1, or "auto"')
         if problems:
             raise BadInput(problems)
 
@@ -74,7 +81,15 @@ class Verlet:
             "far_steps": self.far_steps,
         }
 
+    @property
+    def most_steps(self) -> int:
+        """k_max: the most steps between two sums of the long-range forces."""
+        if self.far == "every step":
+            return 1
+        if self.far_steps != "auto":
+            return int(self.far_steps)
+        return max(1, int(BELOW_RESONANCE * self.steps_per_period)) if self.far == "impulse" else LITERAL_STEPS
+
     def beat(self, distant: bool) -> Beat:
         """How often far loads are summed, for the driver; every step if there are none."""
-        many = distant and self.far != "every step"
-        return Beat(self.far_steps if many else 1, self.far == "taylor-literal")
+        return Beat(self.most_steps if distant else 1, self.far == "taylor-literal")
