@@ -113,7 +113,7 @@ def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adapti
     return Plan(
         outside,
         sums,
-        split=way in ("impulse", "taylor"),
+        split=way == "impulse",
         impulse=way == "impulse",
         foretell=way.startswith("taylor"),
         gas=bool(given.gas),
