@@ -164,6 +164,26 @@ def test_nothing_is_booked_for_grains_that_touch_at_the_start():
     assert last["normal"] < 0.0
 
 
+@pytest.mark.parametrize("speed", [0.5, 20.0])
+@pytest.mark.parametrize("side", [0.0, 0.7])
+def test_a_touch_changes_no_energy_wherever_in_a_step_it_falls(speed, side):
+    """The step that forms a contact keeps the total: w'² = w² + 2 (U(0) − U(δ))/m̄, to rounding.
+
+    Two 10 nm iron grains, head on and from the side, at eleven phases of the step.  Rounding of −U(0) and of
+    ½ m̄ w² is some 1e-16 of either; 1e-12 leaves room.  An impulse of F (τ − dt/2) alone is off by 1e-3.
+    """
+    r, dt = 1e-8, 5e-13
+    for phase in np.linspace(0.0, 1.0, 11):
+        apart = [math.sqrt(4 - side**2) * r + (20.3 + phase) * speed * dt, side * r, 0.0]
+        grains = sand.Grains([[0, 0, 0], apart], r, sand.IRON, velocity=[[speed, 0, 0], [0, 0, 0]])
+        sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step=dt))
+        while sim.ledger.rows[-1]["contacts"] == 0 if len(sim.ledger) else True:
+            sim.run(steps=1)
+        first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+        assert last["lost_forming"] > 0
+        assert abs(last["total"] - first["total"]) < 1e-12 * last["lost_forming"]
+
+
 def test_two_grains_that_bounce():
     """Head-on above the sticking speed: rebound √(v² − v_s²), loss E_cycle = 0.935503 Fcδc exactly booked.
 
