@@ -1,113 +1,12 @@
-"""Long-range forces in a run: cut-offs, cycles of several steps, and what outside forces do to the books."""
+"""Long-range forces in a run: cut-offs, and what outside forces and the gas do to the books."""
 
 import numpy as np
 import pytest
 
 import sand
 from sand.core.constants import BOLTZMANN, COULOMB
-from sand.core.world import FAR_SUMS
+from sand.core.world import KICKED, STEP
 from sand.physics.gas import rotation_friction, translation_friction
-
-from .setups import rest_distance
-
-MOMENT = 200.0  # A m²/kg
-
-
-def chain(ringing, far="impulse", far_steps=70, length=20, seed=3):
-    """A straight chain of 20 nm iron grains: calm at its rest distance, or touching just so, with moments askew."""
-    distance = 2e-8 - 1e-16 if ringing else rest_distance(sand.IRON, 1e-8, 1e-8)
-    position = np.zeros((length, 3))
-    position[:, 0] = distance * np.arange(length)
-    direction = np.tile([1.0, 0.0, 0.0], (length, 1))
-    if ringing:
-        direction += 0.3 * np.random.default_rng(seed).normal(size=(length, 3))
-        direction /= np.linalg.norm(direction, axis=1)[:, None]
-    mass = sand.Grains(position, 1e-8, sand.IRON).mass
-    grains = sand.Grains(position, 1e-8, sand.IRON, moment=MOMENT * mass[:, None] * direction)
-    stepping = sand.Verlet(far=far, far_steps=far_steps)
-    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=stepping)
-
-
-def energy_error(sim, steps=100_000, looks=20):
-    """Largest change of the total [J] over the steps."""
-    for _ in range(looks):
-        sim.run(steps=steps // looks)
-        sim._look()
-    total = sim.ledger["total"]
-    return np.abs(total - total[0]).max()
-
-
-@pytest.mark.parametrize("ringing", [True, False])
-def test_cycles_cost_little_energy(ringing):
-    """A freshly stuck chain and a calm one, 1e5 steps: energy error with k_max = 70 and 12 at most 10 × that of k = 1.
-
-    k = 1 errs by Verlet's (ω dt)²/8 of the ringing.  Cycles of 2.8 contact periods add the far loads' own change
-    within a cycle, second order in it; measured: 1.5 × and 0.9 × (plain impulses without a held part: 600 × when calm).
-    """
-    every, usual, long = chain(ringing, "every step"), chain(ringing, far_steps="auto"), chain(ringing)
-    error1, error12, error70 = energy_error(every), energy_error(usual), energy_error(long)
-    assert long.world.count[FAR_SUMS] < every.world.count[FAR_SUMS] / 50
-    assert usual.world.count[FAR_SUMS] < every.world.count[FAR_SUMS] / 11
-    assert error70 < 10.0 * error1
-    assert error12 < 10.0 * error1
-
-
-def test_the_usual_cycle_stays_below_half_a_period():
-    """0.48 of the steps per period; the paper's 70 for the Taylor series; the user's own otherwise."""
-    found = [sand.Verlet(n).most_steps for n in (10, 25, 100)]
-    assert found == [4, 12, 48]
-    assert sand.Verlet(far="taylor").most_steps == 70
-    assert sand.Verlet(far_steps=70).most_steps == 70
-    assert sand.Verlet(far="every step", far_steps=9).most_steps == 1
-
-
-def test_taylor_series_drift():
-    """The literal Taylor series of a ringing chain misplaces its loads: its energy error is far above the default's."""
-    errors = {far: energy_error(chain(True, far), 20_000, 4) for far in ("impulse", "taylor", "taylor-literal")}
-    assert errors["impulse"] < 0.3 * errors["taylor"] < 0.3 * errors["taylor-literal"]
-
-
-def test_a_cycle_of_one_step_is_every_step():
-    """k_max = 1: the same bits as summing in every step, whichever way."""
-    ends = [chain(True, far, 1, length=5) for far in ("every step", "impulse", "taylor-literal")]
-    for sim in ends:
-        sim.run(steps=500)
-    assert ends[0].world.count[FAR_SUMS] == 500
-    for sim in ends[1:]:
-        assert (sim.grains.position == ends[0].grains.position).all()
-        assert (sim.grains.spin == ends[0].grains.spin).all()
-
-
-def test_cycles_converge():
-    """Positions of a ringing chain after 20 ps × 70 against k = 1: the difference falls as the square of k."""
-    ends = {}
-    for k in (1, 8, 16):
-        sim = chain(True, "impulse" if k > 1 else "every step", k, length=6)
-        sim.run(until=2e-11)
-        while sim.world.steps % 16:
-            sim._engine.advance(np.inf, 1)
-        ends[k] = (sim.time, sim.grains.position.copy())
-    assert ends[8][0] == ends[16][0] == pytest.approx(ends[1][0], rel=1e-12, abs=0.0)
-    far, near = (np.abs(ends[k][1] - ends[1][1]).max() for k in (16, 8))
-    assert near > 1e-9 * 1e-8
-    assert 2.5 < far / near < 6.0
-
-
-@pytest.mark.validate
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_main_job_does_not_heat_up(seed):
-    """6.5e6 steps of the README's gas: |drift| ≤ 1e-3 with the default cycles (H < half the fastest period).
-
-    Measured 1.7e-4 and 2.9e-4; with cycles of 35 or 70 steps the ringing is met in step and the drift is 1.2e-3 to
-    5.6e-3, always upwards.
-    """
-    box = sand.Box.periodic("1.2 um")
-    grains = sand.setup.gas(
-        100, box, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="100 K", seed=seed
-    )
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box=box)
-    assert sim.run(until="5 us").drift < 1e-3
-    assert sim.world.count[FAR_SUMS] < 0.25 * sim.world.steps
 
 
 def passing(cut, step):
@@ -226,7 +125,7 @@ def test_brownian_grains():
     """⟨x²⟩ = 2 (kT/m) τ² (t/τ − 1 + e^(−t/τ)) per axis, ⟨v(0)v(t)⟩ = (kT/m) e^(−t/τ), ½mv² and ½Iω² each (3/2)kT.
 
     All to 3σ; 4000 grains × 3 axes: σ of a variance √(2/12000) = 1.3 %, of the autocorrelation √(1/12000).  Kicks each
-    τ/20 make the diffusion 2e-4 too fast (p²/12τ²), below that.
+    τ/20 make the diffusion (h/τ)²/12 = 2e-4 to 4e-4 too fast, below that.
     """
     count = 4000
     sim, gas, _ = brownian(count)
@@ -250,6 +149,25 @@ def test_brownian_grains():
         assert kept == pytest.approx(np.exp(-t), abs=3 / np.sqrt(3 * count))
         spun = (grains.spin * w0).mean() / (w0**2).mean()
         assert spun == pytest.approx(np.exp(-t * tau / tau_spin), abs=3 / np.sqrt(3 * count))
+
+
+def test_kicks_come_in_time():
+    """Kicks of the gas are 2/3 to 4/3 of the period apart, on average less than half a step from it.
+
+    The step is a power of two of a second, at most the period; the end of the step nearest to the period is taken.
+    """
+    sim, _, tau = brownian(3)
+    period = sim._engine.rules.gas.period
+    assert period == pytest.approx(tau / 20, rel=1e-12, abs=0.0)
+    times = [0.0]
+    for _ in range(300):
+        sim.run(steps=1)
+        if sim.world.clock[KICKED] > times[-1]:
+            times.append(sim.world.clock[KICKED])
+    apart = np.diff(times) / period
+    assert len(apart) > 25
+    assert apart.min() > 0.66 and apart.max() < 1.34
+    assert abs(apart.mean() - 1.0) < 0.5 * sim.world.clock[STEP] / period + 1e-9
 
 
 def test_heat_of_the_gas_is_booked():

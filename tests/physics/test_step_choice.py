@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 import sand
+from sand.stepping.control import calm_steps
 
 R = 3e-7
 
@@ -87,3 +88,18 @@ def test_a_shorter_step_is_held_for_ten_periods():
     assert len(growths) == 1
     assert growths[0] - max(k for k in changes if k < growths[0]) >= HOLD
     assert math.isclose(lengths[-1], step, rel_tol=1e-6)
+
+
+def test_gravity_does_not_shorten_the_step():
+    """A uniform load costs Verlet no energy, however weak the long-range force beside it: the same step without it."""
+    grains = sand.Grains([[0, 0, 0], [1e-5, 0, 0]], R, sand.SILICA)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Attraction()])
+    world, control = sim.world, sim._engine.rules.control
+    assert control.energy_scale > 0.0
+    steps = []
+    for pull in (0.0, 9.81):
+        world.grains.arrays.force[2] = -pull * grains.mass
+        steps.append(calm_steps(world.grains.arrays, world.far, world.contacts.start, world.count, control))
+    assert steps[0] == steps[1]
+    world.far.force[2] = -9.81 * grains.mass  # as a long-range force it does count
+    assert calm_steps(world.grains.arrays, world.far, world.contacts.start, world.count, control)[0] < 0.1 * steps[0][0]

@@ -188,6 +188,14 @@ def test_the_search_is_stated(count, box, how, said):
     assert said in sim.choices["neighbours"]
 
 
+def test_a_margin_of_contacts_alone():
+    """Without a cut-off the list reaches r1 + r2 + r_min and the margin given, or r_min/2."""
+    for margin, said in (("auto", "margin 5 nm"), ("3 nm", "margin 3 nm")):
+        grains = sand.setup.gas(120, "1 um", radius="10 nm", material=sand.IRON, seed=1)
+        sim = sand.Simulation(grains, [sand.Contact()], box="1 um", neighbours=Neighbours(margin=margin))
+        assert said in sim.choices["neighbours"]
+
+
 def test_wrong_settings_have_a_line_each():
     """Unknown word and a margin that is no length."""
     with pytest.raises(sand.BadInput) as caught:

@@ -166,10 +166,10 @@ def make_far_list(grains, far, count, span, search):
     """List all pairs closer than the reach, from where the grains are now; FULL if there is no room."""
     for i in range(grains.mass.size):
         put(far.anchor, i, load(grains.position, i))
-    count[LISTED] += 1
     if rows_from_anchors(far, span, search.reach) == FULL:
         far.anchor[0, 0] = math.inf
         return FULL
+    count[LISTED] += 1
     return 0
 
 

@@ -79,4 +79,4 @@ def outside_shares_for(formula_of_grain):
 
 def is_ours(formula_of_grain):
     """True for formulas of SAND itself; compiled code with a user's own formula is not kept on disk."""
-    return formula_of_grain.__module__.startswith("sand.")
+    return str(formula_of_grain.__module__).startswith("sand.")

@@ -120,7 +120,7 @@ class Simulation:
 
     @property
     def choices(self) -> dict[str, str]:
-        """What was decided for the user, and why: boundary, cut-off, step."""
+        """What was decided for the user, and why: boundary, cut-offs, how neighbours are found."""
         if self._chosen:
             return self._chosen
         told = {"boundary": self.box.describe()}

@@ -35,7 +35,10 @@ IDLE = 1e5
 MOST_OVERLAP = (2.0, 1e-3)
 """Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
 STIR_PART = 0.05
-"""Time between two kicks of the gas, in shortest stopping times; free grains then diffuse 2e-4 too fast."""
+"""Time between two kicks of the gas, in shortest stopping times.
+
+Kicks come at ends of steps or cycles, 2/3 to 4/3 of it apart; free grains diffuse h²/12τ² too fast, at most 4e-4.
+"""
 
 
 class Given(NamedTuple):

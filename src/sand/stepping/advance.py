@@ -62,6 +62,11 @@ def _no_end(grains, far, span, clock, elapsed, dt):
 
 
 @loop
+def _no_cut(grains, far, span, clock, elapsed):
+    """As above."""
+
+
+@loop
 def _begin_impulse(grains, far, clock, dt):
     """The first of a cycle's two impulses; half a step of the far loads is given with all others."""
     renew_held_loads(grains, far)
@@ -85,6 +90,13 @@ def _end_impulse(grains, far, span, clock, elapsed, dt):
 
 
 @loop
+def _cut_impulse(grains, far, span, clock, elapsed):
+    """The second impulse between two steps: the last half step had the held loads alone."""
+    kick_far(grains, far, 0.5 * clock[STEP])
+    _end_impulse(grains, far, span, clock, elapsed, clock[STEP])
+
+
+@loop
 def _no_bonded(grains, contacts, count, far, span, numbers, due):
     """Pairs in contact are not apart from the others."""
 
@@ -94,8 +106,8 @@ def _no_change(grains, contacts, count, far, span, numbers):
     """As above."""
 
 
-_IMPULSES = (_begin_impulse, _inside_impulses, _end_impulse)
-_NO_IMPULSES = (_no_begin, _no_inner, _no_end)
+_IMPULSES = (_begin_impulse, _inside_impulses, _end_impulse, _cut_impulse)
+_NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
 
 
 @functools.cache
@@ -133,14 +145,25 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
     sum_loads = loads_loop(plan)
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
     change_sides = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
-    begin, inside, end = _IMPULSES if plan.impulse else _NO_IMPULSES
+    begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
     stir = stir_gas if plan.gas else no_gas
+
+    @loop
+    def cut_cycle(grains, contacts, far, clock, count, rules):
+        """End a cycle where it stands, so that what a run leaves behind when it stops is whole."""
+        if clock[LEFT] > 0.0:
+            elapsed = clock[CYCLE] - clock[LEFT]
+            sum_loads(grains, contacts, far, clock, count, rules, True, elapsed)
+            cut(grains, far, rules.span, clock, elapsed)
+            change_sides(grains, contacts, count, far, rules.span, rules.far)
+            clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
     @loop
     def first_half(grains, contacts, near, far, clock, count, lost, rules):
         """Choose the step, kick half of it, drift; anything but STEPS_DONE: no step was taken."""
-        dt, stop = possible_step(grains, contacts, near, clock, count, rules)
+        dt, stop = possible_step(grains, contacts, near, far, clock, count, rules)
         if stop != Stop.STEPS_DONE:
+            cut_cycle(grains, contacts, far, clock, count, rules)
             return stop
         if clock[LEFT] == 0.0:
             cycle = dt * cycle_steps(clock, count, rules.beat, dt)

@@ -77,14 +77,15 @@ def load_step(force, torque, mass, inertia, control):
 
 
 @loop
-def calm_steps(grains, start, count, control):
+def calm_steps(grains, far, start, count, control):
     """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
 
     GRAIN1 becomes the grain that wants the step. `start` (N + 1,) tells who has contacts
     (core.world.ContactArrays).
 
     Bound grains ring: their step is that of contacts, and only how they fly and spin is looked at.  Free grains
-    limit the cycle as they limit the step, but for the part of the list's reach they fly.
+    limit the cycle as they limit the step, but for the part of the list's reach they fly.  Their loads are those of
+    the long-range forces, whose energy is at stake: a uniform load, as gravity's, costs Verlet nothing.
     """
     wanted = cycle = control.longest
     slowest = -1
@@ -98,7 +99,7 @@ def calm_steps(grains, start, count, control):
         moment, inertia = load(grains.moment, i), grains.inertia[i]
         mine = min(mine, field_step(moment, load(grains.field, i), control.outer_field, inertia))
         if start[i + 1] == start[i]:
-            force, torque = load(grains.force, i), load(grains.torque, i)
+            force, torque = load(far.force, i), load(far.torque, i)
             mine = min(mine, load_step(force, torque, grains.mass[i], inertia, control))
             cycle = min(cycle, mine)
         if speed > 0.0:
@@ -147,7 +148,7 @@ def levelled(level, wanted, may_grow):
 
 
 @loop
-def choose_step(grains, start, near, clock, count, span, control):
+def choose_step(grains, far, start, near, clock, count, span, control):
     """The next step [s], or 0 if there is none: that of the contacts, or less if something else needs less.
 
     Steps that are not the contacts' are powers of two of a second and change seldom, because every change
@@ -159,7 +160,7 @@ def choose_step(grains, start, near, clock, count, span, control):
     if alone or count[STEPS] - count[LOOKED] >= CHECK_EVERY or (between and clock[CYCLE] > clock[STEP]):
         may_grow = count[STEPS] - count[GROWN] >= GROW_EVERY
         if between:
-            clock[CALM], cycle = calm_steps(grains, start, count, control)
+            clock[CALM], cycle = calm_steps(grains, far, start, count, control)
             if not clock[CALM] > 0.0:
                 return 0.0
             clock[FAR_LEVEL] = levelled(clock[FAR_LEVEL], cycle, may_grow)
@@ -183,7 +184,11 @@ def choose_step(grains, start, near, clock, count, span, control):
 
 @loop
 def cycle_steps(clock, count, beat, dt):
-    """How many steps [of dt] may lie between two sums of the far loads: 1 where nothing touches."""
+    """How many steps of dt [s] may lie between two sums of the far loads: 1 where nothing touches.
+
+    Impulses must come more often than contacts ring, whatever the step: k_max counts the contacts' own steps.
+    """
     if count[CONTACTS] == 0:
         return 1
-    return max(1, min(beat.most, int(clock[FAR_LEVEL] / dt)))
+    longest = min(clock[FAR_LEVEL], beat.most * clock[CONTACT_STEP])
+    return max(1, min(beat.most, int(longest / dt + 1e-6)))

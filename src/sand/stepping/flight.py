@@ -69,11 +69,11 @@ def refreshed(grains, far, count, rules):
 
 
 @loop
-def first_trial(grains, contacts, clock, count, rules):
+def first_trial(grains, contacts, far, clock, count, rules):
     """The step to try [s]: what the last one left, or Verlet's own after a start or a parting; 0 if not finite."""
     dt = clock[FLIGHT]
     if not dt > 0.0:
-        dt, _ = calm_steps(grains, contacts.start, count, rules.control)
+        dt, _ = calm_steps(grains, far, contacts.start, count, rules.control)
     fastest = 0.0
     for i in range(grains.mass.size):
         v = load(grains.velocity, i)
@@ -99,7 +99,7 @@ def step_for(plan: Plan) -> Callable:
 
     @loop
     def fitting_step(grains, contacts, far, stages, clock, count, rules):
-        dt = wish = first_trial(grains, contacts, clock, count, rules)
+        dt = wish = first_trial(grains, contacts, far, clock, count, rules)
         if not dt > 0.0:
             return 0.0, False, Stop.NOT_FINITE
         begin_step(grains, stages, rules, clock[TIME])

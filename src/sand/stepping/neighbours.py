@@ -34,9 +34,9 @@ class Neighbours:
         search: "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
             "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if three of them fit
             into each periodic side of the box.
-        margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.35 of the cut-off. The list
-            is made anew when a grain is more than Δr/2 from where it was; a wide margin makes long but lasting
-            lists. No choice changes a result by more than rounding.
+        margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.35 of the cut-off, or half the
+            smallest radius where no force has one. The list is made anew when a grain is more than Δr/2 from where
+            it was; a wide margin makes long but lasting lists. No choice changes a result by more than rounding.
 
     Raises:
         BadInput: an unknown word, or a margin that is not a length above 0.
@@ -73,8 +73,9 @@ class Neighbours:
         touch = 2.0 * float(grains.radius.max()) + reach
         widest = max(cutoffs, default=0.0)
         # the list of near pairs is made out of this one, and its own margin is half its reach
-        margin = MARGIN * widest if self.margin == "auto" else self.margin
-        margin = margin if widest > 0.0 else 0.5 * reach
+        margin = self.margin
+        if margin == "auto":
+            margin = MARGIN * widest if widest > 0.0 else 0.5 * reach
         whole = max(widest, touch) + margin
         nothing = Search(False, whole, margin)
         if self.search == "all pairs":

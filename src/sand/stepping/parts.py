@@ -50,10 +50,10 @@ def _crushed(grains, contacts, count, span):
 
 
 @loop
-def possible_step(grains, contacts, near, clock, count, rules):
+def possible_step(grains, contacts, near, far, clock, count, rules):
     """The step to take now [s], and STEPS_DONE or why there is none."""
     count[GRAIN1] = count[GRAIN2] = -1
-    dt = choose_step(grains, contacts.start, near, clock, count, rules.span, rules.control)
+    dt = choose_step(grains, far, contacts.start, near, clock, count, rules.span, rules.control)
     if not dt > 0.0:
         return 0.0, Stop.NOT_FINITE
     if clock[LEFT] > 0.0:  # inside a cycle: whole steps that fill it
@@ -164,8 +164,8 @@ def no_gas(grains, clock, count, lost, rules):
 
 @loop
 def stir_gas(grains, clock, count, lost, rules):
-    """Drag and kicks for the time since the last ones, once that is a fair part of the stopping time."""
+    """Drag and kicks for the time since the last ones, at the step or cycle that ends nearest to a period of it."""
     elapsed = clock[TIME] - clock[KICKED]
-    if elapsed >= rules.gas.period:
+    if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= rules.gas.period:
         lost[GAS] += gas_kick(grains, rules.gas.seed, count[STEPS], elapsed, rules.gas.gas)
         clock[KICKED] = clock[TIME]

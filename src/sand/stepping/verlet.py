@@ -31,10 +31,11 @@ class Verlet:
             two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
             bound grains with their mean motion; "taylor-literal" is SAND's own, bound grains with the velocity and
             spin of the moment, ringing included; "every step" sums them in every step.
-        far_steps: most steps in a cycle, k_max ≥ 1, or "auto": as many as stay below half the fastest period of a
-            contact, 12 of 25, for "impulse"; 70, the paper's, for the Taylor series. Impulses at the ends of longer
-            cycles meet the ringing in step and slowly heat it. A cycle is shorter where the long-range forces change
-            faster, and has one step where nothing touches.
+        far_steps: most steps in a cycle, k_max ≥ 1, counted in steps of the contacts' own where a fixed `step` is
+            longer; or "auto": as many as stay below half the fastest period of a contact, 12 of 25, for "impulse";
+            70, the paper's, for the Taylor series. Impulses at the ends of longer cycles meet the ringing in step
+            and slowly heat it. A cycle is shorter where grains that touch nothing need it, by their long-range
+            loads, spins and moments, and has one step where nothing touches.
 
     Raises:
         BadInput: out of range.
