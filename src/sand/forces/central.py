@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from ..core.box import Box
 from ..core.constants import COULOMB, GRAVITATION
-from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
 from ..kernels.central import ALL, LISTED, CentralRules
 from ..kernels.far import FarSums
-from .cutoff import CUTS, ROOM, Choice, cutoff_for, cutoff_given, spoken_cut
+from .cutoff import WithCutoff, cutoff_for
 
 
 @dataclass(frozen=True)
-class Charges:
+class Charges(WithCutoff):
     """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
 
     Charges sit at the centres; what they induce in their neighbours is left out.
@@ -32,51 +31,15 @@ class Charges:
         BadInput: a cut-off that is neither; later, one beyond half the box.
     """
 
-    cutoff: Any = "auto"
-    cut: str = "smooth"
-
-    __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "charges"
+    idle: ClassVar[str] = "charges are switched on but no grain is charged"
     column: ClassVar[str] = "coulomb"
     references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4"
     constant: ClassVar[float] = COULOMB
 
-    def __post_init__(self) -> None:
-        problems = []
-        if self.cut not in CUTS:
-            problems.append(f"{self.name}: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
-        if self.cutoff != "auto":
-            try:
-                object.__setattr__(self, "cutoff", cutoff_given(self.cutoff, self.name))
-            except BadInput as error:
-                problems += error.problems
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        return {"cutoff": "none" if self.cutoff is None else self.cutoff, "cut": self.cut}
-
     def strengths(self, grains: Grains) -> np.ndarray:
         """What attracts or repels, (N,): charges [C]."""
         return grains.charge
-
-    def choose(self, grains: Grains, box: Box) -> Choice:
-        """The cut-off in force, with its reason.  Raises BadInput if it does not fit into the box."""
-        if self.cutoff != "auto":
-            return spoken_cut(self.cutoff, self.cut, box, self.name)
-        if box.is_open:
-            return Choice(None, "open box: all pairs")
-        return Choice(0.5 * box.shortest / ROOM, f"{self.cut}, half the box / {ROOM}")
-
-    def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns when nothing is charged, or when nearest images are summed without a cut."""
-        choice = self.choose(grains, box)
-        warnings = []
-        if not self.acts_on(grains):
-            warnings.append(f"{self.name} are switched on but no grain is charged")
-        if choice.radius is None and not box.is_open:
-            warnings.append(f"{self.name}: cutoff = none in a periodic box: energy jumps when images change")
-        return warnings
 
     def sums(self, box: Box, listed: bool) -> FarSums:
         """The loops that sum it: over listed pairs, or over all."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 from ..core.box import Box
-from ..core.errors import BadInput
+from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..core.grains import Grains
 from ..core.units import si, spoken
 from ..physics.dipole import Cutoff
 
@@ -56,3 +58,54 @@ def cutoff_for(radius: float | None, cut: str) -> Cutoff:
         return Cutoff(radius**2, SHARP / radius**2)
     inner = (1.0 - SHELL) * radius
     return Cutoff(radius**2, 1.0 / (radius**2 - inner**2))
+
+
+@dataclass(frozen=True)
+class WithCutoff:
+    """What all long-range forces have: an end, and something to warn of. `cutoff` and `cut` as the force says."""
+
+    cutoff: Any = "auto"
+    cut: str = "smooth"
+
+    __pydantic_config__ = FORBID_EXTRA
+    name: ClassVar[str]
+    idle: ClassVar[str]  # what is said where no grain feels it
+
+    def __post_init__(self) -> None:
+        problems = []
+        if self.cut not in CUTS:
+            problems.append(f"{self.name}: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
+        if self.cutoff != "auto":
+            try:
+                object.__setattr__(self, "cutoff", cutoff_given(self.cutoff, self.name))
+            except BadInput as error:
+                problems += error.problems
+        if problems:
+            raise BadInput(problems)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"cutoff": "none" if self.cutoff is None else self.cutoff, "cut": self.cut}
+
+    def choose(self, grains: Grains, box: Box) -> Choice:
+        """The cut-off in force, with its reason.  Raises BadInput if it does not fit into the box."""
+        if self.cutoff != "auto":
+            return spoken_cut(self.cutoff, self.cut, box, self.name)
+        if box.is_open:
+            return Choice(None, "open box: all pairs")
+        return self.automatic(grains, 0.5 * box.shortest / ROOM)
+
+    def automatic(self, grains: Grains, half: float) -> Choice:
+        """The cut-off in a periodic box where the user gave none; at most `half` [m]."""
+        return Choice(half, f"{self.cut}, half the box / {ROOM}")
+
+    def acts_on(self, grains: Grains) -> bool:
+        """False if no grain feels it."""
+        raise NotImplementedError
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Warns when no grain feels it, or when nearest images are summed without a cut."""
+        choice = self.choose(grains, box)
+        warnings = [] if self.acts_on(grains) else [self.idle]
+        if choice.radius is None and not box.is_open:
+            warnings.append(f"{self.name}: cutoff = none in a periodic box: energy jumps when images change")
+        return warnings

@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
 from ..core.box import Box
 from ..core.constants import BOLTZMANN, MAGNETIC
-from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
 from ..core.units import spoken
 from ..kernels.dipoles import BARE, CUT, LISTED, DipoleRules
 from ..kernels.far import FarSums
 from ..physics.dipole import capture_radius, contact_energy
-from .cutoff import CUTS, ROOM, Choice, cutoff_for, cutoff_given, spoken_cut
+from .cutoff import ROOM, Choice, WithCutoff, cutoff_for
 
 CAPTURE = 1.5
 """Automatic cut-off over b_max at thermal speed, in a large box."""
 
 
 @dataclass(frozen=True)
-class Dipoles:
+class Dipoles(WithCutoff):
     """Forces and torques between magnetic moments.
 
     Args:
@@ -36,53 +35,19 @@ class Dipoles:
         BadInput: a cut-off that is neither; later, one beyond half the box.
     """
 
-    cutoff: Any = "auto"
-    cut: str = "smooth"
+    name: ClassVar[str] = "dipoles"
+    idle: ClassVar[str] = "dipoles are switched on but no grain has a magnetic moment"
+    column: ClassVar[str] = "magnetic"
+    references: ClassVar[str] = "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975"
 
-    __pydantic_config__ = FORBID_EXTRA
-    name = "dipoles"
-    references = "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975"
-
-    column = "magnetic"
-
-    def __post_init__(self) -> None:
-        problems = []
-        if self.cut not in CUTS:
-            problems.append(f"dipoles: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
-        if self.cutoff != "auto":
-            try:
-                object.__setattr__(self, "cutoff", cutoff_given(self.cutoff, "dipoles"))
-            except BadInput as error:
-                problems += error.problems
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        return {"cutoff": "none" if self.cutoff is None else self.cutoff, "cut": self.cut}
-
-    def choose(self, grains: Grains, box: Box) -> Choice:
-        """The cut-off in force, with its reason.  Raises BadInput if it does not fit into the box."""
-        if self.cutoff != "auto":
-            return spoken_cut(self.cutoff, self.cut, box, self.name)
-        if box.is_open:
-            return Choice(None, "open box: all pairs")
-        half = 0.5 * box.shortest / ROOM
+    def automatic(self, grains: Grains, half: float) -> Choice:
+        """The reach of a thermal capture, where it fits into the box."""
         capture = CAPTURE * thermal_capture(grains)
         if 0.0 < capture < half:
             return Choice(capture, f"{self.cut}, {CAPTURE} b_max at the grains' thermal speed")
         return Choice(
             half, f"{self.cut}, half the box / {ROOM}, inside {CAPTURE} b_max which would be {spoken(capture, 'm')}"
         )
-
-    def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns when no grain has a moment, or when nearest images are summed without a cut."""
-        choice = self.choose(grains, box)
-        warnings = []
-        if not grains.body_moment.any():
-            warnings.append("dipoles are switched on but no grain has a magnetic moment")
-        if choice.radius is None and not box.is_open:
-            warnings.append("dipoles: cutoff = none in a periodic box: energy jumps when images change")
-        return warnings
 
     def sums(self, box: Box, listed: bool) -> FarSums:
         """The loops that sum it: over listed pairs, or over all."""
