@@ -73,6 +73,17 @@ def test_force_is_the_slope_of_the_energy():
         assert work / way == pytest.approx(jkr.force_at(y, 1.0), rel=1e-7, abs=1e-7)
 
 
+def test_stiffness_is_the_slope_of_the_force():
+    """dF/dδ by central differences in y; at rest it is (6/5) E* a0 = (9/5) 6^(−1/3) F_c/δ_c."""
+    for y in np.linspace(0.6, 2.0, 40):
+        h = 1e-5
+        change = jkr.force_at(y + h, 1.0) - jkr.force_at(y - h, 1.0)
+        way = jkr.overlap_at(y + h, 1.0) - jkr.overlap_at(y - h, 1.0)
+        assert change / way == pytest.approx(jkr.stiffness_at(y, 1.0, 1.0), rel=1e-6, abs=1e-6)
+    rest = 9.0 / 5.0 * 6.0 ** (-1.0 / 3.0)
+    assert jkr.stiffness_at(1.0, 1.0, 1.0) == pytest.approx(rest, rel=1e-12, abs=0.0)
+
+
 def test_scales():
     """a0³ = 9πγR²/E*, Fc = 3πγR, δ0 = a0²/3R, δ0/δc = 1.2114137, Fcδc = 24.0687 γ^5/3 R^4/3 E*^−2/3."""
     gamma, radius, modulus = 0.025, 0.3e-6, 2.8e10

@@ -22,6 +22,7 @@ from ..core.world import (
 )
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
+from ..physics.impact import speed_gained
 from ..physics.rotation import turn, turned, turned_back
 from .contacts import bond_at, pose_at, twist_gain, write_loads
 from .neighbours import bond_of, forget_touch
@@ -253,20 +254,6 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     return c
 
 
-@loop
-def speed_gained(overlap, closing, reduced, bond):
-    """w' − w [m/s]: closing speed that the contact adds between first touch and this overlap; 0 if not closing.
-
-    ½ m̄ w'² = ½ m̄ w² + U(0) − U(δ); where that leaves no speed (no adhesion, a graze) the pair has none.
-    """
-    if not closing > 0.0:
-        return 0.0
-    y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
-    work = -law_of.forming(bond) - law_of.normal_energy(overlap, y, bond)
-    after = math.sqrt(max(closing * closing + 2.0 * work / reduced, 0.0))
-    return 2.0 * work / reduced / (after + closing) if after > 0.0 else -closing
-
-
 @rare
 def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
     """Form the contacts of pairs that came to touch inside the step, and book −U(0).
@@ -291,7 +278,7 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
             book(contacts.lost, lost, c, DAMPING, contacts.damped[c] * closing * since)
         reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
         # a step of 0 s finds what touches already
-        gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts.bond, c)) if dt > 0.0 else 0.0
+        gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts.bond, c), dt) if dt > 0.0 else 0.0
         owed = contacts.damped[c] * since - reduced * gain
         knock(grains, i, j, n, owed - 0.5 * dt * dot(load(contacts.push, c), n))
         book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts.bond, c)))

@@ -90,6 +90,14 @@ def force_at(y, pull_off_force):
 
 
 @formula
+def stiffness_at(y, pull_off_force, pull_off_overlap):
+    """dF/dδ [N/m] at y = √(a/a₀): (9 F_c/δ_c 6^(−1/3)) (2y⁵ − y²)/(6y³ − 1), infinite at the break, y³ = 1/6."""
+    square = y * y
+    slope = pull_off_overlap * CUBE_ROOT_6 * (6.0 * square * y - 1.0)
+    return 9.0 * pull_off_force * square * (2.0 * square * y - 1.0) / slope
+
+
+@formula
 def overlap_at(y, pull_off_overlap):
     """Overlap δ [m] at y = √(a/a₀)."""
     return pull_off_overlap * CUBE_ROOT_6 * (2.0 * y * y * y * y - 4.0 / 3.0 * y)

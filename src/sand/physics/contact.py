@@ -226,6 +226,13 @@ def normal_energy(overlap, y, bond):
 
 
 @formula
+def normal_stiffness_at(overlap, y, bond):
+    """dF/dδ [N/m] of the normal mode: JKR, or Hertz (3/2)·(4/3) E* √(R δ); 0 for surfaces apart."""
+    stiffness = adhesion.stiffness_at(y, bond.pull_off_force, bond.pull_off_overlap)
+    return stiffness + 1.5 * bond.hertz * math.sqrt(max(overlap, 0.0))
+
+
+@formula
 def energies(pose, overlap, y, r1, r2, bond):
     """Stored energy [J] of the modes: normal, sliding, rolling, twisting.
 
