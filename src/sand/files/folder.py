@@ -12,15 +12,18 @@ from typing import Any
 
 from ..core.errors import BadInput, FilesFailed
 
-CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION = (
+CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS = (
     "case.toml",
     "trajectory.gsd",
     "ledger.csv",
     "summary.json",
     "figure.png",
     "collision.json",
+    "scattering.json",
+    "results.csv",
+    "flights.csv",
 )
-OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION)
+OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS)
 
 
 def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:

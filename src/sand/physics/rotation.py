@@ -3,6 +3,8 @@
 R(ϱ) turns body vectors into the laboratory frame (active), and ω is in the laboratory frame.
 """
 
+import math
+
 from ..core.jit import formula
 from ..core.vec import add, axpy, cross, scale
 
@@ -39,3 +41,22 @@ def turn(q, angle):
     # one Newton step of 1/√n² from 1: n² is 1 to 1e-7 already
     c = 1.5 - 0.5 * (w0 * w0 + w1 * w1 + w2 * w2 + w3 * w3)
     return c * w0, c * w1, c * w2, c * w3
+
+
+@formula
+def normalised(q):
+    """ϱ/|ϱ|"""
+    c = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return c * q[0], c * q[1], c * q[2], c * q[3]
+
+
+@formula
+def turning_rate(q, w):
+    """ϱ̇ = ½ ω∘ϱ (Eq. 31), ω in the laboratory frame: what `turn` does in a short time, over that time."""
+    x, y, z = scale(0.5, w)
+    return (
+        x * q[3] + y * q[2] - z * q[1],
+        y * q[3] + z * q[0] - x * q[2],
+        z * q[3] + x * q[1] - y * q[0],
+        -x * q[0] - y * q[1] - z * q[2],
+    )

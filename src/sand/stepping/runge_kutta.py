@@ -15,11 +15,11 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.jit import formula, loop, rare
-from ..core.vec import dot, load, load4, put, put4, scale
+from ..core.vec import dot, load, load4, put, put4
 from ..core.world import FAR_SUMS
 from ..kernels.far import add_far_loads, clear_far_loads
 from ..kernels.outside import grain_at, outside_loads
-from ..physics.rotation import turned
+from ..physics.rotation import normalised, turned, turning_rate
 
 STAGES = 7
 TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
@@ -36,25 +36,6 @@ ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 /
 """Weights of order 5 less those of order 4: the error of the latter."""
 X, V, Q, W = 0, 3, 6, 10
 """Rows where position, velocity, orientation and spin begin."""
-
-
-@formula
-def normalised(q):
-    """ϱ/|ϱ|"""
-    c = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return c * q[0], c * q[1], c * q[2], c * q[3]
-
-
-@formula
-def turning_rate(q, w):
-    """ϱ̇ = ½ ω∘ϱ (Eq. 31), ω in the laboratory frame: what `rotation.turn` does in a short time, over that time."""
-    x, y, z = scale(0.5, w)
-    return (
-        x * q[3] + y * q[2] - z * q[1],
-        y * q[3] + z * q[0] - x * q[2],
-        z * q[3] + x * q[1] - y * q[0],
-        -x * q[0] - y * q[1] - z * q[2],
-    )
 
 
 @formula

@@ -1,5 +1,52 @@
 """Closed forms: what one can know without running anything."""
 
 from .contact import ContactNumbers, contact
+from .growth import (
+    Exponents,
+    aggregate_moment,
+    alignment_exponent,
+    alignment_time,
+    chain_moment,
+    dynamic_exponent,
+    growth_exponents,
+    mean_size,
+)
+from .magnetic import (
+    barrier,
+    capture_cross_section,
+    capture_radius,
+    coupling,
+    dipole_energy,
+    effective_potential,
+    geometric_cross_section,
+    interaction_radius,
+    lowest_energy,
+    potential_parameter,
+    reduced_mass,
+    thermal_speed,
+)
 
-__all__ = ["ContactNumbers", "contact"]
+__all__ = [
+    "ContactNumbers",
+    "Exponents",
+    "aggregate_moment",
+    "alignment_exponent",
+    "alignment_time",
+    "barrier",
+    "capture_cross_section",
+    "capture_radius",
+    "chain_moment",
+    "contact",
+    "coupling",
+    "dipole_energy",
+    "dynamic_exponent",
+    "effective_potential",
+    "geometric_cross_section",
+    "growth_exponents",
+    "interaction_radius",
+    "lowest_energy",
+    "mean_size",
+    "potential_parameter",
+    "reduced_mass",
+    "thermal_speed",
+]

@@ -1,0 +1,127 @@
+"""`sand scatter CASE.toml`: cross-sections, maps and trajectories of two bodies."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..core.errors import BadInput
+from . import options, report
+from .exits import DONE, INTERRUPTED
+
+
+@click.command("scatter", short_help="Cross-sections and trajectories of two bodies that a case file describes.")
+@click.argument("case", metavar="CASE.toml")
+@click.option("--out", metavar="DIR", help="Folder for the files (default: the case's name).")
+@click.option("--workers", type=click.IntRange(min=1), default=1, help="Processes that share the work (default 1).")
+@click.option("--scheduler", metavar="ADDRESS", help="A running dask scheduler instead, tcp://host:port.")
+@click.option("--resume", is_flag=True, help="Go on with the flights that the folder holds.")
+@click.option("--overwrite", is_flag=True, help="Replace the job that the folder holds.")
+@options.quiet
+@options.as_json
+@options.debug
+def command(
+    case: str,
+    out: str | None,
+    workers: int,
+    scheduler: str | None,
+    resume: bool,
+    overwrite: bool,
+    quiet: bool,
+    as_json: bool,
+) -> int:
+    """Fly the bodies that CASE.toml describes past each other.
+
+    Leaves scattering.json, results.csv and a figure in the folder, and flights.csv with every single flight. The
+    numbers are the same for any number of workers and after any interruption.
+    """
+    from ..experiments.executors import executor_for
+    from ..experiments.scattering_case import read_scattering
+    from ..experiments.scattering_job import Job
+    from ..files.folder import make_folder, read_toml
+
+    described, flights = read_scattering(case)
+    folder = Path(out or described.measure.out or Path(case).stem)
+    if resume and overwrite:
+        raise BadInput("--resume and --overwrite exclude each other")
+    _refuse(folder, Path(case), resume=resume, overwrite=overwrite)
+    with executor_for(workers, scheduler) as executor:
+        if not resume:
+            make_folder(folder, overwrite=overwrite)
+        job = Job(described, flights, read_toml(case), folder, resume)
+        bar = _Bar(not (quiet or as_json))
+        try:
+            content = report.with_notes(lambda: job.run(executor, bar.see))
+        except KeyboardInterrupt:
+            words = f"sand scatter {shlex.quote(case)} --out {shlex.quote(str(folder))} --resume"
+            report.note(f"interrupted; what was flown is kept, go on with: {words}")
+            return INTERRUPTED
+        finally:
+            bar.close()
+    if as_json:
+        report.emit({**content, "folder": str(folder)})
+    elif not quiet:
+        report.show(f"scatter {case}", [*_rows(content), ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")])
+    return DONE
+
+
+def _refuse(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
+    """What can be wrong with the folder, before anything is computed."""
+    from ..files.folder import FLIGHTS
+    from .launch import refuse_folder
+
+    if resume:
+        if not (folder / FLIGHTS).exists():
+            raise BadInput(f"there is nothing to resume in {folder}: no {FLIGHTS}")
+        return
+    if not overwrite and (folder / FLIGHTS).exists():
+        raise BadInput(
+            f"folder {folder} holds a job; go on with it by --resume, or --overwrite it, or give another --out"
+        )
+    refuse_folder(folder, case, overwrite=overwrite)
+
+
+class _Bar:
+    """One line that is written over, on a terminal only."""
+
+    def __init__(self, wanted: bool):
+        self.shown = wanted and sys.stderr.isatty()
+
+    def see(self, text: str, part: float) -> None:
+        if self.shown:
+            sys.stderr.write(f"\r{100 * part:3.0f}% {text:<70}"[:80])
+            sys.stderr.flush()
+
+    def close(self) -> None:
+        if self.shown:
+            sys.stderr.write("\r" + 80 * " " + "\r")
+
+
+def _rows(content: dict[str, Any]) -> report.Rows:
+    """What people ask for first."""
+    if "cross_sections" in content:
+        return [row for one in content["cross_sections"] for row in _cross_section(one)]
+    if "cells" in content:
+        hits, flights = (sum(cell[k] for cell in content["cells"]) for k in ("hits", "flights"))
+        return [("cells", f"{len(content['cells'])}, {flights} flights, {hits} hits")]
+    unit = content["b_max"]
+    return [
+        (
+            f"set-up {one['setup']}, b = {one['impact_parameter'] / unit:.4g} b_max" if unit else "flight",
+            f"{one['end']}; the target has {one['exchanged']:.1%} of the energy; drift {one['drift']:.0e}",
+        )
+        for one in content["trajectories"]
+    ]
+
+
+def _cross_section(one: dict[str, Any]) -> report.Rows:
+    text = f"sigma = {one['sigma']:.4g} +- {one['sigma_error']:.1g} m^2, {one['enhancement']:.4g} pi (r1 + r2)^2"
+    if one["analytic"] > 0.0:
+        text += f", c = {one['c']:.3f} +- {one['c_error']:.3f}"
+    rate = one["flights"] / max(one["seconds"], 1e-9)
+    lost = "".join(f", {one[k]} {k}" for k in ("bound", "failed") if one[k])
+    return [(f"{one['speed']:.4g} m/s", f"{text} ({one['flights']} flights{lost}, {rate:.0f}/s)")]

@@ -1,0 +1,57 @@
+"""Where the work of an experiment is done: here, in processes, or on a dask cluster of the user's own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+
+from ..core.errors import BadInput
+
+ANSWER = 10.0
+"""Seconds that a scheduler has for its first answer."""
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
+
+
+@contextmanager
+def executor_for(workers: int = 1, scheduler: str | None = None) -> Iterator[Executor | None]:
+    """An executor for the block; None for one worker, which is this process.
+
+    Args:
+        workers: processes to start, each a new interpreter.
+        scheduler: address of a running dask scheduler, "tcp://host:port", instead. Work of a worker that dies is done
+            again by another.
+
+    Raises:
+        BadInput: no address, no `distributed`, or no answer.
+    """
+    if scheduler is not None:
+        with _dask(scheduler) as executor:
+            yield executor
+    elif workers == 1:
+        yield None
+    else:
+        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+            yield pool
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[Executor]:
+    if not _ADDRESS.fullmatch(address):
+        raise BadInput(f"scheduler {address!r} must be an address such as tcp://127.0.0.1:8786")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise BadInput("a scheduler needs dask: pip install 'sand[dask]'") from None
+    try:
+        client = Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise BadInput(f"the scheduler at {address} does not answer within {ANSWER:g} s ({reason})") from None
+    try:
+        with client.get_executor(pure=False, retries=3) as executor:
+            yield executor
+    finally:
+        client.close()

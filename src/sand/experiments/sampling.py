@@ -1,0 +1,178 @@
+"""Stratified sampling of the impact parameter: which flights are needed for a cross-section, and what they tell.
+
+Strata are annuli of equal width in b.  Flight `number` of stratum `k` is the same whoever asks for it, so results do
+not depend on how the work was split, on the order in which it came back, nor on interruptions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+STRATA = 24
+"""Annuli up to the first guess of where no hit is possible."""
+HEADROOM = 1.2
+"""First guess over the widest impact parameter of a central potential."""
+EMPTY = 3
+"""Outermost annuli that must be without a hit; otherwise more are added."""
+PILOT = 24
+"""Flights in each annulus to begin with."""
+STEP_UP = 3.0
+"""A round has at most so many times the flights of all rounds before, because its plan is only as good as they."""
+ONE_SIGMA, CERTAIN = 1.0, 1.96
+"""Normal deviates of an error bar and of an interval of 95 %."""
+
+
+class Task(NamedTuple):
+    """Flights to be flown: first ≤ number < last of one stratum."""
+
+    stratum: int
+    first: int
+    last: int
+
+    def addresses(self) -> Iterator[tuple[int, int]]:
+        """Stratum and number of each."""
+        return ((self.stratum, number) for number in range(self.first, self.last))
+
+
+class Estimate(NamedTuple):
+    """A sum over strata with its bounds."""
+
+    value: float
+    low: float
+    high: float
+
+
+def wilson(hits: np.ndarray, tries: np.ndarray, z: float) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of a probability from so many hits in so many tries (Wilson 1927); 0 and 1 without a try."""
+    n = np.maximum(tries, 1)
+    p = hits / n
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    low, high = np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
+    return np.where(tries > 0, np.where(hits > 0, low, 0.0), 0.0), np.where(
+        tries > 0, np.where(hits < tries, high, 1.0), 1.0
+    )
+
+
+class Strata:
+    """What is known of each annulus.
+
+    Args:
+        width: of an annulus [m].
+        count: how many annuli.
+    """
+
+    def __init__(self, width: float, count: int):
+        self.width = width
+        self.flown: list[dict[int, tuple[float, float]]] = [{} for _ in range(count)]
+
+    @classmethod
+    def up_to(cls, widest: float, farthest: float = math.inf) -> Strata:
+        """The first guess; b may not go beyond `farthest` [m], where a sphere of starts ends."""
+        return cls(min(HEADROOM * widest, farthest) / STRATA, STRATA)
+
+    def __len__(self) -> int:
+        return len(self.flown)
+
+    def edges(self, stratum: int | np.ndarray) -> tuple[float | np.ndarray, float | np.ndarray]:
+        """Least and largest b [m]."""
+        return stratum * self.width, (stratum + 1) * self.width
+
+    def area(self) -> np.ndarray:
+        """π (b₊² − b₋²) (K,) [m²]."""
+        k = np.arange(len(self))
+        return math.pi * self.width**2 * (2 * k + 1.0)
+
+    def add(self, stratum: int, number: int, hit: float, weight: float) -> None:
+        """One flight: 1 or 0, and what it counts for."""
+        while stratum >= len(self):
+            self.flown.append({})
+        self.flown[stratum][number] = (hit, weight)
+
+    def counts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Hits and flights (K,) of the annuli."""
+        hits = np.array([sum(hit for hit, _ in sorted_values(one)) for one in self.flown])
+        return hits, np.array([len(one) for one in self.flown])
+
+    def weights(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and variance (K,) of what hits count for; 1 and 0 where none is known."""
+        mean, spread = np.ones(len(self)), np.zeros(len(self))
+        for k, one in enumerate(self.flown):
+            found = np.array([weight for hit, weight in sorted_values(one) if hit > 0.0])
+            if found.size:
+                mean[k], spread[k] = found.mean(), found.var()
+        return mean, spread
+
+    def estimate(self, z: float = ONE_SIGMA) -> Estimate:
+        """σ = Σ A ⟨w hit⟩ [m²]; bounds from Wilson's, added in squares (Donner & Zou 2012)."""
+        hits, tries = self.counts()
+        mean, spread = self.weights()
+        area = self.area()
+        p = hits / np.maximum(tries, 1)
+        low, high = wilson(hits, tries, z)
+        scatter = z * z * p * spread / np.maximum(tries, 1)
+        value = float((area * mean * p).sum())
+        down = math.sqrt(float((area**2 * ((mean * (p - low)) ** 2 + scatter)).sum()))
+        up = math.sqrt(float((area**2 * ((mean * (high - p)) ** 2 + scatter)).sum()))
+        return Estimate(value, value - down, value + up)
+
+    def error(self) -> float:
+        """Half the width of one standard deviation to both sides [m²]."""
+        found = self.estimate()
+        return 0.5 * (found.high - found.low)
+
+    def round(self, relative_error: float, farthest: float = math.inf) -> list[Task]:
+        """The flights that are to come next; none if σ is known well enough.
+
+        First so many in each annulus, and more annuli as long as the outermost have hits; then where they help most,
+        n ∝ A √(p(1 − p)) (Neyman 1934), p as Wilson smooths it.
+        """
+        hits, tries = self.counts()
+        pilot = [Task(k, int(n), PILOT) for k, n in enumerate(tries) if n < PILOT]
+        if pilot:
+            return pilot
+        if hits[-EMPTY:].any() and (len(self) + 1) * self.width <= farthest * (1 + 1e-9):
+            more = min(max(len(self) // 4, 1), int(farthest / self.width + 1e-9) - len(self))
+            return [Task(len(self) + k, 0, PILOT) for k in range(more)]
+        found = self.estimate()
+        goal = relative_error * found.value
+        if self.error() <= goal or found.value == 0.0:
+            return []
+        p = (hits + 0.5) / (tries + 1.0)
+        mean, spread = self.weights()
+        worth = self.area() * np.sqrt(mean**2 * p * (1 - p) + p * spread)
+        wanted = worth * worth.sum() / goal**2
+        # rounding up leaves at least one in each annulus that is not settled
+        more = np.maximum(np.ceil(wanted) - tries, 0.0)
+        budget = STEP_UP * tries.sum()
+        if more.sum() > budget:
+            more = np.ceil(more * budget / more.sum())
+        if not more.any():
+            more = np.ceil(0.2 * tries * (worth > 0.0))
+        return [Task(k, int(n), int(n + m)) for k, (n, m) in enumerate(zip(tries, more, strict=True)) if m > 0]
+
+
+def sorted_values(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """In the order of their numbers, so that sums are the same bits however they came."""
+    return (flights[number] for number in sorted(flights))
+
+
+def split(tasks: list[Task], most: int) -> list[list[Task]]:
+    """Tasks in bundles of about `most` flights each, in their order."""
+    bundles: list[list[Task]] = [[]]
+    room = most
+    for task in tasks:
+        first = task.first
+        while first < task.last:
+            last = min(task.last, first + room)
+            bundles[-1].append(Task(task.stratum, first, last))
+            room -= last - first
+            first = last
+            if room == 0:
+                bundles.append([])
+                room = most
+    return [bundle for bundle in bundles if bundle]

@@ -1,0 +1,230 @@
+"""From what a user says of a scattering experiment to checked numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..core.constants import BOLTZMANN
+from ..core.errors import BadInput, did_you_mean
+from ..core.grains import Grains
+from ..core.material import Material, material_named
+from ..core.units import in_unit, si, spoken
+from ..forces.vectors import three
+from ..kernels.starts import ALIGNED, GIVEN, RANDOM
+from ..theory.magnetic import thermal_speed
+from .encounters import Flight, scales_of
+
+SPEED_UNITS = ("m/s", "thermal")
+SPINS = {"none": 0.0, "kT/2": 0.5, "equipartition": 1.5}
+"""Mean rotational energy of a grain in k_B T."""
+ORIENTATIONS = {"random": RANDOM, "aligned": ALIGNED, "given": GIVEN}
+SHAPES = ("plane", "sphere")
+OUTCOMES = ("hit", "stick")
+AUTO_START = 10.0
+"""Distance of the start in b_max; at least `LEAST_START` radii of contact."""
+LEAST_START = 5.0
+_OF_CAPTURE = re.compile(r"\s*([0-9.eE+-]+)\s*(b_max|R_m)\s*")
+
+
+class Asking:
+    """Collects what is wrong, so that all of it is told at once."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+
+    def take(self, make: Callable[[], Any], instead: Any = None) -> Any:
+        """`make()`, or `instead` if that is a mistake."""
+        try:
+            return make()
+        except BadInput as error:
+            self.problems += error.problems
+            return instead
+
+    def done(self) -> None:
+        """Raises BadInput if anything was wrong."""
+        if self.problems:
+            raise BadInput(self.problems)
+
+
+def grain(radius: Any, material: Material | str, moment: Any = 0.0) -> Grains:
+    """One grain at rest, its moment along +x.  Raises BadInput."""
+    known = material_named(material) if isinstance(material, str) else material
+    r = si(radius, "m", "radius", above=0.0)
+    size = Grains([[0.0, 0.0, 0.0]], r, known, moment=moment).moment
+    return Grains([[0.0, 0.0, 0.0]], r, known, moment=[[float(np.linalg.norm(size)), 0.0, 0.0]])
+
+
+def flight(
+    radius: Any = None,
+    material: Material | str | None = None,
+    moment: Any = 0.0,
+    temperature: Any = 0.0,
+    speed: Any = None,
+    *,
+    speed_unit: str = "m/s",
+    spin: Any = "none",
+    start: Any = "auto",
+    start_shape: str = "plane",
+    target: Grains | None = None,
+    projectile: Grains | None = None,
+    orientation: str = "random",
+    target_velocity: Any = None,
+    field: Any = None,
+    escape: Any = "auto",
+    outcome: str = "hit",
+    tolerance: Any = 1e-8,
+) -> Flight:
+    """A scattering experiment from what a user says.
+
+    Args:
+        radius: of the grains [m] > 0; material: their `Material` or its name; moment: as `Grains` takes one.
+        temperature: T [K] ≥ 0, of thermal speeds and spins.
+        speed: v∞ of the projectile > 0 [m/s], or in v_th = √(k_B T/m) of the projectile with `speed_unit="thermal"`.
+        spin: mean rotational energy per body: "none", "kT/2" (the paper's U_rot), "equipartition" (3/2 k_B T), all
+            by chance; or a vector [rad/s] for both; or two of them, of projectile and target.
+        start: distance before the target: "auto", the larger of 10 b_max and 5 (r1 + r2); a length [m]; or
+            "20 b_max", "1 R_m" (Eq. 2; needs a temperature).
+        start_shape: of all starts together, "plane" across the flight, or "sphere" about the target.
+        target, projectile: grains, or aggregates, instead of radius, material and moment; the target is like the
+            projectile by default. Their own velocities and spins do not count.
+        orientation: "random"; "aligned", single grains' moments along the line of centres at the start; "given".
+        target_velocity: three components [m/s], or "thermal", √(k_B T/m) for each; None: at rest.
+        field: external flux density, three components [T]; None: none.
+        escape: distance [m] at which a body on its way out is gone; "auto": that of its start.
+        outcome: "hit", surfaces touch; "stick": those that hold, each followed through its real contact.
+        tolerance: error of a step over the scales, 1e-13 … 1e-3.
+
+    Raises:
+        BadInput: one line for each mistake.
+    """
+    ask = Asking()
+    first = projectile if projectile is not None else ask.take(lambda: _made(radius, material, moment))
+    second = target if target is not None else first
+    heat = ask.take(lambda: si(temperature, "K", "temperature", least=0.0), 0.0)
+    for name, value, allowed in (
+        ("speed_unit", speed_unit, SPEED_UNITS),
+        ("orientation", orientation, ORIENTATIONS),
+        ("start_shape", start_shape, SHAPES),
+        ("outcome", outcome, OUTCOMES),
+    ):
+        if value not in allowed:
+            ask.problems.append(f"{name} = {value!r}; {did_you_mean(str(value), list(allowed))}")
+    drift, spread = ask.take(lambda: _drift(target_velocity, heat, second), ((0.0,) * 3, 0.0))
+    whirl, energy = ask.take(lambda: _spin(spin, heat), (((0.0,) * 3,) * 2, 0.0))
+    outer = ask.take(lambda: (0.0,) * 3 if field is None else three(field, "T", "field"))
+    exact = ask.take(lambda: si(tolerance, "1", "tolerance", above=0.0), 1e-8)
+    if not 1e-13 <= exact <= 1e-3:
+        ask.problems.append(f"tolerance = {tolerance!r} must lie in 1e-13 … 1e-3")
+    gone = ask.take(lambda: 0.0 if escape == "auto" else si(escape, "m", "escape", above=0.0))
+    fast = ask.take(lambda: _speed(speed, speed_unit, heat, first))
+    if first is not None and second is not None and fast is not None:
+        if orientation == "aligned" and not len(first) == len(second) == 1:
+            ask.problems.append("orientation = 'aligned' is for single grains; give aggregates as they lie, 'given'")
+        away = ask.take(lambda: _distance(start, first, second, fast, heat))
+    ask.done()
+    return Flight(
+        first,
+        second,
+        fast,
+        away,
+        sphere=start_shape == "sphere",
+        escape=gone,
+        drift=drift,
+        drift_spread=spread,
+        axes=ORIENTATIONS[orientation],
+        spin=whirl,
+        spin_energy=(energy, energy),
+        field=outer,
+        tolerance=exact,
+        temperature=heat,
+        contact=outcome == "stick",
+    )
+
+
+def _made(radius: Any, material: Material | str | None, moment: Any) -> Grains:
+    missing = [name for name, value in (("radius", radius), ("material", material)) if value is None]
+    if missing:
+        raise BadInput(f"{name} is missing; give radius and material, or a projectile" for name in missing)
+    return grain(radius, material or "", moment)
+
+
+def _speed(speed: Any, unit: str, heat: float, body: Grains | None) -> float | None:
+    if speed is None:
+        raise BadInput("speed is missing; give it in m/s, or in thermal speeds with speed_unit='thermal'")
+    if unit != "thermal":
+        return si(speed, "m/s", "speed", above=0.0)
+    times = si(speed, "1", "speed", above=0.0)
+    if not heat > 0.0:
+        raise BadInput("speed_unit = 'thermal' needs a temperature above 0 K")
+    return None if body is None else times * thermal_speed(float(body.mass.sum()), heat)
+
+
+def _drift(value: Any, heat: float, body: Grains | None) -> tuple[Any, float]:
+    """Mean velocity of the target and the standard deviation of each component [m/s]."""
+    rest = (0.0, 0.0, 0.0)
+    if value is None or body is None:
+        return rest, 0.0
+    if isinstance(value, str) and value == "thermal":
+        return rest, thermal_speed(float(body.mass.sum()), heat)
+    return three(value, "m/s", "target_velocity"), 0.0
+
+
+def _spin(value: Any, heat: float) -> tuple[Any, float]:
+    """Given spins of both [rad/s], and the mean energy of thermal ones [J]."""
+    rest = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    if isinstance(value, str):
+        if value not in SPINS:
+            raise BadInput(f"spin = {value!r}; {did_you_mean(value, list(SPINS))}, or three components in rad/s")
+        if SPINS[value] > 0.0 and not heat > 0.0:
+            raise BadInput(f"spin = {value!r} needs a temperature above 0 K")
+        return rest, SPINS[value] * BOLTZMANN * heat
+    parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) else [value]
+    if len(parts) == 2:
+        return (three(parts[0], "rad/s", "spin of the projectile"), three(parts[1], "rad/s", "spin of the target")), 0.0
+    both = three(value, "rad/s", "spin")
+    return (both, both), 0.0
+
+
+def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: float) -> float:
+    """Distance of the start [m].  Raises BadInput where it lies inside the contact."""
+    scales = scales_of(first, second, speed)
+    if isinstance(start, str) and start == "auto":
+        return max(AUTO_START * scales.capture, LEAST_START * scales.touch)
+    match = _OF_CAPTURE.fullmatch(start) if isinstance(start, str) else None
+    if match:
+        times, unit = float(match[1]), match[2]
+        if unit == "R_m" and not heat > 0.0:
+            raise BadInput(f"start = {start!r} needs a temperature above 0 K")
+        # R_m = (4 α/(k_B T))^(1/3): Eq. 2 for two moments
+        size = scales.capture if unit == "b_max" else (4.0 * scales.alpha / (BOLTZMANN * heat)) ** (1.0 / 3.0)
+        distance = times * size
+    elif in_unit(start, "m") is None:
+        raise BadInput(f"start = {start!r} must be 'auto', a length such as '2 um', or '10 b_max', '1 R_m'")
+    else:
+        distance = si(start, "m", "start", above=0.0)
+    if not distance > scales.touch:
+        raise BadInput(
+            f"start = {start!r}, {spoken(distance, 'm')}, lies inside the contact: the bodies reach to "
+            f"{spoken(scales.touch, 'm')}; start farther out"
+        )
+    return distance
+
+
+def impact_parameter(value: Any, flying: Flight, name: str = "impact_parameter") -> float:
+    """b [m] ≥ 0 from a length or "0.95 b_max".  Raises BadInput."""
+    match = _OF_CAPTURE.fullmatch(value) if isinstance(value, str) else None
+    if match and match[2] == "b_max":
+        b = float(match[1]) * flying.scales.capture
+        if flying.scales.capture == 0.0:
+            raise BadInput(f"{name} = {value!r}: without moments b_max is 0; give a length")
+    else:
+        b = si(value, "m", name)
+    if b < 0.0:
+        raise BadInput(f"{name} = {value!r} must be at least 0 m")
+    if flying.sphere and b >= flying.distance:
+        raise BadInput(f"{name} = {value!r} must be below the radius of the start, {spoken(flying.distance, 'm')}")
+    return b

@@ -1,0 +1,190 @@
+"""Two magnetic grains: energies, distances and cross-sections of section 3.1 of the paper (Eqs. 1–14, 27).
+
+Arguments are SI numbers or texts with a unit.  What the paper misprints is given right here and named.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..core.constants import BOLTZMANN, MAGNETIC
+from ..core.errors import BadInput
+from ..core.units import si
+from ..physics import dipole
+
+
+def reduced_mass(mass: Any, other: Any = None) -> float:
+    """m̄ = m1 m2/(m1 + m2) [kg], m/2 for two equal ones (below Eq. 8).
+
+    Args:
+        mass, other: m1, m2 [kg] > 0; the same by default.
+
+    Raises:
+        BadInput: not a mass above 0.
+    """
+    m1 = si(mass, "kg", "mass", above=0.0)
+    m2 = m1 if other is None else si(other, "kg", "other", above=0.0)
+    return m1 * m2 / (m1 + m2)
+
+
+def thermal_speed(mass: Any, temperature: Any) -> float:
+    """v_th = √(k_B T/m) [m/s] (section 4.1), one component's standard deviation.
+
+    Args:
+        mass: m [kg] > 0.
+        temperature: T [K] ≥ 0.
+
+    Raises:
+        BadInput: out of range.
+    """
+    heat = BOLTZMANN * si(temperature, "K", "temperature", least=0.0)
+    return math.sqrt(heat / si(mass, "kg", "mass", above=0.0))
+
+
+def coupling(moment: Any, distance: Any, temperature: Any) -> float:
+    """λ = μ²μ₀/(4π d³ k_B T) (Eq. 1): magnetic over thermal energy.
+
+    Args:
+        moment: μ [A m²] ≥ 0.
+        distance: d [m] > 0, the sum of the radii.
+        temperature: T [K] > 0.
+
+    Raises:
+        BadInput: out of range.
+    """
+    return dipole.coupling(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
+
+
+def interaction_radius(moment: Any, distance: Any, temperature: Any) -> float:
+    """R_m = (2μ₀μ²/(π k_B T))^(1/3) = 2 d λ^(1/3) [m] (Eq. 2); it does not depend on d. Arguments as for `coupling`."""
+    return dipole.interaction_radius(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
+
+
+def geometric_cross_section(radius: Any, other: Any = None) -> float:
+    """σ = π (R_i + R_j)² [m²] of two spheres (Eq. 4, printed with a factor 4 that Eq. 26 does not have).
+
+    Eq. 3, πR² of one grain, is `geometric_cross_section(radius, 0.0)`.
+
+    Args:
+        radius, other: R_i, R_j [m] ≥ 0; the same by default.
+
+    Raises:
+        BadInput: out of range.
+    """
+    r1 = si(radius, "m", "radius", least=0.0)
+    r2 = r1 if other is None else si(other, "m", "other", least=0.0)
+    return math.pi * (r1 + r2) ** 2
+
+
+def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
+    """U = k [μ·μ′/r³ − 3 (μ·r)(μ′·r)/r⁵] [J] (Eq. 6, whose last r′ is r), k = μ₀/4π.
+
+    Args:
+        moment1, moment2: μ, μ′ (3,) [A m²].
+        apart: r (3,) [m], from one to the other, not 0.
+
+    Raises:
+        BadInput: not three finite numbers, or no distance.
+    """
+    a, b, r = (_three(v, n) for v, n in ((moment1, "moment1"), (moment2, "moment2"), (apart, "apart")))
+    if not any(r):
+        raise BadInput("apart = 0: two dipoles in one place have no finite energy")
+    return dipole.pair_load(r, a, b, MAGNETIC)[3]
+
+
+def potential_parameter(moment1: Any, moment2: Any = None) -> float:
+    """α = 2kμμ′ [J m³] (Eq. 7): U_min = −α/d³.
+
+    Args:
+        moment1, moment2: μ, μ′ [A m²] ≥ 0; the same by default.
+
+    Raises:
+        BadInput: out of range.
+    """
+    first, second = _moments(moment1, moment2)
+    return dipole.contact_energy(first, second, 1.0, MAGNETIC)
+
+
+def lowest_energy(moment1: Any, distance: Any, moment2: Any = None) -> float:
+    """U_min = −2kμμ′/d³ [J] (Eq. 7), moments head to tail at the distance d [m] > 0.  Raises BadInput."""
+    first, second = _moments(moment1, moment2)
+    return -dipole.contact_energy(first, second, si(distance, "m", "distance", above=0.0), MAGNETIC)
+
+
+def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: Any, alpha: float) -> float:
+    """U_eff = m̄ b² v∞²/(2r²) − α/r³ [J] (Eqs. 8–10), moments always along r.
+
+    Args:
+        distance: r [m] > 0.
+        impact_parameter: b [m] ≥ 0.
+        speed: v∞ [m/s] ≥ 0, relative.
+        mass: m̄ [kg] > 0, reduced.
+        alpha: `potential_parameter` [J m³].
+
+    Raises:
+        BadInput: out of range.
+    """
+    r, b = si(distance, "m", "distance", above=0.0), si(impact_parameter, "m", "impact_parameter", least=0.0)
+    v, m = si(speed, "m/s", "speed", least=0.0), si(mass, "kg", "mass", above=0.0)
+    return 0.5 * m * (b * v / r) ** 2 - alpha / r**3
+
+
+def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: float) -> float:
+    """U_0 = (m̄ v∞² b²/3)³/(2α²) [J] (Eq. 11): the maximum of `effective_potential`, at r = 3α/(m̄ b² v∞²).
+
+    Arguments as there; α > 0.
+    """
+    b, v = si(impact_parameter, "m", "impact_parameter", least=0.0), si(speed, "m/s", "speed", least=0.0)
+    if not alpha > 0.0:
+        raise BadInput(f"alpha = {alpha!r} must be above 0: there is no barrier without attraction")
+    return (si(mass, "kg", "mass", above=0.0) * (v * b) ** 2 / 3.0) ** 3 / (2.0 * alpha**2)
+
+
+def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> float:
+    """b_max = √3 (α/(m̄ v∞²))^(1/3) [m] (Eqs. 12, 13; what is printed as Eq. 13 is b_max²).
+
+    Args:
+        moment1, moment2: μ, μ′ [A m²] ≥ 0; the same by default.
+        mass: m̄ [kg] > 0, reduced (`reduced_mass`).
+        speed: v∞ [m/s] > 0, relative.
+
+    Raises:
+        BadInput: out of range.
+    """
+    first, second = _moments(moment1, moment2)
+    m, v = si(mass, "kg", "mass", above=0.0), si(speed, "m/s", "speed", above=0.0)
+    return dipole.capture_radius(first, second, m, v, MAGNETIC)
+
+
+def capture_cross_section(moment1: Any, mass: Any, speed: Any, moment2: Any = None, c: float = 1.0) -> float:
+    """σ_m = c 3π (α/(m̄ v∞²))^(2/3) [m²] (Eq. 14; Eq. 27 with the paper's c of 0.8–0.9); arguments as `capture_radius`.
+
+    The paper's c is a matter of the distance from which grains start: see the page on cross-sections.
+    """
+    return c * math.pi * capture_radius(moment1, mass, speed, moment2) ** 2
+
+
+def _thermal(moment: Any, distance: Any, temperature: Any) -> tuple[float, float, float]:
+    return (
+        si(moment, "A m^2", "moment", least=0.0),
+        si(distance, "m", "distance", above=0.0),
+        si(temperature, "K", "temperature", above=0.0),
+    )
+
+
+def _moments(moment1: Any, moment2: Any) -> tuple[float, float]:
+    first = si(moment1, "A m^2", "moment1", least=0.0)
+    return first, first if moment2 is None else si(moment2, "A m^2", "moment2", least=0.0)
+
+
+def _three(value: Any, name: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in np.asarray(value, float))
+    except (TypeError, ValueError):
+        raise BadInput(f"{name} = {value!r} must be three numbers in SI") from None
+    if not math.isfinite(x + y + z):
+        raise BadInput(f"{name} = {value!r} must be three finite numbers")
+    return x, y, z
