@@ -112,7 +112,9 @@ def _rows(content: dict[str, Any]) -> report.Rows:
     return [
         (
             f"set-up {one['setup']}, b = {one['impact_parameter'] / unit:.4g} b_max" if unit else "flight",
-            f"{one['end']}; the target has {one['exchanged']:.1%} of the energy; drift {one['drift']:.0e}",
+            one["end"]
+            + (f"; the target has {one['exchanged']:.1%} of the energy" if one["end"] != "hit" else "")
+            + f"; drift {one['drift']:.0e}",
         )
         for one in content["trajectories"]
     ]

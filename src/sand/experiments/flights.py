@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from ..core.units import si
 from ..kernels.pairs import DIRECTION1, DIRECTION2, SPIN1, SPIN2
@@ -90,7 +92,7 @@ class Trajectory:
         moment_projectile, moment_target: unit vectors (K, 3); spin_projectile, spin_target: (K, 3). Of single grains;
             empty (0, 3) for aggregates.
         impact_parameter, speed: at the start; closest: least distance of the surfaces, 0 at a hit.
-        exchanged: part of the projectile's kinetic energy that the target has at the end.
+        exchanged: part of the projectile's kinetic energy that the target has at the end; NaN after a hit.
         drift: change of the energy over |U_min| at touch.
     """
 
@@ -110,6 +112,13 @@ class Trajectory:
     exchanged: float
     drift: float
 
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions of projectile and target (T, 3) at these times (T,) [s], by cubics through the steps."""
+        return (
+            CubicHermiteSpline(self.time, self.projectile, self.velocity_projectile)(times),
+            CubicHermiteSpline(self.time, self.target, self.velocity_target)(times),
+        )
+
 
 def trajectory(
     flying: Flight, b: Any, *, seed: int = 0, stratum: int = 0, number: int = 0, azimuth: Any = 0.0
@@ -125,11 +134,29 @@ def trajectory(
     Raises:
         BadInput: b is out of range.
     """
-    square = np.array([impact_parameter(b, flying) ** 2])
+    square = impact_parameter(b, flying) ** 2
     angle = si(azimuth, "1", "azimuth", least=0.0)
+    return _recorded(flying, (stratum, number), (square, square), seed, angle)
+
+
+def replay(flying: Flight, stratum: int, number: int, width: float, seed: int = 0) -> Trajectory:
+    """A flight of a cross-section or a map once more, to the bit, with all that happened.
+
+    Args:
+        stratum, number: its address, as in flights.csv.
+        width: of an annulus [m], `CrossSection.profile[0, 1]`.
+    """
+    return _recorded(flying, (stratum, number), ((stratum * width) ** 2, ((stratum + 1) * width) ** 2), seed, -1.0)
+
+
+def _recorded(
+    flying: Flight, address: tuple[int, int], squares: tuple[float, float], seed: int, azimuth: float
+) -> Trajectory:
+    """One flight, again with more room if there was not enough for its steps."""
+    given = [np.array([value]) for value in (*address, *squares)]
     rows = 4096
     while True:
-        told, _, trail = _flown(flying, np.array([stratum]), np.array([number]), square, square, seed, angle, rows)
+        told, _, trail = _flown(flying, given[0], given[1], given[2], given[3], seed, azimuth, rows)
         steps = int(told[0, RESULTS.index("steps")])
         if steps < rows:
             return _trajectory(flying, told[0], trail[: steps + 1])
@@ -159,6 +186,6 @@ def _trajectory(flying: Flight, told: np.ndarray, trail: np.ndarray) -> Trajecto
         impact_parameter=named["impact_parameter"],
         speed=named["speed"],
         closest=max(named["closest"], 0.0),
-        exchanged=float(m2 * (v2[-1] @ v2[-1]) / (m1 * (v1[0] @ v1[0]))),
+        exchanged=float(m2 * (v2[-1] @ v2[-1]) / (m1 * (v1[0] @ v1[0]))) if named["end"] != HIT else math.nan,
         drift=named["drift"],
     )

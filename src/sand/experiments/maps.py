@@ -24,7 +24,7 @@ class ProbabilityMap:
     """P(hit | b, v); SI.
 
     Attributes:
-        speeds: (V,) [m/s]; edges: of the cells in b, (B + 1,) [m].
+        speeds: (V,) [m/s]; edges: of the cells in b, (V, B + 1) [m].
         hits, flights: (V, B).
         capture: b_max of each speed (V,) [m] (Eqs. 12, 13).
         geometric: r1 + r2 [m].
@@ -52,8 +52,8 @@ class ProbabilityMap:
         return [
             {
                 "speed": float(self.speeds[v]),
-                "b_from": float(self.edges[k]),
-                "b_to": float(self.edges[k + 1]),
+                "b_from": float(self.edges[v, k]),
+                "b_to": float(self.edges[v, k + 1]),
                 "flights": int(self.flights[v, k]),
                 "hits": int(self.hits[v, k]),
                 "probability": float(self.probability[v, k]),
@@ -62,7 +62,7 @@ class ProbabilityMap:
                 "b_max": float(self.capture[v]),
             }
             for v in range(self.speeds.size)
-            for k in range(self.edges.size - 1)
+            for k in range(self.edges.shape[1] - 1)
         ]
 
 
@@ -71,7 +71,6 @@ def probability_map(
     *,
     cells: int = 24,
     per_cell: int = 64,
-    widest: float | None = None,
     seed: int = 0,
     executor: Executor | None = None,
     known: Mapping[int, Iterable[Sequence[float]]] | None = None,
@@ -82,7 +81,7 @@ def probability_map(
 
     Args:
         flights: one set-up for each speed.
-        cells: how many in b, up to `widest` [m]; None: 1.2 times the widest b that a central potential captures.
+        cells: how many in b for each speed, up to 1.2 times the widest b that a central potential captures there.
         known, keep: as for `scattering.flown`, with the number of the set-up.
         watch: called with flights done and all flights.
 
@@ -91,14 +90,16 @@ def probability_map(
     """
     if not flights or cells < 1 or per_cell < 1:
         raise BadInput(f"a map needs speeds, and cells = {cells} and per_cell = {per_cell} of at least 1")
-    most = widest or HEADROOM * max(one.scales.widest for one in flights)
-    most = min([most, *(one.distance for one in flights if one.sphere)])
+    most = [
+        min(HEADROOM * one.scales.widest, one.distance) if one.sphere else HEADROOM * one.scales.widest
+        for one in flights
+    ]
     hits, done = np.zeros((len(flights), cells)), np.zeros((len(flights), cells))
     tasks = [Task(k, 0, per_cell) for k in range(cells)]
     for v, one in enumerate(flights):
         before = addressed((known or {}).get(v, ()))
         tell = None if keep is None else partial(keep, v)
-        for told in flown(one, tasks, most / cells, seed, executor, before, tell):
+        for told in flown(one, tasks, most[v] / cells, seed, executor, before, tell):
             place = told[:, STRATUM].astype(int)
             np.add.at(hits[v], place, told[:, END] == HIT)
             np.add.at(done[v], place, 1)
@@ -106,7 +107,7 @@ def probability_map(
                 watch(int(done.sum()), done.size * per_cell)
     return ProbabilityMap(
         np.array([one.speed for one in flights]),
-        np.linspace(0.0, most, cells + 1),
+        np.linspace(0.0, np.array(most), cells + 1, axis=1),
         hits,
         done,
         np.array([one.scales.capture for one in flights]),

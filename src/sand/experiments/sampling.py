@@ -135,9 +135,10 @@ class Strata:
         pilot = [Task(k, int(n), PILOT) for k, n in enumerate(tries) if n < PILOT]
         if pilot:
             return pilot
-        if hits[-EMPTY:].any() and (len(self) + 1) * self.width <= farthest * (1 + 1e-9):
-            more = min(max(len(self) // 4, 1), int(farthest / self.width + 1e-9) - len(self))
-            return [Task(len(self) + k, 0, PILOT) for k in range(more)]
+        room = farthest / self.width - len(self) + 1e-9
+        if hits[-EMPTY:].any() and room >= 1.0:
+            further = int(min(max(len(self) // 4, 1), room))
+            return [Task(len(self) + k, 0, PILOT) for k in range(further)]
         found = self.estimate()
         goal = relative_error * found.value
         if self.error() <= goal or found.value == 0.0:

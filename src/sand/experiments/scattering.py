@@ -20,7 +20,7 @@ from ..core.errors import BadInput
 from ..core.units import si
 from ..stepping.encounter import BOUND, FAILED, HIT
 from .encounters import Flight
-from .flights import COLUMNS, Trajectory, fly, trajectory
+from .flights import COLUMNS, Trajectory, fly, replay, trajectory
 from .sampling import CERTAIN, Strata, Task, split
 from .scattering_input import flight
 
@@ -228,4 +228,4 @@ def _told(flying: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: 
     )
 
 
-__all__ = ["CrossSection", "Trajectory", "cross_section", "flight", "fly", "measure", "trajectory"]
+__all__ = ["CrossSection", "Trajectory", "cross_section", "flight", "fly", "measure", "replay", "trajectory"]

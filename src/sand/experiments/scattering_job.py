@@ -21,6 +21,8 @@ from .maps import probability_map
 from .scattering import measure
 from .scattering_case import ScatterCase
 
+POINTS = 1001
+"""Of a trajectory in results.csv, at equal times."""
 Watch = Callable[[str, float], None]
 """Called with a line on how far things are, and the part that is done."""
 
@@ -94,7 +96,7 @@ class Job:
         rows = [one.to_dict() for one in found]
         flat = [{k: v for k, v in row.items() if k not in ("profile", "interval", "seconds")} for row in rows]
         write_table(self.folder / RESULTS, flat)
-        save(sigma_figure(found, _title(self.flights[0])), self.folder / FIGURE)
+        save(sigma_figure(found, _title(self.flights)), self.folder / FIGURE)
         return {"cross_sections": rows}
 
     def _map(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
@@ -113,7 +115,7 @@ class Job:
         )
         rows = found.to_rows()
         write_table(self.folder / RESULTS, rows)
-        save(map_figure(found, _title(self.flights[0])), self.folder / FIGURE)
+        save(map_figure(found, _title(self.flights)), self.folder / FIGURE)
         return {"cells": rows, "r1_plus_r2": found.geometric}
 
     def _trajectories(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
@@ -127,7 +129,7 @@ class Job:
                 watch(f"flight {n + 1} of set-up {k + 1}", k / len(self.flights))
         write_table(self.folder / RESULTS, [row for k, group in enumerate(groups) for row in _path_rows(k, group)])
         names = [str(spin) for spin in self.case.measure.spins or [self.case.flight.spin]]
-        save(trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights[0])), self.folder / FIGURE)
+        save(trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights)), self.folder / FIGURE)
         kept = ("end", "impact_parameter", "speed", "closest", "exchanged", "drift")
         told = [
             {"setup": k, **{name: getattr(one, name) for name in kept}}
@@ -138,22 +140,21 @@ class Job:
 
 
 def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
-    """Each step of each flight: time and positions of both."""
-    return [
-        {
-            "setup": setup,
-            "flight": n,
-            "time": float(one.time[step]),
-            **{f"projectile_{a}": float(one.projectile[step, k]) for k, a in enumerate("xyz")},
-            **{f"target_{a}": float(one.target[step, k]) for k, a in enumerate("xyz")},
-        }
-        for n, one in enumerate(group)
-        for step in range(one.time.size)
-    ]
+    """Time and positions of both, `POINTS` times of each flight."""
+    rows = []
+    for n, one in enumerate(group):
+        times = np.linspace(0.0, one.time[-1], POINTS)
+        projectile, target = one.at(times)
+        for t, p, q in zip(times, projectile, target, strict=True):
+            row: dict[str, Any] = {"setup": setup, "flight": n, "time": float(t)}
+            row |= {f"projectile_{a}": float(p[k]) for k, a in enumerate("xyz")}
+            rows.append(row | {f"target_{a}": float(q[k]) for k, a in enumerate("xyz")})
+    return rows
 
 
-def _title(one: Flight) -> str:
+def _title(flights: list[Flight]) -> str:
     """What is scattered, in a line."""
+    one = flights[0]
     from ..core.units import spoken
 
     def body(grains: Any) -> str:
@@ -166,4 +167,5 @@ def _title(one: Flight) -> str:
         parts.append(body(one.target))
     heat = f", {spoken(one.temperature, 'K')}" if one.temperature > 0.0 else ""
     shape = "sphere" if one.sphere else "plane"
-    return f"{' on '.join(parts)}{heat}; starts on a {shape}, {spoken(one.distance, 'm')}"
+    far = [spoken(f(each.distance for each in flights), "m") for f in (min, max)]
+    return f"{' on '.join(parts)}{heat}; starts on a {shape}, {' to '.join(dict.fromkeys(far))}"

@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Wedge
-from scipy.interpolate import CubicHermiteSpline
 
 from .figure import DPI, RunFigure
 from .style import BIG, BLUE, FAINT, INK, ORANGE, RED, letter, pretty, styled, with_prefix
@@ -57,14 +55,9 @@ def _draw_flight(axes: Axes, one: Any, colour: str, unit: float, window: float) 
     near |= np.abs(one.target[:, :2]).max(axis=1) < 1.4 * window * unit
     inside = np.flatnonzero(near)
     first, last = (one.time[inside[0]], one.time[inside[-1]]) if inside.size else (one.time[0], one.time[-1])
-    label = f"b = {one.impact_parameter / unit:.3g}: {one.end}"
-    for place, velocity, width, mark in (
-        (one.projectile, one.velocity_projectile, 1.2, label),
-        (one.target, one.velocity_target, 0.6, None),
-    ):
-        spline = CubicHermiteSpline(one.time, place[:, :2], velocity[:, :2])
-        line = spline(np.linspace(first, last, PATH)) / unit
-        dots = spline(np.linspace(first, last, DOTS)) / unit
+    label = f"b = {one.impact_parameter / unit:.4g}: {one.end}"
+    for which, width, mark in ((0, 1.2, label), (1, 0.6, None)):
+        line, dots = (one.at(np.linspace(first, last, n))[which][:, :2] / unit for n in (PATH, DOTS))
         axes.plot(line[:, 0], line[:, 1], color=colour, linewidth=width, label=mark)
         axes.plot(dots[:, 0], dots[:, 1], "o", color=colour, markersize=2.4 if mark else 1.6, markeredgewidth=0.0)
     if one.end == "hit":
@@ -73,57 +66,62 @@ def _draw_flight(axes: Axes, one: Any, colour: str, unit: float, window: float) 
 
 
 def map_figure(found: Any, title: str) -> Figure:
-    """Left the probability over speed and impact parameter, with b_max; right the same as discs for three speeds.
+    """Left the probability over speed and impact parameter, with b_max; right as discs for four speeds, in b_max.
 
     Args:
         found: a `ProbabilityMap`.
     """
     with styled():
         figure = RunFigure(figsize=(9.6, 4.4), dpi=DPI, layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-        unit = found.geometric
-        shades = _draw_map(left, found, unit)
-        letter(left, "a", -0.12)
-        chosen = sorted({0, found.speeds.size // 2, found.speeds.size - 1})
-        widest = found.edges[-1] / unit
-        for n, k in enumerate(chosen):
-            _draw_disc(right, found, int(k), 2.15 * widest * n, unit, shades)
-        right.set_xlim(-1.1 * widest, 2.15 * widest * (len(chosen) - 1) + 1.1 * widest)
-        right.set_ylim(-1.5 * widest, 1.2 * widest)
-        right.set_aspect("equal")
-        right.axis("off")
-        letter(right, "b", 0.0)
-        figure.colorbar(shades, ax=[left, right], label="probability of a hit", shrink=0.8)
+        left, right = np.asarray(figure.subfigures(1, 2, width_ratios=(1.25, 1.0)))
+        axes = left.subplots()
+        shades = _draw_map(axes, found)
+        letter(axes, "a", -0.12)
+        chosen = np.unique(np.linspace(0, found.speeds.size - 1, 4).round().astype(int))
+        discs = np.atleast_1d(right.subplots(2, 2) if chosen.size > 1 else right.subplots()).ravel()
+        for k, place in enumerate(discs):
+            place.axis("off")
+            if k < chosen.size:
+                _draw_disc(place, found, int(chosen[k]), shades)
+        letter(discs[0], "b", 0.0)
+        right.colorbar(shades, ax=list(discs), label="probability of a hit", shrink=0.8)
         figure.suptitle(f"{title}; dashed: $b_\\mathrm{{max}}$ (Eq. 14)", x=0.01, ha="left")
     return figure
 
 
-def _draw_map(axes: Axes, found: Any, unit: float) -> Any:
-    """Cells of speed and impact parameter; speeds are spaced as they were asked for."""
-    speeds = found.speeds
+def _draw_map(axes: Axes, found: Any) -> Any:
+    """Cells of speed and impact parameter; each speed has cells of its own."""
+    speeds, unit = found.speeds, found.geometric
     middle = 0.5 * (speeds[1:] + speeds[:-1])
-    ends = (speeds[0] - (middle[0] - speeds[0]), speeds[-1] + (speeds[-1] - middle[-1])) if speeds.size > 1 else None
-    borders = np.concatenate([[ends[0]], middle, [ends[1]]]) if ends else speeds[0] * np.array([0.9, 1.1])
-    shades = axes.pcolormesh(borders, found.edges / unit, found.probability.T, cmap=SHADES, vmin=0.0, vmax=1.0)
+    first = 1.5 * speeds[0] - 0.5 * speeds[1] if speeds.size > 1 else 0.9 * speeds[0]
+    last = 1.5 * speeds[-1] - 0.5 * speeds[-2] if speeds.size > 1 else 1.1 * speeds[0]
+    borders = np.concatenate([[first], middle, [last]])
+    shades = None
+    for v in range(speeds.size):
+        column = found.probability[v][:, None]
+        shades = axes.pcolormesh(borders[v : v + 2], found.edges[v] / unit, column, cmap=SHADES, vmin=0.0, vmax=1.0)
     if found.capture.any():
         axes.plot(speeds, found.capture / unit, "--", color=RED, linewidth=1.4)
-    axes.set_ylim(0.0, found.edges[-1] / unit)
+    axes.set_xlim(borders[0], borders[-1])
+    axes.set_ylim(0.0, found.edges.max() / unit)
     axes.set_xlabel("speed $v_\\infty$ [m/s]")
     axes.set_ylabel("impact parameter $b/(r_1+r_2)$")
     return shades
 
 
-def _draw_disc(axes: Axes, found: Any, k: int, x: float, unit: float, shades: Any) -> None:
+def _draw_disc(axes: Axes, found: Any, k: int, shades: Any) -> None:
     """Annuli of one speed as the projectile sees the target."""
-    norm = Normalize(0.0, 1.0)
-    for low, high, p in zip(found.edges[:-1], found.edges[1:], found.probability[k], strict=True):
-        axes.add_patch(
-            Wedge((x, 0.0), high / unit, 0.0, 360.0, width=(high - low) / unit, color=shades.cmap(norm(p)), linewidth=0)
-        )
-    if found.capture[k] > 0.0:
-        axes.add_patch(Circle((x, 0.0), found.capture[k] / unit, fill=False, linestyle="--", color=RED, linewidth=1.4))
-    below = -1.2 * found.edges[-1] / unit
-    axes.text(x, below, pretty(float(found.speeds[k]), "m/s"), ha="center", va="center", color=INK)
+    unit = found.capture[k] or found.geometric
+    edges = found.edges[k] / unit
+    for low, high, p in zip(edges[:-1], edges[1:], found.probability[k], strict=True):
+        colour = shades.cmap(p)
+        ring = Wedge((0.0, 0.0), high, 0.0, 360.0, width=high - low, facecolor=colour, edgecolor=colour, linewidth=0.4)
+        axes.add_patch(ring)
+    axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linestyle="--", color=RED, linewidth=1.4))
+    axes.set_xlim(-edges[-1], edges[-1])
+    axes.set_ylim(-edges[-1], edges[-1])
+    axes.set_aspect("equal")
+    axes.set_title(pretty(float(found.speeds[k]), "m/s"), fontsize=8.0)
 
 
 def sigma_figure(found: Sequence[Any], title: str) -> Figure:

@@ -1,0 +1,116 @@
+"""Stratified sampling of the impact parameter."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sand.experiments.sampling import CERTAIN, PILOT, Strata, Task, split, wilson
+
+
+def flown(strata, chance, relative_error, seed):
+    """Sample a known chance P(b) until the goal is reached; rounds taken."""
+    rng = np.random.default_rng(seed)
+    rounds = 0
+    while tasks := strata.round(relative_error):
+        rounds += 1
+        for task in tasks:
+            low, high = strata.edges(task.stratum)
+            for number in range(task.first, task.last):
+                b = math.sqrt(rng.uniform(low**2, high**2))
+                strata.add(task.stratum, number, float(rng.random() < chance(b)), 1.0)
+    return rounds
+
+
+def ramp(b):
+    """1 below 0.5, 0 above 1."""
+    return min(max(2.0 * (1.0 - b), 0.0), 1.0)
+
+
+# ∫ P 2πb db
+AREA = math.pi * 0.25 + 2 * math.pi * (2 * (0.5 - 1 / 3) - 2 * (0.125 - 1 / 24))
+
+
+def test_wilson_against_its_definition():
+    """The bounds p solve |p̂ − p| = z √(p(1 − p)/n)."""
+    hits, tries = np.array([0.0, 3.0, 17.0, 40.0]), np.array([40.0, 40.0, 40.0, 40.0])
+    for z in (1.0, CERTAIN):
+        for bound in wilson(hits, tries, z):
+            inside = (bound > 0.0) & (bound < 1.0)
+            off = np.abs(hits / tries - bound) - z * np.sqrt(bound * (1 - bound) / tries)
+            assert np.abs(off[inside]).max() < 1e-12
+    low, high = wilson(np.array([0.0]), np.array([0.0]), 1.0)
+    assert (low[0], high[0]) == (0.0, 1.0)
+
+
+def test_a_known_cross_section_is_found_within_its_error():
+    """σ of a ramp P(b): unbiased, and the interval of one sigma holds it in 60 to 85 % of 80 samplings (Wilson is wide
+    where P is 0 or 1), that of 95 % in at least 75 of them.
+    """
+    inside = sure = 0
+    off = []
+    for seed in range(80):
+        strata = Strata.up_to(1.0)
+        flown(strata, ramp, 0.03, seed)
+        found = strata.estimate()
+        inside += found.low <= AREA <= found.high
+        wide = strata.estimate(CERTAIN)
+        sure += wide.low <= AREA <= wide.high
+        off.append((found.value - AREA) / strata.error())
+        assert strata.error() <= 0.03 * found.value
+    assert inside > 0.60 * 80
+    assert sure >= 75
+    assert abs(np.mean(off)) < 3.0 / math.sqrt(80)
+
+
+def test_annuli_are_added_where_hits_reach_the_rim():
+    """P reaches three times farther than the first guess: more annuli until the outermost three are empty."""
+    strata = Strata.up_to(1.0)
+    flown(strata, lambda b: ramp(b / 3.0), 0.05, 1)
+    hits, _ = strata.counts()
+    assert len(strata) * strata.width > 3.0
+    assert not hits[-3:].any()
+    assert strata.estimate(CERTAIN).low < 9 * AREA < strata.estimate(CERTAIN).high
+
+
+def test_no_annulus_beyond_a_sphere_of_starts():
+    """Everything hits, but no flight can begin farther out than the sphere: b stops there."""
+    strata = Strata.up_to(1.0, 0.8)
+    for _ in range(3):
+        for task in strata.round(0.2, 0.8):
+            for number in range(task.first, task.last):
+                strata.add(task.stratum, number, 1.0, 1.0)
+    assert len(strata) * strata.width == pytest.approx(0.8, rel=1e-12, abs=0.0)
+
+
+def test_flights_go_where_they_help():
+    """After the pilot most flights are where P is neither 0 nor 1."""
+    strata = Strata.up_to(1.0)
+    flown(strata, ramp, 0.01, 3)
+    _, tries = strata.counts()
+    low, _ = strata.edges(np.arange(len(strata)))
+    between = (low >= 0.5) & (low < 1.0)
+    assert tries[between].mean() > 3 * tries[low >= 1.05].mean()
+
+
+def test_order_and_pieces_change_no_bit():
+    """The same flights in another order: the same sums."""
+    rng = np.random.default_rng(2)
+    flights = [(int(k), n, float(rng.random() < 0.5), rng.random()) for k in range(24) for n in range(PILOT)]
+    ends = []
+    for order in (flights, flights[::-1]):
+        strata = Strata.up_to(1.0)
+        for one in order:
+            strata.add(*one)
+        ends.append(strata.estimate())
+    assert ends[0] == ends[1]
+
+
+def test_bundles_hold_all_flights_once():
+    """Pieces of at most so many flights."""
+    tasks = [Task(0, 5, 40), Task(1, 0, 3), Task(4, 0, 100)]
+    bundles = split(tasks, 30)
+    sizes = [sum(t.last - t.first for t in bundle) for bundle in bundles]
+    assert sizes == [30, 30, 30, 30, 18]
+    got = [address for bundle in bundles for t in bundle for address in t.addresses()]
+    assert got == [address for t in tasks for address in t.addresses()]

@@ -1,0 +1,279 @@
+"""Cross-sections: replay, executors, interruptions, the command, mistakes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.experiments import scattering
+from sand.experiments.executors import executor_for
+from sand.experiments.flights import COLUMNS, fly, replay
+from sand.experiments.maps import probability_map
+from sand.experiments.sampling import Task
+
+GRAINS = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg", "temperature": "100 K"}
+CASE = """
+[projectile]
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+
+[flight]
+temperature = "100 K"
+speed = [1, 2]
+speed_unit = "thermal"
+start = "4 b_max"
+
+[measure]
+relative_error = 0.05
+seed = 3
+"""
+
+
+class Backwards(Executor):
+    """Does the work when it is asked for, the last first."""
+
+    def __init__(self):
+        self.waiting = []
+
+    def submit(self, function, /, *args, **options):
+        future = Future()
+        self.waiting.append((future, function, args))
+        if len(self.waiting) >= 1:
+            for one, work, given in reversed(self.waiting):
+                if not one.done():
+                    one.set_result(work(*given))
+        return future
+
+
+def numbers(found):
+    """All that does not depend on the clock."""
+    told = found.to_dict()
+    told.pop("seconds")
+    return json.dumps({k: np.asarray(v).tolist() for k, v in told.items()})
+
+
+@pytest.fixture
+def here():
+    return scattering.cross_section(
+        **GRAINS, speed=1, speed_unit="thermal", start="4 b_max", relative_error=0.05, seed=3
+    )
+
+
+def test_a_flight_of_a_batch_can_be_flown_alone(here):
+    """A row of 200 and its replay: the same end, time and distance, to the bit."""
+    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
+    width = float(here.profile[0, 1])
+    rows = fly(flying, [Task(5, 100, 300)], width, seed=9)
+    for k in (0, 77, 199):
+        alone = replay(flying, 5, 100 + k, width, seed=9)
+        row = dict(zip(COLUMNS, rows[k], strict=True))
+        assert alone.time[-1] == row["time"]
+        assert alone.time.size == row["steps"] + 1
+        assert alone.impact_parameter == row["impact_parameter"]
+        assert ("hit", "miss").index(alone.end) == row["end"]
+
+
+def test_any_split_gives_the_same_numbers(here, monkeypatch):
+    """Pieces of 64 in two processes, or backwards here: the bits of one process with pieces of 512."""
+    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    monkeypatch.setattr(scattering, "CHUNK", 64)
+    again = scattering.measure(flying, relative_error=0.05, seed=3, executor=Backwards())
+    assert numbers(again) == numbers(here)
+    with executor_for(2) as pool:
+        assert numbers(scattering.measure(flying, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
+    other = scattering.measure(flying, relative_error=0.05, seed=4)
+    assert numbers(other) != numbers(here)
+
+
+def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
+    """dask.distributed with two workers, one of which is killed after the first piece: the same numbers."""
+    distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
+    monkeypatch.setattr(scattering, "CHUNK", 32)
+    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
+    ) as cluster:
+        victim = next(iter(cluster.workers.values()))
+        killed = []
+
+        def kill(rows):
+            if not killed:
+                killed.append(victim.pid)
+                os.kill(victim.pid, signal.SIGKILL)
+
+        with executor_for(scheduler=cluster.scheduler_address) as executor:
+            found = scattering.measure(flying, relative_error=0.05, seed=3, executor=executor, keep=kill)
+        assert killed
+    assert numbers(found) == numbers(here)
+
+
+def test_what_is_known_is_not_flown_again(here):
+    """With the rows of half the flights the other half is flown, and the result is the same."""
+    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    rows, later = [], []
+    whole = scattering.measure(flying, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
+    again = scattering.measure(
+        flying, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
+    )
+    assert numbers(again) == numbers(whole) == numbers(here)
+    assert len(later) == len(rows) - len(rows[::2])
+
+
+def test_a_map():
+    """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all flights are told."""
+    flights = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
+    found = probability_map(flights, cells=6, per_cell=16)
+    assert (found.flights == 16).all()
+    assert (found.probability[:, 0] == 1.0).all()
+    assert (found.probability[:, 5] == 0.0).all()
+    low, high = found.interval()
+    assert (low <= found.probability).all() and (found.probability <= high).all()
+    assert len(found.to_rows()) == 12
+    assert found.edges[:, -1] == pytest.approx(1.2 * found.capture, rel=1e-12, abs=0.0)
+
+
+def test_the_command(tmp_path, capsys):
+    """Two speeds: files, figure, JSON; the folder is not overwritten; a resume finds all flights and flies none."""
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE)
+    assert main(["scatter", str(case), "--out", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [round(one["c"], 1) for one in told["cross_sections"]] == [1.0, 1.0]
+    assert told["versions"]["numba"] and told["seed"] == 3
+    assert {p.name for p in out.iterdir()} == {
+        "case.toml",
+        "flights.csv",
+        "results.csv",
+        "scattering.json",
+        "figure.png",
+    }
+    before = {p.name: p.read_bytes() for p in out.iterdir()}
+    assert main(["scatter", str(case), "--out", str(out)]) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert main(["scatter", str(case), "--out", str(out), "--resume", "--workers", "2"]) == 0
+    assert "sigma = " in capsys.readouterr().out
+    for name in ("flights.csv", "results.csv", "figure.png"):
+        assert (out / name).read_bytes() == before[name]
+    case.write_text(CASE.replace("seed = 3", "seed = 4"))
+    assert main(["scatter", str(case), "--out", str(out), "--resume"]) == 2
+    assert "another case" in capsys.readouterr().err
+
+
+def test_a_killed_job_goes_on(tmp_path):
+    """Killed while it flies, a torn line at the end: resumed, its files are those of one that was left alone."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace("[1, 2]", "[1, 1.5, 2]").replace("0.05", "0.01").replace('"4 b_max"', '"20 b_max"'))
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    assert main(["scatter", str(case), "--out", str(whole), "--quiet"]) == 0
+    job = subprocess.Popen([sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(cut), "--quiet"])
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and job.poll() is None:
+        if (cut / "flights.csv").exists() and (cut / "flights.csv").stat().st_size > 2e4:
+            break
+        time.sleep(0.005)
+    job.kill()
+    job.wait()
+    with open(cut / "flights.csv", "a") as file:
+        file.write("0,3,77,1,3.3e-")
+    assert main(["scatter", str(case), "--out", str(cut), "--quiet", "--resume"]) == 0
+    for name in ("flights.csv", "results.csv"):
+        assert (cut / name).read_bytes() == (whole / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"speed": 0}, "speed = 0"),
+        ({"speed": "3 m"}, "speed = '3 m'"),
+        ({"speed": None}, "speed is missing"),
+        ({"start": "15 nm"}, "inside the contact"),
+        ({"start": "0.01 b_max"}, "inside the contact"),
+        ({"start": "10 bmax"}, "start = '10 bmax' must be"),
+        ({"start": "1 R_m", "temperature": 0}, "needs a temperature"),
+        ({"spin": "kT"}, "spin = 'kT'"),
+        ({"spin": "kT/2", "temperature": 0}, "needs a temperature"),
+        ({"speed_unit": "thermal", "temperature": "0 K"}, "needs a temperature"),
+        ({"speed_unit": "km"}, "speed_unit"),
+        ({"orientation": "aligne"}, "did you mean 'aligned'"),
+        ({"start_shape": "cube"}, "start_shape"),
+        ({"field": [1, 2]}, "field"),
+        ({"target_velocity": "fast"}, "target_velocity"),
+        ({"escape": "-1 m"}, "escape"),
+        ({"tolerance": 0.1}, "tolerance"),
+        ({"outcome": "stuck"}, "outcome"),
+        ({"radius": "-1 nm"}, "radius"),
+        ({"material": "irn"}, "irn"),
+        ({"relative_error": 0.9}, "relative_error"),
+    ],
+)
+def test_mistakes_are_told(options, said):
+    """One line each, with what was given."""
+    given = GRAINS | {"speed": 0.2} | options
+    with pytest.raises(sand.BadInput, match=said) as caught:
+        scattering.cross_section(**given)
+    assert len(caught.value.problems) == 1
+
+
+def test_all_mistakes_at_once():
+    """Three at a time."""
+    with pytest.raises(sand.BadInput) as caught:
+        scattering.flight(**(GRAINS | {"temperature": "3 m"}), speed=-1, spin="none", start_shape="cube")
+    assert len(caught.value.problems) == 3
+
+
+def test_impact_parameters_that_cannot_be():
+    """Below 0, in b_max without moments, outside the sphere of starts."""
+    flying = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
+    plain = scattering.flight(radius="10 nm", material="iron", speed=0.2)
+    for one, b, said in (
+        (flying, "-1 nm", "at least 0"),
+        (plain, "1 b_max", "without moments"),
+        (flying, "2 um", "below"),
+    ):
+        with pytest.raises(sand.BadInput, match=said):
+            scattering.trajectory(one, b)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("speed = [1, 2]", "speed = 0"), "speed = 0"),
+        (("speed = [1, 2]", "sped = 1"), "did you mean 'speed'"),
+        (("seed = 3", 'job = "mapp"'), "measure.job"),
+        (("seed = 3", 'job = "trajectories"'), "one speed"),
+        (("relative_error = 0.05", "relative_error = 5"), "relative_error"),
+        (('start = "4 b_max"', 'start = "12 nm"'), "inside the contact"),
+        (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
+    ],
+)
+def test_wrong_cases_leave_nothing(tmp_path, capsys, change, said):
+    """Exit 2, one line with the file's name, no folder."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace(*change))
+    assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and said in lines[0] and "case.toml" in lines[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("address", "said"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")])
+def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, said):
+    """One line, exit 2, nothing written."""
+    from sand.experiments import executors
+
+    monkeypatch.setattr(executors, "ANSWER", 0.5)
+    case = tmp_path / "case.toml"
+    case.write_text(CASE)
+    assert main(["scatter", str(case), "--out", str(tmp_path / "out"), "--scheduler", address]) == 2
+    lines = [line for line in capsys.readouterr().err.strip().splitlines() if line.startswith("sand:")]
+    assert len(lines) == 1 and said in lines[0]
+    assert not (tmp_path / "out").exists()
