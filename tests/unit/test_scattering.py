@@ -182,6 +182,8 @@ def test_a_killed_job_goes_on(tmp_path):
         time.sleep(0.005)
     job.kill()
     job.wait()
+    assert (cut / "flights.csv").stat().st_size < 0.9 * (whole / "flights.csv").stat().st_size
+    assert not (cut / "scattering.json").exists()
     with open(cut / "flights.csv", "a") as file:
         file.write("0,3,77,1,3.3e-")
     assert main(["scatter", str(case), "--out", str(cut), "--quiet", "--resume"]) == 0

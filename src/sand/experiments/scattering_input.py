@@ -24,6 +24,13 @@ SPINS = {"none": 0.0, "kT/2": 0.5, "equipartition": 1.5}
 ORIENTATIONS = {"random": RANDOM, "aligned": ALIGNED, "given": GIVEN}
 SHAPES = ("plane", "sphere")
 OUTCOMES = ("hit", "stick")
+WORDS: dict[str, Any] = {
+    "speed_unit": SPEED_UNITS,
+    "orientation": ORIENTATIONS,
+    "start_shape": SHAPES,
+    "outcome": OUTCOMES,
+}
+"""What may be said."""
 AUTO_START = 10.0
 """Distance of the start in b_max; at least `LEAST_START` radii of contact."""
 LEAST_START = 5.0
@@ -101,48 +108,57 @@ def flight(
     Raises:
         BadInput: one line for each mistake.
     """
+    return _checked(dict(locals()))
+
+
+def _checked(given: dict[str, Any]) -> Flight:
+    """All of what was given, checked, so that every mistake is told at once."""
     ask = Asking()
-    first = projectile if projectile is not None else ask.take(lambda: _made(radius, material, moment))
-    second = target if target is not None else first
-    heat = ask.take(lambda: si(temperature, "K", "temperature", least=0.0), 0.0)
-    for name, value, allowed in (
-        ("speed_unit", speed_unit, SPEED_UNITS),
-        ("orientation", orientation, ORIENTATIONS),
-        ("start_shape", start_shape, SHAPES),
-        ("outcome", outcome, OUTCOMES),
-    ):
-        if value not in allowed:
-            ask.problems.append(f"{name} = {value!r}; {did_you_mean(str(value), list(allowed))}")
-    drift, spread = ask.take(lambda: _drift(target_velocity, heat, second), ((0.0,) * 3, 0.0))
-    whirl, energy = ask.take(lambda: _spin(spin, heat), (((0.0,) * 3,) * 2, 0.0))
-    outer = ask.take(lambda: (0.0,) * 3 if field is None else three(field, "T", "field"))
-    exact = ask.take(lambda: si(tolerance, "1", "tolerance", above=0.0), 1e-8)
+    first, second = _bodies(ask, given)
+    heat = ask.take(lambda: si(given["temperature"], "K", "temperature", least=0.0), 0.0)
+    for name, allowed in WORDS.items():
+        if given[name] not in allowed:
+            ask.problems.append(f"{name} = {given[name]!r}; {did_you_mean(str(given[name]), list(allowed))}")
+    rest = (0.0, 0.0, 0.0)
+    drift, spread = ask.take(lambda: _drift(given["target_velocity"], heat, second), (rest, 0.0))
+    whirl, energy = ask.take(lambda: _spin(given["spin"], heat), ((rest, rest), 0.0))
+    outer = ask.take(lambda: rest if given["field"] is None else three(given["field"], "T", "field"))
+    exact = ask.take(lambda: si(given["tolerance"], "1", "tolerance", above=0.0), 1e-8)
     if not 1e-13 <= exact <= 1e-3:
-        ask.problems.append(f"tolerance = {tolerance!r} must lie in 1e-13 … 1e-3")
-    gone = ask.take(lambda: 0.0 if escape == "auto" else si(escape, "m", "escape", above=0.0))
-    fast = ask.take(lambda: _speed(speed, speed_unit, heat, first))
+        ask.problems.append(f"tolerance = {given['tolerance']!r} must lie in 1e-13 … 1e-3")
+    gone = ask.take(lambda: 0.0 if given["escape"] == "auto" else si(given["escape"], "m", "escape", above=0.0))
+    fast = ask.take(lambda: _speed(given["speed"], given["speed_unit"], heat, first))
+    away: Any = None
     if first is not None and second is not None and fast is not None:
-        if orientation == "aligned" and not len(first) == len(second) == 1:
+        if given["orientation"] == "aligned" and not len(first) == len(second) == 1:
             ask.problems.append("orientation = 'aligned' is for single grains; give aggregates as they lie, 'given'")
-        away = ask.take(lambda: _distance(start, first, second, fast, heat))
+        away = ask.take(lambda: _distance(given["start"], first, second, fast, heat))
     ask.done()
     return Flight(
         first,
         second,
         fast,
         away,
-        sphere=start_shape == "sphere",
+        sphere=given["start_shape"] == "sphere",
         escape=gone,
         drift=drift,
         drift_spread=spread,
-        axes=ORIENTATIONS[orientation],
+        axes=ORIENTATIONS[given["orientation"]],
         spin=whirl,
         spin_energy=(energy, energy),
         field=outer,
         tolerance=exact,
         temperature=heat,
-        contact=outcome == "stick",
+        contact=given["outcome"] == "stick",
     )
+
+
+def _bodies(ask: Asking, given: dict[str, Any]) -> tuple[Any, Any]:
+    """Projectile and target; None for what could not be made."""
+    first = given["projectile"]
+    if first is None:
+        first = ask.take(lambda: _made(given["radius"], given["material"], given["moment"]))
+    return first, first if given["target"] is None else given["target"]
 
 
 def _made(radius: Any, material: Material | str | None, moment: Any) -> Grains:
