@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import worlds
+from . import scattering, worlds
 from .timing import best, wall
 
 
@@ -110,6 +110,14 @@ def start_up(quick: bool) -> list[dict[str, Any]]:
     return [row("first compile and step", first, "s", 15.0), row("warm start to first step", warm, "s", 1.0)]
 
 
+def scattering_flights(quick: bool) -> list[dict[str, Any]]:
+    """Single flights of two magnetic grains, cold and with thermal spin."""
+    return [
+        row(name, ours, "ms per flight", target, peer, "SciPy DOP853, NumPy" if peer else "")
+        for name, ours, target, peer in scattering.flights(quick)
+    ]
+
+
 def all_rows(quick: bool) -> list[dict[str, Any]]:
     """Measure everything."""
     return [
@@ -119,4 +127,5 @@ def all_rows(quick: bool) -> list[dict[str, Any]]:
         gas_step(quick, 100, 25.0),
         help_page(quick),
         *start_up(quick),
+        *scattering_flights(quick),
     ]

@@ -40,12 +40,13 @@ _HOMES = {
     "Outcome": "run.outcome",
     "Result": "run.outcome",
 }
-_ROOMS = ("setup", "theory", "analysis", "files")
+_ROOMS = ("setup", "theory", "analysis", "experiments", "files")
 
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 
 if TYPE_CHECKING:
     from . import analysis as analysis
+    from . import experiments as experiments
     from . import files as files
     from . import setup as setup
     from . import theory as theory

@@ -1,12 +1,15 @@
 """Every example runs."""
 
+import csv
 import runpy
 import sys
 from pathlib import Path
 
 import pytest
 
+from sand.experiments import sampling
 from sand.experiments.collision_case import read_collision
+from sand.experiments.scattering_case import read_scattering
 from sand.run.case import read_case
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -15,7 +18,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda p: p.name)
 def test_case_files_are_without_mistakes(path):
     """Each is read by the command that its first comment names."""
-    reads = {"run": read_case, "collide": read_collision}
+    reads = {"run": read_case, "collide": read_collision, "scatter": read_scattering}
     comment = path.read_text().split("[", 1)[0]
     command = next(word for word in reads if f"sand {word} examples/{path.name}" in comment)
     reads[command](path)
@@ -29,3 +32,18 @@ def test_figure_4(tmp_path, monkeypatch, capsys):
     assert ": T, crossbar" in told
     assert "hit-and-stick gives: straight" in told
     assert 10_000 < (tmp_path / "figure4.png").stat().st_size < 300_000
+
+
+def test_cross_sections(monkeypatch, capsys):
+    """The table of docs/physics/cross-sections.csv at an error of 50 %: all rows, none far from the file's."""
+    monkeypatch.setattr(sampling, "PILOT", 4)
+    monkeypatch.setattr(sys, "argv", ["cross_sections.py", "0.5"])
+    runpy.run_path(str(EXAMPLES / "cross_sections.py"), run_name="__main__")
+    made, kept = (
+        {row[0]: row[1:] for row in csv.reader(text.splitlines())}
+        for text in (capsys.readouterr().out, (EXAMPLES.parent / "docs/physics/cross-sections.csv").read_text())
+    )
+    assert made.keys() == kept.keys()
+    for name in list(made)[1:]:
+        error = float(made[name][1])
+        assert abs(float(made[name][0]) - float(kept[name][0])) < 4.0 * error, name

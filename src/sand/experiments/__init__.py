@@ -1,1 +1,18 @@
-"""Published figures and common measurements, each as one function."""
+"""Published figures and common measurements, each as one function.
+
+Modules are loaded when first used: `sand.experiments.scattering.cross_section(...)` needs no import of its own.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+MODULES = ("chain_impact", "collision", "maps", "scattering")
+"""What there is to be used; the other modules serve these and the command line."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in MODULES:
+        return importlib.import_module(f".{name}", __name__)
+    raise AttributeError(f"module 'sand.experiments' has no '{name}'")

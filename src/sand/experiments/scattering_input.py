@@ -57,14 +57,6 @@ class Asking:
             raise BadInput(self.problems)
 
 
-def grain(radius: Any, material: Material | str, moment: Any = 0.0) -> Grains:
-    """One grain at rest, its moment along +x.  Raises BadInput."""
-    known = material_named(material) if isinstance(material, str) else material
-    r = si(radius, "m", "radius", above=0.0)
-    size = Grains([[0.0, 0.0, 0.0]], r, known, moment=moment).moment
-    return Grains([[0.0, 0.0, 0.0]], r, known, moment=[[float(np.linalg.norm(size)), 0.0, 0.0]])
-
-
 def flight(
     radius: Any = None,
     material: Material | str | None = None,
@@ -162,10 +154,14 @@ def _bodies(ask: Asking, given: dict[str, Any]) -> tuple[Any, Any]:
 
 
 def _made(radius: Any, material: Material | str | None, moment: Any) -> Grains:
+    """One grain at rest, its moment along +x; other than `setup.grain` it needs no surface energy."""
     missing = [name for name, value in (("radius", radius), ("material", material)) if value is None]
     if missing:
         raise BadInput(f"{name} is missing; give radius and material, or a projectile" for name in missing)
-    return grain(radius, material or "", moment)
+    known = material_named(material) if isinstance(material, str) else material
+    r = si(radius, "m", "radius", above=0.0)
+    size = float(np.linalg.norm(Grains([[0.0, 0.0, 0.0]], r, known, moment=moment).moment))
+    return Grains([[0.0, 0.0, 0.0]], r, known, moment=[[size, 0.0, 0.0]])
 
 
 def _speed(speed: Any, unit: str, heat: float, body: Grains | None) -> float | None:
