@@ -243,6 +243,41 @@ def test_only_the_relative_motion_counts():
     assert rows[0][:, COLUMNS.index("time")] == pytest.approx(rows[1][:, COLUMNS.index("time")], rel=1e-6, abs=0.0)
 
 
+def test_a_target_that_moves():
+    """Given: σ is that of the relative motion.  By chance: ⟨σ(u) u⟩/v∞, for Eq. 14 ⟨(u/v)^(−1/3)⟩ of it, 5 %.
+
+    The laboratory sees the projectile at v∞ and the target at the velocity drawn for it.
+    """
+    options = IRON | {"orientation": "aligned", "start": "4 um"}
+    still = scattering.cross_section(**options, speed=0.3, relative_error=0.02)
+    coming = scattering.cross_section(**options, speed=0.1, target_velocity=[-0.2, 0, 0], relative_error=0.02)
+    assert coming.sigma == pytest.approx(still.sigma, rel=1e-6, abs=0.0)
+    assert coming.c == pytest.approx(1.0, abs=0.03)
+    chance = scattering.cross_section(**options, speed=0.2, target_velocity="thermal", relative_error=0.02)
+    assert chance.c == pytest.approx(1.0, abs=0.05)
+    flying = scattering.flight(**options, speed=0.2, target_velocity="thermal")
+    path = scattering.trajectory(flying, "2 um", number=3)
+    assert np.linalg.norm(path.velocity_projectile[0] - [0.2, 0, 0]) < 1e-12
+    assert 0.02 < np.linalg.norm(path.velocity_target[0]) < 1.0
+    assert np.isnan(path.exchanged)
+
+
+@pytest.mark.parametrize(("radius", "part"), [(1e-4, 0.98), (1e-4, 1.03), (1e-6, 1.5)])
+def test_large_grains_stick_below_their_own_speed(radius, part):
+    """Silica of 100 µm and 1 µm: the contact is slow against the sound in it; a grain of 20 nm rides on the second."""
+    limit = sand.theory.contact(sand.SILICA, radius).sticking_speed
+    ball = sand.Grains([[0, 0, 0]], radius, sand.SILICA)
+    rider = sand.Grains([[0, 0, 0], [-radius - 2e-8 + 5e-11, 0, 0]], [radius, 2e-8], sand.SILICA)
+    projectile = ball if radius > 1e-5 else rider
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        flying = scattering.flight(
+            projectile=projectile, target=ball, speed=part * limit, outcome="stick", orientation="given"
+        )
+        rows = fly(flying, [Task(0, 0, 1)], 1e-4 * radius)
+    assert (rows[:, END] == (HIT if part < 1.0 else BOUNCE)).all()
+
+
 @pytest.mark.parametrize(("speed", "outcome"), [(76.0, HIT), (82.0, BOUNCE)])
 def test_sticking_through_the_real_contact(speed, outcome):
     """Head-on and without moments, iron of 10 nm sticks below v_s = 78.9 m/s (theory.contact) and bounces above."""

@@ -83,9 +83,9 @@ def test_a_flight_of_a_batch_can_be_flown_alone(here):
 
 
 def test_any_split_gives_the_same_numbers(here, monkeypatch):
-    """Pieces of 64 in two processes, or backwards here: the bits of one process with pieces of 512."""
+    """Pieces of 64 in two processes, or backwards here: the bits of one process."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
-    monkeypatch.setattr(scattering, "CHUNK", 64)
+    monkeypatch.setattr(scattering, "MOST", 64)
     again = scattering.measure(flying, relative_error=0.05, seed=3, executor=Backwards())
     assert numbers(again) == numbers(here)
     with executor_for(2) as pool:
@@ -97,7 +97,7 @@ def test_any_split_gives_the_same_numbers(here, monkeypatch):
 def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
     """dask.distributed with two workers, one of which is killed after the first piece: the same numbers."""
     distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
-    monkeypatch.setattr(scattering, "CHUNK", 32)
+    monkeypatch.setattr(scattering, "MOST", 32)
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
@@ -199,6 +199,20 @@ def test_a_killed_job_goes_on(tmp_path):
         ({"speed": None}, "speed is missing"),
         ({"start": "15 nm"}, "inside the contact"),
         ({"start": "0.01 b_max"}, "inside the contact"),
+        ({"start": "1e b_max"}, "start in b_max = '1e'"),
+        ({"start": "-5 b_max"}, "start in b_max"),
+        ({"start": "1e999 b_max"}, "start in b_max"),
+        ({"start": "1e30 m"}, "out of all range"),
+        ({"start": "10 b_max", "moment": 0.0}, "without moments"),
+        ({"escape": "1 nm"}, "beyond the contact"),
+        ({"target_velocity": [0.2, 0, 0]}, "never meet"),
+        ({"projectile": "iron"}, "must be grains"),
+        ({"projectile": sand.setup.grain(radius=1e-8, material="iron")}, "leave them out"),
+        ({"orientation": [1]}, "orientation"),
+        ({"seed": -1}, "seed = -1"),
+        ({"seed": 2**64}, "seed"),
+        ({"seed": 1.5}, "seed = 1.5"),
+        ({"speed": 1e-30}, "cannot be computed"),
         ({"start": "10 bmax"}, "start = '10 bmax' must be"),
         ({"start": "1 R_m", "temperature": 0}, "needs a temperature"),
         ({"spin": "kT"}, "spin = 'kT'"),
@@ -252,6 +266,8 @@ def test_impact_parameters_that_cannot_be():
         (("speed = [1, 2]", "sped = 1"), "did you mean 'speed'"),
         (("seed = 3", 'job = "mapp"'), "measure.job"),
         (("seed = 3", 'job = "trajectories"'), "one speed"),
+        (("seed = 3", 'spins = ["none"]'), "is for job = 'trajectories'"),
+        (("seed = 3", "seed = 18446744073709551616"), "seed"),
         (("relative_error = 0.05", "relative_error = 5"), "relative_error"),
         (('start = "4 b_max"', 'start = "12 nm"'), "inside the contact"),
         (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
@@ -279,3 +295,55 @@ def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address
     lines = [line for line in capsys.readouterr().err.strip().splitlines() if line.startswith("sand:")]
     assert len(lines) == 1 and said in lines[0]
     assert not (tmp_path / "out").exists()
+
+
+class Done(Future):
+    """A future that has its result."""
+
+    def __init__(self):
+        super().__init__()
+        self.set_result(None)
+
+
+def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
+    """One line with the way to go on, exit 2; then the rest is flown."""
+    from concurrent.futures import process
+
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE)
+
+    def dead(*_given, **_options):
+        raise process.BrokenProcessPool("a process was killed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(process.ProcessPoolExecutor, "submit", lambda *a, **k: Done())
+        patch.setattr(scattering, "as_completed", dead)
+        assert main(["scatter", str(case), "--out", str(out), "--workers", "2"]) == 2
+    told = capsys.readouterr().err
+    assert "a worker process died" in told
+    assert "--resume" in told
+    assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
+
+
+def test_sigterm_says_how_to_go_on(tmp_path):
+    """SIGTERM while it flies: exit 130 and one line with --resume."""
+    case, out = tmp_path / "case.toml", tmp_path / "out"
+    case.write_text(CASE.replace("0.05", "0.001").replace('"4 b_max"', '"4 b_max"\nspin = "equipartition"'))
+    words = [sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(out)]
+    job = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    deadline, table = time.monotonic() + 60, out / "flights.csv"
+    while time.monotonic() < deadline and not (table.exists() and table.stat().st_size > 9000):
+        time.sleep(0.02)
+    job.terminate()
+    told = job.communicate(timeout=30)[1]
+    assert job.returncode == 130
+    assert told.count("sand:") == 1
+    assert "--resume" in told
+
+
+def test_a_map_needs_speeds_that_differ(tmp_path, capsys):
+    """One line; and speeds in any order make the same map."""
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace("[1, 2]", "[1, 1]").replace("relative_error = 0.05", 'job = "map"'))
+    assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
+    assert "speeds that differ" in capsys.readouterr().err

@@ -95,7 +95,13 @@ def test_sizes_and_moments():
         (lambda: theory.capture_radius(MOMENT, "3 m", 1.0), "mass"),
         (lambda: theory.coupling(MOMENT, R, "-3 K"), "temperature"),
         (lambda: theory.dipole_energy([0, 0, 1], [0, 0, 1], [0, 0, 0]), "one place"),
-        (lambda: theory.dipole_energy([0, 1], [0, 0, 1], [0, 0, 1]), "three numbers"),
+        (lambda: theory.dipole_energy([0, 1], [0, 0, 1], [0, 0, 1]), "three components"),
+        (lambda: theory.dipole_energy([0, 0, "1 m"], [0, 0, 1], [0, 0, 1]), "moment1 z"),
+        (lambda: theory.effective_potential(R, R, 1.0, MASS, "x"), "alpha"),
+        (lambda: theory.capture_cross_section(MOMENT, MASS, 1.0, c="x"), "c = 'x'"),
+        (lambda: theory.growth_exponents("x"), "exponent"),
+        (lambda: theory.dynamic_exponent("a", 0), "eta"),
+        (lambda: theory.mean_size("abc"), "must be numbers"),
         (lambda: theory.barrier(1e-7, 1.0, MASS, 0.0), "alpha"),
         (lambda: theory.dynamic_exponent(0.9, 0.2), "below 1"),
         (lambda: theory.growth_exponents(reading="papr"), "did you mean 'paper'"),
@@ -112,5 +118,9 @@ def test_mistakes_are_told(call, said):
 
 def test_texts_with_units_are_the_same_numbers():
     """20 nm is 2e-8."""
+    parts = ["1e-18 A m^2", 0, 0]
+    assert theory.dipole_energy(parts, parts, ["20 nm", 0, 0]) == theory.dipole_energy(
+        [1e-18, 0, 0], [1e-18, 0, 0], [2e-8, 0, 0]
+    )
     assert theory.geometric_cross_section("10 nm") == theory.geometric_cross_section(1e-8)
     assert np.isclose(theory.reduced_mass("2 kg", "2 kg"), 1.0, rtol=1e-15)

@@ -36,13 +36,16 @@ def command(
 ) -> int:
     """Fly the bodies that CASE.toml describes past each other.
 
-    Leaves scattering.json, results.csv and a figure in the folder, and flights.csv with every single flight. The
-    numbers are the same for any number of workers and after any interruption.
+    Leaves scattering.json, results.csv and a figure in the folder, and for cross-sections and maps flights.csv with
+    every single flight. The numbers are the same for any number of workers and after any interruption.
     """
+    from concurrent.futures import BrokenExecutor
+
     from ..experiments.executors import executor_for
     from ..experiments.scattering_case import read_scattering
     from ..experiments.scattering_job import Job
     from ..files.folder import make_folder, read_toml
+    from .interrupt import Watch
 
     described, flights = read_scattering(case)
     folder = Path(out or described.measure.out or Path(case).stem)
@@ -54,12 +57,15 @@ def command(
             make_folder(folder, overwrite=overwrite)
         job = Job(described, flights, read_toml(case), folder, resume)
         bar = _Bar(not (quiet or as_json))
+        words = f"sand scatter {shlex.quote(case)} --out {shlex.quote(str(folder))} --resume"
         try:
-            content = report.with_notes(lambda: job.run(executor, bar.see))
+            with Watch():
+                content = report.with_notes(lambda: job.run(executor, bar.see))
         except KeyboardInterrupt:
-            words = f"sand scatter {shlex.quote(case)} --out {shlex.quote(str(folder))} --resume"
-            report.note(f"interrupted; what was flown is kept, go on with: {words}")
+            report.note(f"interrupted; {'go on with: ' + words if job.table else 'nothing is lost, start again'}")
             return INTERRUPTED
+        except BrokenExecutor:
+            raise BadInput(f"a worker process died; what was flown is kept, go on with: {words}") from None
         finally:
             bar.close()
     if as_json:

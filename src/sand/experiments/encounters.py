@@ -42,7 +42,8 @@ class Flight:
         escape: distance [m] beyond which one that flies away is gone; 0: that of its start.
         axes: RANDOM, ALIGNED or GIVEN of kernels/starts.py.
         spin: three components [rad/s] of projectile and target, a thermal spin of `spin_energy` [J] each is added.
-        drift_spread: standard deviation of each component of the target's velocity [m/s].
+        drift_spread: standard deviation of each component of the target's velocity [m/s].  Impact parameters are
+            those of the relative motion.
         field: external flux density [T]; tolerance: error of a step over the scales.
         contact: go on through the real contact, and count only what sticks.
     """
@@ -73,7 +74,20 @@ class Flight:
     @property
     def scales(self) -> Scales:
         """Sizes in closed form."""
-        return scales_of(self.projectile, self.target, self.speed)
+        return scales_of(self.projectile, self.target, self.relative_speed)
+
+    @property
+    def relative_speed(self) -> float:
+        """|v∞ − drift| [m/s]; a target that moves by chance counts as at rest on average."""
+        return math.dist([self.speed * a for a in self.along], self.drift)
+
+    @property
+    def analytic(self) -> float:
+        """Eq. 14 [m²] at the relative speed; for a target that moves by chance ⟨σ_Eq14(u) u⟩/v∞, as σ is told."""
+        plain = math.pi * self.scales.capture**2
+        if self.drift_spread == 0.0:
+            return plain
+        return plain * mean_power(-1.0 / 3.0, self.speed, self.drift_spread)
 
     def start(self, azimuth: float = -1.0) -> Start:
         """For the kernel; azimuth [rad] of the impact parameter, below 0: by chance."""
@@ -116,10 +130,9 @@ class Flight:
         )
 
     def limits(self) -> Limits:
-        """For the kernel.  Drifts are told in |U_min| at touch, in kinetic energy without moments."""
+        """For the kernel."""
         s = self.scales
-        stake = s.alpha / s.touch**3 if s.alpha > 0.0 else 0.5 * s.reduced * self.speed**2
-        return Limits(self.tolerance, self.escape, self.most_steps, s.touch, stake)
+        return Limits(self.tolerance, self.escape, self.most_steps, s.touch, s.reduced)
 
 
 def scales_of(projectile: Grains, target: Grains, speed: float) -> Scales:
@@ -134,6 +147,14 @@ def scales_of(projectile: Grains, target: Grains, speed: float) -> Scales:
     # where the top of the barrier, b_max/√3 away, lies inside the grains, they touch before it matters
     widest = capture if capture > math.sqrt(3.0) * touch else focused
     return Scales(reduced, touch, alpha, capture, widest)
+
+
+def mean_power(power: float, speed: float, spread: float) -> float:
+    """⟨(u/v)^p⟩ for u = |v − w|, each component of w normal with this standard deviation [m/s]."""
+    u = np.linspace(0.0, speed + 12.0 * spread, 20_001)[1:]
+    near, far = ((u - speed) / spread) ** 2, ((u + speed) / spread) ** 2
+    density = u / (speed * spread * math.sqrt(2.0 * math.pi)) * (np.exp(-0.5 * near) - np.exp(-0.5 * far))
+    return float(np.trapezoid(density * (u / speed) ** power, u) / np.trapezoid(density, u))
 
 
 def extent(body: Grains) -> float:

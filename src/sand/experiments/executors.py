@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import re
+import signal
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -33,8 +35,31 @@ def executor_for(workers: int = 1, scheduler: str | None = None) -> Iterator[Exe
     elif workers == 1:
         yield None
     else:
-        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-            yield pool
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_signals_to_parent) as pool:
+            _start(pool, workers)
+            try:
+                yield pool
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+
+
+def _leave_signals_to_parent() -> None:
+    """Ctrl-C goes to all processes of a terminal; the parent alone answers it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _start(pool: Executor, workers: int) -> None:
+    """Start all processes now, deaf to Ctrl-C from their first moment on."""
+    here = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if here else None
+    try:
+        for future in [pool.submit(_leave_signals_to_parent) for _ in range(workers)]:
+            future.result()
+    finally:
+        if here:
+            signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ..core.errors import BadInput
 from ..core.units import si
 from ..kernels.pairs import DIRECTION1, DIRECTION2, SPIN1, SPIN2
 from ..kernels.starts import R, U
@@ -62,6 +63,9 @@ def _flown(
     rows: int = 0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Results (K, 8), states at the end (K, size), and the trail of the last flight."""
+    for name, value in (("seed", seed), ("stratum", strata.min()), ("number", numbers.min())):
+        if isinstance(value, bool) or int(value) != value or not 0 <= value < 2**64:
+            raise BadInput(f"{name} = {value!r} must be a whole number of at least 0, below 2^64")
     model, rules = flying.pair()
     room = room_for(model.size, rows)
     results, ends = np.zeros((numbers.size, len(RESULTS))), np.zeros((numbers.size, model.size))
@@ -92,8 +96,9 @@ class Trajectory:
         moment_projectile, moment_target: unit vectors (K, 3); spin_projectile, spin_target: (K, 3). Of single grains;
             empty (0, 3) for aggregates.
         impact_parameter, speed: at the start; closest: least distance of the surfaces, 0 at a hit.
-        exchanged: part of the projectile's kinetic energy that the target has at the end; NaN after a hit.
-        drift: change of the energy over |U_min| at touch.
+        exchanged: part of the projectile's kinetic energy that the target has at the end; NaN after a hit, and where
+            the target moved from the start.
+        drift: change of the energy over the largest kinetic energy of the relative motion.
     """
 
     end: str
@@ -140,9 +145,10 @@ def trajectory(
 
 
 def replay(flying: Flight, stratum: int, number: int, width: float, seed: int = 0) -> Trajectory:
-    """A flight of a cross-section or a map once more, to the bit, with all that happened.
+    """A flight of a cross-section or a map once more, to the bit, with all that happened up to a touch.
 
     Args:
+        flying: the set-up; what becomes of a hit in its contact is not followed here.
         stratum, number: its address, as in flights.csv.
         width: of an annulus [m], `CrossSection.profile[0, 1]`.
     """
@@ -167,12 +173,13 @@ def _trajectory(flying: Flight, told: np.ndarray, trail: np.ndarray) -> Trajecto
     time, y = trail[:, 0], trail[:, 1:]
     m1, m2 = float(flying.projectile.mass.sum()), float(flying.target.mass.sum())
     apart, moving = y[:, R : R + 3], y[:, U : U + 3]
-    drift = np.array(flying.drift)
+    drift = flying.speed * np.array(flying.along) - moving[0]  # of the target, drawn by chance or given
     steady = drift + m1 / (m1 + m2) * moving[0]
     middle = m1 / (m1 + m2) * apart[0] + time[:, None] * steady
     one, two = m2 / (m1 + m2), -m1 / (m1 + m2)
     v1, v2 = steady + one * moving, steady + two * moving
     single = flying.spheres
+    told_of = told[0] != HIT and not drift.any()
     turns = {name: y[:, k : k + 3] if single else np.zeros((0, 3)) for name, k in TURNS.items()}
     named = {name: float(value) for name, value in zip(RESULTS, told, strict=True)}
     return Trajectory(
@@ -186,6 +193,6 @@ def _trajectory(flying: Flight, told: np.ndarray, trail: np.ndarray) -> Trajecto
         impact_parameter=named["impact_parameter"],
         speed=named["speed"],
         closest=max(named["closest"], 0.0),
-        exchanged=float(m2 * (v2[-1] @ v2[-1]) / (m1 * (v1[0] @ v1[0]))) if named["end"] != HIT else math.nan,
+        exchanged=float(m2 * (v2[-1] @ v2[-1]) / (m1 * (v1[0] @ v1[0]))) if told_of else math.nan,
         drift=named["drift"],
     )

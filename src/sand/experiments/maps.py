@@ -14,7 +14,7 @@ from ..stepping.encounter import HIT
 from .encounters import Flight
 from .flights import COLUMNS
 from .sampling import HEADROOM, Task, wilson
-from .scattering import addressed, flown
+from .scattering import addressed, flown, seed_of
 
 END, STRATUM = COLUMNS.index("end"), COLUMNS.index("stratum")
 
@@ -82,6 +82,7 @@ def probability_map(
     Args:
         flights: one set-up for each speed.
         cells: how many in b for each speed, up to 1.2 times the widest b that a central potential captures there.
+        seed: of the first; the others have `seed_of` it and their number.
         known, keep: as for `scattering.flown`, with the number of the set-up.
         watch: called with flights done and all flights.
 
@@ -99,7 +100,7 @@ def probability_map(
     for v, one in enumerate(flights):
         before = addressed((known or {}).get(v, ()))
         tell = None if keep is None else partial(keep, v)
-        for told in flown(one, tasks, most[v] / cells, seed, executor, before, tell):
+        for told in flown(one, tasks, most[v] / cells, seed_of(seed, v), executor, before, tell):
             place = told[:, STRATUM].astype(int)
             np.add.at(hits[v], place, told[:, END] == HIT)
             np.add.at(done[v], place, 1)

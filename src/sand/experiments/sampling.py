@@ -16,9 +16,9 @@ STRATA = 24
 """Annuli up to the first guess of where no hit is possible."""
 HEADROOM = 1.2
 """First guess over the widest impact parameter of a central potential."""
-EMPTY = 3
+EMPTY = 4
 """Outermost annuli that must be without a hit; otherwise more are added."""
-PILOT = 24
+PILOT = 48
 """Flights in each annulus to begin with."""
 STEP_UP = 3.0
 """A round has at most so many times the flights of all rounds before, because its plan is only as good as they."""
@@ -129,7 +129,7 @@ class Strata:
         """The flights that are to come next; none if σ is known well enough.
 
         First so many in each annulus, and more annuli as long as the outermost have hits; then where they help most,
-        n ∝ A √(p(1 − p)) (Neyman 1934), p as Wilson smooths it.
+        n ∝ A √(p(1 − p)) (Neyman 1934), with p from the neighbours.
         """
         hits, tries = self.counts()
         pilot = [Task(k, int(n), PILOT) for k, n in enumerate(tries) if n < PILOT]
@@ -143,7 +143,7 @@ class Strata:
         goal = relative_error * found.value
         if self.error() <= goal or found.value == 0.0:
             return []
-        p = (hits + 0.5) / (tries + 1.0)
+        p = (beside(hits) + 0.5) / (beside(tries) + 1.0)
         mean, spread = self.weights()
         worth = self.area() * np.sqrt(mean**2 * p * (1 - p) + p * spread)
         wanted = worth * worth.sum() / goal**2
@@ -157,23 +157,29 @@ class Strata:
         return [Task(k, int(n), int(n + m)) for k, (n, m) in enumerate(zip(tries, more, strict=True)) if m > 0]
 
 
+def beside(counts: np.ndarray) -> np.ndarray:
+    """Sums over the two annuli to either side, without the annulus itself.
+
+    Were an annulus given flights by its own hits, one that had too few by chance would get too few to find out.
+    """
+    padded = np.pad(np.asarray(counts, float), 2)
+    return sum(padded[2 + k : 2 + k + len(counts)] for k in (-2, -1, 1, 2))  # type: ignore[return-value]
+
+
 def sorted_values(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
     """In the order of their numbers, so that sums are the same bits however they came."""
     return (flights[number] for number in sorted(flights))
 
 
-def split(tasks: list[Task], most: int) -> list[list[Task]]:
-    """Tasks in bundles of about `most` flights each, in their order."""
-    bundles: list[list[Task]] = [[]]
-    room = most
-    for task in tasks:
-        first = task.first
-        while first < task.last:
-            last = min(task.last, first + room)
-            bundles[-1].append(Task(task.stratum, first, last))
-            room -= last - first
-            first = last
-            if room == 0:
-                bundles.append([])
-                room = most
-    return [bundle for bundle in bundles if bundle]
+def cut(tasks: list[Task], most: int) -> tuple[list[Task], list[Task]]:
+    """The first `most` flights, and all others, in their order."""
+    head: list[Task] = []
+    for k, task in enumerate(tasks):
+        size = task.last - task.first
+        if size > most:
+            middle = task.first + most
+            split = [task._replace(last=middle)] if most else []
+            return head + split, [task._replace(first=middle), *tasks[k + 1 :]]
+        head.append(task)
+        most -= size
+    return head, []

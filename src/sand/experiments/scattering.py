@@ -8,6 +8,7 @@ when the projectile is as far away again and on its way out.  Errors of a step a
 from __future__ import annotations
 
 import time as wall
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
@@ -21,11 +22,11 @@ from ..core.units import si
 from ..stepping.encounter import BOUND, FAILED, HIT
 from .encounters import Flight
 from .flights import COLUMNS, Trajectory, fly, replay, trajectory
-from .sampling import CERTAIN, Strata, Task, split
+from .sampling import CERTAIN, Strata, Task, cut
 from .scattering_input import flight
 
-CHUNK = 512
-"""Flights per piece of work; a second or so."""
+PIECE, TRIAL, MOST = 0.5, 16, 4096
+"""Seconds that a piece of work should take; flights of the first one; most of any."""
 END, SPEED, DRIFT = (COLUMNS.index(name) for name in ("end", "speed", "drift"))
 
 
@@ -34,12 +35,15 @@ class CrossSection:
     """σ of one set-up; SI.
 
     Attributes:
-        sigma: [m²]; sigma_error: one standard deviation; interval: 95 %.
-        geometric: π (r1 + r2)² [m²], of outer spheres for aggregates; analytic: Eq. 14 [m²].
+        sigma: area of the impact parameters that lead to a hit [m²]; for a target that moves by chance the rate of
+            hits over number density and v∞, ⟨σ(u) u⟩/v∞, u the relative speed. sigma_error: one standard deviation;
+            interval: 95 %.
+        geometric: π (r1 + r2)² [m²], of outer spheres for aggregates; analytic: Eq. 14 [m²] at the relative speed, with
+            Σ|μ| for aggregates, averaged as σ is for a target that moves by chance.
         flights, hits: how many; bound, failed: of them, neither hit nor miss; counted as misses.
         speed: [m/s]; distance: of the start [m]; seed.
         profile: rows (b₋, b₊, flights, hits) of each annulus, (K, 4).
-        drift: largest change of a flight's energy over |U_min| at touch.
+        drift: largest change of a flight's energy over the largest kinetic energy of its relative motion.
         seconds: spent.
     """
 
@@ -136,15 +140,41 @@ def measure(
     farthest = flying.distance if flying.sphere else np.inf
     strata = Strata.up_to(flying.scales.widest, farthest)
     before = addressed(known)
+    # a target that moves by chance is met at a rate; one that moves along is at rest in its own frame
+    unit = flying.speed if flying.drift_spread > 0.0 else flying.relative_speed
     rows: list[np.ndarray] = []
     while tasks := strata.round(goal, farthest):
         for new in flown(flying, tasks, strata.width, seed, executor, before, keep):
             rows.append(new)
             for row in new:
-                strata.add(int(row[0]), int(row[1]), float(row[END] == HIT), float(row[SPEED]) / flying.speed)
+                strata.add(int(row[0]), int(row[1]), float(row[END] == HIT), float(row[SPEED]) / unit)
         if watch is not None:
             watch(sum(len(r) for r in rows), strata.estimate().value, strata.error())
-    return _told(flying, strata, np.concatenate(rows), seed, wall.monotonic() - begun)
+    whole = np.concatenate(rows)
+    _warn(strata, whole, farthest)
+    return _told(flying, strata, whole, seed, wall.monotonic() - begun)
+
+
+def _warn(strata: Strata, rows: np.ndarray, farthest: float) -> None:
+    """Of a σ that is not what it seems.  Raises BadInput where flights could not be computed."""
+    failed = int((rows[:, END] == FAILED).sum())
+    if failed > 0.01 * len(rows):
+        raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin are out of all range")
+    if failed:
+        warnings.warn(f"{failed} of {len(rows)} flights could not be computed and count as misses", stacklevel=3)
+    hits, _ = strata.counts()
+    if not hits.any():
+        warnings.warn(f"none of {len(rows)} flights hit: sigma is 0 as far as they can tell", stacklevel=3)
+    if hits[-1] and (len(strata) + 1) * strata.width > farthest * (1 + 1e-9):
+        warnings.warn("flights hit at all b that begin on the sphere of starts: sigma is cut off there", stacklevel=3)
+
+
+def seed_of(seed: int, setup: int) -> int:
+    """Of the set-ups of a job: each draws for itself, so that errors at two speeds have nothing to do with each other.
+
+    The seed itself for the first; multiples of 2⁶⁴/golden ratio are far from each other.
+    """
+    return (seed + setup * 0x9E3779B97F4A7C15) % 2**64
 
 
 def addressed(rows: Iterable[Sequence[float]]) -> dict[tuple[int, int], np.ndarray]:
@@ -171,8 +201,7 @@ def flown(
     ready = [before[key] for t in tasks for key in t.addresses() if key in before]
     if ready:
         yield np.array(ready)
-    bundles = split([piece for t in tasks for piece in _gaps(t, before)], CHUNK)
-    for new in _pieces(flying, bundles, width, seed, executor):
+    for new in _pieces(flying, [piece for t in tasks for piece in _gaps(t, before)], width, seed, executor):
         if keep is not None:
             keep(new)
         yield new
@@ -187,14 +216,24 @@ def _gaps(task: Task, known: Mapping[tuple[int, int], np.ndarray]) -> list[Task]
 
 
 def _pieces(
-    flying: Flight, bundles: list[list[Task]], width: float, seed: int, executor: Executor | None
+    flying: Flight, tasks: list[Task], width: float, seed: int, executor: Executor | None
 ) -> Iterator[np.ndarray]:
-    """The rows of each bundle as it is done."""
+    """The rows of all tasks in pieces of about `PIECE` seconds; a first one, flown here, tells how long a flight is."""
+    size = TRIAL
+    while tasks:
+        bundle, tasks = cut(tasks, size)
+        begun = wall.perf_counter()
+        rows = fly(flying, bundle, width, seed)
+        size = min(max(int(PIECE * len(rows) / max(wall.perf_counter() - begun, 1e-9)), 1), MOST)
+        yield rows
+        if executor is not None:
+            break
     if executor is None:
-        for bundle in bundles:
-            yield fly(flying, bundle, width, seed)
         return
-    waiting = [executor.submit(fly, flying, bundle, width, seed) for bundle in bundles]
+    waiting = []
+    while tasks:
+        bundle, tasks = cut(tasks, size)
+        waiting.append(executor.submit(fly, flying, bundle, width, seed))
     try:
         for future in as_completed(waiting):
             yield future.result()
@@ -214,7 +253,7 @@ def _told(flying: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: 
         sigma_error=strata.error(),
         interval=(sure.low, sure.high),
         geometric=float(np.pi * flying.scales.touch**2),
-        analytic=float(np.pi * flying.scales.capture**2),
+        analytic=flying.analytic,
         flights=int(tries.sum()),
         hits=int(hits.sum()),
         bound=int((ends == BOUND).sum()),

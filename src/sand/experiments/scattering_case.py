@@ -51,7 +51,7 @@ class MeasureSection(Section):
     spins: list[Any] = Field(default_factory=list)
     cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
     per_cell: Annotated[int, Field(ge=1, strict=True)] = 64
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = 0
     out: str | None = None
 
     @field_validator("relative_error")
@@ -76,8 +76,8 @@ class ScatterCase(Section):
         ask = Asking()
         materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
         bodies = {
-            name: ask.take(lambda body=body: body.build(materials, self.measure.seed))  # type: ignore[misc]
-            for name, body in (("projectile", self.projectile), ("target", self.target))
+            name: ask.take(lambda body=body, k=k: body.build(materials, 2 * self.measure.seed + k))  # type: ignore[misc]
+            for k, (name, body) in enumerate((("projectile", self.projectile), ("target", self.target)))
             if body is not None
         }
         given = self.flight.model_dump()
@@ -88,6 +88,12 @@ class ScatterCase(Section):
             ask.problems.append("flight.speed is missing; give one, or a list of them")
         if len(speeds) > 1 and self.measure.job == "trajectories":
             ask.problems.append("flight.speed: trajectories are flown at one speed; give one")
+        if self.measure.job != "trajectories":
+            ask.problems += [
+                f"measure.{name} is for job = 'trajectories'; leave it out"
+                for name in ("spins", "impact_parameters")
+                if getattr(self.measure, name)
+            ]
         found = [
             ask.take(lambda speed=speed, spin=spin: flight(**bodies, **given, speed=speed, spin=spin))  # type: ignore[misc]
             for spin in spins
@@ -103,6 +109,10 @@ class ScatterCase(Section):
             ask.problems.append("measure.impact_parameters is missing: which trajectories? for example ['0.95 b_max']")
         ask.problems = list(dict.fromkeys(ask.problems))  # once, not for every speed
         ask.done()
+        if self.measure.job == "map":
+            found.sort(key=lambda one: one.speed)
+            if len({one.speed for one in found}) < len(found):
+                raise BadInput("flight.speed: a map needs speeds that differ")
         return found
 
     def impact_parameters(self, flying: Flight) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import Any
@@ -34,7 +35,9 @@ WORDS: dict[str, Any] = {
 AUTO_START = 10.0
 """Distance of the start in b_max; at least `LEAST_START` radii of contact."""
 LEAST_START = 5.0
-_OF_CAPTURE = re.compile(r"\s*([0-9.eE+-]+)\s*(b_max|R_m)\s*")
+_OF_CAPTURE = re.compile(r"\s*(\S+)\s+(b_max|R_m)\s*")
+FARTHEST = 1e9
+"""Largest start in sums of the radii."""
 
 
 class Asking:
@@ -93,7 +96,7 @@ def flight(
         orientation: "random"; "aligned", single grains' moments along the line of centres at the start; "given".
         target_velocity: three components [m/s], or "thermal", √(k_B T/m) for each; None: at rest.
         field: external flux density, three components [T]; None: none.
-        escape: distance [m] at which a body on its way out is gone; "auto": that of its start.
+        escape: distance [m] > r1 + r2 at which a body on its way out is gone; "auto": that of its start.
         outcome: "hit", surfaces touch; "stick": those that hold, each followed through its real contact.
         tolerance: error of a step over the scales, 1e-13 … 1e-3.
 
@@ -109,7 +112,7 @@ def _checked(given: dict[str, Any]) -> Flight:
     first, second = _bodies(ask, given)
     heat = ask.take(lambda: si(given["temperature"], "K", "temperature", least=0.0), 0.0)
     for name, allowed in WORDS.items():
-        if given[name] not in allowed:
+        if not isinstance(given[name], str) or given[name] not in allowed:
             ask.problems.append(f"{name} = {given[name]!r}; {did_you_mean(str(given[name]), list(allowed))}")
     rest = (0.0, 0.0, 0.0)
     drift, spread = ask.take(lambda: _drift(given["target_velocity"], heat, second), (rest, 0.0))
@@ -124,7 +127,14 @@ def _checked(given: dict[str, Any]) -> Flight:
     if first is not None and second is not None and fast is not None:
         if given["orientation"] == "aligned" and not len(first) == len(second) == 1:
             ask.problems.append("orientation = 'aligned' is for single grains; give aggregates as they lie, 'given'")
-        away = ask.take(lambda: _distance(given["start"], first, second, fast, heat))
+        speed = math.dist((fast, 0.0, 0.0), drift)
+        if speed < 1e-9 * fast:
+            ask.problems.append("speed and target_velocity are the same: the bodies never meet")
+        else:
+            away = ask.take(lambda: _distance(given["start"], first, second, speed, heat))
+            touch = scales_of(first, second, speed).touch
+            if gone and not gone > touch:
+                ask.problems.append(f"escape = {given['escape']!r} must lie beyond the contact, {spoken(touch, 'm')}")
     ask.done()
     return Flight(
         first,
@@ -147,9 +157,15 @@ def _checked(given: dict[str, Any]) -> Flight:
 
 def _bodies(ask: Asking, given: dict[str, Any]) -> tuple[Any, Any]:
     """Projectile and target; None for what could not be made."""
+    for name in ("projectile", "target"):
+        if given[name] is not None and not isinstance(given[name], Grains):
+            ask.problems.append(f"{name} = {given[name]!r} must be grains, such as sand.setup.grain(...)")
+            return None, None
     first = given["projectile"]
     if first is None:
         first = ask.take(lambda: _made(given["radius"], given["material"], given["moment"]))
+    elif given["radius"] is not None or given["material"] is not None:
+        ask.problems.append("radius and material are those of the projectile already; leave them out")
     return first, first if given["target"] is None else given["target"]
 
 
@@ -206,9 +222,11 @@ def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: flo
     scales = scales_of(first, second, speed)
     if isinstance(start, str) and start == "auto":
         return max(AUTO_START * scales.capture, LEAST_START * scales.touch)
-    match = _OF_CAPTURE.fullmatch(start) if isinstance(start, str) else None
-    if match:
-        times, unit = float(match[1]), match[2]
+    told = _multiple(start, "start")
+    if told is not None:
+        times, unit = told
+        if scales.capture == 0.0:
+            raise BadInput(f"start = {start!r}: without moments b_max and R_m are 0; give a length")
         if unit == "R_m" and not heat > 0.0:
             raise BadInput(f"start = {start!r} needs a temperature above 0 K")
         # R_m = (4 α/(k_B T))^(1/3): Eq. 2 for two moments
@@ -223,14 +241,24 @@ def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: flo
             f"start = {start!r}, {spoken(distance, 'm')}, lies inside the contact: the bodies reach to "
             f"{spoken(scales.touch, 'm')}; start farther out"
         )
+    if not distance < FARTHEST * scales.touch:
+        raise BadInput(f"start = {start!r} is out of all range: at most {FARTHEST:.0e} times r1 + r2")
     return distance
+
+
+def _multiple(value: Any, name: str) -> tuple[float, str] | None:
+    """Number and unit of "10 b_max" or "1 R_m"; None for anything else.  Raises BadInput for a number that is none."""
+    match = _OF_CAPTURE.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        return None
+    return si(match[1], "1", f"{name} in {match[2]}", least=0.0), match[2]
 
 
 def impact_parameter(value: Any, flying: Flight, name: str = "impact_parameter") -> float:
     """b [m] ≥ 0 from a length or "0.95 b_max".  Raises BadInput."""
-    match = _OF_CAPTURE.fullmatch(value) if isinstance(value, str) else None
-    if match and match[2] == "b_max":
-        b = float(match[1]) * flying.scales.capture
+    told = _multiple(value, name)
+    if told is not None and told[1] == "b_max":
+        b = told[0] * flying.scales.capture
         if flying.scales.capture == 0.0:
             raise BadInput(f"{name} = {value!r}: without moments b_max is 0; give a length")
     else:

@@ -18,7 +18,7 @@ from ..view.figure import save
 from .encounters import Flight
 from .flights import COLUMNS, Trajectory, trajectory
 from .maps import probability_map
-from .scattering import measure
+from .scattering import measure, seed_of
 from .scattering_case import ScatterCase
 
 POINTS = 1001
@@ -54,10 +54,12 @@ class Job:
                 raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
         else:
             write_toml(place, self.content, "sand scatter: what was asked for")
-        self.table = GrowingTable(self.folder / FLIGHTS, ("setup", *COLUMNS), resume=self.resume)
         self.before: dict[int, list[list[float]]] = {}
-        for row in self.table.rows:
-            self.before.setdefault(int(row[0]), []).append(row[1:])
+        self.table = None
+        if self.case.measure.job != "trajectories":
+            self.table = GrowingTable(self.folder / FLIGHTS, ("setup", *COLUMNS), resume=self.resume)
+            for row in self.table.rows:
+                self.before.setdefault(int(row[0]), []).append(row[1:])
 
     def run(self, executor: Executor | None = None, watch: Watch | None = None) -> dict[str, Any]:
         """All of it; returns what scattering.json holds."""
@@ -66,12 +68,14 @@ class Job:
             "map": self._map,
             "trajectories": self._trajectories,
         }[self.case.measure.job](executor, watch or (lambda text, part: None))
-        self.table.sort()
+        if self.table is not None:
+            self.table.sort()
         content = {"job": self.case.measure.job, "seed": self.case.measure.seed, "versions": versions(), **told}
         write_json(self.folder / SCATTERING, content)
         return content
 
     def _keep(self, setup: int, rows: np.ndarray) -> None:
+        assert self.table is not None
         self.table.add([setup, *row] for row in rows.tolist())
 
     def _cross_sections(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
@@ -84,7 +88,7 @@ class Job:
                 measure(
                     one,
                     relative_error=self.case.measure.relative_error,
-                    seed=self.case.measure.seed,
+                    seed=seed_of(self.case.measure.seed, k),
                     executor=executor,
                     known=self.before.get(k, ()),
                     keep=lambda rows, k=k: self._keep(k, rows),  # type: ignore[misc]

@@ -16,15 +16,14 @@ from ..forces.field import Field
 from ..kernels.pairs import DIRECTION1, DIRECTION2, SPIN1, SPIN2
 from ..kernels.rigid import ANGULAR1, ANGULAR2, TURN1, TURN2
 from ..kernels.starts import R, U
+from ..physics import adhesion
 from ..run.simulation import Simulation
 from .encounters import Flight, body_of
 
 PERIODS = 40
-"""A pair that has been in contact for so many of its normal periods sticks."""
-APART = 3.0
-"""Distance of the centres, in sums of the radii, at which two that fly apart have bounced off."""
-LOOKS = 400
-"""Looks, one each `PERIODS`, after which a pair that is still in between counts as stuck: it cannot get away."""
+"""A pair that has been in contact for so many normal periods without a break sticks."""
+LOOKS = 2000
+"""Looks after which a pair that is neither stuck nor free counts as stuck: it was caught and keeps coming back."""
 
 
 def sticks(flying: Flight, state: np.ndarray) -> bool:
@@ -43,18 +42,40 @@ def sticks(flying: Flight, state: np.ndarray) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the user has been told of them
         sim = Simulation(grains, forces)
-    smallest = min((m.density / m.young_modulus) ** 0.5 for m in grains.materials) * float(grains.radius.min())
-    burst, calm = 2.0 * math.pi * 10.0 * smallest, 0
+    period, joined_for = slowest_period(flying), 0
     for _ in range(LOOKS):
-        sim.run(until=sim.time + burst)
+        _, moving = _relative(sim.grains, first)
+        away = float(np.linalg.norm(moving))
+        # apart, the next thing can only happen after a way of the size of the grains
+        free_flight = 0.05 * float(grains.radius.min()) / away if away > 0.0 else period
+        sim.run(until=sim.time + (period if joined_for or not sim.time else max(period, free_flight)))
         pairs = sim.contacts["pair"]
-        joined = bool(((pairs < first).sum(axis=1) == 1).any()) if len(pairs) else False
-        calm = calm + 1 if joined else 0
-        if calm >= PERIODS // 10:
+        joined = bool(len(pairs)) and bool(((pairs < first).sum(axis=1) == 1).any())
+        joined_for = joined_for + 1 if joined else 0
+        if joined_for >= PERIODS:
             return True
-        if not joined and _flies_apart(sim.grains, first, flying):
+        if not joined and _escapes(*_relative(sim.grains, first), flying):
             return False
     return True
+
+
+def slowest_period(flying: Flight) -> float:
+    """2π √(m̄/k_n) [s] of the bodies' reduced mass on the softest contact that they can make, k_n = (6/5) E* a0.
+
+    Without adhesion: the time of a Hertzian impact at the speed of the flight, 2.87 (m̄²/(R E*² v))^(1/5).
+    """
+    contact, reduced, longest = Contact(), flying.scales.reduced, 0.0
+    for one in {(m, r) for m, r in zip(flying.projectile.material.tolist(), flying.projectile.radius, strict=True)}:
+        for two in {(m, r) for m, r in zip(flying.target.material.tolist(), flying.target.radius, strict=True)}:
+            pairing = contact.pairing(flying.projectile.materials[one[0]], flying.target.materials[two[0]])
+            radius = one[1] * two[1] / (one[1] + two[1])
+            hertz = 2.87 * (reduced**2 / (radius * pairing.modulus**2 * flying.relative_speed)) ** 0.2
+            longest = max(longest, hertz)
+            if pairing.surface_energy > 0.0:
+                a0 = adhesion.rest_radius(pairing.surface_energy, radius, pairing.modulus)
+                stiffness = adhesion.normal_stiffness(a0, pairing.modulus)
+                longest = max(longest, 2.0 * math.pi * math.sqrt(reduced / stiffness))
+    return longest
 
 
 def grains_at(flying: Flight, state: np.ndarray) -> tuple[Grains, int]:
@@ -87,14 +108,17 @@ def grains_at(flying: Flight, state: np.ndarray) -> tuple[Grains, int]:
     return grains, len(one)
 
 
-def _flies_apart(grains: Grains, first: int, flying: Flight) -> bool:
-    """Well apart and still going."""
+def _relative(grains: Grains, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Separation and relative velocity of the two centres of mass, projectile from target."""
     mass = grains.mass
+    parts = (slice(first), slice(first, None))
     centres, speeds = (
-        [np.average(v[part], axis=0, weights=mass[part]) for part in (slice(first), slice(first, None))]
-        for v in (grains.position, grains.velocity)
+        [np.average(v[part], axis=0, weights=mass[part]) for part in parts] for v in (grains.position, grains.velocity)
     )
-    apart, moving = centres[0] - centres[1], speeds[0] - speeds[1]
-    reduced, distance = flying.scales.reduced, float(np.linalg.norm(apart))
-    free = 0.5 * reduced * float(moving @ moving) > flying.scales.alpha / distance**3
-    return free and distance > APART * flying.scales.touch and float(apart @ moving) > 0.0
+    return centres[0] - centres[1], speeds[0] - speeds[1]
+
+
+def _escapes(apart: np.ndarray, moving: np.ndarray, flying: Flight) -> bool:
+    """On the way out, and faster than the strongest attraction could hold."""
+    kinetic = 0.5 * flying.scales.reduced * float(moving @ moving)
+    return float(apart @ moving) > 0.0 and kinetic > flying.scales.alpha / float(np.linalg.norm(apart)) ** 3

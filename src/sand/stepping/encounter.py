@@ -25,7 +25,7 @@ HIT, MISS, BOUND, FAILED = range(4)
 """How a flight ended: at a touch, beyond the escape distance, still together after the most steps, not finite."""
 RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
 """What is kept of each flight, in this order: impact parameter and closest distance of surfaces [m], relative speed at
-the start and at the end [m/s], time [s], largest change of the energy over `Limits.stake`."""
+the start and at the end [m/s], time [s], change of the energy over the largest ½m̄u² that was met."""
 EXACT = 1e-7
 """A touch is found to this part of `Limits.touch`."""
 FIRST = 1e-2
@@ -58,7 +58,7 @@ class Limits(NamedTuple):
     escape: float  # distance [m] beyond which a body that flies away has escaped; 0: that of its start
     most_steps: int
     touch: float  # a length [m], r1 + r2
-    stake: float  # energy [J] that drifts are told in
+    reduced: float  # m̄ [kg]
 
 
 def blend_of(weights: np.ndarray, size: int) -> Callable:
@@ -153,7 +153,8 @@ def flight_of(model: Model) -> Callable:
         rates(y, rate[0], rules)
         begun = energy_of(y, rules)
         gap, longest = gap_of(y, rules)
-        time, dt, closest, steps, drift = 0.0, FIRST * first, gap, 0, 0.0
+        time, dt, closest, steps = 0.0, FIRST * first, gap, 0
+        fastest, end = dot(u, u), BOUND
         note(room.trail, 0, time, y)
         while steps < limits.most_steps:
             dt = min(dt, longest)
@@ -161,7 +162,7 @@ def flight_of(model: Model) -> Callable:
             if not off <= 1.0:
                 dt *= next_factor(off)
                 if not dt > SMALLEST * first:
-                    return FAILED, time, steps, closest, drift
+                    return FAILED, time, steps, closest, 0.0
                 continue
             new_gap, longest = gap_of(new, rules)
             if new_gap < -EXACT * limits.touch and gap > 0.0:  # beyond the touch: to where the chord has it
@@ -176,13 +177,14 @@ def flight_of(model: Model) -> Callable:
             closest = min(closest, gap)
             note(room.trail, steps, time, y)
             r, u = at(y, R), at(y, U)
-            if gap <= EXACT * limits.touch or (dot(r, r) >= outside * outside and dot(r, u) > 0.0):
-                energy = energy_of(y, rules)
-                drift = abs(energy - begun) / limits.stake
-                if gap <= EXACT * limits.touch:
-                    return HIT, time, steps, closest, drift
-                return MISS, time, steps, closest, drift
-        return BOUND, time, steps, closest, abs(energy_of(y, rules) - begun) / limits.stake
+            fastest = max(fastest, dot(u, u))
+            if gap <= EXACT * limits.touch:
+                end = HIT
+                break
+            if dot(r, r) >= outside * outside and dot(r, u) > 0.0:
+                end = MISS
+                break
+        return end, time, steps, closest, abs(energy_of(y, rules) - begun) / (0.5 * limits.reduced * fastest)
 
     return fly
 

@@ -32,7 +32,9 @@ def aggregate_moment(moment: Any, grains: Any, exponent: float = REMANENCE) -> f
     Raises:
         BadInput: out of range.
     """
-    return si(moment, "A m^2", "moment", least=0.0) * si(grains, "1", "grains", least=1.0) ** float(exponent)
+    return si(moment, "A m^2", "moment", least=0.0) * si(grains, "1", "grains", least=1.0) ** si(
+        exponent, "1", "exponent"
+    )
 
 
 def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np.ndarray | None = None) -> float:
@@ -45,8 +47,11 @@ def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np
     Raises:
         BadInput: none at all, or a size below 1.
     """
-    s = np.asarray(sizes, float)
-    n = np.ones_like(s) if numbers is None else np.asarray(numbers, float)
+    try:
+        s = np.asarray(sizes, float)
+        n = np.ones_like(s) if numbers is None else np.asarray(numbers, float)
+    except (TypeError, ValueError):
+        raise BadInput("sizes and numbers must be numbers") from None
     if s.shape != n.shape or not (s >= 1.0).all() or not (n >= 0.0).all() or not n.sum() > 0.0:
         raise BadInput("sizes must be at least 1 and numbers at least 0, as many of these as of those, and not all 0")
     return float((s * s * n).sum() / (s * n).sum())
@@ -61,9 +66,10 @@ def dynamic_exponent(eta: float, nu: float) -> float:
     Raises:
         BadInput: η + ν ≥ 1.
     """
-    rest = 1.0 - eta - nu
+    both = si(eta, "1", "eta") + si(nu, "1", "nu")
+    rest = 1.0 - both
     if not rest > 0.0:
-        raise BadInput(f"eta + nu = {eta + nu:g} must be below 1: from there on growth is no power of time")
+        raise BadInput(f"eta + nu = {both:g} must be below 1: from there on growth is no power of time")
     return 1.0 / rest
 
 
@@ -93,6 +99,7 @@ def growth_exponents(exponent: float = REMANENCE, reading: str = "paper", *, rou
     """
     if reading not in READINGS:
         raise BadInput(f"reading = {reading!r}; {did_you_mean(str(reading), READINGS)}")
+    exponent = si(exponent, "1", "exponent")
     lost = alignment_exponent(exponent)
     # μ² ∝ m^square
     square = {
@@ -108,7 +115,7 @@ def growth_exponents(exponent: float = REMANENCE, reading: str = "paper", *, rou
 
 def alignment_exponent(exponent: float = REMANENCE) -> float:
     """1 − γ, the exponent of τ ∝ m^(1−γ) (Eq. 23): 0.37."""
-    return 1.0 - exponent
+    return 1.0 - si(exponent, "1", "exponent")
 
 
 def alignment_time(inertia: Any, moment: Any, flux_density: Any, angle: float = 0.5 * math.pi) -> float:

@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from ..core.constants import BOLTZMANN, MAGNETIC
 from ..core.errors import BadInput
 from ..core.units import si
@@ -89,7 +87,8 @@ def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
     Raises:
         BadInput: not three finite numbers, or no distance.
     """
-    a, b, r = (_three(v, n) for v, n in ((moment1, "moment1"), (moment2, "moment2"), (apart, "apart")))
+    a, b = _three(moment1, "A m^2", "moment1"), _three(moment2, "A m^2", "moment2")
+    r = _three(apart, "m", "apart")
     if not any(r):
         raise BadInput("apart = 0: two dipoles in one place have no finite energy")
     return dipole.pair_load(r, a, b, MAGNETIC)[3]
@@ -114,7 +113,7 @@ def lowest_energy(moment1: Any, distance: Any, moment2: Any = None) -> float:
     return -dipole.contact_energy(first, second, si(distance, "m", "distance", above=0.0), MAGNETIC)
 
 
-def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: Any, alpha: float) -> float:
+def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
     """U_eff = m̄ b² v∞²/(2r²) − α/r³ [J] (Eqs. 8–10), moments always along r.
 
     Args:
@@ -129,18 +128,17 @@ def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: 
     """
     r, b = si(distance, "m", "distance", above=0.0), si(impact_parameter, "m", "impact_parameter", least=0.0)
     v, m = si(speed, "m/s", "speed", least=0.0), si(mass, "kg", "mass", above=0.0)
-    return 0.5 * m * (b * v / r) ** 2 - alpha / r**3
+    return 0.5 * m * (b * v / r) ** 2 - si(alpha, "J m^3", "alpha", least=0.0) / r**3
 
 
-def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: float) -> float:
+def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
     """U_0 = (m̄ v∞² b²/3)³/(2α²) [J] (Eq. 11): the maximum of `effective_potential`, at r = 3α/(m̄ b² v∞²).
 
-    Arguments as there; α > 0.
+    Arguments as there; α > 0, there is no barrier without attraction.
     """
     b, v = si(impact_parameter, "m", "impact_parameter", least=0.0), si(speed, "m/s", "speed", least=0.0)
-    if not alpha > 0.0:
-        raise BadInput(f"alpha = {alpha!r} must be above 0: there is no barrier without attraction")
-    return (si(mass, "kg", "mass", above=0.0) * (v * b) ** 2 / 3.0) ** 3 / (2.0 * alpha**2)
+    strength = si(alpha, "J m^3", "alpha", above=0.0)
+    return (si(mass, "kg", "mass", above=0.0) * (v * b) ** 2 / 3.0) ** 3 / (2.0 * strength**2)
 
 
 def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> float:
@@ -159,12 +157,12 @@ def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> 
     return dipole.capture_radius(first, second, m, v, MAGNETIC)
 
 
-def capture_cross_section(moment1: Any, mass: Any, speed: Any, moment2: Any = None, c: float = 1.0) -> float:
+def capture_cross_section(moment1: Any, mass: Any, speed: Any, moment2: Any = None, c: Any = 1.0) -> float:
     """σ_m = c 3π (α/(m̄ v∞²))^(2/3) [m²] (Eq. 14; Eq. 27 with the paper's c of 0.8–0.9); arguments as `capture_radius`.
 
     The paper's c is a matter of the distance from which grains start: see the page on cross-sections.
     """
-    return c * math.pi * capture_radius(moment1, mass, speed, moment2) ** 2
+    return si(c, "1", "c", least=0.0) * math.pi * capture_radius(moment1, mass, speed, moment2) ** 2
 
 
 def _thermal(moment: Any, distance: Any, temperature: Any) -> tuple[float, float, float]:
@@ -180,11 +178,9 @@ def _moments(moment1: Any, moment2: Any) -> tuple[float, float]:
     return first, first if moment2 is None else si(moment2, "A m^2", "moment2", least=0.0)
 
 
-def _three(value: Any, name: str) -> tuple[float, float, float]:
+def _three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
     try:
-        x, y, z = (float(part) for part in np.asarray(value, float))
+        x, y, z = value
     except (TypeError, ValueError):
-        raise BadInput(f"{name} = {value!r} must be three numbers in SI") from None
-    if not math.isfinite(x + y + z):
-        raise BadInput(f"{name} = {value!r} must be three finite numbers")
-    return x, y, z
+        raise BadInput(f"{name} = {value!r} must be three components in {unit}") from None
+    return si(x, unit, f"{name} x"), si(y, unit, f"{name} y"), si(z, unit, f"{name} z")

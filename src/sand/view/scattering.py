@@ -95,7 +95,7 @@ def _draw_map(axes: Axes, found: Any) -> Any:
     middle = 0.5 * (speeds[1:] + speeds[:-1])
     first = 1.5 * speeds[0] - 0.5 * speeds[1] if speeds.size > 1 else 0.9 * speeds[0]
     last = 1.5 * speeds[-1] - 0.5 * speeds[-2] if speeds.size > 1 else 1.1 * speeds[0]
-    borders = np.concatenate([[first], middle, [last]])
+    borders = np.concatenate([[max(first, 0.0)], middle, [last]])
     shades = None
     for v in range(speeds.size):
         column = found.probability[v][:, None]
