@@ -121,7 +121,7 @@ def test_pieces_hold_all_flights_once():
 def test_a_soft_rim_is_not_lost():
     """P = 0.6 (1.3 − b) up to 1.3: flights must not follow an annulus's own luck; bias of 300 below 0.7 %.
 
-    Their mean has an error of 3 %/√300 = 0.17 % and is 0.4 % low; with allocation by an annulus's own hits it was 0.9 %.
+    Their mean has an error of 3 %/√300 = 0.17 % and is 0.4 % low; with allocation by its own hits, 0.9 %.
     """
 
     def soft(b):
