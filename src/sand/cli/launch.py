@@ -33,15 +33,9 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         heading: of what is told before the start.
         end: of the run; None: the end that the simulation has in its plans.
     """
-    from ..core.jit import compiling
-
-    def tell() -> None:
-        if not quiet:
-            report.note("compiling (once per version of SAND), about a quarter of a minute …")
-
     talk = not (quiet or as_json)
     bar = None
-    with compiling(tell), Watch() as watch:
+    with report.compiling(quiet), Watch() as watch:
         simulation = report.with_notes(make)
         simulation.observers.append(watch)
         goal = _goal(simulation, end)

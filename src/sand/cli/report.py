@@ -7,6 +7,7 @@ import math
 import shlex
 import warnings
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +23,15 @@ Rows = list[tuple[str, str]]
 def note(text: str) -> None:
     """One line on stderr."""
     click.echo(f"sand: {text}", err=True)
+
+
+def compiling(quiet: bool = False) -> AbstractContextManager[None]:
+    """Says so, once, if anything has to be compiled inside the block."""
+    if quiet:
+        return nullcontext()
+    from ..core.jit import compiling as watch
+
+    return watch(lambda: note("compiling (once per version of SAND), about a quarter of a minute …"))
 
 
 def emit(content: dict[str, Any]) -> None:

@@ -59,7 +59,7 @@ def command(
         bar = _Bar(not (quiet or as_json))
         words = f"sand scatter {shlex.quote(case)} --out {shlex.quote(str(folder))} --resume"
         try:
-            with Watch():
+            with report.compiling(quiet), Watch():
                 content = report.with_notes(lambda: job.run(executor, bar.see))
         except KeyboardInterrupt:
             report.note(f"interrupted; {'go on with: ' + words if job.table else 'nothing is lost, start again'}")
