@@ -163,6 +163,9 @@ def test_the_command(tmp_path, capsys):
     assert "sigma = " in capsys.readouterr().out
     for name in ("flights.csv", "results.csv", "figure.png"):
         assert (out / name).read_bytes() == before[name]
+    for path, said in ((case, "scattering case"), (out, "results.csv"), (out / "scattering.json", "sigma = ")):
+        assert main(["info", str(path)]) == 0
+        assert said in capsys.readouterr().out
     case.write_text(CASE.replace("seed = 3", "seed = 4"))
     assert main(["scatter", str(case), "--out", str(out), "--resume"]) == 2
     assert "another case" in capsys.readouterr().err

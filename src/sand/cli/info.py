@@ -12,6 +12,7 @@ import click
 from ..core.errors import BadInput
 from ..files import folder as files
 from . import options, report
+from .info_jobs import of_job_file, of_job_folder, of_other_case
 
 Told = tuple[str, report.Rows, dict[str, Any]]
 """A heading, rows for people, and the same for machines."""
@@ -23,6 +24,8 @@ Told = tuple[str, report.Rows, dict[str, Any]]
 @options.debug
 def command(path: str, as_json: bool) -> int:
     """What a run's folder holds, or a case file, trajectory.gsd, ledger.csv, summary.json or checkpoint.
+
+    The same for cases, folders and results of `sand scatter` and `sand collide`.
 
     A case file is checked as `sand run` would, without running it.
     """
@@ -74,6 +77,8 @@ def of_run(path: Path) -> Told:
 
     if not (path / files.CASE).exists():
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
+    if (job := of_job_folder(path)) is not None:
+        return job
     planned = files.read_toml(path / files.CASE).get("run", {})
     summary = _summary(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
     ledger = _ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
@@ -109,6 +114,8 @@ def of_case(path: Path) -> Told:
     from ..run.build import case_of, simulation_of
     from ..run.case import read_case
 
+    if (other := of_other_case(path)) is not None:
+        return other
     case = read_case(path)
     if case.grains.kind == "given":
         rows = [("grains", f"{case.grains.number}, made by a script"), ("box", case.box.periodic.describe())]
@@ -169,7 +176,9 @@ def of_checkpoint(path: Path) -> Told:
 
 
 def of_summary(path: Path) -> Told:
-    """A summary."""
+    """A summary, or the results of another command."""
+    if (job := of_job_file(path)) is not None:
+        return job
     summary = _summary(path)
     rows = [("outcome", summary["outcome_text"] + report.named(summary["grains_concerned"]))]
     return f"{path}: the summary of a run", rows + report.results(summary), {"kind": "summary", **summary}

@@ -71,7 +71,9 @@ def command(
     if as_json:
         report.emit({**content, "folder": str(folder)})
     elif not quiet:
-        report.show(f"scatter {case}", [*_rows(content), ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")])
+        report.show(
+            f"scatter {case}", [*rows_of(content), ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")]
+        )
     return DONE
 
 
@@ -107,7 +109,7 @@ class _Bar:
             sys.stderr.write("\r" + 80 * " " + "\r")
 
 
-def _rows(content: dict[str, Any]) -> report.Rows:
+def rows_of(content: dict[str, Any]) -> report.Rows:
     """What people ask for first."""
     if "cross_sections" in content:
         return [row for one in content["cross_sections"] for row in _cross_section(one)]
