@@ -36,6 +36,7 @@ _HOMES = {
     "Neighbours": "stepping.neighbours",
     "Simulation": "run.simulation",
     "resume": "run.build",
+    "open": "run.opened",
     "Observer": "run.observers",
     "Outcome": "run.outcome",
     "Result": "run.outcome",
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
     from .forces.gravity import Gravity as Gravity
     from .run.build import resume as resume
     from .run.observers import Observer as Observer
+    from .run.opened import open as open
     from .run.outcome import Outcome as Outcome
     from .run.outcome import Result as Result
     from .run.simulation import Simulation as Simulation

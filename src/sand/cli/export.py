@@ -1,0 +1,60 @@
+"""`sand export DIR --to FORMAT`: frames for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..core.errors import BadInput
+from . import options, report
+from .exits import DONE
+
+FORMATS = ("xyz", "lammps-dump", "lammps-data", "vtk")
+
+
+@click.command("export", short_help="Write a run's frames for other programs.")
+@click.argument("folder", metavar="DIR")
+@click.option("--to", "form", required=True, type=click.Choice(FORMATS), help="What for.")
+@click.option("--out", metavar="PATH", help="Path without ending (default: 'trajectory' in DIR).")
+@click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
+@click.option("--overwrite", is_flag=True, help="Replace files that are there.")
+@options.as_json
+@options.debug
+def command(folder: str, form: str, out: str | None, frames: str, overwrite: bool, as_json: bool) -> int:
+    """Write the frames of the run in DIR for other programs.
+
+    vtk: a .vtp for each frame and a .pvd with their times, for ParaView; xyz: extended XYZ in ångström, for OVITO and
+    ASE; lammps-dump and lammps-data: `units si`.
+    """
+    from ..files.folder import TRAJECTORY
+    from ..run.opened import Opened
+
+    run = Opened(folder)
+    stem = Path(out) if out else Path(folder) / Path(TRAJECTORY).stem
+    endings = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
+    there = sorted(stem.parent.glob(stem.name + endings[form]))
+    if there and not overwrite:
+        raise BadInput(f"{there[0]} exists; give another --out, or --overwrite")
+    written = run.export(form, stem, chosen(frames))
+    if as_json:
+        report.emit({"files": [str(path) for path in written]})
+    else:
+        more = f" and {len(written) - 1} more" if len(written) > 1 else ""
+        report.show(f"export {folder}", [("files", f"{written[0]}{more}")])
+    return DONE
+
+
+def chosen(text: str) -> slice:
+    """'-1', '3', '10:', '::5' as a slice.  Raises BadInput."""
+    parts = text.split(":")
+    try:
+        numbers = [int(part) if part.strip() else None for part in parts]
+        if len(numbers) == 1 and numbers[0] is not None:
+            first = numbers[0]
+            return slice(first, first + 1 if first != -1 else None)
+        if not 2 <= len(numbers) <= 3:
+            raise ValueError
+        return slice(*numbers)
+    except ValueError:
+        raise BadInput(f"--frames {text!r} must be a frame or a slice such as '-1', '10:', '0:100:5'") from None

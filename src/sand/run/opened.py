@@ -1,0 +1,108 @@
+"""A run's folder to be looked at: frames, ledger, contacts, summary, each read when asked for."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis.clusters import cluster_labels
+from ..core.errors import BadInput
+from ..files import folder as files
+from ..files.export import export_frames
+from ..files.trajectory import Frame, Frames
+
+
+class Opened:
+    """What `sand.open(DIR)` gives; nothing is read before it is asked for, and nothing is written but by `export`.
+
+    A run that is still going can be looked at: open it again to see what has come since.
+
+    Args:
+        folder: of a run.
+
+    Raises:
+        BadInput: there is no run in it.
+    """
+
+    def __init__(self, folder: str | Path):
+        self.folder = Path(folder)
+        if not self.folder.is_dir():
+            raise BadInput(f"there is no folder {folder}")
+        if not (self.folder / files.TRAJECTORY).exists():
+            raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")
+
+    @cached_property
+    def frames(self) -> Frames:
+        """The frames, a sequence; each is read when asked for.  Raises BadInput for a broken trajectory."""
+        return Frames(self.folder / files.TRAJECTORY)
+
+    @cached_property
+    def ledger(self) -> dict[str, np.ndarray]:
+        """Columns of the ledger by name (K,), SI.  Raises BadInput."""
+        rows = files.read_ledger(self.folder / files.LEDGER)
+        return {name: np.array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+
+    @cached_property
+    def case(self) -> dict[str, Any]:
+        """The case as understood.  Raises BadInput."""
+        return files.read_toml(self.folder / files.CASE)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """How the run ended; raises BadInput while it has not."""
+        return files.read_json(self.folder / files.SUMMARY)
+
+    def contacts(self, frame: int = -1) -> dict[str, np.ndarray]:
+        """Contacts of a frame: pair (C, 2), overlap [m], formed [s] (C,), force on the first [N] (C, 3)."""
+        one = self.frames[frame]
+        return {"pair": one.pair, "overlap": one.overlap, "formed": one.formed, "force": one.force}
+
+    def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
+        """Write frames for another program; returns the files.
+
+        Args:
+            form: "xyz", "lammps-dump", "lammps-data" or "vtk".
+            stem: path without ending; "trajectory" in the run's folder by default.
+            frames: which.
+
+        Raises:
+            BadInput: an unknown format, no frame, no such folder.
+        """
+        place = self.folder / "trajectory" if stem is None else Path(stem)
+        return export_frames(self.frames[frames], place, form, cluster_labels)
+
+    def to_xarray(self) -> Any:
+        """All frames as an xarray Dataset with dimensions frame, grain and axis, SI; xarray has to be installed."""
+        import xarray
+
+        whole: list[Frame] = list(self.frames)
+        vectors = ("position", "velocity", "moment", "spin")
+        data = {
+            name: (("frame", "grain", "axis"), np.array([getattr(one, name) for one in whole]), {"units": unit})
+            for name, unit in zip(vectors, ("m", "m/s", "A m^2", "rad/s"), strict=True)
+        }
+        labels = np.array([cluster_labels(len(one), one.pair) for one in whole])
+        coordinates = {
+            "time": ("frame", np.array([one.time for one in whole]), {"units": "s"}),
+            "step": ("frame", np.array([one.step for one in whole])),
+            "radius": ("grain", whole[0].radius, {"units": "m"}),
+            "material": ("grain", np.array(whole[0].materials)[whole[0].material]),
+            "axis": ("axis", list("xyz")),
+        }
+        return xarray.Dataset(data | {"cluster": (("frame", "grain"), labels)}, coords=coordinates)
+
+    def to_pandas(self) -> Any:
+        """The ledger as a pandas DataFrame; pandas has to be installed."""
+        import pandas
+
+        return pandas.DataFrame(self.ledger)
+
+    def __repr__(self) -> str:
+        return f"<run in {self.folder}: {len(self.frames)} frames>"
+
+
+open = Opened
+"""`sand.open(DIR)`: a run's folder to be looked at."""

@@ -1,0 +1,145 @@
+"""A run's folder opened to be looked at, its export, and files that are not what they were."""
+
+import json
+import random
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.files.checkpoint import read_checkpoint
+from sand.files.trajectory import Frames, read_frames
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A finished run with contacts; its folder and simulation."""
+    folder = tmp_path_factory.mktemp("opened") / "run"
+    position = [[(2e-8 - 1e-10) * k, 0, 0] for k in range(5)] + [[0, 2e-7, 0]]
+    grains = sand.Grains(position, 1e-8, sand.IRON, moment="200 A m^2/kg", velocity=np.eye(6, 3) * 0.1)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], out=folder, frame_every="10 ps")
+    sim.run(until="50 ps")
+    return folder, sim
+
+
+def test_everything_is_there(run):
+    """Frames one by one, ledger columns, contacts with forces, case and summary."""
+    folder, sim = run
+    opened = sand.open(folder)
+    assert len(opened.frames) == len(sim.ledger) == 6
+    assert opened.frames[-1].time == sim.time
+    assert [frame.step for frame in opened.frames[1:4]] == [int(s) for s in sim.ledger["step"][1:4]]
+    assert (opened.ledger["total"] == sim.ledger["total"]).all()
+    assert opened.frames.times == pytest.approx(sim.ledger["time"], rel=1e-15, abs=0)
+    contacts = opened.contacts()
+    assert (contacts["pair"] == sim.contacts["pair"]).all()
+    assert contacts["force"] == pytest.approx(sim.contacts["force"], rel=1e-6, abs=0)
+    assert opened.summary["outcome"] == "finished"
+    assert opened.case["grains"]["number"] == 6
+    with pytest.raises(IndexError, match="from 0 to 5"):
+        opened.frames[6]
+
+
+def test_tables_for_others(run):
+    """xarray: dimensions, coordinates, units; pandas: the ledger."""
+    pytest.importorskip("xarray", reason="xarray is in the test extra")
+    folder, sim = run
+    opened = sand.open(folder)
+    data = opened.to_xarray()
+    assert dict(data.sizes) == {"frame": 6, "grain": 6, "axis": 3}
+    assert data.position.attrs["units"] == "m"
+    assert data.position.values[-1] == pytest.approx(sim.grains.position, abs=1e-6 * 1e-8 * 20)
+    assert len(set(data.cluster.values[-1].tolist())) == 2
+    assert list(opened.to_pandas()["total"]) == list(sim.ledger["total"])
+
+
+@pytest.mark.parametrize(("form", "files"), [("xyz", 1), ("lammps-dump", 1), ("lammps-data", 6), ("vtk", 7)])
+def test_the_export_command(run, tmp_path, capsys, form, files):
+    """As many files as promised, not overwritten without leave; slices choose frames."""
+    folder, _ = run
+    stem = str(tmp_path / "out")
+    assert main(["export", str(folder), "--to", form, "--out", stem, "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["files"]) == files == len(list(tmp_path.iterdir()))
+    assert main(["export", str(folder), "--to", form, "--out", stem]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main(["export", str(folder), "--to", form, "--out", stem, "--overwrite", "--frames", "-1"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--to", "vtk", "--frames", "a:b"], "--frames"),
+        (["--to", "vtk", "--frames", "50:60"], "no frame"),
+        (["--to", "xyz", "--out", "/nowhere/at/all"], "no folder"),
+        (["--to", "pdb"], "pdb"),
+    ],
+)
+def test_mistakes(run, capsys, words, said):
+    """One line, exit 2."""
+    assert main(["export", str(run[0]), *words]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert said in lines[0]
+
+
+def test_no_run_there(tmp_path):
+    """A missing folder, and one without a run."""
+    for path, said in ((tmp_path / "none", "no folder"), (tmp_path, "not the folder of a run")):
+        with pytest.raises(sand.BadInput, match=said):
+            sand.open(path)
+
+
+def mutated(good, rng):
+    """The bytes cut, with some changed, taken out or put in."""
+    bad, kind, place = bytearray(good), rng.randrange(5), rng.randrange(len(good))
+    if kind == 0:
+        del bad[place:]
+    elif kind == 1:
+        for _ in range(rng.randrange(1, 8)):
+            bad[rng.randrange(len(bad))] = rng.randrange(256)
+    elif kind == 2:
+        bad[place : place + 100] = rng.randbytes(min(100, len(bad) - place))
+    elif kind == 3:
+        del bad[place : place + rng.randrange(1, 100)]
+    else:
+        bad[place:place] = rng.randbytes(rng.randrange(1, 50))
+    return bytes(bad)
+
+
+@pytest.mark.parametrize(("pattern", "read"), [("checkpoint-*.npz", read_checkpoint), ("trajectory.gsd", read_frames)])
+def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read):
+    """300 mutations each: BadInput, or, where nothing that counts was hit, what the whole file holds."""
+    path = sorted(run[0].glob(pattern))[-1]
+    good, rng, other = path.read_bytes(), random.Random(5), tmp_path / path.name
+    whole = read(path)
+    refused = 0
+    for _ in range(300):
+        other.write_bytes(mutated(good, rng))
+        try:
+            found = read(other)
+        except sand.BadInput as error:
+            assert len(error.problems) == 1
+            refused += 1
+            continue
+        if read is read_frames:
+            assert len(found) <= len(whole)
+            for mine, theirs in zip(found, whole, strict=False):
+                assert (mine.position == theirs.position).all() and mine.time == theirs.time
+        else:
+            assert all((found[0][name] == whole[0][name]).all() for name in whole[0])
+    assert refused > 280
+
+
+def test_an_old_trajectory_without_forces_and_check_sum(run, tmp_path):
+    """Files of before are read: forces are NaN."""
+    import gsd.hoomd
+
+    with gsd.hoomd.open(str(run[0] / "trajectory.gsd"), "r") as file:
+        frame = file[2]
+    del frame.log["crc32"], frame.log["bonds/force"]
+    with gsd.hoomd.open(str(tmp_path / "old.gsd"), "w") as file:
+        file.append(frame)
+    (old,) = Frames(tmp_path / "old.gsd")
+    assert np.isnan(old.force).all()
+    assert old.force.shape == (len(old.pair), 3)
