@@ -1,0 +1,121 @@
+"""A run that is killed at any moment goes on as if nothing had been: SIGKILL, in writes too."""
+
+import random
+import shutil
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from sand.files.checkpoint import newest_checkpoint
+from sand.files.trajectory import read_frames
+
+CASE = """
+[run]
+until = "60 ns"
+frame_every = "0.5 ns"
+seed = 3
+
+[box]
+periodic = "0.7 um"
+
+[grains]
+kind = "gas"
+number = 80
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+temperature = "3000 K"
+
+[forces.contact]
+
+[forces.dipoles]
+cutoff = "0.15 um"
+
+[forces.gas]
+temperature = "100 K"
+pressure = "1 mbar"
+"""
+
+
+def sand_command(*words):
+    """A `sand` process that writes checkpoints all the time."""
+    script = (
+        "import sys; import sand.run.record as r; r.CHECKPOINT_EVERY = 0.05; "
+        "from sand.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    )
+    return subprocess.Popen([sys.executable, "-c", script, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def content(folder):
+    """Everything that must not depend on interruptions."""
+    arrays, _ = newest_checkpoint(folder)
+    frames = read_frames(folder / "trajectory.gsd")
+    return (
+        {name: array.tobytes() for name, array in arrays.items()},
+        (folder / "ledger.csv").read_text(),
+        [(f.step, f.time, f.position.tobytes(), f.pair.tobytes()) for f in frames],
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a run that nobody disturbed, and the seconds it took."""
+    place = tmp_path_factory.mktemp("whole")
+    (place / "case.toml").write_text(CASE)
+    folder = place / "run"
+    assert sand_command("run", str(place / "case.toml"), "--out", str(place / "first"), "--quiet").wait() == 0
+    begun = time.monotonic()
+    assert sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet").wait() == 0
+    return place, folder, time.monotonic() - begun
+
+
+def killed_and_resumed(whole, tmp_path, rng, kills):
+    """Kill a run and each of its resumes after a random time, then let it end."""
+    place, _, seconds = whole
+    folder = tmp_path / "run"
+    job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
+    flushed = 0
+    for _ in range(kills):
+        try:
+            job.wait(timeout=rng.uniform(0.3, 1.0) * seconds)
+        except subprocess.TimeoutExpired:
+            job.kill()
+            job.wait()
+        if not list(folder.glob("checkpoint-*.npz")):
+            shutil.rmtree(folder, ignore_errors=True)
+            job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
+            continue
+        frames = read_frames(folder / "trajectory.gsd")
+        assert len(frames) >= flushed
+        flushed = len(frames)
+        job = sand_command("resume", str(folder), "--quiet")
+    told = job.communicate()[1].decode()
+    assert job.returncode == 0, told
+    return folder
+
+
+def same_as_whole(whole, folder):
+    ours, theirs = content(folder), content(whole[1])
+    assert ours[1] == theirs[1]
+    assert ours[2] == theirs[2]
+    assert ours[0].keys() == theirs[0].keys()
+    different = [name for name in ours[0] if ours[0][name] != theirs[0][name]]
+    assert different == []
+
+
+def test_killed_three_times(whole, tmp_path):
+    """Contacts, a list, cycles and a gas; killed while it runs: the same bits in checkpoint, ledger and frames."""
+    arrays, _ = newest_checkpoint(whole[1])
+    assert arrays["contacts/pair"].shape[1] > 5  # there is something to lose
+    assert np.isfinite(arrays["far/anchor"]).all()
+    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(1), 3))
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("seed", range(25))
+def test_killed_a_hundred_times(whole, tmp_path, seed):
+    """The same, four kills in each of twenty-five runs."""
+    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(100 + seed), 4))
