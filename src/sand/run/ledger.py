@@ -17,6 +17,10 @@ from ..kernels.measure import ENERGIES, measure_energies
 MAGNETIC = "magnetic"
 """A column that every ledger has, with dipoles or without."""
 LOSSES = tuple(f"lost_{name}" for name in LOST)
+RUNAWAY = 1.0
+"""Change of the total over all energy so far at which a run is stopped."""
+SOUND = 1e-3
+"""Of the energies of the moment: what a sound run may have."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 
@@ -48,6 +52,12 @@ def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, 
         "largest_cluster": int(cluster_sizes(labels).max()),
     }
     return row
+
+
+def kinetic_energies(grains: Grains) -> np.ndarray:
+    """½mv² + ½Iω² of each grain (N,) [J]."""
+    moving = grains.mass * (grains.velocity**2).sum(axis=1)
+    return 0.5 * (moving + grains.inertia * (grains.spin**2).sum(axis=1))
 
 
 def momenta(grains: Grains) -> list[float]:
@@ -109,6 +119,21 @@ class Ledger:
         largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
         scale = self.dissipated + largest
         return self._change() / scale if scale > 0.0 else 0.0
+
+    def runs_away(self, row: dict[str, float]) -> bool:
+        """True if the total of this row is off by more than all energy that the books have had before it."""
+        if not self.rows:
+            return False
+        held = {"total", "step", "time", *LOSSES, *MOMENTA, *NUMBERS}
+        energies = [name for name in self.columns if name not in held]
+
+        def size(one: dict[str, float]) -> float:
+            return math.fsum(abs(one[name]) for name in energies)
+
+        before = max(size(one) for one in self.rows[:: max(len(self.rows) // 8, 1)])
+        change = abs(row["total"] - self.rows[0]["total"])
+        # the last part is for runs that begin with no energy at all; what is not a number runs away, too
+        return not change <= RUNAWAY * (before + self.dissipated) + SOUND * size(row)
 
     def drift_per_kT(self, temperature: float, grains: int) -> float:
         """The same change over N k_B T; not a number for T = 0."""

@@ -23,7 +23,7 @@ from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
 from .at_grains import at_grains
 from .contacts import ContactTable
-from .ledger import Ledger, take_stock
+from .ledger import Ledger, kinetic_energies, take_stock
 from .observers import Observer, Schedule
 from .outcome import OF_STOP, Outcome, Result
 from .record import Record
@@ -32,6 +32,8 @@ from .translate import build_engine
 
 BURST = 0.1
 """Wall time [s] the compiled driver stays away from Python, about."""
+GUARD_EVERY = 10_000
+"""Steps between two looks at whether the energy runs away."""
 
 
 class Simulation:
@@ -212,16 +214,20 @@ class Simulation:
 
     def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
         frames = Schedule(self.frame_every or math.inf, self.time)
-        burst = 64
+        burst, guarded = 64, self.world.steps
         while True:
             began = wall.monotonic()
-            left = max(min(burst, last - self.world.steps), 0)
+            left = max(min(burst, last - self.world.steps, guarded + GUARD_EVERY - self.world.steps), 0)
             stop = self._engine.advance(min(end, frames.due), left)
             spent = wall.monotonic() - began
             if left == burst:
                 burst = max(64, min(int(burst * min(BURST / max(spent, 1e-9), 2.0)), 10**7))
             if stop in OF_STOP:
                 return OF_STOP[stop]
+            if self.world.steps - guarded >= GUARD_EVERY:
+                guarded = self.world.steps
+                if self.ledger.runs_away(self._stock()):
+                    return Outcome.RUNAWAY
             done = self.time >= end or self.world.steps >= last
             if stop is Stop.TIME_REACHED or done:
                 self._look()
@@ -237,6 +243,8 @@ class Simulation:
 
     def _close(self, outcome: Outcome) -> Result:
         named = self._engine.culprits() if outcome.is_physics else ()
+        if outcome is Outcome.RUNAWAY:
+            named = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
         if outcome.is_physics:
             self._look()
         result = Result(outcome, self.world.steps, self.time, self.ledger.drift, named)
