@@ -2,6 +2,8 @@
 
 import json
 import os
+import shutil
+from pathlib import Path
 
 import gsd.hoomd
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 import sand
 from sand.core.errors import FilesFailed
-from sand.files.checkpoint import newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.files.folder import LedgerFile, make_folder, read_ledger, read_toml, replace_file, write_json, write_toml
 from sand.files.trajectory import read_frames
 
@@ -133,3 +135,16 @@ def test_foreign_files_are_named(tmp_path):
     path.write_bytes(b"not a trajectory" * 100)
     with pytest.raises(sand.BadInput, match="not a trajectory"):
         read_frames(path)
+
+
+@pytest.mark.parametrize("version", range(1, VERSION + 1))
+def test_checkpoints_of_every_version_go_on(tmp_path, version):
+    """Folders made by tests/reference/make_checkpoint.py with each format: read, and run to their end."""
+    folder = tmp_path / "run"
+    shutil.copytree(Path(__file__).parents[1] / "reference" / f"run-v{version}", folder)
+    sim = sand.resume(folder)
+    assert 3e-11 < sim.time < 6e-11
+    assert len(sim.contacts["pair"]) == 3
+    result = sim.run(until="80 ps")
+    assert result.outcome is sand.Outcome.FINISHED
+    assert result.drift < 1e-3
