@@ -139,6 +139,19 @@ def test_a_runaway_energy_ends_the_run(tmp_path):
     assert len(list((tmp_path / "run").glob("checkpoint-*.npz"))) == 2
 
 
+def test_no_false_alarm_in_a_cold_start_without_frames():
+    """Two cold magnetic grains far apart fall together: 1e4 times the energy of the start, booked once, at the end."""
+    moment = [[6.6e-18, 0, 0]] * 2
+    grains = sand.Grains([[0, 0, 0], [1.2e-7, 1e-9, 0]], 1e-8, sand.IRON, moment=moment)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], frame_every="1 s")
+    result = sim.run(steps=60_000)
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert result.outcome is sand.Outcome.FINISHED
+    assert len(sim.ledger) == 2
+    assert last["made"] == 1
+    assert sim.ledger.dissipated > 1e3 * abs(first["total"])
+
+
 def test_no_false_alarm_where_there_was_no_energy():
     """A grain that falls from rest at the origin, 3e4 steps: all energy comes later, the total stays 0 to rounding."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.IRON), [sand.Gravity("9.81 m/s^2")])

@@ -17,10 +17,8 @@ from ..kernels.measure import ENERGIES, measure_energies
 MAGNETIC = "magnetic"
 """A column that every ledger has, with dipoles or without."""
 LOSSES = tuple(f"lost_{name}" for name in LOST)
-RUNAWAY = 1.0
-"""Change of the total over all energy so far at which a run is stopped."""
-SOUND = 1e-3
-"""Of the energies of the moment: what a sound run may have."""
+RUNAWAY = 0.5
+"""Change of the total over all energies of the moment and all dissipated, at which a run is stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 
@@ -52,6 +50,16 @@ def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, 
         "largest_cluster": int(cluster_sizes(labels).max()),
     }
     return row
+
+
+def dissipated_in(row: dict[str, float]) -> float:
+    """Energy dissipated up to a row [J], forming included.
+
+    What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took more
+    than it gave.
+    """
+    channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
+    return math.fsum([*(row[name] for name in channels), max(row["lost_gas"], 0.0)])
 
 
 def kinetic_energies(grains: Grains) -> np.ndarray:
@@ -102,16 +110,8 @@ class Ledger:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated so far [J], forming included.
-
-        What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took
-        more than it gave.
-        """
-        if not self.rows:
-            return 0.0
-        last = self.rows[-1]
-        channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
-        return math.fsum([*(last[name] for name in channels), max(last["lost_gas"], 0.0)])
+        """Energy dissipated so far [J], forming included, see `dissipated_in`; 0 without a row."""
+        return dissipated_in(self.rows[-1]) if self.rows else 0.0
 
     @property
     def drift(self) -> float:
@@ -121,19 +121,17 @@ class Ledger:
         return self._change() / scale if scale > 0.0 else 0.0
 
     def runs_away(self, row: dict[str, float]) -> bool:
-        """True if the total of this row is off by more than all energy that the books have had before it."""
+        """True if more than half of all energy that this row has, or dissipated, came from nowhere.
+
+        It looks at this row and the first alone, so that it does not depend on how often rows are written.
+        """
         if not self.rows:
             return False
         held = {"total", "step", "time", *LOSSES, *MOMENTA, *NUMBERS}
-        energies = [name for name in self.columns if name not in held]
-
-        def size(one: dict[str, float]) -> float:
-            return math.fsum(abs(one[name]) for name in energies)
-
-        before = max(size(one) for one in self.rows[:: max(len(self.rows) // 8, 1)])
+        there = math.fsum(abs(row[name]) for name in self.columns if name not in held)
         change = abs(row["total"] - self.rows[0]["total"])
-        # the last part is for runs that begin with no energy at all; what is not a number runs away, too
-        return not change <= RUNAWAY * (before + self.dissipated) + SOUND * size(row)
+        # written so that what is not a number runs away, too
+        return not change <= RUNAWAY * (there + dissipated_in(row))
 
     def drift_per_kT(self, temperature: float, grains: int) -> float:
         """The same change over N k_B T; not a number for T = 0."""

@@ -14,7 +14,7 @@ class Outcome(Enum):
     FINISHED = "the end that was asked for is reached"
     INTERRUPTED = "interrupted from outside; a checkpoint lets the run go on"
     NOT_FINITE = "a speed or spin is no longer a finite number"
-    RUNAWAY = "the energy runs away: the books are off by more than all energy there was; the step is too long"
+    RUNAWAY = "the energy runs away: more than half of it came from nowhere; the step is too long"
     NO_STEP = "no step can be taken: the physics asks for one too short for the clock"
     FLEW_TOO_FAR = "a grain would fly more than half the smallest radius in one step: the step is too long"
     SPUN_TOO_FAR = "a grain would turn by more than half a radian in one step: the step is too long"
