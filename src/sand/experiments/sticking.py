@@ -7,6 +7,7 @@ import warnings
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
 from ..core.grains import Grains
@@ -54,7 +55,7 @@ def sticks(flying: Flight, state: np.ndarray) -> bool:
         joined_for = joined_for + 1 if joined else 0
         if joined_for >= PERIODS:
             return True
-        if not joined and _escapes(*_relative(sim.grains, first), flying):
+        if not joined and _escapes(sim.grains, first, flying):
             return False
     return True
 
@@ -118,7 +119,9 @@ def _relative(grains: Grains, first: int) -> tuple[np.ndarray, np.ndarray]:
     return centres[0] - centres[1], speeds[0] - speeds[1]
 
 
-def _escapes(apart: np.ndarray, moving: np.ndarray, flying: Flight) -> bool:
-    """On the way out, and faster than the strongest attraction could hold."""
+def _escapes(grains: Grains, first: int, flying: Flight) -> bool:
+    """On the way out, and faster than all moments could hold, were they as close as the two closest grains are."""
+    apart, moving = _relative(grains, first)
     kinetic = 0.5 * flying.scales.reduced * float(moving @ moving)
-    return float(apart @ moving) > 0.0 and kinetic > flying.scales.alpha / float(np.linalg.norm(apart)) ** 3
+    closest = float(cdist(grains.position[:first], grains.position[first:]).min())
+    return float(apart @ moving) > 0.0 and kinetic > flying.scales.alpha / closest**3
