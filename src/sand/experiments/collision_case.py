@@ -120,13 +120,8 @@ class CollisionCase(Section):
         )
 
 
-def read_collision(path: str | Path) -> CollisionCase:
-    """Read and check a case file of `sand collide`.
-
-    Raises:
-        BadInput: every mistake of the file, one line each, with its place.
-    """
-    content = read_toml(path)
+def wrong_bodies(content: dict[str, Any]) -> list[str]:
+    """What is wrong with the materials of a case with a target and a projectile."""
     problems = wrong_materials(content)
     own = content.get("materials", {})
     known = [*PRESETS, *(own if isinstance(own, dict) else [])]
@@ -135,6 +130,17 @@ def read_collision(path: str | Path) -> CollisionCase:
         name = given.get("material", "silica") if isinstance(given, dict) else "silica"
         if str(name) not in known:
             problems.append(f"{body}.material: unknown material '{name}'; {did_you_mean(str(name), known)}")
+    return problems
+
+
+def read_collision(path: str | Path) -> CollisionCase:
+    """Read and check a case file of `sand collide`.
+
+    Raises:
+        BadInput: every mistake of the file, one line each, with its place.
+    """
+    content = read_toml(path)
+    problems = wrong_bodies(content)
     case, model = None, with_integrator(CollisionCase, content)
     try:
         case = model.model_validate(content)

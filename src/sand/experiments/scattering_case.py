@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
-from ..core.errors import BadInput, did_you_mean
+from ..core.errors import BadInput
 from ..core.material import PRESETS
 from ..files.folder import read_toml
-from ..run.case import MaterialSection, Section, wrong_materials
+from ..run.case import MaterialSection, Section
 from ..run.mistakes import complaints
-from .collision_case import BodySection
+from .collision_case import BodySection, wrong_bodies
 from .encounters import Flight
 from .scattering_input import Asking, flight, impact_parameter
 
@@ -133,14 +133,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
         BadInput: every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
-    problems = wrong_materials(content)
-    own = content.get("materials", {})
-    known = [*PRESETS, *(own if isinstance(own, dict) else [])]
-    for body in ("projectile", "target"):
-        given = content.get(body)
-        name = given.get("material", "silica") if isinstance(given, dict) else "silica"
-        if str(name) not in known:
-            problems.append(f"{body}.material: unknown material '{name}'; {did_you_mean(str(name), known)}")
+    problems = wrong_bodies(content)
     try:
         case = ScatterCase.model_validate(content)
     except ValidationError as error:

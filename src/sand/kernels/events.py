@@ -260,7 +260,8 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
 
     The grains flew freely to where they are, a time τ = overlap / closing speed w beyond the touch.  An impulse along
     n gives them the speed w' of their contact, less what velocity Verlet still adds: to first order F (τ − dt/2).
-    The second order, (F τ)²/2m̄, would be an error of the same sign in every touch."""
+    The second order, (F τ)²/2m̄, would be an error of the same sign in every touch.
+    """
     for p in range(count[PAIRS]):
         i, j = near.pair[0, p], near.pair[1, p]
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)

@@ -16,11 +16,12 @@ from ..core.jit import kernel, loop, rare
 from ..core.vec import dot, norm
 from ..kernels.pairs import Model
 from ..kernels.starts import R, U, at, draw_path
+from .runge_kutta import next_factor
 
 STAGES = SCHEME.n_stages
 """12; the rates at the new state, number 13, serve as the first of the next step."""
-SAFETY, SHRINK, GROW, ORDER = 0.9, 0.2, 5.0, 8.0
-"""Of the next step: part of what would just do, least and largest factor, power of the step that the error goes as."""
+ORDER = 8.0
+"""The error of a step goes as this power of its length."""
 HIT, MISS, BOUND, FAILED = range(4)
 """How a flight ended: at a touch, beyond the escape distance, still together after the most steps, not finite."""
 RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
@@ -102,14 +103,6 @@ def stages_of(rates: Callable, size: int, stage: int) -> Callable:
 
 
 @loop
-def next_factor(error):
-    """What the next step should be, in parts of this one: 0.9 err^(−1/8), within 0.2 … 5."""
-    if error == 0.0:
-        return GROW
-    return min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / ORDER)))
-
-
-@loop
 def note(trail, step, time, y):
     """Write time and state into the trail, if it is long enough."""
     if step < trail.shape[0]:
@@ -160,7 +153,7 @@ def flight_of(model: Model) -> Callable:
             dt = min(dt, longest)
             off = tried(room, rules, dt) / limits.tolerance
             if not off <= 1.0:
-                dt *= next_factor(off)
+                dt *= next_factor(off, ORDER)
                 if not dt > SMALLEST * first:
                     return FAILED, time, steps, closest, 0.0
                 continue
@@ -173,7 +166,7 @@ def flight_of(model: Model) -> Callable:
                 y[row] = new[row]
                 rate[0, row] = rate[STAGES, row]
             gap, time, steps = new_gap, time + dt, steps + 1
-            dt *= next_factor(off)
+            dt *= next_factor(off, ORDER)
             closest = min(closest, gap)
             note(room.trail, steps, time, y)
             r, u = at(y, R), at(y, U)

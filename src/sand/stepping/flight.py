@@ -34,13 +34,9 @@ from .advance import halves_for
 from .control import GROW_EVERY, calm_steps
 from .parts import no_gas, stir_gas
 from .rules import Plan, Stop
-from .runge_kutta import error_of, loads_at_stage, normalise_all, place_stage, trial_for, work_of
+from .runge_kutta import GROW, error_of, loads_at_stage, next_factor, normalise_all, place_stage, trial_for, work_of
 from .touch import NEVER, first_touch
 
-SAFETY = 0.9
-"""Of the step that would just meet the prescribed errors."""
-SHRINK, GROW = 0.2, 5.0
-"""Least and largest factor from one step to the next."""
 ORDER = 5.0
 """The error of a step goes as this power of its length."""
 STALE_PART = 0.25
@@ -49,14 +45,6 @@ STRIDE_PART = 0.9
 """Of the longest way, for the way foretold."""
 TRIES = 30
 """Most attempts to end a step at a touch; each squares the error of the last, so that five are many."""
-
-
-@loop
-def next_factor(error):
-    """What the next step should be, in parts of this one: 0.9 err^(−1/5), within 0.2 … 5."""
-    if not error > 0.0:
-        return GROW
-    return min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / ORDER)))
 
 
 @loop
@@ -115,11 +103,11 @@ def step_for(plan: Plan) -> Callable:
             if not error <= 1.0:
                 count[GRAIN1], count[GRAIN2] = stray, -1
                 count[REJECTED] += 1
-                dt *= next_factor(error)
+                dt *= next_factor(error, ORDER)
                 growth, tries = 1.0, 0
                 continue
             if tries == 0:
-                wish = dt * min(growth, next_factor(error))
+                wish = dt * min(growth, next_factor(error, ORDER))
             touch = first_touch(grains, far, stages, rules, dt) if rules.contact.on else NEVER
             if touch >= 1.0 or tries == TRIES:
                 clock[FLIGHT] = min(wish, rules.control.longest)

@@ -34,8 +34,18 @@ WEIGHTS[5, :5] = [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656]
 WEIGHTS[6, :6] = [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]
 ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 """Weights of order 5 less those of order 4: the error of the latter."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+"""Of the next step: part of what would just do, least and largest factor."""
 X, V, Q, W = 0, 3, 6, 10
 """Rows where position, velocity, orientation and spin begin."""
+
+
+@formula
+def next_factor(error, order):
+    """What the next step should be, in parts of this one: 0.9 err^(−1/order), within 0.2 … 5; 5 without any error."""
+    if error == 0.0:
+        return GROW
+    return min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / order)))
 
 
 @formula
