@@ -406,12 +406,16 @@ def ledger_page() -> str:
 
 
 def trajectory_page() -> str:
-    """The docstring of sand.files.trajectory."""
-    from sand.files import trajectory
+    """The docstrings of sand.files.frame, and the table of a checkpoint's arrays."""
+    from sand.files import checkpoint, frame
 
     return (
-        "# The trajectory\n\n" + markdown(trajectory.__doc__) + "\n\n`sand.files.trajectory.read_frames(path)` "
-        "gives the frames back in SI. " + markdown(trajectory.Frame.__doc__) + "\n"
+        "# The trajectory\n\n" + markdown(frame.__doc__) + "\n\n`sand.files.trajectory.read_frames(path)` "
+        "gives the frames back in SI. "
+        + markdown(frame.Frame.__doc__)
+        + "\n\n## Checkpoints\n\n"
+        + markdown(checkpoint.__doc__)
+        + "\n"
     )
 
 

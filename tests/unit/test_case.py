@@ -95,7 +95,7 @@ def problems_of(content):
         ({"forces__contact": True}, ["forces.contact", "True"]),
         # things that are missing
         ({"run__until": None}, ["run", "until is missing"]),
-        ({"grains__number": None}, ["grains.number is missing"]),
+        ({"grains__number": None}, ["grains", "number is missing", "number = 125"]),
         ({"grains__radius": None}, ["grains", "radius is missing"]),
         ({"run": None}, ["run is missing"]),
         ({"materials__mine__density": "3 g/cm^3"}, ["mine lacks young_modulus, poisson_ratio"]),

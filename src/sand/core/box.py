@@ -93,6 +93,19 @@ class Box:
         """Positions (…, 3) [m] moved into −L/2 … L/2 on periodic axes."""
         return self.nearest(position)
 
+    def close_pairs(self, position: np.ndarray, reach: float) -> np.ndarray:
+        """All pairs i < j of points (N, 3) [m] that are at most `reach` [m] apart, (P, 2), sorted.
+
+        On periodic axes the nearest images count; `reach` must be below half the shortest of them.
+        """
+        from scipy.spatial import cKDTree
+
+        lengths = np.array([0.0 if v is None else v for v in self.lengths])
+        folded = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)
+        folded = np.where((lengths > 0.0) & (folded >= lengths), 0.0, folded)  # −1e-300 modulo L is L
+        pairs = cKDTree(folded, boxsize=lengths).query_pairs(reach, output_type="ndarray")
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
     def describe(self) -> str:
         """One line for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
         from .units import spoken

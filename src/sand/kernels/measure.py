@@ -57,11 +57,16 @@ CONTACT_ROWS = (
     ("energy_twisting", "J", "stored by the twisting spring"),
 )
 """What `measure_contacts` tells of each contact: name, unit, meaning."""
+CONTACT_VECTORS = (
+    ("slide_vector", "m", "sliding displacement ζ"),
+    ("roll_vector", "m", "rolling displacement ξ"),
+)
+"""The vectors it tells after them, three rows each."""
 
 
 @kernel
 def measure_contacts(grains, contacts, count, span, follow, out):
-    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS."""
+    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS and CONTACT_VECTORS."""
     for c in range(count[CONTACTS]):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
@@ -70,7 +75,8 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         y = adhesion.root(adhesion.stretch(overlap, plain.pull_off_overlap))
         bond = law_of.stiffened(plain, y, follow)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
-        slide, roll = norm(strain.slide), norm(across(strain.roll, pose.n))
+        xi = across(strain.roll, pose.n)
+        slide, roll = norm(strain.slide), norm(xi)
         stored = law_of.energies(pose, overlap, y, r1, r2, bond)
         out[0, c], out[1, c] = overlap, law_of.contact_radius(overlap, y, bond)
         out[2, c], out[3, c], out[4, c] = slide, roll, strain.twist
@@ -84,3 +90,6 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         out[12, c] = -bond.twist_stiffness * strain.twist
         for mode in range(4):
             out[13 + mode, c] = stored[mode]
+        for axis in range(3):
+            out[17 + axis, c] = strain.slide[axis]
+            out[20 + axis, c] = xi[axis]

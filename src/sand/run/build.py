@@ -7,11 +7,15 @@ import math
 from pathlib import Path
 from typing import Any
 
+from ..core.box import Box, as_box
 from ..core.errors import BadInput
 from ..core.grains import Grains
+from ..core.material import Material
 from ..files.checkpoint import newest_checkpoint
-from ..files.folder import CASE
+from ..files.folder import CASE, TRAJECTORY
+from ..files.trajectory import Frames
 from ..forces.base import FarForce
+from ..setup.frame import Start, from_frame
 from ..setup.gas import gas
 from .case import Case, read_case
 from .simulation import Simulation
@@ -27,13 +31,31 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     Raises:
         BadInput: what only shows when grains, forces and box come together.
     """
-    if case.grains.kind != "gas":
+    if case.grains.kind == "given":
         raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
+    start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
+    simulation = Simulation(
+        start.grains,
+        case.forces.build(),
+        box=start.box,
+        stepping=case.stepping,
+        neighbours=case.neighbours,
+        seed=case.run.seed,
+        out=out,
+        frame_every=case.run.frame_every,
+        contacts=start.contacts,
+        **options,
+    )
+    simulation.recipe, simulation.origin = case.grains.recipe(), start.note
+    return simulation
+
+
+def _of_gas(case: Case) -> Start:
     section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
         raise BadInput("grains.material of a gas must be one name")
     grains = gas(
-        section.number,
+        section.number,  # type: ignore[arg-type]
         case.box.periodic,
         radius=section.radius,
         material=library[section.material],
@@ -43,19 +65,44 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
         spins=section.spins,
         seed=case.run.seed,
     )
-    simulation = Simulation(
-        grains,
-        case.forces.build(),
-        box=case.box.periodic,
-        stepping=case.stepping,
-        neighbours=case.neighbours,
-        seed=case.run.seed,
-        out=out,
-        frame_every=case.run.frame_every,
-        **options,
-    )
-    simulation.recipe = section.model_dump(exclude_none=True)
-    return simulation
+    return Start(grains, None, as_box(case.box.periodic), "")
+
+
+def _of_file(case: Case) -> Start:
+    section = case.grains
+    try:
+        start = from_trajectory(section.file or "", section.frame, case.materials_by_name())
+    except BadInput as error:
+        raise error.at("grains") from None
+    if case.box.periodic is not None and not same_box(case.box.periodic, start.box):
+        raise BadInput(
+            f"box: it is {case.box.periodic.describe()} here, but {start.box.describe()} in {section.file}; "
+            "leave [box] out, the file's is taken then"
+        )
+    return start
+
+
+def same_box(first: Box, second: Box) -> bool:
+    """True for the same axes, equal to the precision of a trajectory."""
+    pairs = list(zip(first.lengths, second.lengths, strict=True))
+    return all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
+
+
+def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]) -> Start:
+    """One frame of a trajectory (or of the run in a folder) as a new start, see `setup.from_frame`.
+
+    Raises:
+        BadInput: no such file or frame, or one that cannot be a start.
+    """
+    place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
+    frames = Frames(place)
+    try:
+        start = from_frame(frames[frame], materials)
+    except IndexError as error:
+        raise BadInput(str(error)) from None
+    finally:
+        frames.close()
+    return start._replace(note=f"{place}, {start.note}")
 
 
 def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str, Any]:
@@ -137,8 +184,8 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         restart=(arrays, meta),
         **options,
     )
-    if case.grains.kind == "gas":
-        simulation.recipe = case.grains.model_dump(exclude_none=True)
+    if case.grains.kind != "given":
+        simulation.recipe = case.grains.recipe()
     end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))
     simulation.planned = (end, last)
     return simulation

@@ -108,16 +108,18 @@ class MaterialSection(Section):
 
 
 class GrainsSection(Section):
-    """[grains]: a gas of grains; "given" marks runs whose grains came from a script."""
+    """[grains]: a gas of grains, or those of a `file`: a frame of a trajectory; "given" marks grains from a script."""
 
-    kind: Literal["gas", "given"] = "gas"
-    number: Annotated[int, Field(ge=1, strict=True)]
+    kind: Literal["gas", "file", "given"] = "gas"
+    number: Annotated[int, Field(ge=1, strict=True)] | None = None
     radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
     material: str | list[str] = "iron"
     moment: Any = None
     charge: quantity("C") | None = None  # type: ignore[valid-type]
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
     spins: str = "kT/2"
+    file: str | None = None
+    frame: Annotated[int, Field(strict=True)] = -1
 
     @field_validator("moment")
     @classmethod
@@ -135,9 +137,30 @@ class GrainsSection(Section):
 
     @model_validator(mode="after")
     def _whole(self) -> GrainsSection:
-        if self.kind == "gas" and self.radius is None:
-            raise ValueError("radius is missing; add it, for example radius = '10 nm'")
+        needed, foreign = GRAINS_NEED[self.kind]
+        problems = [
+            f"{name} is missing; add it, for example {name} = {example}"
+            for name, example in needed.items()
+            if getattr(self, name) is None
+        ]
+        told = [name for name in foreign if name in self.model_fields_set]
+        problems += [f"{name} is not for kind = '{self.kind}'; remove it, or change kind" for name in told]
+        if problems:
+            raise ValueError("\n".join(problems))
         return self
+
+    def recipe(self) -> dict[str, Any]:
+        """What a case file says to have these grains, all defaults filled in."""
+        _, foreign = GRAINS_NEED[self.kind]
+        return self.model_dump(exclude_none=True, exclude=set(foreign))
+
+
+GRAINS_NEED: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
+    "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame")),
+    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "radius", "moment", "charge", "temperature", "spins")),
+    "given": ({"number": "125"}, ("file", "frame")),
+}
+"""By kind: keys it cannot do without, with an example, and keys that it has no use for."""
 
 
 class ForcesSection(Section):
@@ -238,7 +261,10 @@ def read_case(path: str | Path) -> Case:
     Raises:
         BadInput: every mistake of the file, one line each, with its place.
     """
-    return check_case(read_toml(path), str(path))
+    case = check_case(read_toml(path), str(path))
+    if case.grains.file is not None:  # as seen from the case file
+        case.grains.file = str((Path(path).parent / case.grains.file).absolute())
+    return case
 
 
 def check_case(content: dict[str, Any], name: str) -> Case:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..core.world import CONTACTS, LOST_IN_CONTACTS, World
-from ..kernels.measure import CONTACT_ROWS, measure_contacts
+from ..kernels.measure import CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
 
 COLUMNS = (
     ("pair", "", "the two grains"),
     ("formed", "s", "time of first touch; the start for contacts that were there"),
     *CONTACT_ROWS,
+    *CONTACT_VECTORS,
     ("force", "N", "force on the first grain; the second one's is the opposite"),
     ("torque1", "N m", "torque on the first grain"),
     ("torque2", "N m", "torque on the second grain"),
@@ -25,19 +26,22 @@ COLUMNS = (
 class ContactTable(Mapping[str, np.ndarray]):
     """One row per contact, columns by name (see COLUMNS): `table["roll_share"]`; a snapshot, not a view.
 
-    Columns are (C,), but `pair` is (C, 2) and force and torques are (C, 3), laboratory frame.
+    Columns are (C,), but `pair` is (C, 2) and vectors are (C, 3), laboratory frame.
     """
 
     def __init__(self, world: World, follow: bool):
         used = int(world.count[CONTACTS])
         contacts = world.contacts
-        rows = np.zeros((len(CONTACT_ROWS), used))
+        scalars = len(CONTACT_ROWS)
+        rows = np.zeros((scalars + 3 * len(CONTACT_VECTORS), used))
         measure_contacts(world.grains.arrays, contacts, world.count, world.box.span, follow, rows)
         self._columns: dict[str, np.ndarray] = {
             "pair": contacts.pair[:, :used].T.copy(),
             "formed": contacts.formed[:used].copy(),
         }
         self._columns |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
+        vectors = rows[scalars:].reshape(len(CONTACT_VECTORS), 3, used)
+        self._columns |= {name: vectors[k].T.copy() for k, (name, _, _) in enumerate(CONTACT_VECTORS)}
         for name, stored in (("force", "push"), ("torque1", "torque1"), ("torque2", "torque2")):
             self._columns[name] = getattr(contacts, stored)[:, :used].T.copy()
         for k, name in enumerate(LOST_IN_CONTACTS):

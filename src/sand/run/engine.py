@@ -14,6 +14,7 @@ from ..forces.base import FarForce, GrainForce
 from ..kernels.cells import FULL, remake_far_list
 from ..kernels.far import shares_for
 from ..kernels.outside import outside_shares_for
+from ..kernels.seeds import seed_contacts
 from ..stepping.adaptive import Adaptive
 from ..stepping.advance import driver_for
 from ..stepping.control import GROW_EVERY
@@ -65,6 +66,15 @@ class Engine:
                 w.grow_rows()
             else:
                 return stop
+
+    def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
+        """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""
+        w = self.world
+        while w.contacts.pair.shape[1] < len(pair):
+            w.grow_contacts()
+        given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
+        pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
+        return int(seed_contacts(w.grains.arrays, w.contacts, w.count, w.box.span, self.rules.contact, pairs, *given))
 
     def begin(self) -> None:
         """Contacts of grains that touch at the start, nothing booked, and the first loads."""

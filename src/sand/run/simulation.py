@@ -17,6 +17,7 @@ from ..core.grains import Grains
 from ..core.units import si, spoken
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
+from ..setup.frame import Bonds
 from ..stepping.adaptive import Adaptive
 from ..stepping.neighbours import Neighbours
 from ..stepping.rules import Stop
@@ -50,6 +51,8 @@ class Simulation:
         overwrite: allow `out` to hold an earlier run, whose files are then replaced.
         observers: objects that look on (see `sand.Observer`); they never change the physics.
         frame_every: time between frames [s]; by default a two-hundredth of the first `run`.
+        contacts: that are there from the start though they are stretched or strained, as `sand.setup.from_frame` gives
+            them; grains that overlap touch anyway.
         restart: arrays and meta of a checkpoint in `out` to go on from (`sand.resume` gives them).
 
     Raises:
@@ -69,6 +72,7 @@ class Simulation:
         overwrite: bool = False,
         observers: Iterable[Observer] = (),
         frame_every: Any = None,
+        contacts: Bonds | None = None,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
         if not isinstance(grains, Grains):
@@ -81,11 +85,11 @@ class Simulation:
         self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
         self._chosen: dict[str, str] = {}  # what the start of a resumed run decided
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
+        self.origin = ""  # what is to be said of where the grains came from
         self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
         self.start = grains.copy()
-        self._engine = build_engine(
-            grains, self.forces, self.box, stepping or Verlet(), self.neighbours, self.seed or 0, fresh=restart is None
-        )
+        parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, self.seed or 0)
+        self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
         self.stepping = self._engine.stepping
         self.world = self._engine.world
         self.temperature = kinetic_temperature(grains)
@@ -125,7 +129,8 @@ class Simulation:
         """What was decided for the user, and why: boundary, cut-offs, how neighbours are found."""
         if self._chosen:
             return self._chosen
-        told = {"boundary": self.box.describe()}
+        told = {"start": self.origin} if self.origin else {}
+        told["boundary"] = self.box.describe()
         for force in self.forces:
             choose = getattr(force, "choose", None)
             if choose is not None:

@@ -21,6 +21,7 @@ from ..kernels.gas import VACUUM
 from ..kernels.outside import is_ours
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
+from ..setup.frame import Bonds
 from ..stepping.adaptive import Adaptive
 from ..stepping.control import IMPACT_PART, Control
 from ..stepping.neighbours import Found, Neighbours
@@ -59,12 +60,14 @@ def build_engine(
     seed: int = 0,
     *,
     fresh: bool = True,
+    contacts: Bonds | None = None,
 ) -> Engine:
     """Check that everything fits together and translate it.
 
     Args:
         seed: of random kicks.
         fresh: a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
+        contacts: that are there from the start, with what they remember.
 
     Raises:
         BadInput: every problem at once.
@@ -104,9 +107,31 @@ def build_engine(
     plan = _plan(given, composed, sums, verlet, isinstance(stepping, Adaptive))
     world = _world(grains, box, found, plan.adaptive)
     engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
+    held = _seed(engine, given.contact, contacts)
     if given.contact is not None and fresh:
-        _refuse_overlaps(engine, given.contact)
+        _refuse_overlaps(engine, given.contact, held)
     return engine
+
+
+def _seed(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> set[tuple[int, ...]]:
+    """Put the contacts of an earlier run into the world; returns their pairs, sorted.  Raises BadInput."""
+    if contacts is None or not len(contacts.pair):
+        return set()
+    count, pair = len(engine.world.grains), np.asarray(contacts.pair)
+    if contact is None:
+        raise BadInput(f"{len(pair)} contacts are given, but there is no sand.Contact() among the forces; add it")
+    shapes = tuple(np.shape(part) for part in contacts)
+    if shapes != ((len(pair), 2), (len(pair), 3), (len(pair), 3), (len(pair),)):
+        raise BadInput(f"contacts have shapes {shapes}; they must be (C, 2), (C, 3), (C, 3), (C,)")
+    if pair.min() < 0 or pair.max() >= count or (pair[:, 0] == pair[:, 1]).any():
+        raise BadInput(f"contacts name grains that are not there; grains are 0 to {count - 1}, two different ones each")
+    wrong = engine.seed(pair, contacts.slide, contacts.roll, contacts.twist)
+    if wrong >= 0:
+        i, j = pair[wrong]
+        raise BadInput(
+            f"the contact of grains {i} and {j} is stretched beyond its break; these materials and radii do not hold it"
+        )
+    return {tuple(sorted(two)) for two in pair.tolist()}
 
 
 def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
@@ -233,16 +258,15 @@ def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) ->
     )
 
 
-def _refuse_overlaps(engine: Engine, contact: Contact) -> None:
-    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start."""
-    from scipy.spatial import cKDTree
+def _refuse_overlaps(engine: Engine, contact: Contact, held: set[tuple[int, ...]]) -> None:
+    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start.
 
+    Contacts that are `held` from an earlier run (sorted pairs) may be in the middle of an impact.
+    """
     grains, box = engine.world.grains, engine.world.box
-    position, radius = grains.position, grains.radius
-    lengths = np.array([v if v is not None else 0.0 for v in box.lengths])
-    shifted = np.where(lengths > 0.0, np.mod(position + 0.5 * lengths, np.where(lengths > 0.0, lengths, 1.0)), position)
-    tree = cKDTree(shifted, boxsize=lengths)
-    pairs = tree.query_pairs(2.0 * float(radius.max()), output_type="ndarray")
+    radius = grains.radius
+    pairs = box.close_pairs(grains.position, 2.0 * float(radius.max()))
+    pairs = pairs[[tuple(pair) not in held for pair in pairs.tolist()]]
     overlap = grains.overlaps(pairs, box)
     table = contact.pairings(grains.materials)
     problems = []

@@ -1,0 +1,212 @@
+"""A frame of a trajectory as a new start: single precision healed, no contact made or broken."""
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.files.trajectory import read_frames
+from sand.setup.frame import SINGLE, healed
+
+RADIUS = 1e-8
+STIFFNESS = 100.0
+"""More than k_n [N/m] of two grains of silica; at rest it is 2 E* a0 = 57 N/m."""
+
+
+@pytest.fixture(scope="module")
+def crash(tmp_path_factory):
+    """A run in which a fast grain hits a compact cluster in a corner of a periodic box; its folder and frames."""
+    folder = tmp_path_factory.mktemp("frames") / "crash"
+    cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=4)
+    place = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
+    place += [1.4e-7, 0.9e-7, 1.4e-7]
+    speed = np.zeros((41, 3))
+    speed[40] = [0.3, 0.4, -30.0]
+    grains = sand.Grains(place, RADIUS, "silica", velocity=speed, moment="2 A m^2/kg")
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box="0.3 um", out=folder, frame_every="0.25 ns")
+    sim.run(until="10 ns")
+    return folder, read_frames(folder / "trajectory.gsd"), sim
+
+
+def test_the_run_is_worth_it(crash):
+    """There are stretched contacts, strained ones, some at a limit, and contacts across the faces."""
+    _, frames, _ = crash
+    shares = np.vstack([frame.share for frame in frames])
+    assert (shares[:, 0] > 0.05).any()
+    assert (shares[:, 2] > 0.2).any()
+    last = frames[-1]
+    apart = last.position[last.pair[:, 0]] - last.position[last.pair[:, 1]]
+    assert (np.abs(apart) > 1e-7).any()
+
+
+def test_every_frame_starts_a_run_with_its_contacts(crash):
+    """Pairs are the same, overlaps to rounding (64 ε of the coordinates in radii), strains to single precision.
+
+    The force of each contact is that of the frame, to k_n times the rounding of overlaps and the frame's own rounding.
+    """
+    _, frames, _ = crash
+    for number, frame in enumerate(frames):
+        start = sand.setup.from_frame(frame, {"silica": sand.SILICA})
+        sim = sand.Simulation(start.grains, [sand.Contact(), sand.Dipoles()], box=start.box, contacts=start.contacts)
+        table = sim.contacts
+        assert {tuple(sorted(p)) for p in table["pair"].tolist()} == {tuple(sorted(p)) for p in frame.pair.tolist()}
+        assert (table["pair"] == frame.pair).all(), f"frame {number}"
+        assert table["overlap"] == pytest.approx(frame.overlap, rel=0, abs=64 * 2.3e-16 * 16 * RADIUS)
+        floor = 64 * 2.3e-16 * RADIUS
+        for name in ("slide", "roll"):
+            was = getattr(frame, name)  # directions of n are known to 16 · 6e-8/2 rad
+            assert table[f"{name}_vector"] == pytest.approx(was, rel=0, abs=1e-6 * np.abs(was).max() + floor)
+        assert table["twist"] == pytest.approx(frame.twist, rel=1e-6, abs=1e-12)
+        rounding = STIFFNESS * 64 * 2.3e-16 * 16 * RADIUS
+        assert table["force"] == pytest.approx(frame.force, rel=0, abs=2e-6 * np.abs(frame.force).max() + rounding)
+        assert np.abs(sim.grains.position - frame.position).max() < 16 * SINGLE * RADIUS * 4
+        assert sim.ledger["made"][-1] == sim.ledger["broken"][-1] == 0
+
+
+def test_the_books_begin_where_they_were(crash):
+    """All energies of the new run's first row are those of the old ledger's row, to single precision."""
+    _, frames, old = crash
+    k = len(frames) // 2
+    start = sand.setup.from_frame(frames[k], {"silica": sand.SILICA})
+    sim = sand.Simulation(start.grains, [sand.Contact(), sand.Dipoles()], box=start.box, contacts=start.contacts)
+    sim.loads()
+    for name in ("translation", "rotation", "normal", "sliding", "rolling", "twisting", "magnetic"):
+        was = old.ledger[name][k]
+        assert sim.ledger[name][0] == pytest.approx(was, rel=3e-6, abs=3e-6 * abs(old.ledger["translation"][k])), name
+
+
+def test_it_goes_on_as_the_old_run_did(crash):
+    """After the time between two frames positions agree with the old run's next frame.
+
+    The two start 1e-7 apart (single precision of velocities, of strains) and steps are not the same; Verlet's own
+    error at these steps is far above that, so the bound is a thousandth of what moved.
+    """
+    _, frames, _ = crash
+    k = len(frames) // 2
+    start = sand.setup.from_frame(frames[k], {"silica": sand.SILICA})
+    sim = sand.Simulation(start.grains, [sand.Contact(), sand.Dipoles()], box=start.box, contacts=start.contacts)
+    sim.run(until=frames[k + 1].time - frames[k].time)
+    moved = np.abs(start.box.nearest(frames[k + 1].position - frames[k].position)).max()
+    late = abs(sim.time - (frames[k + 1].time - frames[k].time)) * np.abs(sim.grains.velocity).max()
+    assert np.abs(start.box.nearest(sim.grains.position - frames[k + 1].position)).max() < 1e-3 * moved + late
+    assert len(sim.contacts["pair"]) == len(frames[k + 1].pair)
+
+
+def test_healing_against_chance():
+    """Positions rounded to 24 bits: dense lattices with more contacts than freedoms, gaps of a hair, a periodic box.
+
+    Overlaps come back to 64 ε of the coordinates, no coordinate moves by more than a few roundings, and pairs that
+    did not touch do not touch.
+    """
+    rng = np.random.default_rng(3)
+    for box in (sand.Box.open(), sand.Box.periodic(12 * RADIUS * 0.99)):
+        grid = np.array([[x, y, z] for x in range(6) for y in range(6) for z in range(6)], float)
+        true = (grid - 2.5) * 2.0 * RADIUS * 0.99 + rng.normal(size=(216, 3)) * 0.02 * RADIUS
+        radius = RADIUS * rng.uniform(0.97, 1.03, 216)
+        pairs = box.close_pairs(true, 2.2 * RADIUS)
+        apart = np.linalg.norm(box.nearest(true[pairs[:, 0]] - true[pairs[:, 1]]), axis=1)
+        overlap = radius[pairs].sum(axis=1) - apart
+        held = overlap > -0.01 * RADIUS  # some of them stretched
+        touching = pairs[held]
+        rounded = np.float64(np.float32(true / RADIUS)) * RADIUS
+        found = healed(rounded, radius, box, touching, overlap[held])
+        apart = np.linalg.norm(box.nearest(found[touching[:, 0]] - found[touching[:, 1]]), axis=1)
+        assert radius[touching].sum(axis=1) - apart == pytest.approx(
+            overlap[held], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
+        )
+        assert np.abs(box.nearest(found - rounded)).max() < 12 * SINGLE * RADIUS * 10
+        assert held.sum() > 400
+
+
+def test_what_rounding_brought_together_is_parted():
+    """Two grains a hair apart that overlap once rounded: no contact is made."""
+    place = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
+    none = np.zeros((0, 2), int)
+    found = healed(place, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
+    gap = np.linalg.norm(found[0] - found[1]) / (2 * RADIUS) - 1
+    assert 0 < gap < 2e-9
+    assert (found[2] == place[2]).all()
+
+
+def said(capsys):
+    return capsys.readouterr()
+
+
+def test_the_command(crash, tmp_path, monkeypatch, capsys):
+    """`sand run --from`: the earlier run's case, a frame of it, said so; a case file can ask for it; resume goes on."""
+    folder, frames, _ = crash
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "--from", str(folder), "--frame", "20", "--until", "0.1 ns"]) == 0
+    told = " ".join(said(capsys).out.split())
+    assert f"trajectory.gsd, step {frames[20].step}" in told
+    assert f"{len(frames[20].pair)} contacts kept" in told
+    new = sand.open("crash-from-20")
+    assert new.frames[0].time == 0.0
+    assert (new.frames[0].pair == frames[20].pair).all()
+    assert new.case["grains"] == {
+        "kind": "file",
+        "material": "silica",
+        "file": str(folder.absolute()),
+        "frame": 20,
+    }
+    (tmp_path / "mine.toml").write_text(
+        f'[run]\nuntil = "0.1 ns"\nframe_every = "0.25 ns"\n[grains]\nkind = "file"\nfile = "{folder}"\nframe = 20\n'
+        "[forces.contact]\n[forces.dipoles]\ncutoff = 3.52e-09\n"
+    )
+    assert main(["run", "mine.toml", "--quiet"]) == 0
+    again = sand.open("mine")
+    assert (again.frames[-1].position == new.frames[-1].position).all()
+    assert main(["resume", "mine", "--until", "0.2 ns", "--quiet"]) == 0
+    assert main(["run", "--from", str(folder), "--frame", "20", "--until", "0.2 ns", "--out", "x", "--quiet"]) == 0
+    assert (sand.open("x").frames[-1].position == sand.open("mine").frames[-1].position).all()
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["--frame", "3"], ["--from"]),
+        ([], ["CASE.toml", "--from"]),
+        (["--from", "nowhere"], ["there is no file or folder nowhere"]),
+        (["--from", "RUN", "--frame", "999"], ["41 frames", "from 0 to 40", "999"]),
+        (["other.toml", "--from", "RUN"], ["box", "400 nm", "300 nm", "leave [box] out"]),
+        (["bare.toml", "--from", "RUN"], ["contacts are given", "Contact"]),
+        (["soft.toml", "--from", "RUN", "--frame", "STRETCHED"], ["soft.toml", "beyond its break"]),
+        (["both.toml"], ["number", "remove it"]),
+        (["fileless.toml"], ["file is missing"]),
+        (["foreign.toml"], ["foreign.toml", "not a trajectory"]),
+    ],
+)
+def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
+    """One line each, nothing written."""
+    folder, frames, _ = crash
+    stretched = int(np.argmax([frame.share[:, 0].max() for frame in frames]))
+    monkeypatch.chdir(tmp_path)
+    run, forces = '[run]\nuntil = "1 ns"\n', "[forces.contact]\n"
+    grains = "[grains]\nkind = 'gas'\nnumber = 2\nradius = '1 nm'\n"
+    cases = {
+        "other": run + grains + forces + "[box]\nperiodic = '0.4 um'\n",
+        "bare": run + grains,
+        "soft": run + grains + forces + "[materials.silica]\nlike = 'silica'\nsurface_energy = '1e-7 J/m^2'\n",
+        "both": run + f"[grains]\nkind = 'file'\nnumber = 4\nfile = '{folder}'\n",
+        "fileless": run + "[grains]\nkind = 'file'\n",
+        "foreign": run + "[grains]\nkind = 'file'\nfile = 'foreign.toml'\n",
+    }
+    for name, text in cases.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    before = sorted(tmp_path.iterdir())
+    meant = {"RUN": str(folder), "STRETCHED": str(stretched)}
+    assert main(["run", *(meant.get(word, word) for word in words)]) == 2
+    told = said(capsys).err
+    assert told.count("\n") == 1, told
+    assert all(part in told for part in parts), told
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_frame_that_does_not_fit_itself(crash):
+    """An overlap that the positions cannot have is refused, not forced."""
+    _, frames, _ = crash
+    frame = frames[3]
+    overlap = frame.overlap.copy()
+    overlap[5] += 0.3 * RADIUS
+    with pytest.raises(sand.BadInput, match="damaged"):
+        healed(frame.position, frame.radius, frame.box, frame.pair.astype(int), overlap)
