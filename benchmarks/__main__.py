@@ -9,6 +9,7 @@ import warnings
 
 from sand.run.record import versions
 
+from . import files
 from .long_range import growth, savings, tell
 from .rows import all_rows
 
@@ -19,11 +20,16 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="smaller worlds, less repetition")
     parser.add_argument("--json", action="store_true", help="one JSON object")
     parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
+    parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     if options.long_range:
         rows, grown = savings((100, 1000) if options.quick else (100, 1000, 10_000)), growth()
         print(json.dumps({"rows": rows, "growth": grown})) if options.json else tell(rows, grown)
+        return
+    if options.files:
+        cost = files.costs(1000 if options.quick else 10_000)
+        print(json.dumps(cost)) if options.json else files.tell(cost)
         return
     rows = all_rows(options.quick)
     if options.json:

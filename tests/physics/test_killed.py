@@ -1,7 +1,8 @@
-"""A run that is killed at any moment goes on as if nothing had been: SIGKILL, in writes too."""
+"""A run that is killed at any moment goes on as if nothing had been: SIGKILL, in writes too, and SIGTERM."""
 
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -9,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+from sand.cli.exits import DONE, INTERRUPTED
 from sand.files.checkpoint import newest_checkpoint
 from sand.files.trajectory import read_frames
 
@@ -72,8 +74,8 @@ def whole(tmp_path_factory):
     return place, folder, time.monotonic() - begun
 
 
-def killed_and_resumed(whole, tmp_path, rng, kills):
-    """Kill a run and each of its resumes after a random time, then let it end."""
+def killed_and_resumed(whole, tmp_path, rng, kills, kind=signal.SIGKILL):
+    """Stop a run and each of its resumes by a signal after a random time, then let it end."""
     place, _, seconds = whole
     folder = tmp_path / "run"
     job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
@@ -82,8 +84,8 @@ def killed_and_resumed(whole, tmp_path, rng, kills):
         try:
             job.wait(timeout=rng.uniform(0.3, 1.0) * seconds)
         except subprocess.TimeoutExpired:
-            job.kill()
-            job.wait()
+            job.send_signal(kind)
+            assert job.wait() in (-kind, INTERRUPTED, DONE), job.stderr.read()
         if not list(folder.glob("checkpoint-*.npz")):
             shutil.rmtree(folder, ignore_errors=True)
             job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
@@ -114,8 +116,14 @@ def test_killed_three_times(whole, tmp_path):
     same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(1), 3))
 
 
+def test_asked_to_stop_twice(whole, tmp_path):
+    """The same for SIGTERM, which ends a run at the next step with a checkpoint."""
+    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(2), 2, signal.SIGTERM))
+
+
 @pytest.mark.validate
 @pytest.mark.parametrize("seed", range(25))
-def test_killed_a_hundred_times(whole, tmp_path, seed):
-    """The same, four kills in each of twenty-five runs."""
-    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(100 + seed), 4))
+@pytest.mark.parametrize("kind", [signal.SIGKILL, signal.SIGTERM])
+def test_stopped_a_hundred_times(whole, tmp_path, seed, kind):
+    """The same, four times in each of twenty-five runs, for both signals."""
+    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(100 + seed), 4, kind))

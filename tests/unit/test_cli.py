@@ -144,7 +144,7 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
     ("words", "part"),
     [
         (["run", "nowhere.toml"], "there is no file nowhere.toml"),
-        (["run"], "Missing argument 'CASE.toml'; see sand run --help"),
+        (["run"], "give a case file"),
         (["rum"], "No such command 'rum'"),
         (["run", "small.toml", "--untl", "3"], "No such option"),
         (["run", "small.toml", "--until", "1 kg"], "--until = '1 kg' is not a quantity in s"),
@@ -157,7 +157,7 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
         (["run", "small.toml", "--out", "small.toml/deeper"], "small.toml is a file"),
         (["run", "."], "cannot read ."),
         (["resume", "nowhere"], "there is no folder nowhere"),
-        (["resume", "."], "case.toml"),
+        (["resume", "."], "no checkpoint"),
         (["info", "nowhere"], "there is no file or folder nowhere"),
         (["info", "."], "not the folder of a run"),
         (["info", "picture.png"], "give a run's folder"),

@@ -95,15 +95,16 @@ def test_json_and_toml(tmp_path):
     assert read_toml(tmp_path / "a.toml") == values
 
 
-def test_the_ledger_file_drops_what_a_restart_will_write_again(tmp_path):
-    """Rows after the checkpoint and a torn last line go; numbers come back to the last bit."""
+def test_the_ledger_file_begins_with_the_rows_it_is_given(tmp_path):
+    """A restart replaces the file; a torn last line is not read; numbers come back to the last bit."""
     path = tmp_path / "ledger.csv"
     file = LedgerFile(path, ["step", "x"])
     for step in (0, 5, 9):
         file.append({"step": step, "x": 0.1 * step})
     with open(path, "a") as torn:
         torn.write("12")
-    LedgerFile(path, ["step", "x"], resume_at=5)
+    assert [row["step"] for row in read_ledger(path)] == [0, 5, 9]
+    LedgerFile(path, ["step", "x"], read_ledger(path)[:2])
     assert read_ledger(path) == [{"step": 0, "x": 0.0}, {"step": 5, "x": 0.5}]
 
 
@@ -148,3 +149,23 @@ def test_checkpoints_of_every_version_go_on(tmp_path, version):
     result = sim.run(until="80 ps")
     assert result.outcome is sand.Outcome.FINISHED
     assert result.drift < 1e-3
+
+
+def test_the_checkpoint_knows_case_and_ledger(tmp_path):
+    """Without case.toml and ledger.csv a run goes on and both come back; a case that was changed is refused."""
+    folder = tmp_path / "run"
+    sim = struck_chain()
+    sim = sand.Simulation(sim.grains, sim.forces, out=folder, frame_every="0.1 ns")
+    sim.run(until="0.5 ns")
+    case, ledger = (folder / "case.toml").read_text(), (folder / "ledger.csv").read_text()
+    (folder / "case.toml").unlink()
+    (folder / "ledger.csv").write_text("step,time\n7,nonsense")
+    assert sand.resume(folder).ledger.rows == sim.ledger.rows
+    sand.resume(folder).run()
+    assert (folder / "case.toml").read_text() == case
+    assert (folder / "ledger.csv").read_text() == ledger
+    (folder / "case.toml").write_text(case.replace("density = ", "density = 1"))
+    with pytest.raises(sand.BadInput, match=r"\[materials\] is not what the run began with.*--from"):
+        sand.resume(folder)
+    (folder / "case.toml").write_text(case.replace("until = ", "until = 1"))  # the end may change
+    sand.resume(folder)

@@ -118,8 +118,8 @@ def test_numbers_that_are_not_finite_end_the_run():
     assert result.grains == (3,)
 
 
-def test_a_runaway_energy_ends_the_run(tmp_path):
-    """Half a contact period per step is beyond what Verlet bears: seen within 1e4 steps, the state before is kept."""
+def too_long_steps(out):
+    """Half a contact period per step, which is beyond what Verlet bears."""
     d = 2e-8 - 2e-11
     fast = sand.theory.contact(sand.IRON, 1e-8).twist_period
     periods = [getattr(sand.theory.contact(sand.IRON, 1e-8), f"{k}_period") for k in ("normal", "slide", "roll")]
@@ -131,12 +131,31 @@ def test_a_runaway_energy_ends_the_run(tmp_path):
         spin=1e6 * np.random.default_rng(2).normal(size=(6, 3)),
     )
     stepping = sand.Verlet(step=0.5 * min(fast, *periods))
-    sim = sand.Simulation(grains, [sand.Contact()], stepping=stepping, out=tmp_path / "run")
+    return sand.Simulation(grains, [sand.Contact()], stepping=stepping, out=out, frame_every="1 s")
+
+
+def test_a_runaway_energy_ends_the_run(tmp_path):
+    """Seen within 1e4 steps; the state from before is kept, and going on from it ends at the same step."""
+    sim = too_long_steps(tmp_path / "run")
     result = sim.run(steps=60_000)
     assert result.outcome is sand.Outcome.RUNAWAY
     assert result.steps <= 20_000
     assert len(result.grains) == 2
-    assert len(list((tmp_path / "run").glob("checkpoint-*.npz"))) == 2
+    arrays, meta = sand.files.checkpoint.newest_checkpoint(tmp_path / "run")
+    assert meta["steps"] < result.steps
+    assert np.abs(arrays["grains/velocity"]).max() < 1.0  # a state from before
+    go_on = sand.resume(tmp_path / "run")
+    assert go_on.run().outcome is sand.Outcome.RUNAWAY
+    assert go_on.world.steps == result.steps
+
+
+def test_a_short_run_cannot_finish_with_energy_from_nowhere(tmp_path):
+    """The end is looked at, too, and its state is not written over a good one."""
+    result = too_long_steps(tmp_path / "run").run(steps=9_000)
+    assert result.outcome is sand.Outcome.RUNAWAY
+    assert result.steps == 9_000
+    assert sand.files.checkpoint.newest_checkpoint(tmp_path / "run")[1]["steps"] == 0
+    assert len(list((tmp_path / "run").glob("checkpoint-*.npz"))) == 1
 
 
 def test_no_false_alarm_in_a_cold_start_without_frames():

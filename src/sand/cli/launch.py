@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..core.errors import BadInput, Interrupted
+from ..core.errors import BadInput, FilesFailed, Interrupted
 from ..core.units import spoken
 from ..files.folder import SUMMARY, read_json
 from . import report
@@ -49,6 +49,8 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
             result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
+        except FilesFailed as error:
+            raise FilesFailed(f"{error}; {_what_is_left(folder)}") from error
         except (Exception, KeyboardInterrupt) as error:
             if not (watch.asked or isinstance(error, KeyboardInterrupt)):
                 raise
@@ -85,7 +87,8 @@ def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
         return INTERRUPTED
     if outcome.is_physics:
         report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
-        report.note(f"the state just before is in {report.checkpoints(folder)[-1]}")
+        last = report.checkpoints(folder)[-1]
+        report.note(f"the {'state just' if outcome.keeps_state else 'last good state'} before is in {last}")
         return PHYSICS
     return DONE
 
@@ -97,6 +100,13 @@ def _cut_off(folder: Path) -> int:
     else:
         report.note("interrupted before the first step; nothing is lost, start again")
     return INTERRUPTED
+
+
+def _what_is_left(folder: Path) -> str:
+    """What to do when a file could not be written."""
+    if report.checkpoints(folder):
+        return f"once that is mended go on from the last checkpoint with: {report.resume_line(folder)}"
+    return "there is no checkpoint yet; once that is mended start again, with --overwrite"
 
 
 def _listed(folder: Path) -> str:

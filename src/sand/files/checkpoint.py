@@ -4,17 +4,18 @@ A NumPy archive of plain arrays, without pickles, written beside, synced and ren
 
 | array | meaning |
 |---|---|
-| meta.json | JSON as bytes: `format`, `version`, `sha256` over the other arrays, step, time, planned end, choices |
+| meta.json | JSON as bytes: `format`, `version`, `sha256` over all else, step, time, planned end, case, choices |
 | clock | time, steps and what is left of the cycle [s]; meta.json names the places of this and of the next two |
 | count | numbers of steps, contacts, pairs, made, broken, moved; counters of lists |
 | lost | energy lost per channel [J] |
+| ledger | all rows so far, (K, columns of ledger.csv) |
 | grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
 | contacts/… | pairs, pointers in body frames, twist, time of touch, constants, losses, loads, contacts per grain |
 | near/… | the list of pairs that may touch, and the positions when it was made |
 | far/… | loads of the last long-range summation, what their cycle has used up, positions when the list was made |
 
 Random numbers are functions of the seed, the grain and the number of the kick, so that there is no state of a generator
-to be kept.  What is wanted beyond that is in the folder's case.toml and ledger.csv.
+to be kept.
 """
 
 from __future__ import annotations

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,8 @@ def replace_file(path: Path, content: bytes) -> None:
         finally:
             os.close(handle)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
         raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error
 
 
@@ -138,23 +141,24 @@ class LedgerFile:
     """ledger.csv: one row per entry, numbers to the last bit; opened anew for each row, so nothing is held.
 
     Args:
-        path: of the file.
+        path: of the file; what it held before is replaced.
         columns: names, the first being `step`.
-        resume_at: number of the step a restart begins from; later rows and a torn last one are dropped.
+        rows: that it begins with.
     """
 
-    def __init__(self, path: Path, columns: Sequence[str], resume_at: int | None = None):
+    def __init__(self, path: Path, columns: Sequence[str], rows: Iterable[dict[str, float]] = ()):
         self.path, self.columns = path, list(columns)
-        rows: list[str] = []
-        if resume_at is not None and path.exists():
-            rows = [line for line in _whole_rows(read_text(path)) if int(line.split(",", 1)[0]) <= resume_at]
-        replace_file(path, ("\n".join([",".join(self.columns), *rows]) + "\n").encode())
+        lines = [",".join(self.columns), *(self._line(row) for row in rows)]
+        replace_file(path, ("\n".join(lines) + "\n").encode())
+
+    def _line(self, row: dict[str, float]) -> str:
+        return ",".join(repr(row[name]) for name in self.columns)
 
     def append(self, row: dict[str, float]) -> None:
         """Raises FilesFailed."""
         try:
             with open(self.path, "a", encoding="utf-8", newline="") as file:
-                file.write(",".join(repr(row[name]) for name in self.columns) + "\n")
+                file.write(self._line(row) + "\n")
         except OSError as error:
             raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import os
 import time as wall
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,21 +16,12 @@ from ..core.box import Box
 from ..core.errors import BadInput, FilesFailed
 from ..core.grains import Grains
 from .frame import Frame, stored_frame
+from .gsd_index import make_room, mend, refuse_impossible_sizes
 
-_ENTRY = np.dtype(
-    [
-        ("frame", "<u8"),
-        ("rows", "<u8"),
-        ("location", "<i8"),
-        ("columns", "<u4"),
-        ("name", "<u2"),
-        ("type", "u1"),
-        ("flags", "u1"),
-    ]
-)
-"""An entry of a GSD file's index (gsd.readthedocs.io, file layer)."""
 FLUSH_EVERY = 1.0
 """Seconds of wall time between flushes; GSD buffers, and what is not flushed dies with the process."""
+SINGLE_PER_GRAIN = 64
+"""Bytes of a grain in a frame besides what is logged."""
 
 
 class TrajectoryWriter:
@@ -35,20 +29,26 @@ class TrajectoryWriter:
 
     Args:
         path: of the file; made if missing.
-        append: go on with an existing file; frames it holds already are not written twice.
+        resume_at: number of the step from which an existing file is gone on with: later frames it holds already are not
+            written twice, but those that are not whole are dropped.
 
     Raises:
         FilesFailed: the file cannot be written; BadInput: an existing file is not a trajectory.
     """
 
-    def __init__(self, path: Path, *, append: bool = False):
+    def __init__(self, path: Path, resume_at: int | None = None):
         import gsd.hoomd
 
         self.path = path
         self.last_step = -1
+        self._whole_until = -1  # step of the last flush
+        self._lost = False  # given up after an error
+        self._pending = 0  # bytes that wait for the next one, about
         self._flushed = wall.monotonic()
-        mode = "r+" if append and path.exists() else "w"
+        mode = "w" if resume_at is None or not path.exists() else "r+"
         try:
+            if mode == "r+" and resume_at is not None:
+                mend(path, resume_at)
             self._file = gsd.hoomd.open(str(path), mode)
             if mode == "r+" and len(self._file):
                 self.last_step = int(self._file[len(self._file) - 1].configuration.step)
@@ -65,51 +65,57 @@ class TrajectoryWriter:
         box: Box,
         contacts: Mapping[str, np.ndarray],
     ) -> None:
-        """Append one frame; `contacts` holds `pair` (C, 2), `overlap` [m] and `formed` [s].
+        """Append one frame; `contacts` is a `ContactTable`, by column.
 
         Raises:
             FilesFailed: the frame could not be written; earlier ones stay.
         """
         if step <= self.last_step:
             return
+        frame = stored_frame(step, time, grains, box, contacts)
+        self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
-            self._file.append(stored_frame(step, time, grains, box, contacts))
-            self.last_step = step
-            if wall.monotonic() - self._flushed > FLUSH_EVERY:
-                self.flush()
+            self._file.append(frame)
         except OSError as error:
-            raise FilesFailed(f"cannot write {self.path}: {error.strerror or error}") from error
+            raise self._given_up(error) from error
+        self.last_step = step
+        if wall.monotonic() - self._flushed > FLUSH_EVERY:
+            self.flush()
 
-    def flush(self) -> None:
-        """Everything written so far survives a kill."""
-        self._file.flush()
-        self._flushed = wall.monotonic()
+    def flush(self, sync: bool = False) -> None:
+        """Everything written so far survives a kill, and a power cut if it is to be in `sync` with the disk.
+
+        Raises:
+            FilesFailed: frames since the last flush may be lost; earlier ones stay.
+        """
+        try:
+            make_room(self.path, self._pending)
+            self._file.flush()
+            if sync:
+                with open(self.path, "rb") as same:
+                    os.fsync(same.fileno())
+        except OSError as error:
+            raise self._given_up(error) from error
+        self._flushed, self._whole_until, self._pending = wall.monotonic(), self.last_step, 0
+
+    def _given_up(self, error: OSError) -> FilesFailed:
+        """Let the file go as it is on the disk."""
+        # GSD would write once more when its object dies, and spoil what is there (see `make_room`)
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
+        self._lost = True
+        with contextlib.suppress(OSError, RuntimeError, BadInput):
+            mend(self.path, self._whole_until)
+        return FilesFailed(f"cannot write {self.path}: {error.strerror or error}")
+
+    def rescue(self) -> None:
+        """Flush what can be flushed, after another file could not be written; nothing is raised."""
+        with contextlib.suppress(FilesFailed):
+            if not self._lost:
+                self.flush()
 
     def close(self) -> None:
+        """Let the file go."""
         self._file.close()
-
-
-def _refuse_impossible_sizes(path: Path) -> None:
-    """Look at the index of a GSD file before anything is read: a broken one may ask for petabytes.
-
-    Raises:
-        BadInput: an entry lies outside the file.
-    """
-    size = path.stat().st_size
-    with open(path, "rb") as file:
-        head = np.frombuffer(file.read(16 * 8), np.uint64)
-        if head.size < 5:
-            raise BadInput(f"{path} is not a trajectory of SAND (it is cut off)")
-        place, count = int(head[1]), int(head[2])
-        if not 0 < place <= place + count * _ENTRY.itemsize <= size:
-            raise BadInput(f"{path} is not a trajectory of SAND (its index lies outside the file)")
-        file.seek(place)
-        entries = np.frombuffer(file.read(count * _ENTRY.itemsize), _ENTRY)
-    used = entries[entries["location"] != 0]
-    wide = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1] + [10**9] * 244, np.float64)[used["type"]]
-    ends = used["location"].astype(np.float64) + used["rows"].astype(np.float64) * used["columns"] * wide
-    if (used["location"] < 0).any() or (ends > size).any():
-        raise BadInput(f"{path} is not a trajectory of SAND (parts of it lie outside the file)")
 
 
 class Frames(Sequence[Frame]):
@@ -129,7 +135,7 @@ class Frames(Sequence[Frame]):
         if not self.path.exists():
             raise BadInput(f"there is no file {path}")
         try:
-            _refuse_impossible_sizes(self.path)
+            refuse_impossible_sizes(self.path)
             self._file = gsd.hoomd.open(str(path), "r")
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             raise BadInput(f"{path} is not a trajectory of SAND ({error})") from error

@@ -12,12 +12,12 @@ from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.material import Material
 from ..files.checkpoint import newest_checkpoint
-from ..files.folder import CASE, TRAJECTORY
+from ..files.folder import CASE, TRAJECTORY, read_toml
 from ..files.trajectory import Frames
 from ..forces.base import FarForce
 from ..setup.frame import Start, from_frame
 from ..setup.gas import gas
-from .case import Case, read_case
+from .case import Case, check_case, read_case
 from .simulation import Simulation
 
 
@@ -141,6 +141,29 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
     }
 
 
+def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
+    """The case that a run began with.
+
+    Raises:
+        BadInput: case.toml has been changed since, in more than its [run].
+    """
+    path = folder / CASE
+    if "case" not in meta:  # of an early development version
+        return read_case(path)
+    if path.exists():
+        changed = [
+            name
+            for name, table in {**meta["case"], **read_toml(path)}.items()
+            if name != "run" and meta["case"].get(name, {}) != table
+        ]
+        if changed:
+            raise BadInput(
+                f"{path}: [{changed[0]}] is not what the run began with, and a run cannot change on its way; put it "
+                f"back, or start a new run from the last frame: sand run {path} --from {folder}"
+            )
+    return check_case(meta["case"], f"the case in the checkpoint of {folder}")
+
+
 def resume(folder: str | Path, **options: Any) -> Simulation:
     """A run's folder at its newest checkpoint as a simulation; `run()` goes on to the end once asked for.
 
@@ -154,8 +177,8 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     place = Path(folder)
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
-    case = read_case(place / CASE)
     arrays, meta = newest_checkpoint(place)
+    case = _case_of_checkpoint(place, meta)
     names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
     library = case.materials_by_name()
     try:

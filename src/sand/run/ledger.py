@@ -10,6 +10,7 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..core.constants import BOLTZMANN
+from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.world import BROKEN, CONTACTS, LOST, MADE, MOVED, World
 from ..kernels.measure import ENERGIES, measure_energies
@@ -21,6 +22,8 @@ RUNAWAY = 0.5
 """Change of the total over all energies of the moment and all dissipated, at which a run is stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
+WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
+"""Columns of whole numbers."""
 
 
 def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, float]:
@@ -94,8 +97,21 @@ class Ledger:
         self.rows.append(row)
         return True
 
+    def to_array(self) -> np.ndarray:
+        """All rows (K, columns), for a checkpoint; whole numbers below 2⁵³ are exact in it."""
+        return np.array([[row[name] for name in self.columns] for row in self.rows], dtype=np.float64)
+
+    def from_array(self, table: np.ndarray) -> None:
+        """Take over the rows of `to_array`.  Raises BadInput if they are not of these columns."""
+        if table.ndim != 2 or table.shape[1] != len(self.columns):
+            raise BadInput(f"the ledger in the checkpoint has shape {table.shape}, not (K, {len(self.columns)})")
+        kinds = [int if name in WHOLE else float for name in self.columns]
+        self.rows = [
+            {name: kind(v) for name, kind, v in zip(self.columns, kinds, row, strict=True)} for row in table.tolist()
+        ]
+
     def restore(self, rows: Iterable[dict[str, float]]) -> None:
-        """Take over the rows of a checkpoint."""
+        """Take over the rows of a ledger file."""
         self.rows = list(rows)
 
     def __len__(self) -> int:

@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from .simulation import Simulation
 
 CHECKPOINT_EVERY = 60.0
-"""Seconds of wall time between checkpoints."""
+"""Seconds of wall time between checkpoints, at most."""
+AT_OUTPUT_EVERY = 1.0
+"""The same at outputs, at least; longer where checkpoints would take more than COST of the time."""
+COST = 0.01
 
 
 class Record:
@@ -38,8 +41,9 @@ class Record:
         self._resumed = resumed
         self._trajectory: TrajectoryWriter | None = None
         self._ledger: LedgerFile | None = None
-        self._saved = wall.monotonic()
+        self._saved, self._took = wall.monotonic(), 0.0
         self._ends = (math.inf, math.inf)
+        self._case: dict[str, Any] = {}
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
         """Begin or go on with the files; called by each `run` with its end."""
@@ -47,21 +51,20 @@ class Record:
 
         if (until, last_step) != self._ends:
             self._ends = (until, last_step)
+            self._case = case_of(simulation, until, last_step)
             text = "as understood by SAND, all defaults filled in, SI units"
-            write_toml(self.folder / files.CASE, case_of(simulation, until, last_step), text)
+            write_toml(self.folder / files.CASE, self._case, text)
         if self._trajectory is not None:
             return
+        self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         steps = simulation.world.steps if self._resumed else None
-        self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, steps)
-        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, append=self._resumed)
+        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, steps)
         if not self._resumed:
-            for row in simulation.ledger.rows:
-                self._ledger.append(row)
             self._frame(simulation)
         self.save(simulation)
 
     def earlier_rows(self, steps: int) -> list[dict[str, float]]:
-        """The rows of the ledger up to a step, for a restart."""
+        """The rows of the ledger file up to a step, where the checkpoint has none."""
         rows = read_ledger(self.folder / files.LEDGER)
         return [row for row in rows if row["step"] <= steps]
 
@@ -77,16 +80,21 @@ class Record:
         w = simulation.world
         self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts)
 
-    def tick(self, simulation: Simulation) -> None:
+    def tick(self, simulation: Simulation, at_output: bool = False) -> None:
         """A checkpoint if the last one is old."""
-        if wall.monotonic() - self._saved > CHECKPOINT_EVERY:
+        cheap = max(AT_OUTPUT_EVERY, self._took / COST)
+        if wall.monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY):
             self.save(simulation)
 
     def save(self, simulation: Simulation) -> None:
-        """Write a checkpoint now; the trajectory is flushed first, so that nothing before it is lost."""
+        """Write a checkpoint now; the trajectory is flushed first, so that nothing before it is lost.
+
+        A state that is not fit to go on from is not written: the last good one stays.
+        """
         assert simulation.world.count[STAGE] == 0
+        begun = wall.monotonic()
         if self._trajectory is not None:
-            self._trajectory.flush()
+            self._trajectory.flush(sync=True)
         meta = {
             "steps": simulation.world.steps,
             "time": simulation.time,
@@ -95,12 +103,22 @@ class Record:
             "wall_seconds": simulation.wall_seconds,
             "temperature": simulation.temperature,
             "choices": simulation.choices,
+            "case": files.plain(self._case),
             "clock": CLOCK,
             "count": COUNT,
             "lost": LOST,
         }
-        write_checkpoint(self.folder, simulation.world.to_arrays(), meta)
+        if simulation.is_sound:
+            arrays = {**simulation.world.to_arrays(), "ledger": simulation.ledger.to_array()}
+            write_checkpoint(self.folder, arrays, meta)
         self._saved = wall.monotonic()
+        self._took = self._saved - begun
+
+    def rescue(self) -> None:
+        """Keep what can be kept after a file could not be written; a further `run` opens the files anew."""
+        if self._trajectory is not None:
+            self._trajectory.rescue()
+        self._trajectory, self._resumed, self._ends = None, True, (math.inf, math.inf)
 
     def close(self, simulation: Simulation, result: Result) -> None:
         """Checkpoint, summary and figure; the trajectory stays open for a further `run`."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.box import as_box
-from ..core.errors import BadInput, Interrupted
+from ..core.errors import BadInput, FilesFailed, Interrupted
 from ..core.grains import Grains
 from ..core.units import si, spoken
 from ..forces.base import Force
@@ -103,7 +103,9 @@ class Simulation:
             self._engine.take_up(arrays)
             self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
             self._chosen = meta.get("choices", {})
-            if self.record:
+            if "ledger" in arrays:
+                self.ledger.from_array(arrays["ledger"])
+            elif self.record:
                 self.ledger.restore(self.record.earlier_rows(self.world.steps))
         for text in self._engine.warnings:
             warnings.warn(text, stacklevel=2)
@@ -112,6 +114,11 @@ class Simulation:
     def time(self) -> float:
         """[s]"""
         return self.world.time
+
+    @property
+    def is_sound(self) -> bool:
+        """False if numbers are no longer finite, or most of the energy came from nowhere."""
+        return not self.ledger.runs_away(self._stock())
 
     @property
     def grains(self) -> Grains:
@@ -168,6 +175,7 @@ class Simulation:
 
         Raises:
             BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
+            FilesFailed: the disk is full, the folder has vanished, …; what was written before stays whole.
             Interrupted: Ctrl-C or SIGTERM; the checkpoint is written before.
         """
         end = math.inf if until is None else si(until, "s", "until")
@@ -176,20 +184,25 @@ class Simulation:
             end, last = self.planned
         if end == last == math.inf:
             raise BadInput("run needs an end: until='5 us' or steps=1000")
-        if end < self.time:
+        if until is not None and end < self.time:
             raise BadInput(f"until = {until!r} lies before the present time, {self.time:.6g} s")
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
             self.frame_every = (end - self.time) / 200.0
-        self._start()
-        if self.record:
-            self.record.open(self, end, last)
-        begun = wall.monotonic()
-        with Signals() as signals:
-            try:
-                outcome = self._loop(end, last, signals)
-            finally:
-                self.wall_seconds += wall.monotonic() - begun
-        return self._close(outcome)
+        try:
+            self._start()
+            if self.record:
+                self.record.open(self, end, last)
+            begun = wall.monotonic()
+            with Signals() as signals:
+                try:
+                    outcome = self._loop(end, last, signals)
+                finally:
+                    self.wall_seconds += wall.monotonic() - begun
+            return self._close(outcome)
+        except FilesFailed:
+            if self.record:
+                self.record.rescue()
+            raise
 
     def view(self) -> Any:
         """The figure of the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
@@ -231,16 +244,17 @@ class Simulation:
                 return OF_STOP[stop]
             if self.world.steps - guarded >= GUARD_EVERY:
                 guarded = self.world.steps
-                if self.ledger.runs_away(self._stock()):
+                if not self.is_sound:
                     return Outcome.RUNAWAY
             done = self.time >= end or self.world.steps >= last
-            if stop is Stop.TIME_REACHED or done:
+            output = stop is Stop.TIME_REACHED or done
+            if output:
                 self._look()
                 frames.pass_by(self.time)
             if done:
-                return Outcome.FINISHED
+                return Outcome.FINISHED if self.is_sound else Outcome.RUNAWAY
             if self.record:
-                self.record.tick(self)
+                self.record.tick(self, output)
             for observer in self.observers:
                 observer.tick(self)
             if signals.received:

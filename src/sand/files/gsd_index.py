@@ -1,0 +1,133 @@
+"""The index of a GSD file, looked at before anything in it is believed, and mended after a full disk."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..core.errors import BadInput
+from .frame import Frame
+
+ENTRY = np.dtype(
+    [
+        ("frame", "<u8"),
+        ("rows", "<u8"),
+        ("location", "<i8"),
+        ("columns", "<u4"),
+        ("name", "<u2"),
+        ("type", "u1"),
+        ("flags", "u1"),
+    ]
+)
+"""An entry of a GSD file's index (gsd.readthedocs.io, file layer)."""
+SPARE = 65536
+"""Bytes that GSD may want besides data and index."""
+WIDTHS = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1] + [10**9] * 244, np.float64)
+"""Bytes of a number by its type there; impossible for types that are none."""
+
+
+def read_index(path: Path) -> tuple[int, np.ndarray]:
+    """Place of the index in the file and its entries, those in use being the first.
+
+    Raises:
+        BadInput: it lies outside the file.
+    """
+    size = path.stat().st_size
+    with open(path, "rb") as file:
+        head = np.frombuffer(file.read(16 * 8), np.uint64)
+        if head.size < 5:
+            raise BadInput(f"{path} is not a trajectory of SAND (it is cut off)")
+        place, count = int(head[1]), int(head[2])
+        if not 0 < place <= place + count * ENTRY.itemsize <= size:
+            raise BadInput(f"{path} is not a trajectory of SAND (its index lies outside the file)")
+        file.seek(place)
+        entries = np.frombuffer(file.read(count * ENTRY.itemsize), ENTRY)
+    return place, entries[entries["location"] != 0]
+
+
+def make_room(path: Path, pending: int) -> None:
+    """See that the disk has room for so many bytes more [B] and for an index twice as long, before GSD writes them.
+
+    GSD (up to 5.0 at least) goes on after it failed to lengthen its index, and writes entries over the frames.
+
+    Raises:
+        OSError: there is no room.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        return
+    file = os.open(path, os.O_RDWR)
+    try:
+        head = np.frombuffer(os.pread(file, 24, 0), np.uint64)
+        size = os.fstat(file).st_size
+        try:
+            os.posix_fallocate(file, size, pending + 4 * int(head[2]) * ENTRY.itemsize + SPARE)
+        finally:
+            os.ftruncate(file, size)
+    finally:
+        os.close(file)
+
+
+def _outside(path: Path, entries: np.ndarray) -> np.ndarray:
+    """True for entries whose data lie outside the file."""
+    length = entries["rows"].astype(np.float64) * entries["columns"] * WIDTHS[entries["type"]]
+    return (entries["location"] < 0) | (entries["location"].astype(np.float64) + length > path.stat().st_size)
+
+
+def refuse_impossible_sizes(path: Path) -> None:
+    """A broken index may ask for petabytes.
+
+    Raises:
+        BadInput: an entry lies outside the file.
+    """
+    _, entries = read_index(path)
+    if _outside(path, entries).any():
+        raise BadInput(f"{path} is not a trajectory of SAND (parts of it lie outside the file)")
+
+
+def mend(path: Path, step: int) -> None:
+    """Drop the first frame after `step` that is not whole, and all that follow; whole ones stay.
+
+    A disk that fills up, or a power cut, can leave an index that promises more than there is.
+
+    Raises:
+        BadInput: it is no trajectory.
+    """
+    import gsd.hoomd
+
+    place, entries = read_index(path)
+    torn = entries["frame"][_outside(path, entries)]
+    if torn.size:
+        _cut(path, place, entries, int(torn.min()))
+    with gsd.hoomd.open(str(path), "r") as file:
+        for number in range(_frames_until(file, step), len(file)):
+            try:
+                Frame(file[number])
+            except Exception:  # whatever a broken file makes the reader do
+                break
+        else:
+            return
+    _cut(path, place, entries, number)
+
+
+def _frames_until(file: object, step: int) -> int:
+    """Number of frames up to a step, looked for from the end."""
+    number = len(file)  # type: ignore[arg-type]
+    while number > 0:
+        chunk = "configuration/step"
+        there = file.file.chunk_exists(number - 1, chunk)  # type: ignore[attr-defined]
+        if int(file.file.read_chunk(number - 1, chunk)[0]) <= step if there else step >= 0:  # type: ignore[attr-defined]
+            break
+        number -= 1
+    return number
+
+
+def _cut(path: Path, place: int, entries: np.ndarray, frame: int) -> None:
+    """Let a file end before a frame: its entries, and those after them, become unused ones."""
+    first = int(np.argmax(entries["frame"] >= frame))
+    with open(path, "r+b") as file:
+        file.seek(place + first * ENTRY.itemsize)
+        file.write(bytes((len(entries) - first) * ENTRY.itemsize))
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,228 @@
+"""Files that are not what they were: refused in a line, or read right; never a traceback, a hang, or much memory."""
+
+import contextlib
+import random
+import resource
+import signal
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+
+import sand
+from sand.experiments.collision_case import read_collision
+from sand.experiments.scattering_case import read_scattering
+from sand.files.checkpoint import read_checkpoint
+from sand.files.trajectory import read_frames
+from sand.run.build import simulation_of
+from sand.run.case import read_case
+
+from ..physics.test_full_disk import CASE
+
+LONGEST = 20
+"""Seconds that a file may take."""
+MEMORY = 1_000_000
+"""Growth of the process that is allowed, in kB."""
+
+
+@contextlib.contextmanager
+def within_bounds():
+    """No file takes long, and all of them together no memory."""
+
+    def hangs(*_):
+        raise TimeoutError("a file takes too long")
+
+    before, handler = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, signal.signal(signal.SIGALRM, hangs)
+    try:
+        yield lambda: signal.alarm(LONGEST)
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, handler)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MEMORY
+
+
+def mutated(good, rng):
+    """The bytes cut, with some changed, taken out or put in."""
+    bad, kind, place = bytearray(good), rng.randrange(5), rng.randrange(len(good))
+    if kind == 0:
+        del bad[place:]
+    elif kind == 1:
+        for _ in range(rng.randrange(1, 8)):
+            bad[rng.randrange(len(bad))] = rng.randrange(256)
+    elif kind == 2:
+        bad[place : place + 100] = rng.randbytes(min(100, len(bad) - place))
+    elif kind == 3:
+        del bad[place : place + rng.randrange(1, 100)]
+    else:
+        bad[place:place] = rng.randbytes(rng.randrange(1, 50))
+    return bytes(bad)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The folder of a run with contacts."""
+    folder = tmp_path_factory.mktemp("mutated") / "run"
+    position = [[(2e-8 - 1e-10) * k, 0, 0] for k in range(5)] + [[0, 2e-7, 0]]
+    grains = sand.Grains(position, 1e-8, sand.IRON, moment="200 A m^2/kg", velocity=np.eye(6, 3) * 0.1)
+    sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], out=folder, frame_every="10 ps").run(until="50 ps")
+    return folder
+
+
+@pytest.mark.parametrize("count", [300, pytest.param(2000, marks=pytest.mark.validate)])
+@pytest.mark.parametrize(("pattern", "read"), [("checkpoint-*.npz", read_checkpoint), ("trajectory.gsd", read_frames)])
+def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, count):
+    """BadInput, or, where nothing that counts was hit, what the whole file holds."""
+    path = sorted(run.glob(pattern))[-1]
+    good, rng, other = path.read_bytes(), random.Random(count), tmp_path / path.name
+    whole = read(path)
+    refused = 0
+    with within_bounds() as next_one:
+        for _ in range(count):
+            other.write_bytes(mutated(good, rng))
+            next_one()
+            try:
+                found = read(other)
+            except sand.BadInput as error:
+                assert len(error.problems) == 1
+                refused += 1
+                continue
+            if read is read_frames:
+                assert len(found) <= len(whole)
+                for mine, theirs in zip(found, whole, strict=False):
+                    assert (mine.position == theirs.position).all() and mine.time == theirs.time
+            else:
+                assert all((found[0][name] == whole[0][name]).all() for name in whole[0])
+                assert found[1] == whole[1]
+    assert refused > 0.8 * count  # the others hit what the format leaves empty
+
+
+COLLISION = """
+[target]
+kind = "pca"
+grains = 4
+radius = "0.3 um"
+material = "silica"
+
+[projectile]
+kind = "chain"
+grains = 3
+radius = "0.3 um"
+material = "silica"
+
+[impact]
+speed = "1 m/s"
+impact_parameter = "0.3 b"
+turn = true
+seeds = [1, 2]
+
+[forces.contact]
+damping = "viscoelastic"
+"""
+SCATTERING = """
+[projectile]
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+
+[flight]
+temperature = "100 K"
+speed = 0.0625
+speed_unit = "thermal"
+start = "10 b_max"
+orientation = "aligned"
+
+[measure]
+job = "trajectories"
+impact_parameters = ["0.95 b_max", "1.0 b_max"]
+spins = ["none", "kT/2"]
+seed = 1
+"""
+RICH = (
+    CASE
+    + """
+[forces.dipoles]
+cutoff = "0.1 um"
+
+[forces.field]
+flux_density = "1 mT"
+
+[forces.gas]
+temperature = "100 K"
+pressure = "1 mbar"
+
+[materials.mine]
+like = "silica"
+surface_energy = "0.02 J/m^2"
+
+[stepping]
+method = "verlet"
+steps_per_period = 30
+
+[neighbours]
+search = "all pairs"
+"""
+)
+KINDS = {
+    "run": (RICH, read_case),
+    "collision": (COLLISION, read_collision),
+    "scattering": (SCATTERING, read_scattering),
+}
+STRANGE = [
+    None, True, 0, -1, 3, 10**30, 0.0, -1.5, 1e308, 1e-308, float("nan"), float("inf"), "", " ", "nm", "1", "-1 nm",
+    "1e400 nm", "1 furlong", "10 nm", "5 us", "1 K", "nan K", "inf s", "iron", "öö", "a\nb", "\u0000", "[0]", [], [1],
+    ["open", 1, 2], [[0, 0, 1]], {}, {"x": 1}, {"like": "iron"},
+]  # fmt: skip
+
+
+def spoilt(content, rng):
+    """The case with one to three entries made strange, taken out, renamed or moved."""
+    tables = [content]
+    for table in tables:
+        tables += [value for value in table.values() if isinstance(value, dict)]
+    for _ in range(rng.randrange(1, 4)):
+        table = rng.choice([t for t in tables if t] or [content])
+        if not table:
+            break
+        key, strange = rng.choice(list(table)), rng.choice(STRANGE)
+        kind = rng.randrange(4)
+        if kind == 0 or strange is None:
+            del table[key]
+        elif kind == 1:
+            table[key[:-1] + rng.choice("aez_") if rng.random() < 0.5 else "new"] = table.pop(key)
+        elif kind == 2:
+            table[rng.choice(list(rng.choice(tables) or table))] = table[key]
+        else:
+            table[key] = strange
+    return content
+
+
+def look(name, path):
+    """Read a case of a kind, and build the simulation if it is one."""
+    found = KINDS[name][1](path)
+    if name == "run" and found.grains.kind == "gas" and found.grains.number <= 200:
+        simulation_of(found, None)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("count", [150, pytest.param(3400, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("name", list(KINDS))
+def test_mutated_cases_are_read_or_refused_in_lines(tmp_path, name, count):
+    """Half of them changed as text, half as tables: a case, or lines that name the file; nothing else."""
+    text = KINDS[name][0]
+    path, rng, refused = tmp_path / "case.toml", random.Random(count), 0
+    path.write_text(text)
+    look(name, path)  # it is right before
+    with within_bounds() as next_one:
+        for number in range(count):
+            if number % 2:
+                path.write_bytes(mutated(text.encode(), rng))
+            else:
+                path.write_bytes(tomli_w.dumps(spoilt(tomllib.loads(text), rng)).encode("utf-8", "replace"))
+            next_one()
+            try:
+                look(name, path)
+            except sand.BadInput as error:
+                refused += 1
+                assert all(line and "\n" not in line for line in error.problems), (path.read_text(), error.problems)
+    assert refused > 0.4 * count
