@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
+from ..analysis.shape import gyration_radius
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.units import si
@@ -70,12 +71,6 @@ class Collision:
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
-
-
-def gyration(position: np.ndarray, mass: np.ndarray) -> float:
-    """Radius of gyration [m], centres only: √(Σ m |x − x̄|² / Σ m)."""
-    middle = np.average(position, axis=0, weights=mass)
-    return float(np.sqrt(np.average(((position - middle) ** 2).sum(axis=1), weights=mass)))
 
 
 def collide(
@@ -192,8 +187,11 @@ def _judge(
         contacts_after=int(row["contacts"]),
         impact_energy=0.5 * m1 * m2 / (m1 + m2) * speed**2,
         lost={name: row[f"lost_{name}"] for name in LOST},
-        gyration_before=(gyration(target.position, target.mass), gyration(projectile.position, projectile.mass)),
-        gyration_after=gyration(grains.position[largest], grains.mass[largest]),
+        gyration_before=(
+            gyration_radius(target.position, target.mass),
+            gyration_radius(projectile.position, projectile.mass),
+        ),
+        gyration_after=gyration_radius(grains.position[largest], grains.mass[largest]),
         rebound=_rebound(grains, labels, order),
         time=simulation.time,
         steps=simulation.world.steps,

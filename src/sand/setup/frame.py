@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.linalg import lsqr
 
 from ..core.box import Box
 from ..core.errors import BadInput, did_you_mean
@@ -139,6 +137,9 @@ def _overlapping(place: np.ndarray, size: np.ndarray, box: Box) -> list[tuple[in
 
 def _least_shift(pair: np.ndarray, n: np.ndarray, lacking: np.ndarray, count: int) -> np.ndarray:
     """The smallest displacements (N, 3) that lengthen each distance by what it lacks, to first order."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import lsqr
+
     rows = np.repeat(np.arange(len(pair)), 6)
     columns = (3 * pair[:, :, None] + np.arange(3)).reshape(-1)
     jacobian = csr_array((np.stack([n, -n], axis=1).reshape(-1), (rows, columns)), shape=(len(pair), 3 * count))

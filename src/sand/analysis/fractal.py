@@ -1,0 +1,143 @@
+"""Fractal dimension, by three methods that do not agree exactly and are not meant to.
+
+* `ensemble_dimension`: N = k (r_g/a)^D over many aggregates of many sizes; the cleanest, if there are many.
+* `correlation_dimension`: of one aggregate, from the number of grains within a distance of a grain.
+* `box_dimension`: of one aggregate, from the number of boxes it takes to cover it. Boxes at the rim are part empty,
+  which makes it too low, for compact bodies by as much as a half; for chains and fluffy ones it is as good as the
+  others.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
+
+from ..core.errors import BadInput
+from .fits import PowerLaw, power_law
+from .shape import gyration_radius
+
+FEWEST = 32
+"""Grains that one aggregate must have for the methods that look at one."""
+WINDOW = (2.0, 0.7)
+"""Distances of the correlation integral: from so many grain distances to so many radii of gyration."""
+BOXES = (2.0, 0.5)
+"""Sides of boxes: from so many grain distances to so many radii of gyration."""
+POINTS = 12
+SHIFTS = 32
+MOST_PAIRS = 3000
+"""Grains up to which all distances are taken at once; above, a tree counts them."""
+
+
+class Dimension(NamedTuple):
+    """A fractal dimension."""
+
+    value: float
+    error: float  # standard error; that of the window is in it where there is one aggregate only
+    prefactor: float  # k of N = k (x/a)^D, a half a grain distance
+    window: tuple[float, float]  # distances [m], or numbers of grains, that were used
+
+
+def ensemble_dimension(
+    sizes: np.ndarray, gyration: np.ndarray, grain_radius: float, groups: np.ndarray | None = None, least: int = 5
+) -> Dimension:
+    """D of N = k (r_g/a)^D.
+
+    Args:
+        sizes: N (K,) of the aggregates.
+        gyration: r_g (K,) [m].
+        grain_radius: a [m].
+        groups: (K,) box or run of each, for errors; each its own by default.
+        least: aggregates of fewer grains are left out.
+
+    Raises:
+        BadInput: fewer than two different sizes from `least` on.
+    """
+    n, r = np.asarray(sizes, float), np.asarray(gyration, float)
+    used = n >= least
+    if len(np.unique(n[used])) < 2:
+        raise BadInput(f"a fractal dimension needs aggregates of at least two different sizes from {least} grains on")
+    # N is what is known, r_g scatters about what N makes of it
+    fit = power_law(n[used], r[used] / grain_radius, None if groups is None else np.asarray(groups)[used])
+    value = 1.0 / fit.exponent
+    return Dimension(value, fit.error * value**2, fit.prefactor**-value, (float(n[used].min()), float(n[used].max())))
+
+
+def _one(position: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Positions, the usual distance of neighbours, and r_g [m] of an aggregate that is large enough."""
+    place = np.asarray(position, dtype=np.float64)
+    if place.ndim != 2 or place.shape[1] != 3 or len(place) < FEWEST:
+        raise BadInput(f"the fractal dimension of one aggregate needs at least {FEWEST} grains, not {len(place)}")
+    nearest = cKDTree(place).query(place, k=2)[0][:, 1]
+    return place, float(np.median(nearest)), gyration_radius(place)
+
+
+def correlation_dimension(position: np.ndarray, window: tuple[float, float] | None = None) -> Dimension:
+    """D of the correlation integral C(r) ∝ r^D, the share of pairs closer than r.
+
+    Args:
+        position: (N, 3) [m], N ≥ 32, of a whole aggregate.
+        window: distances [m] to fit between; 2 grain distances to 0.7 r_g by default.
+
+    Raises:
+        BadInput: too few grains, or a window without room.
+
+    The error is the scatter of the slope between thirds of the window: fractals of this size are no straight lines.
+    """
+    place, unit, size = _one(position)
+    low, high = window or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
+    radii = _spaced(low, high)
+    return _of_slopes(radii, pairs_within(place, radii) * 2.0 / len(place), unit, (low, high))
+
+
+def pairs_within(place: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Number of pairs closer than each distance."""
+    if len(place) <= MOST_PAIRS:
+        return np.searchsorted(np.sort(pdist(place)), radii, side="right").astype(float)
+    tree = cKDTree(place)
+    return (tree.count_neighbors(tree, radii) - len(place)) / 2.0
+
+
+def box_dimension(position: np.ndarray, window: tuple[float, float] | None = None, seed: int = 0) -> Dimension:
+    """D of box counting: n(s) ∝ s^−D boxes of side s are needed, the fewest over shifted and turned grids.
+
+    Args:
+        position: (N, 3) [m], N ≥ 32, of a whole aggregate.
+        window: sides [m] to fit between; 2 grain distances to half r_g by default.
+        seed: of shifts and turns.
+
+    Raises:
+        BadInput: too few grains, or a window without room.
+    """
+    place, unit, size = _one(position)
+    low, high = window or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))
+    sides, rng = _spaced(low, high), np.random.default_rng(seed)
+    needed = np.full((SHIFTS, len(sides)), np.inf)
+    for shift in range(SHIFTS):
+        turned = place @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        for k, side in enumerate(sides):
+            cell = np.floor(turned / side + rng.random(3)).astype(np.int64)
+            cell -= cell.min(axis=0)
+            span = cell.max(axis=0) + 1
+            needed[shift, k] = len(np.unique((cell[:, 0] * span[1] + cell[:, 1]) * span[2] + cell[:, 2]))
+    return _of_slopes(sides, len(place) / needed.min(axis=0), unit, (low, high))
+
+
+def _spaced(low: float, high: float) -> np.ndarray:
+    if not 0.0 < low < high:
+        raise BadInput(f"the window from {low:.3g} m to {high:.3g} m has no room; the second must be above the first")
+    return np.geomspace(low, high, POINTS)
+
+
+def _of_slopes(x: np.ndarray, y: np.ndarray, unit: float, window: tuple[float, float]) -> Dimension:
+    """The slope over the whole window; its error from the slopes of the three thirds."""
+    used = y > 0
+    if used.sum() < POINTS // 2:
+        raise BadInput("there is nothing within most of the window")
+    whole: PowerLaw = power_law(x[used], y[used])
+    thirds = [part for part in np.array_split(np.flatnonzero(used), 3) if len(part) > 1]
+    slopes = [power_law(x[part], y[part]).exponent for part in thirds]
+    error = float(np.std(slopes, ddof=1) / np.sqrt(len(slopes)))
+    return Dimension(whole.exponent, error, whole.prefactor * (0.5 * unit) ** whole.exponent, window)

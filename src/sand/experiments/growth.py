@@ -1,0 +1,241 @@
+"""How aggregates grow: ensembles of boxes, and what they have in common (Figure 1, Eqs. 15–25)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.census import COLUMNS, census
+from ..analysis.fits import PowerLaw, power_law
+from ..analysis.fractal import Dimension, ensemble_dimension
+from ..core.errors import BadInput
+from ..files import folder as files
+from ..run.build import case_of, resume, simulation_of
+from ..run.case import check_case
+from ..run.opened import Opened
+
+LOOKS = 10
+"""Frames of each box at which its aggregates are measured, evenly over the run, the last among them."""
+FIRST_SIZE = 2.0
+"""S from which growth is fitted; before, most grains have met nobody."""
+LARGEST_PART = 0.15
+"""Part of all grains up to which S is fitted: beyond, a box runs out of partners."""
+LEAST = 3
+"""Grains of an aggregate from which its moment counts."""
+
+
+def grow(
+    content: dict[str, Any],
+    seeds: Sequence[int],
+    folder: str | Path,
+    executor: Executor | None = None,
+    told: Callable[[int, str], None] | None = None,
+) -> list[Path]:
+    """Run the same box for many seeds, each into its own folder; runs that are there already are gone on with.
+
+    Args:
+        content: a case as for `sand run`, as read from TOML.
+        seeds: one box each.
+        folder: that holds their folders, seed-1 and so on.
+        executor: where; one after the other in this process by default.
+        told: called with a seed and how its run ended.
+
+    Returns:
+        The folders, in the order of the seeds.
+
+    Raises:
+        BadInput: a case with mistakes, a folder that holds something else, a run stopped by physics.
+        Interrupted: Ctrl-C; calling again goes on.
+    """
+    place = Path(folder)
+    check_case(content, "case")
+    places = [place / f"seed-{seed}" for seed in seeds]
+    jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
+    if executor is None:
+        outcomes: Any = (one_box(*job) for job in jobs)
+    else:
+        waiting = [executor.submit(one_box, *job) for job in jobs]
+        outcomes = (future.result() for future in waiting)
+    wrong = []
+    for seed, outcome in zip(seeds, outcomes, strict=True):
+        if told is not None:
+            told(seed, outcome)
+        if outcome != "finished":
+            wrong.append(f"seed {seed}: stopped ({outcome}); see {place / f'seed-{seed}' / files.SUMMARY}")
+    if wrong:
+        raise BadInput(wrong)
+    return places
+
+
+def one_box(content: dict[str, Any], seed: int, folder: str) -> str:
+    """Run one box to its end, from its newest checkpoint if it has one; returns the name of the outcome.
+
+    Raises:
+        BadInput: the folder holds a run of another case.
+    """
+    place, case = Path(folder), check_case(content, "case")
+    case.run.seed = seed
+    if any(place.glob("checkpoint-*.npz")):
+        simulation = resume(place)
+        asked, there = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
+        if changed := [name for name in asked if name != "run" and asked[name] != there[name]]:
+            raise BadInput(f"{place} holds a run with other [{changed[0]}]; give another folder, or the same case")
+        until = case.run.until if case.run.until is None else max(case.run.until, simulation.time)
+    else:
+        # a folder without a checkpoint is what a kill at the very start leaves
+        simulation, until = simulation_of(case, place, overwrite=True), case.run.until
+    steps = None if case.run.steps is None else case.run.steps - simulation.world.steps
+    if steps is not None and steps <= 0:
+        return "finished"
+    return simulation.run(until, steps=steps).outcome.name.lower()
+
+
+class Box(NamedTuple):
+    """One run of an ensemble."""
+
+    folder: Path
+    time: np.ndarray  # (K,) [s]
+    size: np.ndarray  # (K,) S(t)
+    grains: int
+    radius: float  # mean of the grains [m]
+    moment: float  # mean size of theirs [A m²]
+    aggregates: dict[str, np.ndarray]  # census of all looks, and `time` [s] of each row
+
+
+def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
+    """S(t) and the aggregates of one run.
+
+    Raises:
+        BadInput: there is no run, or one that cannot be read.
+    """
+    run = Opened(folder)
+    frames, ledger = run.frames, run.ledger
+    if not len(frames) or "mean_cluster_size" not in ledger:
+        raise BadInput(f"{folder} holds a run without frames or ledger")
+    numbers = np.unique(np.linspace(0, len(frames) - 1, looks + 1).round().astype(int)[1:])
+    found: list[dict[str, np.ndarray]] = []
+    for number in numbers:
+        frame = frames[int(number)]
+        rows = census(frame, least)
+        found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
+    first = frames[0]
+    frames.close()
+    return Box(
+        Path(folder),
+        ledger["time"],
+        ledger["mean_cluster_size"],
+        len(first),
+        float(first.radius.mean()),
+        float(np.linalg.norm(first.moment, axis=1).mean()),
+        {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
+    )
+
+
+def boxes_in(folder: str | Path) -> list[Path]:
+    """The run in a folder, or the runs in its folders, in the order of their numbers.
+
+    Raises:
+        BadInput: there is none.
+    """
+    place = Path(folder)
+    if (place / files.TRAJECTORY).exists():
+        return [place]
+    found = [one.parent for one in place.glob(f"*/{files.TRAJECTORY}")]
+    if not found:
+        raise BadInput(f"{folder} holds no run, and none of its folders does")
+    return sorted(found, key=lambda one: (len(one.name), one.name))
+
+
+class Growth(NamedTuple):
+    """What an ensemble says; a law that it cannot tell is None, with the reason in `missing`."""
+
+    time: np.ndarray  # (K,) [s], common to all boxes
+    sizes: np.ndarray  # (boxes, K): S(t)
+    window: tuple[float, float]  # of S, for z
+    z: PowerLaw | None  # S ∝ t^z
+    moment: PowerLaw | None  # μ/μ1 = N^γ
+    open_moment: PowerLaw | None  # the same, of aggregates without rings
+    dimension: Dimension | None  # N = k (r_g/a)^D
+    missing: dict[str, str]
+
+    @property
+    def mean(self) -> np.ndarray:
+        """S(t), mean over boxes."""
+        return self.sizes.mean(axis=0)
+
+    @property
+    def error(self) -> np.ndarray:
+        """Its standard error; not a number for one box."""
+        if len(self.sizes) < 2:
+            return np.full(self.sizes.shape[1], np.nan)
+        return self.sizes.std(axis=0, ddof=1) / np.sqrt(len(self.sizes))
+
+
+def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -> Growth:
+    """S(t), z, the exponent of moments and the fractal dimension of an ensemble.
+
+    Args:
+        boxes: alike but for their seeds.
+        window: values of S between which z is fitted; by default 2 to 0.15 N, where a box runs out of partners.
+
+    Raises:
+        BadInput: no box, or boxes that are not alike.
+    """
+    if not boxes:
+        raise BadInput("an ensemble needs at least one box")
+    if len({(box.grains, round(box.radius * 1e15)) for box in boxes}) > 1:
+        raise BadInput("the boxes of an ensemble must have the same number and size of grains")
+    last = min(box.time[-1] for box in boxes)
+    time = boxes[0].time[boxes[0].time <= last * (1.0 + 1e-9)]
+    sizes = np.array([np.interp(time, box.time, box.size) for box in boxes])
+    chosen = window or (FIRST_SIZE, LARGEST_PART * boxes[0].grains)
+    missing: dict[str, str] = {}
+
+    def law(name: str, fit: Callable[[], Any]) -> Any:
+        try:
+            return fit()
+        except BadInput as error:
+            missing[name] = str(error)
+            return None
+
+    of_box, rows = _all_aggregates(boxes)
+
+    def moment_law(which: np.ndarray) -> PowerLaw:
+        if boxes[0].moment == 0.0:
+            raise BadInput("the grains have no moments")
+        return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
+
+    heavy = rows["grains"] >= LEAST
+    return Growth(
+        time,
+        sizes,
+        chosen,
+        law("z", lambda: _z(time, sizes, chosen)),
+        law("moment", lambda: moment_law(heavy)),
+        law("open_moment", lambda: moment_law(heavy & (rows["rings"] == 0))),
+        law("dimension", lambda: ensemble_dimension(rows["grains"], rows["gyration_radius"], boxes[0].radius, of_box)),
+        missing,
+    )
+
+
+def _z(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> PowerLaw:
+    """From the times at which the mean over boxes is within the window."""
+    mean = sizes.mean(axis=0)
+    used = (mean >= window[0]) & (mean <= window[1]) & (time > 0.0)
+    if used.sum() < 3:
+        raise BadInput(
+            f"S does not stay between {window[0]:g} and {window[1]:g} for three frames; it ends at {mean[-1]:.3g}"
+        )
+    group = np.repeat(np.arange(len(sizes)), used.sum())
+    return power_law(np.tile(time[used], len(sizes)), sizes[:, used].ravel(), group)
+
+
+def _all_aggregates(boxes: Sequence[Box]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Box number of each row, and the rows of all boxes."""
+    of_box = np.concatenate([np.full(len(box.aggregates["grains"]), k) for k, box in enumerate(boxes)])
+    return of_box, {name: np.concatenate([box.aggregates[name] for box in boxes]) for name in boxes[0].aggregates}

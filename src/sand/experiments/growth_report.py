@@ -1,0 +1,121 @@
+"""What an analysis of ensembles leaves: numbers, tables, a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..analysis.fits import separation
+from ..core.errors import BadInput
+from ..files.folder import make_folder, write_json
+from ..files.table import write_table
+from .growth import Box, Growth, boxes_in, growth_of, read_box
+
+NAMES = ("analysis.json", "growth.csv", "aggregates.csv", "growth.png")
+"""Files of an analysis."""
+
+
+class Ensemble(NamedTuple):
+    """Boxes that are alike but for their seeds, and what they say together."""
+
+    name: str
+    growth: Growth
+    boxes: list[Box]
+
+
+def ensemble_in(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
+    """The runs in a folder as one ensemble.
+
+    Args:
+        folder: of a run, or of runs.
+        window: values of S between which z is fitted.
+
+    Raises:
+        BadInput: no run, or runs that are not alike.
+    """
+    boxes = [read_box(one) for one in boxes_in(folder)]
+    try:
+        return Ensemble(Path(folder).absolute().name, growth_of(boxes, window), boxes)
+    except BadInput as error:
+        raise error.at(str(folder)) from None
+
+
+def numbers(one: Ensemble) -> dict[str, Any]:
+    """What analysis.json holds of one ensemble; laws with value, error and interval, None where unknown."""
+
+    def law(found: Any) -> dict[str, Any] | None:
+        return None if found is None else found._asdict()
+
+    growth = one.growth
+    return {
+        "name": one.name,
+        "boxes": len(one.boxes),
+        "grains": one.boxes[0].grains,
+        "time": float(growth.time[-1]),
+        "mean_size": float(growth.mean[-1]),
+        "mean_size_error": float(growth.error[-1]),
+        "window": list(growth.window),
+        "z": law(growth.z),
+        "moment": law(growth.moment),
+        "moment_without_rings": law(growth.open_moment),
+        "dimension": law(growth.dimension),
+        "missing": growth.missing,
+    }
+
+
+def compared(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
+    """By how many standard errors S of the first of two ensembles is above that of the second, at their last time."""
+    if len(ensembles) != 2 or min(len(one.boxes) for one in ensembles) < 2:
+        return None
+    time = float(min(one.growth.time[-1] for one in ensembles))
+    sizes = [[float(np.interp(time, box.time, box.size)) for box in one.boxes] for one in ensembles]
+    first, second = (one.name for one in ensembles)
+    sigma = separation(np.array(sizes[0]), np.array(sizes[1]))
+    return {"first": first, "second": second, "time": time, "sizes": sizes, "sigma": sigma}
+
+
+def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any]) -> None:
+    """analysis.json, S(t) and all aggregates as tables, and the figure.
+
+    Raises:
+        FilesFailed: the disk is full, …
+    """
+    from ..view.figure import save
+    from ..view.growth import growth_figure
+
+    if not folder.exists():
+        make_folder(folder)
+    write_json(folder / NAMES[0], content)
+    most = max(len(one.boxes) for one in ensembles)
+    write_table(folder / NAMES[1], [row for one in ensembles for row in _growth_rows(one, most)])
+    write_table(folder / NAMES[2], [row for one in ensembles for row in _aggregate_rows(one)])
+    drawn = []
+    for one in ensembles:
+        joined = {k: np.concatenate([box.aggregates[k] for box in one.boxes]) for k in one.boxes[0].aggregates}
+        units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
+        drawn.append((one.name, one.growth, joined | units))
+    save(growth_figure(drawn), folder / NAMES[3])
+
+
+def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:
+    """A row for each time; boxes that an ensemble has less than another are empty."""
+    growth = one.growth
+    rows = []
+    for k, time in enumerate(growth.time.tolist()):
+        row: dict[str, Any] = {"ensemble": one.name, "time": time}
+        row |= {"mean_size": float(growth.mean[k]), "error": float(growth.error[k])}
+        own = growth.sizes[:, k].tolist()
+        rows.append(row | {f"box_{b + 1}": own[b] if b < len(own) else "" for b in range(most)})
+    return rows
+
+
+def _aggregate_rows(one: Ensemble) -> list[dict[str, Any]]:
+    rows = []
+    for box in one.boxes:
+        names = list(box.aggregates)
+        for values in zip(*(box.aggregates[name].tolist() for name in names), strict=True):
+            rows.append({"ensemble": one.name, "box": box.folder.name, **dict(zip(names, values, strict=True))})
+    return rows
