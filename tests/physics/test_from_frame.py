@@ -75,6 +75,17 @@ def test_the_books_begin_where_they_were(crash):
         assert sim.ledger[name][0] == pytest.approx(was, rel=3e-6, abs=3e-6 * abs(old.ledger["translation"][k])), name
 
 
+def test_a_frame_as_a_simulation(crash):
+    """`sand.open(DIR).at(k)`: energies at grains sum to those of the old ledger's row, to single precision."""
+    folder, frames, old = crash
+    k = len(frames) // 2
+    at = sand.open(folder).at(k).at_grains()
+    elastic = sum(old.ledger[name][k] for name in ("normal", "sliding", "rolling", "twisting"))
+    scale = abs(old.ledger["translation"][k])
+    assert at["contacts"].sum() == pytest.approx(elastic, rel=3e-6, abs=3e-6 * scale)
+    assert at["magnetic"].sum() == pytest.approx(old.ledger["magnetic"][k], rel=3e-6, abs=3e-6 * scale)
+
+
 def test_it_goes_on_as_the_old_run_did(crash):
     """After the time between two frames positions agree with the old run's next frame.
 

@@ -9,6 +9,7 @@ import click
 from ..core.errors import BadInput
 from . import options, report
 from .collide import read_seeds
+from .exits import INTERRUPTED
 
 
 @click.command("grow", short_help="Run the same box for many seeds, to be analysed together.")
@@ -45,8 +46,12 @@ def command(
         if not (quiet or as_json):
             click.echo(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(chosen)})")
 
-    with report.compiling(quiet), executor_for(workers, scheduler) as executor:
-        report.with_notes(lambda: grow(read_toml(case), chosen, folder, executor, told))
+    try:
+        with report.compiling(quiet), executor_for(workers, scheduler) as executor:
+            report.with_notes(lambda: grow(read_toml(case), chosen, folder, executor, told))
+    except KeyboardInterrupt:
+        report.note(f"interrupted; the same command goes on with the boxes in {folder}")
+        return INTERRUPTED
     if as_json:
         report.emit({"folder": str(folder), "seeds": chosen, "outcomes": outcomes})
     elif not quiet:

@@ -13,6 +13,9 @@ from ..core.errors import BadInput
 from ..files import folder as files
 from ..files.export import export_frames
 from ..files.trajectory import Frame, Frames
+from ..setup.frame import from_frame
+from .case import read_case
+from .simulation import Simulation
 
 
 class Opened:
@@ -59,6 +62,19 @@ class Opened:
         """Contacts of a frame: pair (C, 2), overlap [m], formed [s] (C,), force on the first [N] (C, 3)."""
         one = self.frames[frame]
         return {"pair": one.pair, "overlap": one.overlap, "formed": one.formed, "force": one.force}
+
+    def at(self, frame: int = -1) -> Simulation:
+        """A new simulation in memory, its clock at 0, with the grains, contacts, box and forces of a frame.
+
+        Its `loads()`, `at_grains()` and `contacts` say what a frame does not hold: energies, fields, torques.
+
+        Raises:
+            BadInput: see `setup.from_frame`; or a force that a case file cannot name.
+        """
+        case = read_case(self.folder / files.CASE)
+        start = from_frame(self.frames[frame], case.materials_by_name())
+        settings = {"stepping": case.stepping, "neighbours": case.neighbours, "seed": case.run.seed}
+        return Simulation(start.grains, case.forces.build(), box=start.box, contacts=start.contacts, **settings)
 
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.

@@ -1,0 +1,175 @@
+"""Ensembles of boxes: run, go on, measure, tell; tiny ones."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import tomli_w
+
+import sand
+from sand.cli.main import main
+from sand.experiments.executors import executor_for
+from sand.experiments.growth import Box, boxes_in, grow, growth_of, one_box, read_box
+
+CASE = {
+    "run": {"until": "30 ns", "frame_every": "1 ns"},
+    "box": {"periodic": "0.25 um"},
+    "grains": {
+        "kind": "gas",
+        "number": 30,
+        "radius": "10 nm",
+        "material": "iron",
+        "moment": "200 A m^2/kg",
+        "temperature": "300 K",
+    },
+    "forces": {"contact": {}, "dipoles": {}},
+}
+
+
+@pytest.fixture(scope="module")
+def ensembles(tmp_path_factory):
+    """Three magnetic boxes and three without moments, run in this process."""
+    top = tmp_path_factory.mktemp("growth")
+    grow(CASE, [1, 2, 3], top / "magnetic")
+    plain = CASE | {
+        "grains": {k: v for k, v in CASE["grains"].items() if k != "moment"},
+        "forces": {"contact": {}},
+    }
+    grow(plain, [1, 2, 3], top / "plain")
+    return top
+
+
+def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
+    """The same bits as a simulation of that seed by itself, in a process of its own, too."""
+    alone = tmp_path / "alone"
+    with executor_for(2) as executor:
+        grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2, 3], alone, executor)
+    for seed in (2, 3):
+        ours, theirs = (sand.open(top / f"seed-{seed}") for top in (alone, ensembles / "magnetic"))
+        assert (ours.frames[-1].position == theirs.frames[-1].position).all()
+        assert ours.case["run"]["seed"] == seed
+
+
+def test_called_again_it_goes_on(tmp_path):
+    """To a later end, with the bits of a run that never stopped; a finished one is left as it is."""
+    short = CASE | {"run": {"until": "10 ns", "frame_every": "1 ns"}}
+    assert one_box(short, 1, str(tmp_path / "seed-1")) == "finished"
+    assert one_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
+    assert one_box(CASE, 1, str(tmp_path / "whole")) == "finished"
+    ours, theirs = (sand.open(tmp_path / name) for name in ("seed-1", "whole"))
+    assert (ours.frames[-1].position == theirs.frames[-1].position).all()
+    before = (tmp_path / "seed-1" / "trajectory.gsd").read_bytes()
+    assert one_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
+    assert (tmp_path / "seed-1" / "trajectory.gsd").read_bytes() == before
+    other = CASE | {"box": {"periodic": "0.26 um"}}
+    with pytest.raises(sand.BadInput, match=r"other \[box\]"):
+        one_box(other, 1, str(tmp_path / "seed-1"))
+
+
+def test_what_is_read_of_a_box(ensembles):
+    """S(t) is the ledger's; the census of the last look is that of the last frame."""
+    box = read_box(ensembles / "magnetic" / "seed-1", looks=5)
+    run = sand.open(ensembles / "magnetic" / "seed-1")
+    assert (box.size == run.ledger["mean_cluster_size"]).all()
+    last = box.aggregates["time"] == box.aggregates["time"].max()
+    sizes = box.aggregates["grains"][last]
+    alone = 30 - sizes.sum()
+    assert ((sizes**2).sum() + alone) / 30 == pytest.approx(box.size[-1], rel=1e-12)
+    assert len(np.unique(box.aggregates["time"])) == 5
+    assert (box.aggregates["moment"] <= box.aggregates["grains"] * box.moment * (1 + 1e-6)).all()
+
+
+def made_up(z, gamma, dimension, seed, grains=1000):
+    """A box whose S(t), moments and sizes follow given laws, with a factor of its own."""
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0, 1e-5, 201)
+    own = math.exp(0.1 * rng.normal())
+    n = np.round(np.exp(rng.uniform(math.log(2), math.log(200), 300)))
+    scatter = np.exp(0.1 * rng.normal(size=(2, 300)))
+    return Box(
+        f"box-{seed}",
+        time,
+        1.0 + own * 100 * (time / 1e-5) ** z,
+        grains,
+        1e-8,
+        2e-18,
+        {
+            "grains": n,
+            "moment": 2e-18 * n**gamma * scatter[0],
+            "gyration_radius": 1e-8 * (n / 1.3) ** (1 / dimension) * scatter[1],
+            "rings": (n > 150).astype(float),
+            "time": np.full(300, 1e-5),
+        },
+    )
+
+
+def test_laws_that_were_put_in_come_out():
+    """z, γ and D_f of made-up boxes within four of their errors; z also to what the 1 in S = 1 + ct^z bends it.
+
+    From S = 10 on d ln S/d ln t is at least 0.9 z.
+    """
+    growth = growth_of([made_up(2.0, 0.63, 1.4, seed) for seed in range(8)], (10.0, 100.0))
+    assert 1.8 < growth.z.exponent < 2.0 + 4 * growth.z.error
+    for law, exact in ((growth.moment, 0.63), (growth.open_moment, 0.63)):
+        assert abs(law.exponent - exact) < 4 * law.error < 0.04
+    assert abs(growth.dimension.value - 1.4) < 4 * growth.dimension.error < 0.08
+    assert growth.missing == {}
+    assert growth.error[-1] == pytest.approx(growth.sizes[:, -1].std(ddof=1) / math.sqrt(8), rel=1e-12)
+
+
+def test_what_cannot_be_told_says_why(ensembles):
+    """Boxes without moments, and ones that hardly grew."""
+    growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
+    assert growth.moment is None and growth.missing["moment"] == "the grains have no moments"
+    assert growth.z is None and "S does not stay between" in growth.missing["z"]
+    with pytest.raises(sand.BadInput, match="same number and size"):
+        growth_of([made_up(2, 0.6, 1.4, 1), made_up(2, 0.6, 1.4, 2, grains=10)])
+
+
+def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
+    """`sand grow` leaves what `grow` does; `sand analyse` tells, compares, writes tables and a figure, once."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "box.toml").write_text(tomli_w.dumps(CASE | {"run": CASE["run"] | {"until": "3 ns"}}))
+    assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "few", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["outcomes"] == {"1": "finished", "2": "finished"}
+    words = [str(ensembles / "magnetic"), str(ensembles / "plain")]
+    assert main(["analyse", *words, "--out", "told", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["comparison"]["sigma"] > 3
+    assert told == json.loads((tmp_path / "told" / "analysis.json").read_text())
+    assert [one["boxes"] for one in told["ensembles"]] == [3, 3]
+    assert told["ensembles"][0]["mean_size"] > 3 > told["ensembles"][1]["mean_size"]
+    assert (tmp_path / "told" / "growth.png").stat().st_size > 10_000
+    assert len((tmp_path / "told" / "growth.csv").read_text().splitlines()) == 1 + 2 * 31
+    assert main(["analyse", *words, "--out", "told"]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main(["analyse", str(ensembles / "magnetic" / "seed-1"), "--window", "1.5", "4"]) == 0
+    shown = capsys.readouterr().out
+    assert "1 of 30 grains" in shown and "nan" not in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["analyse", "nowhere"], "no run"),
+        (["analyse", "."], "no run"),
+        (["analyse"], "Missing argument"),
+        (["analyse", "RUN", "--window", "3", "2"], "--window"),
+        (["analyse", "RUN", "--out", "no/where"], "--out no/where"),
+        (["grow", "nowhere.toml"], "there is no file"),
+        (["grow", "box.toml", "--seeds", "x"], "--seeds"),
+        (["grow", "box.toml", "--out", "box.toml"], "is a file"),
+        (["grow", "wrong.toml"], "wrong.toml: grains.radius"),
+    ],
+)
+def test_mistakes(ensembles, tmp_path, monkeypatch, capsys, words, part):
+    """One line, exit code 2, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "box.toml").write_text(tomli_w.dumps(CASE))
+    (tmp_path / "wrong.toml").write_text(tomli_w.dumps(CASE | {"grains": CASE["grains"] | {"radius": "1 s"}}))
+    before = sorted(tmp_path.iterdir())
+    assert main([str(ensembles / "magnetic") if word == "RUN" else word for word in words]) == 2
+    err = capsys.readouterr().err
+    assert part in err and err.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
