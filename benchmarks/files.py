@@ -32,7 +32,6 @@ def costs(count: int = 10_000) -> dict[str, Any]:
             sim.run(steps=20)
             row = sim.ledger.rows[-1]
             spent["row"].append(_seconds(sim._stock))
-            record._trajectory.last_step = -1  # write the same frame again
             spent["frame"].append(_seconds(lambda row=row: (record.write(sim, row), record._trajectory.flush(True))))
             spent["checkpoint"].append(_seconds(lambda: record.save(sim)))
         sizes = {path.suffix: path.stat().st_size for path in (Path(place) / "run").iterdir()}

@@ -22,6 +22,7 @@ _HOMES = {
     "MAGNETITE": "core.material",
     "SandError": "core.errors",
     "BadInput": "core.errors",
+    "FilesFailed": "core.errors",
     "Interrupted": "core.errors",
     "Contact": "forces.contact",
     "Dipoles": "forces.dipoles",
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from . import theory as theory
     from .core.box import Box as Box
     from .core.errors import BadInput as BadInput
+    from .core.errors import FilesFailed as FilesFailed
     from .core.errors import Interrupted as Interrupted
     from .core.errors import SandError as SandError
     from .core.grains import Grains as Grains

@@ -1,5 +1,8 @@
 """A frame of a trajectory as a new start: single precision healed, no contact made or broken."""
 
+import copy
+import math
+
 import numpy as np
 import pytest
 
@@ -129,6 +132,33 @@ def test_healing_against_chance():
         assert held.sum() > 400
 
 
+def test_a_rigid_packing_that_hardly_touches():
+    """32 grains of an fcc block exactly 2r apart: rounding decides which pairs touch; none does afterwards.
+
+    Far away, single precision knows places to 6e-8 of the distance only, and that is no damage.
+    """
+    cell = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])
+    grid = np.array([[x, y, z] for x in range(2) for y in range(2) for z in range(2)], float)
+    block = (grid[:, None] + cell).reshape(-1, 3) * 2.0 * math.sqrt(2.0) * RADIUS
+    none = np.zeros((0, 2), int)
+    for away in (0.0, 1e5 * RADIUS):
+        rounded = np.float64(np.float32((block + away) / RADIUS)) * RADIUS
+        found = healed(rounded, np.full(32, RADIUS), sand.Box.open(), none, np.zeros(0))
+        pairs = sand.Box.open().close_pairs(found, 2.5 * RADIUS)
+        assert np.linalg.norm(found[pairs[:, 0]] - found[pairs[:, 1]], axis=1).min() > 2.0 * RADIUS
+        assert np.abs(found - rounded).max() < 1e-3 * RADIUS + 64 * SINGLE * away
+
+
+def test_a_frame_without_numbers(crash):
+    """The last frame of a run that ended in numbers that are not finite is refused with its step."""
+    _, frames, _ = crash
+    frame = copy.copy(frames[4])
+    frame.velocity = frame.velocity.copy()
+    frame.velocity[3] = np.nan
+    with pytest.raises(sand.BadInput, match=f"step {frame.step}: velocity .* not finite; take an earlier frame"):
+        sand.setup.from_frame(frame, {"silica": sand.SILICA})
+
+
 def test_what_rounding_brought_together_is_parted():
     """Two grains a hair apart that overlap once rounded: no contact is made."""
     place = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
@@ -157,7 +187,7 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
     assert new.case["grains"] == {
         "kind": "file",
         "material": "silica",
-        "file": str(folder.absolute()),
+        "file": str((folder / "trajectory.gsd").resolve()),
         "frame": 20,
     }
     (tmp_path / "mine.toml").write_text(
@@ -177,6 +207,10 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
     [
         (["--frame", "3"], ["--from"]),
         ([], ["CASE.toml", "--from"]),
+        (["bare.toml", "--from", "RUN", "--out", "RUN", "--overwrite"], ["holds the run that grains are taken from"]),
+        (["--from", "bare.toml"], ["holds no grains"]),
+        (["--from", "."], ["not the folder of a run"]),
+        (["iron.toml"], ["grains.material", "silica", "iron"]),
         (["--from", "nowhere"], ["there is no file or folder nowhere"]),
         (["--from", "RUN", "--frame", "999"], ["41 frames", "from 0 to 40", "999"]),
         (["other.toml", "--from", "RUN"], ["box", "400 nm", "300 nm", "leave [box] out"]),
@@ -199,6 +233,7 @@ def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
         "bare": run + grains,
         "soft": run + grains + forces + "[materials.silica]\nlike = 'silica'\nsurface_energy = '1e-7 J/m^2'\n",
         "both": run + f"[grains]\nkind = 'file'\nnumber = 4\nfile = '{folder}'\n",
+        "iron": run + f"[grains]\nkind = 'file'\nmaterial = 'iron'\nfile = '{folder}'\n" + forces,
         "fileless": run + "[grains]\nkind = 'file'\n",
         "foreign": run + "[grains]\nkind = 'file'\nfile = 'foreign.toml'\n",
     }

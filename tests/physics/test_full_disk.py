@@ -9,6 +9,7 @@ import sys
 
 import pytest
 
+import sand
 from sand.cli.main import main
 from sand.files.folder import read_ledger
 from sand.files.trajectory import read_frames
@@ -82,6 +83,28 @@ def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
     assert ("sand resume" if list(folder.glob("checkpoint-*.npz")) else "--overwrite") in said[0]
     assert not list(folder.glob(".*"))
     gone_on(whole, folder)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="relies on Linux's limits for files")
+@pytest.mark.parametrize("limit", [120_000, 150_000, 165_000, 180_000])
+def test_many_small_frames(tmp_path, limit):
+    """Two grains, 200 frames before the first flush: the index must be lengthened several times over.
+
+    GSD goes on where it cannot lengthen its index, and writes entries over the first frames; it is not let.
+    """
+    grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", velocity=[[1.0, 0, 0], [0, 0, 2.0]])
+    settings = {"stepping": sand.Verlet(step=1e-11), "frame_every": 1e-11}
+    whole = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "whole", **settings)
+    whole.run(steps=200)
+    sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run", **settings)
+    with no_file_longer_than(limit), pytest.raises(sand.FilesFailed, match="File too large"):
+        sim.run(steps=200)
+    with pytest.raises(sand.BadInput, match=r"cannot go on.*sand\.resume"):
+        sim.run(steps=1)
+    before = len(read_frames(tmp_path / "run" / "trajectory.gsd"))
+    assert before >= 1
+    sand.resume(tmp_path / "run").run()
+    assert content(tmp_path / "run") == content(tmp_path / "whole")
 
 
 def test_a_folder_that_vanishes(whole, tmp_path):

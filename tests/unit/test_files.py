@@ -167,5 +167,66 @@ def test_the_checkpoint_knows_case_and_ledger(tmp_path):
     (folder / "case.toml").write_text(case.replace("density = ", "density = 1"))
     with pytest.raises(sand.BadInput, match=r"\[materials\] is not what the run began with.*--from"):
         sand.resume(folder)
-    (folder / "case.toml").write_text(case.replace("until = ", "until = 1"))  # the end may change
-    sand.resume(folder)
+    for wrong in (
+        case + "\n[neighbours]\n",
+        case.replace("frame_every = ", "frame_every = 1"),
+        "[run]\nuntil = 1e-9\n",
+    ):
+        (folder / "case.toml").write_text(wrong)
+        with pytest.raises(sand.BadInput):
+            sand.resume(folder)
+    (folder / "case.toml").write_text(case.replace("until = 5e-10", "until = 6e-10"))  # the end may change
+    assert sand.resume(folder).run().time >= 6e-10
+
+
+def test_forces_and_columns_keep_the_order_of_the_script(tmp_path):
+    """Whatever order the forces were given in, a resumed ledger has each energy in its own column."""
+    grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", charge=1e-17)
+    forces = [sand.Gravity([0, 0, -9.81]), sand.ElectricField([0, 0, 1000.0]), sand.Contact()]
+    settings = {"frame_every": 1e-8, "stepping": sand.Verlet(step=1e-9)}
+    sim = sand.Simulation(grains, forces, out=tmp_path / "run", **settings)
+    sim.run(until=3e-8)
+    again = sand.resume(tmp_path / "run")
+    assert [force.name for force in again.forces] == ["gravity", "electric", "contact"]
+    assert again.ledger.rows == sim.ledger.rows
+    again.run(until=5e-8)
+    whole = sand.Simulation(grains, forces, **settings)
+    whole.run(until=5e-8)
+    assert (again.grains.position == whole.grains.position).all()
+    assert again.ledger["electric"].tolist() == whole.ledger["electric"].tolist()
+
+
+def test_frames_of_another_history_are_replaced(tmp_path):
+    """Frames after the checkpoint that are not the same bits (another machine, a damaged file) are written anew."""
+    sim = struck_chain()
+    true = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "true", frame_every="0.1 ns")
+    true.run(until="1 ns")
+    first = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="0.1 ns")
+    first.run(until="0.5 ns")
+    good = {path: path.read_bytes() for path in (tmp_path / "run").glob("checkpoint-*.npz")}
+    first.world.grains.arrays.velocity[0, 0] += 10.0
+    first.run(until="1 ns")
+    for late in (tmp_path / "run").glob("checkpoint-*.npz"):
+        late.unlink()
+    for path, state in good.items():
+        path.write_bytes(state)
+    again = sand.resume(tmp_path / "run")
+    again.run(until="1 ns")
+    ours, theirs = (
+        [(f.step, f.position.tobytes(), f.velocity.tobytes()) for f in read_frames(tmp_path / name / "trajectory.gsd")]
+        for name in ("run", "true")
+    )
+    assert ours == theirs
+
+
+def test_a_trajectory_beyond_mending_is_moved_aside(tmp_path):
+    """The checkpoint is what counts: told, kept under another name, a new file begun."""
+    sim = struck_chain()
+    sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="0.1 ns")
+    sim.run(until="0.3 ns")
+    sim.record._trajectory.close()
+    (tmp_path / "run" / "trajectory.gsd").write_bytes(b"rubbish" * 1000)
+    with pytest.warns(UserWarning, match="beyond mending"):
+        sand.resume(tmp_path / "run").run(until="0.5 ns")
+    assert (tmp_path / "run" / "trajectory-damaged.gsd").read_bytes().startswith(b"rubbish")
+    assert len(read_frames(tmp_path / "run" / "trajectory.gsd")) == 2

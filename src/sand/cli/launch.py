@@ -88,7 +88,8 @@ def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
     if outcome.is_physics:
         report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
         last = report.checkpoints(folder)[-1]
-        report.note(f"the {'state just' if outcome.keeps_state else 'last good state'} before is in {last}")
+        kept = int(last.stem.removeprefix("checkpoint-")) == result.steps
+        report.note(f"the {'state just' if kept else 'last good state'} before is in {last}")
         return PHYSICS
     return DONE
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..core.errors import BadInput
-from ..files.folder import CASE
+from ..files.folder import CASE, TRAJECTORY
 from . import options, report
 
 
@@ -48,43 +48,57 @@ def command(
     from ..run.case import GrainsSection, read_case
     from .launch import End, launch, refuse_folder
 
-    if source is None:
-        if frame is not None:
-            raise BadInput("--frame says which frame of --from FILE to start with; give that, too")
-        if case is None:
-            raise BadInput("give a case file: sand run CASE.toml; or an earlier run: sand run --from DIR")
-    elif not Path(source).exists():
-        raise BadInput(f"--from: there is no file or folder {source}")
-    elif case is None:
-        case = str(_folder_of(source) / CASE)
-    described = read_case(case)
-    if source is not None:
-        described.grains = GrainsSection(
-            kind="file", file=str(Path(source).absolute()), frame=-1 if frame is None else frame
-        )
+    if source is None and frame is not None:
+        raise BadInput("--frame says which frame of --from FILE to start with; give that, too")
+    grains = None if source is None else _source(source)
+    name = _case_name(case, grains)
+    described = read_case(name)
+    if grains is not None:
+        number = -1 if frame is None else frame
+        described.grains = GrainsSection(kind="file", file=str(grains.absolute()), frame=number)
+        if case is None:  # a gas is not to kick as it did in the run before
+            described.run.seed += 1 + number % 1_000_000
     if end is not None:
         described.run.until, described.run.steps = end, None
     if seed is not None:
         described.run.seed = seed
-    folder = Path(out or _usual_folder(described.run.out, Path(case), source, frame))
-    refuse_folder(folder, Path(case), overwrite=overwrite)
+    folder = Path(out or _usual_folder(described.run.out, Path(name), grains, frame))
+    refuse_folder(folder, Path(name), overwrite=overwrite)
     return launch(
-        lambda: report.blame(Path(case), lambda: simulation_of(described, folder, overwrite=overwrite)),
+        lambda: report.blame(Path(name), lambda: simulation_of(described, folder, overwrite=overwrite)),
         folder,
-        f"run {case}" + (f" from {source}" if source else ""),
+        f"run {name}" + (f" from {source}" if source else ""),
         End(described.run.until, described.run.steps),
         quiet=quiet,
         as_json=as_json,
     )
 
 
-def _folder_of(source: str) -> Path:
-    """The folder of the run that `source` names, itself or its trajectory."""
-    return Path(source) if Path(source).is_dir() else Path(source).parent
+def _source(source: str) -> Path:
+    """The file that grains are to be taken from.  Raises BadInput."""
+    place = Path(source).expanduser().absolute().resolve()
+    if not place.exists():
+        raise BadInput(f"--from: there is no file or folder {source}")
+    if place.is_dir() and not (place / TRAJECTORY).exists():
+        raise BadInput(f"--from: {source} is not the folder of a run: there is no {TRAJECTORY} in it")
+    if place.suffix in (".toml", ".npz", ".csv", ".json", ".png"):
+        raise BadInput(f"--from: {source} holds no grains; give the folder of a run, or its {TRAJECTORY}")
+    return place / TRAJECTORY if place.is_dir() else place
 
 
-def _usual_folder(told: str | None, case: Path, source: str | None, frame: int | None) -> Path:
+def _case_name(case: str | None, source: Path | None) -> str:
+    """The case file: what was given, or that of the run whose grains are taken.  Raises BadInput."""
+    if case is not None:
+        return case
+    if source is None:
+        raise BadInput("give a case file: sand run CASE.toml; or an earlier run: sand run --from DIR")
+    if not (source.parent / CASE).exists():
+        raise BadInput(f"--from: there is no {CASE} beside {source}; give a case file before --from")
+    return str(source.parent / CASE)
+
+
+def _usual_folder(told: str | None, case: Path, source: Path | None, frame: int | None) -> Path:
     """Where files go if --out does not say: what the case says, or its name; never into the earlier run."""
     if source is None:
         return Path(told or case.stem)
-    return Path(f"{_folder_of(source).absolute().name}-from-{'last' if frame is None else frame}")
+    return Path(f"{source.parent.name}-from-{'last' if frame is None or frame < 0 else frame}")

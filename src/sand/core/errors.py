@@ -18,7 +18,9 @@ class BadInput(SandError, ValueError):
     """
 
     def __init__(self, problems: str | Iterable[str]):
-        self.problems: list[str] = [problems] if isinstance(problems, str) else list(problems)
+        given = [problems] if isinstance(problems, str) else list(problems)
+        # what the user wrote may hold line breaks, and is shown as it would be typed
+        self.problems: list[str] = ["\\n".join(problem.splitlines()) for problem in given]
         super().__init__("\n".join(self.problems))
 
     def at(self, where: str) -> BadInput:

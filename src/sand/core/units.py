@@ -104,6 +104,10 @@ def in_unit(value: Any, unit: str) -> Any:
     return float(array) if array.ndim == 0 else array
 
 
+LEAST, MOST = 1e-60, 1e60
+"""Sizes of SI numbers whose products and powers do not run out of the range of double precision."""
+
+
 def si(value: Any, unit: str, name: str, *, above: float | None = None, least: float | None = None) -> float:
     """One finite number in SI.
 
@@ -122,6 +126,8 @@ def si(value: Any, unit: str, name: str, *, above: float | None = None, least: f
     shown = f"{name} = {value!r}"
     if not math.isfinite(number):
         raise BadInput(f"{shown} is not finite; give a number in {unit}")
+    if number != 0.0 and not LEAST < abs(number) < MOST:
+        raise BadInput(f"{shown} is not between {LEAST:g} and {MOST:g} {unit}, where numbers can be computed with")
     if above is not None and not number > above:
         raise BadInput(f"{shown} must be above {above:g} {unit}".removesuffix(" 1"))
     if least is not None and not number >= least:

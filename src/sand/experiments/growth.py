@@ -191,7 +191,7 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
     if len({(box.grains, round(box.radius * 1e15)) for box in boxes}) > 1:
         raise BadInput("the boxes of an ensemble must have the same number and size of grains")
     last = min(box.time[-1] for box in boxes)
-    time = boxes[0].time[boxes[0].time <= last * (1.0 + 1e-9)]
+    time = np.append(boxes[0].time[boxes[0].time < last], last)
     sizes = np.array([np.interp(time, box.time, box.size) for box in boxes])
     chosen = window or (FIRST_SIZE, LARGEST_PART * boxes[0].grains)
     missing: dict[str, str] = {}

@@ -70,7 +70,7 @@ def stored_frame(step: int, time: float, grains: Grains, box: Box, contacts: Map
     frame.configuration.box = [*(np.array(lengths) / scale), 0.0, 0.0, 0.0]
     p = frame.particles
     p.N = len(grains)
-    p.types = [m.name for m in grains.materials]
+    p.types = [m.name.encode("ascii", "backslashreplace").decode() for m in grains.materials]
     p.typeid = grains.material
     p.position = grains.position / scale
     p.diameter = 2.0 * grains.radius / scale
@@ -131,7 +131,8 @@ class Frame:
         self.radius = 0.5 * np.asarray(p.diameter, dtype=np.float64) * scale
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
-        self.materials, self.material = list(p.types), np.asarray(p.typeid)
+        names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
+        self.materials, self.material = names, np.asarray(p.typeid)
         self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
         self.orientation = np.roll(np.asarray(p.orientation), -1, axis=1)
         self.pair = np.asarray(stored.bonds.group).reshape(-1, 2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,8 @@ ENTRY = np.dtype(
 """An entry of a GSD file's index (gsd.readthedocs.io, file layer)."""
 SPARE = 65536
 """Bytes that GSD may want besides data and index."""
+CHUNKS = 40
+"""More than a frame of ours has."""
 WIDTHS = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1] + [10**9] * 244, np.float64)
 """Bytes of a number by its type there; impossible for types that are none."""
 
@@ -47,10 +50,13 @@ def read_index(path: Path) -> tuple[int, np.ndarray]:
     return place, entries[entries["location"] != 0]
 
 
-def make_room(path: Path, pending: int) -> None:
-    """See that the disk has room for so many bytes more [B] and for an index twice as long, before GSD writes them.
+def make_room(path: Path, wanted: int, pending: int) -> None:
+    """See that the disk has room for what GSD is about to write: data, and an index that holds it.
 
-    GSD (up to 5.0 at least) goes on after it failed to lengthen its index, and writes entries over the frames.
+    GSD (up to 5.0 at least) goes on after it failed to lengthen its index, and writes entries over the first frames.
+
+    Args:
+        wanted: entries that the index is to hold, at most; pending: bytes [B] of data that wait to be written.
 
     Raises:
         OSError: there is no room.
@@ -59,10 +65,13 @@ def make_room(path: Path, pending: int) -> None:
         return
     file = os.open(path, os.O_RDWR)
     try:
-        head = np.frombuffer(os.pread(file, 24, 0), np.uint64)
+        allocated = int(np.frombuffer(os.pread(file, 24, 0), np.uint64)[2])
+        longer = allocated
+        while longer <= wanted:
+            longer *= 2
         size = os.fstat(file).st_size
         try:
-            os.posix_fallocate(file, size, pending + 4 * int(head[2]) * ENTRY.itemsize + SPARE)
+            os.posix_fallocate(file, size, pending + (longer > allocated) * longer * ENTRY.itemsize + SPARE)
         finally:
             os.ftruncate(file, size)
     finally:
@@ -86,48 +95,57 @@ def refuse_impossible_sizes(path: Path) -> None:
         raise BadInput(f"{path} is not a trajectory of SAND (parts of it lie outside the file)")
 
 
-def mend(path: Path, step: int) -> None:
+def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
     """Drop the first frame after `step` that is not whole, and all that follow; whole ones stay.
 
     A disk that fills up, or a power cut, can leave an index that promises more than there is.
+
+    Returns:
+        Number and check sum of each whole frame after `step`, by its step.
 
     Raises:
         BadInput: it is no trajectory.
     """
     import gsd.hoomd
 
-    place, entries = read_index(path)
+    _, entries = read_index(path)
     torn = entries["frame"][_outside(path, entries)]
     if torn.size:
-        _cut(path, place, entries, int(torn.min()))
+        cut(path, int(torn.min()))
+    whole: dict[int, tuple[int, int]] = {}
     with gsd.hoomd.open(str(path), "r") as file:
         for number in range(_frames_until(file, step), len(file)):
             try:
-                Frame(file[number])
+                stored = file[number]
+                whole[Frame(stored).step] = (number, int(stored.log["crc32"][0]))
             except Exception:  # whatever a broken file makes the reader do
                 break
         else:
-            return
-    _cut(path, place, entries, number)
+            return whole
+    cut(path, number)
+    return whole
 
 
-def _frames_until(file: object, step: int) -> int:
+def _frames_until(file: Any, step: int) -> int:
     """Number of frames up to a step, looked for from the end."""
-    number = len(file)  # type: ignore[arg-type]
+    number = len(file)
     while number > 0:
-        chunk = "configuration/step"
-        there = file.file.chunk_exists(number - 1, chunk)  # type: ignore[attr-defined]
-        if int(file.file.read_chunk(number - 1, chunk)[0]) <= step if there else step >= 0:  # type: ignore[attr-defined]
+        chunk = "configuration/step"  # missing where it is 0
+        there = file.file.chunk_exists(number - 1, chunk)
+        if (int(file.file.read_chunk(number - 1, chunk)[0]) if there else 0) <= step:
             break
         number -= 1
     return number
 
 
-def _cut(path: Path, place: int, entries: np.ndarray, frame: int) -> None:
+def cut(path: Path, frame: int) -> None:
     """Let a file end before a frame: its entries, and those after them, become unused ones."""
-    first = int(np.argmax(entries["frame"] >= frame))
+    place, entries = read_index(path)
+    late = np.flatnonzero(entries["frame"] >= frame)
+    if not late.size:
+        return
     with open(path, "r+b") as file:
-        file.seek(place + first * ENTRY.itemsize)
-        file.write(bytes((len(entries) - first) * ENTRY.itemsize))
+        file.seek(place + int(late[0]) * ENTRY.itemsize)
+        file.write(bytes((len(entries) - int(late[0])) * ENTRY.itemsize))
         file.flush()
         os.fsync(file.fileno())

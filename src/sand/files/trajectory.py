@@ -6,9 +6,10 @@ import contextlib
 import ctypes
 import os
 import time as wall
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -16,10 +17,14 @@ from ..core.box import Box
 from ..core.errors import BadInput, FilesFailed
 from ..core.grains import Grains
 from .frame import Frame, stored_frame
-from .gsd_index import make_room, mend, refuse_impossible_sizes
+from .gsd_index import CHUNKS, cut, make_room, mend, read_index, refuse_impossible_sizes
 
 FLUSH_EVERY = 1.0
 """Seconds of wall time between flushes; GSD buffers, and what is not flushed dies with the process."""
+MOST_WAITING = 50
+"""Frames that wait for a flush at most."""
+DAMAGED = "trajectory-damaged.gsd"
+"""Where a file goes that cannot be gone on with."""
 SINGLE_PER_GRAIN = 64
 """Bytes of a grain in a frame besides what is logged."""
 
@@ -30,32 +35,33 @@ class TrajectoryWriter:
     Args:
         path: of the file; made if missing.
         resume_at: number of the step from which an existing file is gone on with: later frames it holds already are not
-            written twice, but those that are not whole are dropped.
+            written twice, but those that are not whole are dropped, and so is what turns out to be of another history.
 
     Raises:
-        FilesFailed: the file cannot be written; BadInput: an existing file is not a trajectory.
+        FilesFailed: the file cannot be written.
+
+    A file that is beyond mending is moved aside, with a warning: frames are for looking, the checkpoint is what counts.
     """
 
     def __init__(self, path: Path, resume_at: int | None = None):
-        import gsd.hoomd
-
         self.path = path
-        self.last_step = -1
-        self._whole_until = -1  # step of the last flush
+        self._there: dict[int, tuple[int, int]] = {}  # later frames: number and check sum by step
+        self._last = self._whole_until = -1 if resume_at is None else resume_at  # steps: of the last frame, and flush
         self._lost = False  # given up after an error
-        self._pending = 0  # bytes that wait for the next one, about
+        self._waiting = self._pending = 0  # frames that wait for the next flush, and their bytes, about
+        self._entries = 0  # of the index, at most
         self._flushed = wall.monotonic()
-        mode = "w" if resume_at is None or not path.exists() else "r+"
         try:
-            if mode == "r+" and resume_at is not None:
-                mend(path, resume_at)
-            self._file = gsd.hoomd.open(str(path), mode)
-            if mode == "r+" and len(self._file):
-                self.last_step = int(self._file[len(self._file) - 1].configuration.step)
+            if resume_at is not None and path.exists():
+                try:
+                    self._there = mend(path, resume_at)
+                except (BadInput, RuntimeError):
+                    path.replace(path.with_name(DAMAGED))
+                    warnings.warn(f"{path} is beyond mending; it is now {DAMAGED}, and a new one begins", stacklevel=2)
+            self._file = _opened(path, resume_at is not None)
+            self._entries = len(read_index(path)[1])
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
-        except RuntimeError as error:
-            raise BadInput(f"{path} is not a trajectory: {error}") from error
 
     def write(
         self,
@@ -70,17 +76,30 @@ class TrajectoryWriter:
         Raises:
             FilesFailed: the frame could not be written; earlier ones stay.
         """
-        if step <= self.last_step:
-            return
         frame = stored_frame(step, time, grains, box, contacts)
+        if self._is_there(step, int(frame.log["crc32"][0])):
+            return
+        self._waiting, self._entries = self._waiting + 1, self._entries + CHUNKS
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
             self._file.append(frame)
         except OSError as error:
             raise self._given_up(error) from error
-        self.last_step = step
-        if wall.monotonic() - self._flushed > FLUSH_EVERY:
+        self._last = step
+        if wall.monotonic() - self._flushed > FLUSH_EVERY or self._waiting >= MOST_WAITING:
             self.flush()
+
+    def _is_there(self, step: int, code: int) -> bool:
+        """True if the file holds this very frame; if it holds another one, that and all later ones are dropped."""
+        number, stored = self._there.pop(step, (-1, code))
+        if number >= 0 and stored == code:
+            return True
+        others = [place for place, _ in self._there.values()] + [number] * (number >= 0)
+        if others:
+            self._file.close()
+            cut(self.path, min(others))
+            self._there, self._file = {}, _opened(self.path, True)
+        return False
 
     def flush(self, sync: bool = False) -> None:
         """Everything written so far survives a kill, and a power cut if it is to be in `sync` with the disk.
@@ -89,14 +108,14 @@ class TrajectoryWriter:
             FilesFailed: frames since the last flush may be lost; earlier ones stay.
         """
         try:
-            make_room(self.path, self._pending)
+            make_room(self.path, self._entries, self._pending)
             self._file.flush()
             if sync:
                 with open(self.path, "rb") as same:
                     os.fsync(same.fileno())
         except OSError as error:
             raise self._given_up(error) from error
-        self._flushed, self._whole_until, self._pending = wall.monotonic(), self.last_step, 0
+        self._flushed, self._waiting, self._pending, self._whole_until = wall.monotonic(), 0, 0, self._last
 
     def _given_up(self, error: OSError) -> FilesFailed:
         """Let the file go as it is on the disk."""
@@ -116,6 +135,13 @@ class TrajectoryWriter:
     def close(self) -> None:
         """Let the file go."""
         self._file.close()
+
+
+def _opened(path: Path, go_on: bool) -> Any:
+    """The file to be written, from its beginning or its end."""
+    import gsd.hoomd
+
+    return gsd.hoomd.open(str(path), "r+" if go_on and path.exists() else "w")
 
 
 class Frames(Sequence[Frame]):

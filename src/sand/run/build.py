@@ -33,6 +33,8 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     """
     if case.grains.kind == "given":
         raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
+    if case.grains.file is not None and out is not None:
+        _refuse_own_source(Path(case.grains.file), Path(out))
     start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
     simulation = Simulation(
         start.grains,
@@ -48,6 +50,13 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     )
     simulation.recipe, simulation.origin = case.grains.recipe(), start.note
     return simulation
+
+
+def _refuse_own_source(source: Path, out: Path) -> None:
+    """Raises BadInput where a run would write over what it starts from."""
+    own = source if source.is_dir() else source.parent
+    if out.exists() and own.exists() and out.samefile(own):
+        raise BadInput(f"{out} holds the run that grains are taken from; give another folder for the new one")
 
 
 def _of_gas(case: Case) -> Start:
@@ -74,6 +83,10 @@ def _of_file(case: Case) -> Start:
         start = from_trajectory(section.file or "", section.frame, case.materials_by_name())
     except BadInput as error:
         raise error.at("grains") from None
+    told = section.material if isinstance(section.material, list) else [section.material]
+    there = [m.name for m in start.grains.materials]
+    if "material" in section.model_fields_set and set(told) != set(there):
+        raise BadInput(f"grains.material: the file has {', '.join(there)}, not {', '.join(told)}; leave material out")
     if case.box.periodic is not None and not same_box(case.box.periodic, start.box):
         raise BadInput(
             f"box: it is {case.box.periodic.describe()} here, but {start.box.describe()} in {section.file}; "
@@ -99,7 +112,7 @@ def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]
     try:
         start = from_frame(frames[frame], materials)
     except IndexError as error:
-        raise BadInput(str(error)) from None
+        raise BadInput(f"{error}; -1 is the last") from None
     finally:
         frames.close()
     return start._replace(note=f"{place}, {start.note}")
@@ -119,7 +132,7 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
         "until": until,
         "steps": last_step if last_step == float("inf") else int(last_step),
         "frame_every": simulation.frame_every,
-        "seed": simulation.seed or 0,
+        "seed": int(simulation.seed or 0),
     }
     forces = {}
     for force in simulation.forces:
@@ -142,26 +155,29 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
 
 
 def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
-    """The case that a run began with.
+    """The case that a run began with, and in `meta` the end that its case.toml names now.
 
     Raises:
-        BadInput: case.toml has been changed since, in more than its [run].
+        BadInput: case.toml has been changed since, in more than its end.
     """
     path = folder / CASE
     if "case" not in meta:  # of an early development version
         return read_case(path)
-    if path.exists():
-        changed = [
-            name
-            for name, table in {**meta["case"], **read_toml(path)}.items()
-            if name != "run" and meta["case"].get(name, {}) != table
-        ]
-        if changed:
+    begun: dict[str, Any] = meta["case"]
+    there = read_toml(path) if path.exists() else begun
+    ends = {"until", "steps"}
+    for name in {**begun, **there}:
+        old, new = (dict(case.get(name, {})) for case in (begun, there))
+        if name == "run":
+            old, new = ({k: v for k, v in run.items() if k not in ends} for run in (old, new))
+        if old != new:
             raise BadInput(
-                f"{path}: [{changed[0]}] is not what the run began with, and a run cannot change on its way; put it "
-                f"back, or start a new run from the last frame: sand run {path} --from {folder}"
+                f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; put it "
+                f"back, or start a new run from the last frame: sand run CASE.toml --from {folder}"
             )
-    return check_case(meta["case"], f"the case in the checkpoint of {folder}")
+    for name in ends & there["run"].keys():  # an end may be changed
+        meta["last_step" if name == "steps" else name] = there["run"][name]
+    return check_case(there, str(path))
 
 
 def resume(folder: str | Path, **options: Any) -> Simulation:

@@ -11,6 +11,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    PrivateAttr,
     ValidationError,
     ValidationInfo,
     create_model,
@@ -174,10 +175,21 @@ class ForcesSection(Section):
     charges: Charges | None = None
     attraction: Attraction | None = None
     gas: Gas | None = None
+    _order: tuple[str, ...] = PrivateAttr(())
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _in_order(cls, value: Any, handler: Any) -> Any:
+        section = handler(value)
+        if isinstance(value, dict):
+            section._order = tuple(value)
+        return section
 
     def build(self) -> list[Any]:
-        """The forces that are given, in a fixed order."""
-        return [given for key in type(self).model_fields if (given := getattr(self, key)) is not None]
+        """The forces that are given, in the order of the file: sums are added in it."""
+        given = {key: getattr(self, key) for key in type(self).model_fields}
+        order = [*(key for key in self._order if key in given), *given]
+        return [given[key] for key in dict.fromkeys(order) if given[key] is not None]
 
 
 def integrator(value: Any) -> Any:
@@ -263,7 +275,7 @@ def read_case(path: str | Path) -> Case:
     """
     case = check_case(read_toml(path), str(path))
     if case.grains.file is not None:  # as seen from the case file
-        case.grains.file = str((Path(path).parent / case.grains.file).absolute())
+        case.grains.file = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return case
 
 

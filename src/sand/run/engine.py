@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.world import CONTACT_STEP, FAR_SUMS, GRAIN1, GRAIN2, GROWN, LOOKED, MADE, STAGE, STEPS, World
+from ..core.world import CONTACT_STEP, FAR_SUMS, GRAIN1, GRAIN2, GROWN, LOOKED, MADE, MOVED, STAGE, STEPS, World
 from ..forces.base import FarForce, GrainForce
 from ..kernels.cells import FULL, remake_far_list
 from ..kernels.far import shares_for
@@ -83,7 +83,7 @@ class Engine:
         w.count[LOOKED] = w.count[GROWN] = -GROW_EVERY
         w.clock[CONTACT_STEP] = math.inf
         self.advance(-math.inf, 1)
-        w.count[STEPS] = w.count[MADE] = w.count[FAR_SUMS] = 0
+        w.count[STEPS] = w.count[MADE] = w.count[MOVED] = w.count[FAR_SUMS] = 0
         w.lost[:] = 0.0
         w.contacts.lost[:] = 0.0
 

@@ -101,13 +101,16 @@ class Ledger:
         """All rows (K, columns), for a checkpoint; whole numbers below 2⁵³ are exact in it."""
         return np.array([[row[name] for name in self.columns] for row in self.rows], dtype=np.float64)
 
-    def from_array(self, table: np.ndarray) -> None:
-        """Take over the rows of `to_array`.  Raises BadInput if they are not of these columns."""
-        if table.ndim != 2 or table.shape[1] != len(self.columns):
-            raise BadInput(f"the ledger in the checkpoint has shape {table.shape}, not (K, {len(self.columns)})")
-        kinds = [int if name in WHOLE else float for name in self.columns]
+    def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
+        """Take over the rows of `to_array`, whose columns had these names.  Raises BadInput if they are others."""
+        if table.ndim != 2 or table.shape[1] != len(columns) or set(columns) != set(self.columns):
+            raise BadInput(
+                f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
+            )
+        kinds = [int if name in WHOLE else float for name in columns]
+        self.columns = tuple(columns)
         self.rows = [
-            {name: kind(v) for name, kind, v in zip(self.columns, kinds, row, strict=True)} for row in table.tolist()
+            {name: kind(v) for name, kind, v in zip(columns, kinds, row, strict=True)} for row in table.tolist()
         ]
 
     def restore(self, rows: Iterable[dict[str, float]]) -> None:

@@ -73,8 +73,15 @@ class Opened:
         """
         case = read_case(self.folder / files.CASE)
         start = from_frame(self.frames[frame], case.materials_by_name())
-        settings = {"stepping": case.stepping, "neighbours": case.neighbours, "seed": case.run.seed}
-        return Simulation(start.grains, case.forces.build(), box=start.box, contacts=start.contacts, **settings)
+        return Simulation(
+            start.grains,
+            case.forces.build(),
+            box=start.box,
+            contacts=start.contacts,
+            stepping=case.stepping,
+            neighbours=case.neighbours,
+            seed=case.run.seed,
+        )
 
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.

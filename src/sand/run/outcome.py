@@ -25,11 +25,6 @@ class Outcome(Enum):
         """True if the physics stopped the run (exit code 3)."""
         return self not in (Outcome.FINISHED, Outcome.INTERRUPTED)
 
-    @property
-    def keeps_state(self) -> bool:
-        """True if the state at the end is fit to go on from; if not, the newest checkpoint is of an earlier one."""
-        return self not in (Outcome.NOT_FINITE, Outcome.RUNAWAY)
-
 
 OF_STOP = {
     Stop.NOT_FINITE: Outcome.NOT_FINITE,

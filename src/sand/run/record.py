@@ -104,6 +104,7 @@ class Record:
             "temperature": simulation.temperature,
             "choices": simulation.choices,
             "case": files.plain(self._case),
+            "ledger": simulation.ledger.columns,
             "clock": CLOCK,
             "count": COUNT,
             "lost": LOST,
@@ -115,10 +116,9 @@ class Record:
         self._took = self._saved - begun
 
     def rescue(self) -> None:
-        """Keep what can be kept after a file could not be written; a further `run` opens the files anew."""
+        """Keep what can be kept after a file could not be written."""
         if self._trajectory is not None:
             self._trajectory.rescue()
-        self._trajectory, self._resumed, self._ends = None, True, (math.inf, math.inf)
 
     def close(self, simulation: Simulation, result: Result) -> None:
         """Checkpoint, summary and figure; the trajectory stays open for a further `run`."""

@@ -88,7 +88,7 @@ class Simulation:
         self.origin = ""  # what is to be said of where the grains came from
         self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
         self.start = grains.copy()
-        parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, self.seed or 0)
+        parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, int(self.seed or 0))
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
         self.stepping = self._engine.stepping
         self.world = self._engine.world
@@ -98,13 +98,14 @@ class Simulation:
         self.record = Record(out, overwrite, resumed=restart is not None) if out is not None else None
         self.wall_seconds = 0.0
         self._begun = restart is not None
+        self._broken = ""  # why it cannot be run any further
         if restart is not None:
             arrays, meta = restart
             self._engine.take_up(arrays)
             self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
             self._chosen = meta.get("choices", {})
             if "ledger" in arrays:
-                self.ledger.from_array(arrays["ledger"])
+                self.ledger.from_array(arrays["ledger"], meta["ledger"])
             elif self.record:
                 self.ledger.restore(self.record.earlier_rows(self.world.steps))
         for text in self._engine.warnings:
@@ -178,6 +179,8 @@ class Simulation:
             FilesFailed: the disk is full, the folder has vanished, …; what was written before stays whole.
             Interrupted: Ctrl-C or SIGTERM; the checkpoint is written before.
         """
+        if self._broken:
+            raise BadInput(f"this simulation cannot go on: {self._broken}")
         end = math.inf if until is None else si(until, "s", "until")
         last = math.inf if steps is None else self.world.steps + _whole_steps(steps)
         if until is None and steps is None:
@@ -199,9 +202,10 @@ class Simulation:
                 finally:
                     self.wall_seconds += wall.monotonic() - begun
             return self._close(outcome)
-        except FilesFailed:
+        except FilesFailed as error:
             if self.record:
                 self.record.rescue()
+            self._broken = f"its files could not be written ({error}); go on with sand.resume, or start again"
             raise
 
     def view(self) -> Any:

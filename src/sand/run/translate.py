@@ -125,13 +125,16 @@ def _seed(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> se
         raise BadInput(f"contacts have shapes {shapes}; they must be (C, 2), (C, 3), (C, 3), (C,)")
     if pair.min() < 0 or pair.max() >= count or (pair[:, 0] == pair[:, 1]).any():
         raise BadInput(f"contacts name grains that are not there; grains are 0 to {count - 1}, two different ones each")
+    held = {tuple(sorted(two)) for two in pair.tolist()}
+    if len(held) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
+        raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
     wrong = engine.seed(pair, contacts.slide, contacts.roll, contacts.twist)
     if wrong >= 0:
         i, j = pair[wrong]
         raise BadInput(
             f"the contact of grains {i} and {j} is stretched beyond its break; these materials and radii do not hold it"
         )
-    return {tuple(sorted(two)) for two in pair.tolist()}
+    return held
 
 
 def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:

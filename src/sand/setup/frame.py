@@ -59,6 +59,9 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
             f"the frame has grains of '{unknown[0]}', which is no known material; describe it in "
             f"[materials.{unknown[0]}]; {did_you_mean(unknown[0], list(materials))}"
         )
+    for name in ("position", "velocity", "spin", "moment", "overlap"):
+        if not np.isfinite(getattr(frame, name)).all():
+            raise BadInput(f"step {frame.step}: {name} has numbers that are not finite; take an earlier frame")
     pair = np.asarray(frame.pair, dtype=np.int64)
     position = healed(frame.position, frame.radius, frame.box, pair, frame.overlap)
     blank = Grains(position, frame.radius, [materials[frame.materials[k]] for k in frame.material])
@@ -97,35 +100,40 @@ def healed(position: np.ndarray, radius: np.ndarray, box: Box, pair: np.ndarray,
         BadInput: there are no such positions within 1e-3 of a radius.
     """
     unit = float(radius.mean())
-    place, fixed = position / unit, {tuple(sorted(p)) for p in pair.tolist()}
-    size = radius / unit
-    held, target = pair, size[pair].sum(axis=1) - overlap / unit
-    tolerance = 64.0 * np.finfo(float).eps * max(1.0, float(np.abs(place).max()))
+    begun, size = position / unit, radius / unit
+    place, known = begun, {tuple(sorted(p)) for p in pair.tolist()}
+    apart_by = np.zeros((0, 2), dtype=np.int64)  # pairs that single precision brought to touch
     room = Box(tuple(None if v is None else v / unit for v in box.lengths))  # type: ignore[arg-type]
+    rounding = float(np.abs(begun).max())
+    tolerance = 64.0 * np.finfo(float).eps * max(1.0, rounding)
+    wanted = size[pair].sum(axis=1) - overlap / unit
     for _ in range(ROUNDS):
-        touching = [p for p in _overlapping(place, size, room) if tuple(sorted(p)) not in fixed]
-        if touching:
-            fixed |= {tuple(sorted(p)) for p in touching}
-            held = np.concatenate([held, np.array(touching)])
-            target = np.concatenate([target, size[np.array(touching)].sum(axis=1) * (1.0 + APART)])
-        if not len(held):
+        touching = [p for p in _overlapping(place, size, room) if tuple(sorted(p)) not in known]
+        known |= {tuple(sorted(p)) for p in touching}
+        apart_by = np.concatenate([apart_by, np.array(touching, dtype=np.int64).reshape(-1, 2)])
+        held = np.concatenate([pair, apart_by])
+        lacking, n = _lacking(place, held, np.concatenate([wanted, size[apart_by].sum(axis=1)]), room)
+        free = np.arange(len(held)) >= len(pair)
+        # of what must not touch, only what does is pushed, and a hair further than needed
+        lacking = np.where(free, np.where(lacking >= 0.0, lacking + max(APART, 4.0 * tolerance), 0.0), lacking)
+        if not len(held) or np.abs(lacking).max() <= tolerance:
             break
-        apart = room.nearest(place[held[:, 0]] - place[held[:, 1]])
-        distance = np.linalg.norm(apart, axis=1)
-        lacking = target - distance
-        if np.abs(lacking).max() <= tolerance:
-            break
-        place = place + _least_shift(held, apart / distance[:, None], lacking, len(place))
+        use = ~free | (lacking > 0.0)
+        place = place + _least_shift(held[use], n[use], lacking[use], len(place))
     else:
-        worst = int(np.abs(lacking).argmax())
-        raise BadInput(
-            f"the overlap of grains {held[worst, 0]} and {held[worst, 1]} does not fit their positions; "
-            "the frame is damaged"
-        )
-    if np.abs(place - position / unit).max() > 1e-3:
+        i, j = held[int(np.abs(lacking).argmax())]
+        raise BadInput(f"the overlap of grains {i} and {j} does not fit their positions; the frame is damaged")
+    if np.abs(place - begun).max() > max(1e-3, 64.0 * SINGLE * rounding):
         raise BadInput("the overlaps of the frame do not fit its positions; it is damaged, or not of SAND")
     # what needs no mending is not to be rounded either
-    return np.where(place == position / unit, position, place * unit)
+    return np.where(place == begun, position, place * unit)
+
+
+def _lacking(place: np.ndarray, pair: np.ndarray, wanted: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray]:
+    """What each pair's distance (C,) lacks, and its direction (C, 3)."""
+    apart = box.nearest(place[pair[:, 0]] - place[pair[:, 1]])
+    distance = np.linalg.norm(apart, axis=1)
+    return wanted - distance, apart / distance[:, None]
 
 
 def _overlapping(place: np.ndarray, size: np.ndarray, box: Box) -> list[tuple[int, int]]:
