@@ -39,7 +39,7 @@ class Kernel:
     degree: float | None = None
 
     def __call__(self, mass1: Any, mass2: Any) -> Any:
-        """K [m³/s], of the shape that the masses [kg] have together.  Raises BadInput for a mass that is not above 0."""
+        """K [m³/s], of the shape that the masses [kg] have together.  Raises BadInput for masses not above 0."""
         first, second = np.asarray(mass1, float), np.asarray(mass2, float)
         if not (first > 0.0).all() or not (second > 0.0).all():
             raise BadInput("masses must be above 0 kg")
@@ -107,8 +107,8 @@ def mean_speed(mass: Any, temperature: Any) -> float:
 def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 2.0) -> Kernel:
     """K = π r² (N1^(1/D) + N2^(1/D))² √(8k_B T/(π m̄)): clusters of radius r N^(1/D) in free molecular flow.
 
-    η = 2/D and ν = −1/2 of Eq. 20: z = 2 for D = 2, 6/5 for compact ones.  Below D = 2 it is an upper bound: the clusters are
-    more transparent than the spheres around them.
+    η = 2/D and ν = −1/2 of Eq. 20: z = 2 for D = 2, 6/5 for compact ones.  Below D = 2 it is an upper bound: the
+    clusters are more transparent than the spheres around them.
 
     Args:
         radius: r of a grain [m] > 0.
