@@ -24,15 +24,14 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Ker
     """K = σ v of any two masses, from some.
 
     Args:
-        rows: (m1, m2, σ, v) each, in kg, kg, m², m/s, all above 0, in either order of the masses; at least three that do
-            not lie on a line in (ln m1 + ln m2, |ln m1 − ln m2|), e.g. two masses and all three pairs of them.  σ and v as
-            `scattering.cross_section` gives them: `(m1, m2, found.sigma, found.speed)` where the target is at rest, or
-            moves by chance (then σ v is the mean of σ(u) u).
+        rows: (m1, m2, σ, v) each, in kg, kg, m², m/s, all above 0, in either order of the masses: at least two masses
+            and all three pairs of them.  `(m1, m2, found.sigma, found.speed)` of what `scattering.cross_section` found
+            where the target is at rest, or moves by chance (then σ v is the mean of σ(u) u).
         extrapolate: beyond the measured masses go on as the power law that fits all rows best; else refuse.
 
     Raises:
-        BadInput: rows that are no such rows, contradict each other, or do not span a range of masses; when called, for masses
-            beyond it.
+        BadInput: rows that are no such rows, contradict each other, or do not span a range of masses; when called, for
+            masses beyond it.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
@@ -91,7 +90,10 @@ def write_csv(path: str | Path, kernel: Rate, masses: Any) -> None:
 
 
 def write_cgs(path: str | Path, kernel: Rate, masses: Any) -> None:
-    """Plain text for `numpy.loadtxt`: masses (K,) [g] in the first row, then K (K, K) [cm³/s].  Arguments as `write_csv`."""
+    """Plain text for `numpy.loadtxt`: masses (K,) [g] in the first row, then K (K, K) [cm³/s].
+
+    Arguments and errors as for `write_csv`.
+    """
     m, table = _masses(masses), on_grid(kernel, masses)
     lines = ["# collision kernel; first row: masses m_j [g]; row 1 + i: K(m_i, m_j) [cm^3/s]"]
     lines += [" ".join(repr(float(v)) for v in row) for row in [m * GRAM, *(table * CUBIC_CM)]]
@@ -99,7 +101,7 @@ def write_cgs(path: str | Path, kernel: Rate, masses: Any) -> None:
 
 
 def for_dustpy(table: Any, scale_heights: Any) -> np.ndarray:
-    """What DustPy's `dust.kernel` holds: ∫ n1 n2 K dz/(N1 N2) = K/√(2π(H1² + H2²)) [cm²/s], pairs of equals counted half.
+    """What DustPy's `dust.kernel` holds: ∫ n1 n2 K dz/(N1 N2) = K/√(2π(H1² + H2²)) [cm²/s], half of it for equals.
 
     DustPy integrates over the height of a disk of Gaussian layers, sums over pairs j ≤ i, and takes the ½ of two equal
     masses into the kernel.
@@ -116,9 +118,7 @@ def for_dustpy(table: Any, scale_heights: Any) -> np.ndarray:
     """
     k, height = np.asarray(table, float), np.asarray(scale_heights, float)
     if height.ndim != 2 or k.shape != (height.shape[1], height.shape[1]) or not (height > 0.0).all():
-        raise BadInput(
-            f"a table of shape {k.shape} and heights of {height.shape} do not fit: (Nm, Nm), (Nr, Nm) above 0"
-        )
+        raise BadInput(f"table {k.shape} and scale heights {height.shape} must be (Nm, Nm) and (Nr, Nm), these above 0")
     squares = height**2
     found = k * (1.0 - 0.5 * np.eye(len(k))) / np.sqrt(2.0 * np.pi * (squares[:, :, None] + squares[:, None, :]))
     found[[0, -1]] = 0.0

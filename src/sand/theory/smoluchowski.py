@@ -2,8 +2,9 @@
 
     dn_k/dt = ½ Σ_{i+j=k} K_ij n_i n_j − n_k Σ_j K_kj n_j
 
-Clusters have sizes x_k, in grains.  Where all sums of sizes are sizes the equation is solved as it stands; on any other grid
-a sum between two sizes is shared so that number and mass are kept (Kovetz & Olund 1969, as Brauer et al. 2008 use it).
+Clusters have sizes x_k, in grains.  Where all sums of sizes are sizes the equation is solved as it stands; on any
+other grid a sum between two sizes is shared so that number and mass are kept (Kovetz & Olund 1969, as Brauer et al.
+2008 use it).
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class Growth:
             BadInput: fewer than three outputs there, or S grows faster than any power.
         """
         size, faster = np.log10(self.mean_size), self.rate > 0.0
-        late = faster & (size >= size[-1] - si(decades, "1", "decades", above=0.0))
+        late = faster & (size >= size.max(initial=0.0) - si(decades, "1", "decades", above=0.0))
         if late.sum() < 3:
             raise BadInput(
                 f"{late.sum()} outputs in the last {decades:g} decades of S; give more times, or more decades"
@@ -128,8 +129,8 @@ def coagulate(
         mass: of a grain [kg] > 0.
         until_size: the mean size S > 0 at which to stop; None: never.
         may_lose: part of the mass that may leave through the top of the grid, above 0, below 1; beyond it all ends.
-        accuracy: error of a step over n_k, 1e-12 … 1e-2; what holds less than 1e-4 of it of the grains, divided by x, is
-            held to that instead, so that the tail cannot spoil S.
+        accuracy: error of a step over n_k, 1e-12 … 1e-2; but no better than 1e-4 of it of all grains, divided by x_k,
+            so that the far tail can neither spoil S nor hold up the rest.
         method: "BDF", implicit, for any kernel: small clusters that meet large ones make the equation stiff; "DOP853",
             explicit, many times faster for hundreds of sizes and growth by a few decades.
 
@@ -172,14 +173,15 @@ def coagulate(
             f"the growth of clusters cannot be integrated beyond {done.t[-1] * clock:.3g} s: {done.message}"
         )
     outcome = FULL if done.status == 0 else LEFT if len(done.t_events[0]) else LARGE
-    return _told(system, done.y, t[: done.y.shape[1]], grains, clock, grain, outcome)
+    reached = np.reshape(done.y, (len(begin), -1))  # SciPy gives an empty list where no output was reached
+    return _told(system, reached, t[: reached.shape[1]], grains, clock, grain, outcome)
 
 
 def _told(
     system: _System, y: np.ndarray, times: np.ndarray, grains: float, clock: float, grain: float, outcome: str
 ) -> Growth:
     x, parts = system.sizes, y[:-1].T
-    changes = np.array([system.change(0.0, column)[:-1] for column in y.T]).reshape(parts.shape)
+    changes = np.reshape([system.change(0.0, column)[:-1] for column in y.T], parts.shape)
     held = parts.sum(axis=1)
     mean = parts @ x / held
     rate = (changes @ x - mean * changes.sum(axis=1)) / held / clock
