@@ -249,19 +249,28 @@ def _room(name: str, room: types.ModuleType) -> list[str]:
     if getattr(room, "__all__", None):
         for member in room.__all__:
             thing = getattr(room, member)
+            if isinstance(thing, types.ModuleType):
+                out += _local(f"{name}.{member}", thing)
+                continue
             out += [f"### `{name}.{member}`", f"```python\n{wrapped(signature(thing, f'{name}.{member}'))}\n```"]
             out += [markdown(thing.__doc__)]
         return out
     for info in pkgutil.iter_modules(room.__path__):
-        module = importlib.import_module(f"{room.__name__}.{info.name}")
-        for member, thing in vars(module).items():
-            local = getattr(thing, "__module__", None) == module.__name__
-            if member.startswith("_") or not local or not thing.__doc__ or not callable(thing):
-                continue
-            if re.match(_WRITERS, member):
-                continue
-            full = f"{name}.{info.name}.{member}"
-            out += [f"### `{full}`", f"```python\n{wrapped(signature(thing, member))}\n```", markdown(thing.__doc__)]
+        out += _local(f"{name}.{info.name}", importlib.import_module(f"{room.__name__}.{info.name}"))
+    return out
+
+
+def _local(name: str, module: types.ModuleType) -> list[str]:
+    """The documented functions and classes that a module of a room has itself."""
+    out: list[str] = []
+    for member, thing in vars(module).items():
+        local = getattr(thing, "__module__", None) == module.__name__
+        if member.startswith("_") or not local or not thing.__doc__ or not callable(thing):
+            continue
+        if re.match(_WRITERS, member):
+            continue
+        full = f"{name}.{member}"
+        out += [f"### `{full}`", f"```python\n{wrapped(signature(thing, member))}\n```", markdown(thing.__doc__)]
     return out
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-MODULES = ("chain_impact", "collision", "maps", "scattering")
+MODULES = ("chain_impact", "collision", "kernel_table", "maps", "scattering")
 """What there is to be used; the other modules serve these and the command line."""
 
 

@@ -1,5 +1,6 @@
 """Closed forms: what one can know without running anything."""
 
+from . import kinetics, smoluchowski
 from .contact import ContactNumbers, contact
 from .growth import (
     Exponents,
@@ -10,6 +11,7 @@ from .growth import (
     dynamic_exponent,
     growth_exponents,
     mean_size,
+    squared_exponent,
 )
 from .magnetic import (
     barrier,
@@ -44,9 +46,12 @@ __all__ = [
     "geometric_cross_section",
     "growth_exponents",
     "interaction_radius",
+    "kinetics",
     "lowest_energy",
     "mean_size",
     "potential_parameter",
     "reduced_mass",
+    "smoluchowski",
+    "squared_exponent",
     "thermal_speed",
 ]

@@ -1,0 +1,298 @@
+"""Smoluchowski's equation against exact solutions and power laws; kernels, their tables, and what DustPy takes."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand import theory
+from sand.experiments import kernel_table
+from sand.theory import growth, kinetics, smoluchowski
+from sand.theory.smoluchowski import all_sizes, coagulate, log_sizes
+
+R = 1e-8
+MASS = sand.IRON.density * 4.0 / 3.0 * math.pi * R**3
+MOMENT = 200.0 * MASS
+DENSITY = 1e18
+RATE = 1e-14
+TAU = 2.0 / (RATE * DENSITY)
+
+
+def solved(kernel, sizes, times, **options):
+    return coagulate(kernel, sizes, DENSITY, times, mass=MASS, **options)
+
+
+def measured_z(kernel, per_decade=6, largest=1e11):
+    """z over the last two decades of S below a thousandth of the largest size."""
+    times = np.geomspace(0.1, 1e40, 2000) * 2.0 / (kernel(MASS, MASS) * DENSITY)
+    sizes = log_sizes(largest, per_decade)
+    grown = solved(kernel, sizes, times, until_size=1e-3 * largest, accuracy=1e-6)
+    assert grown.outcome == smoluchowski.LARGE
+    return grown.exponent(2.0)
+
+
+def test_constant_kernel_against_the_exact_solution():
+    """n_k = n0 T^(k−1)/(1+T)^(k+1), T = t/τ, τ = 2/(K n0); dM2/dt = K M1² makes S = 1 + 2T, dS/dt = 2/τ.
+
+    Asked for: 1e-4 of n0.  Sums of sizes are sizes, so only the integrator errs (1e-8 a step), and what left the grid:
+    e^(−300/5) of n0 at T = 5.
+    """
+    sizes, scaled = all_sizes(300), np.array([0.1, 0.5, 1.0, 2.0, 5.0])
+    grown = solved(kinetics.constant(RATE), sizes, scaled * TAU, method="DOP853")
+    exact = np.exp((sizes - 1) * np.log(scaled)[:, None] - (sizes + 1) * np.log1p(scaled)[:, None])
+    assert np.abs(grown.numbers / DENSITY - exact).max() < 1e-9
+    assert grown.mean_size == pytest.approx(1 + 2 * scaled, rel=1e-9, abs=0.0)
+    assert grown.rate == pytest.approx(np.full(5, 2 / TAU), rel=1e-9, abs=0.0)
+    assert grown.slope == pytest.approx(2 * scaled / (1 + 2 * scaled), rel=1e-9, abs=0.0)
+    assert grown.outcome == smoluchowski.FULL
+    implicit = solved(kinetics.constant(RATE), all_sizes(100), scaled[:3] * TAU, method="BDF")
+    assert np.abs(implicit.numbers / DENSITY - exact[:3, :100]).max() < 1e-7
+
+
+def test_additive_kernel_against_golovin():
+    """n_k = n0 (1−φ) (kφ)^(k−1) e^(−kφ)/k!, φ = 1 − e^(−T), T = b n0 t, and S = e^(2T), for K = b(N1 + N2).
+
+    Tolerance: 1e-8 a step; at T = 0.5 the 300 sizes hold all but 1e-10.
+    """
+    sizes, scaled = all_sizes(300), np.array([0.1, 0.3, 0.5])
+    grown = solved(kinetics.additive(RATE, MASS), sizes, scaled * TAU / 2, method="DOP853")
+    phi = -np.expm1(-scaled)[:, None]
+    factorial = np.array([math.lgamma(k + 1) for k in sizes])
+    exact = (1 - phi) * np.exp((sizes - 1) * np.log(sizes * phi) - sizes * phi - factorial)
+    assert np.abs(grown.numbers / DENSITY - exact).max() < 1e-9
+    assert grown.mean_size == pytest.approx(np.exp(2 * scaled), rel=1e-6, abs=0.0)
+
+
+def test_product_kernel_is_stopped_at_its_gel():
+    """S = 1/(1 − T), T = c n0 t, infinite at T = 1 for K = c N1N2: the grid is left before, and said so."""
+    grown = solved(kinetics.product(RATE, MASS), all_sizes(300), np.linspace(0.0, 2.0, 21) * TAU / 2, method="DOP853")
+    assert grown.outcome == smoluchowski.LEFT
+    scaled = 2 * grown.times / TAU
+    assert 0.5 < scaled[-1] < 1.0
+    assert grown.mean_size == pytest.approx(1 / (1 - scaled), rel=1e-3, abs=0.0)
+
+
+@pytest.mark.parametrize("sizes", [all_sizes(60), log_sizes(1e4, 7), np.array([1.0, 3.5, 4.0, 9.0, 40.0, 1e3])])
+def test_mass_is_kept_to_rounding(sizes):
+    """Σ x_k n_k + what left = n0, whatever the grid: each pair gives what it takes (1e-13: 1e3 steps of rounding)."""
+    for kernel in (kinetics.constant(RATE), kinetics.brownian(R, MASS, 100.0)):
+        unit = 2.0 / (kernel(MASS, MASS) * DENSITY)
+        grown = solved(kernel, sizes, np.array([1.0, 30.0, 1e3]) * unit, may_lose=0.999)
+        assert (grown.mass + grown.lost) / (MASS * DENSITY) == pytest.approx(
+            np.ones(len(grown.times)), rel=1e-13, abs=0
+        )
+        assert (grown.numbers @ sizes) * MASS == pytest.approx(grown.mass, rel=1e-13, abs=0.0)
+
+
+def test_numbers_are_kept_by_sharing():
+    """N = n0/(1 + T) for a constant kernel on any grid: a sum shared by two sizes is one cluster (1e-6: steps)."""
+    scaled = np.array([1.0, 10.0, 100.0])
+    grown = solved(kinetics.constant(RATE), log_sizes(1e5, 6), scaled * TAU)
+    assert grown.numbers.sum(axis=1) / DENSITY == pytest.approx(1 / (1 + scaled), rel=1e-6, abs=0.0)
+
+
+def test_the_grid_errs_by_the_square_of_its_spacing():
+    """S on a logarithmic grid is too large, by a factor of 4 less on one twice as fine (2.6 % at 10 per decade)."""
+    off = []
+    for per_decade in (10, 20, 40):
+        grown = solved(kinetics.constant(RATE), log_sizes(2e4, per_decade), [100 * TAU], accuracy=1e-7)
+        off.append(grown.mean_size[0] / 201.0 - 1.0)
+    assert off[0] == pytest.approx(0.026, rel=0.1, abs=0.0)
+    assert 3.0 < off[0] / off[1] < 5.0 and 3.0 < off[1] / off[2] < 5.0
+
+
+@pytest.mark.parametrize(("eta", "nu"), [(0.0, -0.5), (0.5, -0.5), (0.8, -0.5), (1.0, -0.5), (0.5, 0.0)])
+def test_z_from_the_exponents(eta, nu):
+    """z = 1/(1 − η − ν) (Eq. 20) to 1 %, which is asked for, at λ = −0.5, 0, 0.3, 0.5, 0.5.
+
+    A logarithmic grid looks the same from each of its sizes, so z has no error of the grid.
+    """
+    kernel = kinetics.power(RATE, MASS, eta, nu)
+    assert kernel.degree == eta + nu
+    assert measured_z(kernel) == pytest.approx(theory.dynamic_exponent(eta, nu), rel=1e-3, abs=0.0)
+
+
+@pytest.mark.parametrize(("reading", "speed"), [("paper", "impact"), ("mass", "impact"), ("aligned", "thermal")])
+def test_z_of_magnetic_growth(reading, speed):
+    """3.31, 2.17 and, with a thermal speed, 1.52, to 1 %; with the exponents of `growth_exponents`."""
+    kernel = kinetics.capture(R, MASS, MOMENT, 100.0, reading=reading, speed=speed)
+    exponents = growth.growth_exponents(reading=reading)
+    degree = exponents.eta + (exponents.nu if speed == "impact" else -0.5)
+    assert kernel.degree == pytest.approx(degree, rel=1e-12, abs=0.0)
+    assert measured_z(kernel) == pytest.approx(1 / (1 - degree), rel=2e-3, abs=0.0)
+
+
+def test_z_of_33_is_out_of_reach():
+    """λ = 0.97: at S = 1e8 z is still some 20 % low, since the mass of small clusters falls as S^(λ−1) only."""
+    aligned = measured_z(kinetics.capture(R, MASS, MOMENT, 100.0, reading="aligned"))
+    assert 22.0 < aligned < 30.0
+
+
+def test_kernels_are_those_of_the_closed_forms():
+    """K of two grains is σ v: π(2r)²⟨v⟩; Eq. 14 at m̄v² = k_BT times √(2α/(m̄d³)), or ⟨σv⟩; to rounding."""
+    reduced, heat = theory.reduced_mass(MASS), sand.core.constants.BOLTZMANN * 100.0
+    brownian = theory.geometric_cross_section(R) * kinetics.mean_speed(reduced, 100.0)
+    assert kinetics.brownian(R, MASS, 100.0)(MASS, MASS) == pytest.approx(brownian, rel=1e-12, abs=0.0)
+    thermal = math.sqrt(heat / reduced)
+    sigma = theory.capture_cross_section(MOMENT, reduced, thermal)
+    impact = math.sqrt(-2.0 * theory.lowest_energy(MOMENT, 2 * R) / reduced)
+    made = kinetics.capture(R, MASS, MOMENT, 100.0, c=0.85)
+    assert made(MASS, MASS) == pytest.approx(0.85 * sigma * impact, rel=1e-12, abs=0.0)
+    # Maxwell's distribution by quadrature: a referee for the Γ functions
+    v = (np.arange(200000) + 0.5) * (12.0 * thermal / 200000)
+    weight = v**2 * np.exp(-0.5 * (v / thermal) ** 2)
+    sigmas = sigma * (v / thermal) ** (-4.0 / 3.0)
+    mean = float((weight * sigmas * v).sum() / weight.sum())
+    slow = kinetics.capture(R, MASS, MOMENT, 100.0, reading="aligned", speed="thermal")
+    assert slow(MASS, MASS) == pytest.approx(mean, rel=1e-6, abs=0.0)
+    # moments of unequal clusters as in Eq. 16
+    moments = [theory.aggregate_moment(MOMENT, n) for n in (8, 50)]
+    both = theory.reduced_mass(8 * MASS, 50 * MASS)
+    unequal = theory.capture_cross_section(moments[0], both, math.sqrt(heat / both), moments[1])
+    unequal *= math.sqrt(-2.0 * theory.lowest_energy(moments[0], 2 * R, moments[1]) / both)
+    aligned = kinetics.capture(R, MASS, MOMENT, 100.0, reading="aligned")
+    assert aligned(8 * MASS, 50 * MASS) == pytest.approx(unequal, rel=1e-12, abs=0.0)
+
+
+def test_kernels_are_symmetric_and_homogeneous():
+    """K(m1, m2) = K(m2, m1), K(am1, am2) = a^λ K(m1, m2), to rounding."""
+    m1, m2 = MASS * np.array([1.0, 2.0, 7.5]), MASS * np.array([3.0, 2.0, 1e5])
+    for kernel in (
+        kinetics.constant(RATE),
+        kinetics.additive(RATE, MASS),
+        kinetics.product(RATE, MASS),
+        kinetics.power(RATE, MASS, 0.7, -0.2),
+        kinetics.brownian(R, MASS, 100.0, 1.4),
+        *(
+            kinetics.capture(R, MASS, MOMENT, 100.0, reading=r, speed=s)
+            for r in growth.READINGS
+            for s in kinetics.SPEEDS
+        ),
+    ):
+        assert kernel(m1, m2) == pytest.approx(kernel(m2, m1), rel=1e-14, abs=0.0)
+        assert kernel(9 * m1, 9 * m2) == pytest.approx(9**kernel.degree * kernel(m1, m2), rel=1e-13, abs=0.0)
+
+
+def rows_of(kernel, masses):
+    return [(a, b, kernel(a, b) / 0.3, 0.3) for a in masses for b in masses if a <= b]
+
+
+def test_measured_rows_become_the_kernel():
+    """Between measured masses ln K is linear: a product of powers comes out exactly, another within its curvature."""
+    product = kinetics.product(RATE, MASS)
+    known = kernel_table.measured(rows_of(product, MASS * np.array([1.0, 8.0, 64.0])))
+    m = MASS * np.geomspace(1.0, 64.0, 7)
+    assert kernel_table.on_grid(known, m) == pytest.approx(kernel_table.on_grid(product, m), rel=1e-9, abs=0.0)
+    brownian = kinetics.brownian(R, MASS, 100.0)
+    known = kernel_table.measured(rows_of(brownian, MASS * 2.0 ** np.arange(7)))
+    table = kernel_table.on_grid(known, m)
+    assert table == pytest.approx(kernel_table.on_grid(brownian, m), rel=0.03, abs=0.0)
+    # where triangles on either side of the diagonal are cut another way (here by 6 %), the order must not matter
+    coarse = kernel_table.measured(rows_of(brownian, MASS * 10 ** np.linspace(0.0, 2.0, 6)))
+    table = kernel_table.on_grid(coarse, MASS * np.geomspace(1.0, 100.0, 13))
+    assert (table == table.T).all()
+
+
+def test_beyond_what_was_measured():
+    """Refused; if asked for, the power law goes on, exactly where K is one, and without a jump at the edge."""
+    product = kinetics.product(RATE, MASS)
+    rows = rows_of(product, MASS * np.array([1.0, 8.0, 64.0]))
+    with pytest.raises(sand.BadInput, match="extrapolate=True"):
+        kernel_table.measured(rows)(MASS, 65 * MASS)
+    longer = kernel_table.measured(rows, extrapolate=True)
+    assert longer(0.1 * MASS, 1e3 * MASS) == pytest.approx(product(0.1 * MASS, 1e3 * MASS), rel=1e-9, abs=0.0)
+    curved = kernel_table.measured(
+        rows_of(kinetics.brownian(R, MASS, 100.0), MASS * 4.0 ** np.arange(4)), extrapolate=True
+    )
+    assert curved(MASS, 64.01 * MASS) == pytest.approx(curved(MASS, 63.99 * MASS), rel=1e-3, abs=0.0)
+    grown = solved(curved, log_sizes(1e4, 8), [1e-3], until_size=10.0)
+    assert grown.mean_size[-1] >= 1.0
+
+
+def test_tables_are_written_and_read(tmp_path):
+    """Numbers to the last bit; g and cm³/s in the plain text."""
+    kernel, m = kinetics.brownian(R, MASS, 100.0), MASS * 2.0 ** np.arange(4)
+    kernel_table.write_csv(tmp_path / "k.csv", kernel, m)
+    read = np.genfromtxt(tmp_path / "k.csv", delimiter=",", names=True)
+    assert read.dtype.names == ("mass1", "mass2", "kernel") and len(read) == 10
+    assert (kernel(read["mass1"], read["mass2"]) == read["kernel"]).all()
+    kernel_table.write_cgs(tmp_path / "k.txt", kernel, m)
+    masses, *table = np.loadtxt(tmp_path / "k.txt")
+    assert masses == pytest.approx(1e3 * m, rel=1e-15, abs=0.0)
+    assert np.array(table) == pytest.approx(1e6 * kernel_table.on_grid(kernel, m), rel=1e-15, abs=0.0)
+
+
+def test_what_dustpy_takes():
+    """DustPy's own kernel, (1 − δ/2) π(a_i + a_j)² v/√(2π(H_i² + H_j²)), written out; 0 at the two ends in radius.
+
+    Checked by integral, too: ∫ of two Gaussian layers' densities times K over the height.
+    """
+    size, speed, height = np.array([1.0, 2.0, 4.0]), 3.0, np.array([[9.0, 9.0, 9.0], [5.0, 4.0, 2.0], [9.0, 9.0, 9.0]])
+    table = np.pi * (size[:, None] + size) ** 2 * speed
+    found = kernel_table.for_dustpy(table, height)
+    assert found.shape == (3, 3, 3) and not found[[0, 2]].any()
+    z = np.linspace(-60.0, 60.0, 200001)
+    for i in range(3):
+        for j in range(3):
+            a, b = height[1, i], height[1, j]
+            layers = np.exp(-0.5 * (z / a) ** 2 - 0.5 * (z / b) ** 2) / (2 * np.pi * a * b)
+            share = 0.5 if i == j else 1.0
+            assert found[1, i, j] == pytest.approx(
+                share * table[i, j] * layers.sum() * (z[1] - z[0]), rel=1e-6, abs=0.0
+            )
+
+
+def grow(**changed):
+    given = {"kernel": kinetics.constant(RATE), "sizes": all_sizes(9), "numbers": DENSITY, "times": [TAU], "mass": MASS}
+    given |= changed
+    return coagulate(given.pop("kernel"), given.pop("sizes"), given.pop("numbers"), given.pop("times"), **given)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: kinetics.constant("1 m"), "rate"),
+        (lambda: kinetics.power(RATE, 0.0, 1, 0), "mass"),
+        (lambda: kinetics.brownian(R, MASS, 100.0, 3.5), "fractal_dimension"),
+        (lambda: kinetics.capture(R, MASS, MOMENT, 100.0, speed="termal"), "did you mean 'thermal'"),
+        (lambda: kinetics.capture(R, MASS, MOMENT, 100.0, reading="x"), "reading"),
+        (lambda: kinetics.capture(R, MASS, 0.0, 100.0), "moment"),
+        (lambda: kinetics.constant(RATE)(MASS, [0.0]), "above 0 kg"),
+        (lambda: all_sizes(5000), "log_sizes"),
+        (lambda: log_sizes(1e9, 3), "per_decade"),
+        (lambda: grow(sizes=[2.0, 1.0]), "rise"),
+        (lambda: grow(sizes=[0.5, 1.0]), "begin at 1"),
+        (lambda: grow(numbers=[1.0, 2.0]), "one for each size"),
+        (lambda: grow(numbers="many"), "must be numbers"),
+        (lambda: grow(times=[2.0, 1.0]), "times"),
+        (lambda: grow(times=[float("nan")]), "finite"),
+        (lambda: grow(mass="1 m"), "mass"),
+        (lambda: grow(until_size=-1.0), "until_size"),
+        (lambda: grow(may_lose=1.0), "may_lose"),
+        (lambda: grow(accuracy=1.0), "accuracy"),
+        (lambda: grow(method="bdf"), "method"),
+        (lambda: grow(kernel=lambda a, b: a + 0 * b), "symmetric"),
+        (lambda: grow(kernel=lambda a, b: -a - b), "at least 0"),
+        (lambda: grow(kernel=lambda a, b: 1.0), "one number for each pair"),
+        (lambda: grow().exponent(), "outputs"),
+        (lambda: kernel_table.measured([(1, 2, 3)]), "four"),
+        (lambda: kernel_table.measured([(1, 1, 1, 1), (2, 2, 1, 1), (4, 4, 1, 1)]), "span"),
+        (lambda: kernel_table.measured([(1, 2, 1, 1), (2, 1, 2, 1), (1, 1, 1, 1)]), "same masses"),
+        (lambda: kernel_table.measured([(1, 2, -1, 1)]), "above 0"),
+        (lambda: kernel_table.on_grid(kinetics.constant(RATE), [2.0, 1.0]), "rise"),
+        (lambda: kernel_table.for_dustpy(np.ones((2, 2)), np.ones((3, 3))), "scale heights"),
+    ],
+)
+def test_mistakes_are_told(call, said):
+    """One line, with the name."""
+    with pytest.raises(sand.BadInput, match=said) as caught:
+        call()
+    assert len(caught.value.problems) == 1
+
+
+def test_growth_faster_than_any_power_is_said():
+    """The additive kernel grows exponentially, dS/dt ∝ S: there is no z."""
+    grown = solved(kinetics.additive(RATE, MASS), all_sizes(200), np.linspace(0.0, 0.6, 30) * TAU / 2, method="DOP853")
+    with pytest.raises(sand.BadInput, match="faster than any power"):
+        grown.exponent()
