@@ -9,7 +9,7 @@ import pytest
 
 from sand import BadInput
 from sand.analysis.census import COLUMNS, census, size_distribution
-from sand.analysis.fits import power_law, separation
+from sand.analysis.fits import power_law, rate_law, separation
 from sand.analysis.fractal import box_dimension, correlation_dimension, ensemble_dimension, pairs_within
 from sand.analysis.magnetism import aggregate_moments
 from sand.analysis.network import network
@@ -242,6 +242,27 @@ def test_errors_count_boxes_not_points():
     assert errors[0] == pytest.approx(errors[1], rel=0.1)
     assert errors[0] == pytest.approx(slopes.std() / math.sqrt(8), rel=0.15)
     assert np.isnan(power_law(np.array([1.0, 2]), np.array([1.0, 2]), np.zeros(2)).error)
+
+
+def test_laws_of_growth():
+    """S = (1 + t/zτ)^z put in exactly comes out to 1e-6 (the optimiser's), z = 1, 2, 3.2 and an exponential.
+
+    With a factor e^±0.1 of its own for each box's τ the mean over boxes bends by less than its square, 1 %.
+    """
+    time = np.linspace(0.01, 10, 200)
+    for z in (1.0, 2.0, 3.2):
+        found = rate_law(time, (1 + time / (z * 0.7))[None] ** z)
+        assert (found.exponent, found.time) == (pytest.approx(z, rel=1e-5), pytest.approx(0.7, rel=1e-5))
+        assert found.at(time) == pytest.approx((1 + time / (z * 0.7)) ** z, rel=1e-5)
+        assert np.isnan(found.error)
+    assert rate_law(time, np.exp(time / 3)[None]).degree == pytest.approx(1.0, abs=1e-5)
+    boxes = np.array([(1 + time * math.exp(0.1 * x) / 2) ** 2 for x in RNG.normal(size=8)])
+    found = rate_law(time, boxes)
+    assert found.low <= found.exponent <= found.high
+    assert found.exponent == pytest.approx(2.0, rel=0.01)
+    assert found.groups == 8
+    with pytest.raises(BadInput, match="grow beyond 1"):
+        rate_law(time, np.ones((2, 200)))
 
 
 def test_separation():

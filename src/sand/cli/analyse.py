@@ -63,7 +63,11 @@ def _tell(content: dict[str, Any], place: Path | None) -> None:
         rows = [
             ("boxes", f"{one['boxes']} of {one['grains']} grains"),
             ("S", f"{one['mean_size']:.3g}{_pm(one['mean_size_error'])} at {spoken(one['time'], 's')}"),
-            ("z", _line(one, "z", "S ∝ t^", f" while S goes from {one['window'][0]:g} to {one['window'][1]:.4g}")),
+            (
+                "z",
+                _line(one, "z", "S = (1 + t/zτ)^", f", fitted from S = {one['window'][0]:g} to {one['window'][1]:.4g}"),
+            ),
+            ("", _line(one, "slope", "ln S over ln t has slope ", "")),
             ("moments", _line(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
             ("", _line(one, "moment_without_rings", "without rings N^", "")),
             ("D_f", _line(one, "dimension", "", " from N(r_g)")),
@@ -73,7 +77,10 @@ def _tell(content: dict[str, Any], place: Path | None) -> None:
     if compared is not None:
         report.show(
             f"{compared['first']} against {compared['second']}",
-            [("S", f"apart by {compared['sigma']:.3g} standard errors at {spoken(compared['time'], 's')}")],
+            [
+                ("ln S", f"apart by {compared['sigma']:.3g} standard errors at {spoken(compared['time'], 's')}"),
+                ("S", f"apart by {compared['sigma_of_size']:.3g}"),
+            ],
         )
     if place is not None:
         report.show("files", [("folder", str(place))])

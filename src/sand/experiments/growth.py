@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.census import COLUMNS, census
-from ..analysis.fits import PowerLaw, power_law
+from ..analysis.fits import PowerLaw, RateLaw, power_law, rate_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..core.errors import BadInput
 from ..files import folder as files
@@ -157,7 +157,8 @@ class Growth(NamedTuple):
     time: np.ndarray  # (K,) [s], common to all boxes
     sizes: np.ndarray  # (boxes, K): S(t)
     window: tuple[float, float]  # of S, for z
-    z: PowerLaw | None  # S ∝ t^z
+    z: RateLaw | None  # dS/dt ∝ S^λ, S = (1 + t/zτ)^z
+    slope: PowerLaw | None  # the straight line S ∝ t^slope
     moment: PowerLaw | None  # μ/μ1 = N^γ
     open_moment: PowerLaw | None  # the same, of aggregates without rings
     dimension: Dimension | None  # N = k (r_g/a)^D
@@ -215,7 +216,8 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
         time,
         sizes,
         chosen,
-        law("z", lambda: _z(time, sizes, chosen)),
+        law("z", lambda: rate_law(*_within(time, sizes, chosen))),
+        law("slope", lambda: _slope(*_within(time, sizes, chosen))),
         law("moment", lambda: moment_law(heavy)),
         law("open_moment", lambda: moment_law(heavy & (rows["rings"] == 0))),
         law("dimension", lambda: ensemble_dimension(rows["grains"], rows["gyration_radius"], boxes[0].radius, of_box)),
@@ -223,16 +225,19 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
     )
 
 
-def _z(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> PowerLaw:
-    """From the times at which the mean over boxes is within the window."""
+def _within(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Times at which the mean over boxes is within the window, and S (boxes, K) then."""
     mean = sizes.mean(axis=0)
     used = (mean >= window[0]) & (mean <= window[1]) & (time > 0.0)
     if used.sum() < 3:
         raise BadInput(
             f"S does not stay between {window[0]:g} and {window[1]:g} for three frames; it ends at {mean[-1]:.3g}"
         )
-    group = np.repeat(np.arange(len(sizes)), used.sum())
-    return power_law(np.tile(time[used], len(sizes)), sizes[:, used].ravel(), group)
+    return time[used], sizes[:, used]
+
+
+def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLaw:
+    return power_law(np.tile(time, len(sizes)), sizes.ravel(), np.repeat(np.arange(len(sizes)), len(time)))
 
 
 def _all_aggregates(boxes: Sequence[Box]) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -59,6 +59,7 @@ def numbers(one: Ensemble) -> dict[str, Any]:
         "mean_size_error": float(growth.error[-1]),
         "window": list(growth.window),
         "z": law(growth.z),
+        "slope": law(growth.slope),
         "moment": law(growth.moment),
         "moment_without_rings": law(growth.open_moment),
         "dimension": law(growth.dimension),
@@ -67,14 +68,19 @@ def numbers(one: Ensemble) -> dict[str, Any]:
 
 
 def compared(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
-    """By how many standard errors S of the first of two ensembles is above that of the second, at their last time."""
+    """By how many standard errors the first of two ensembles is ahead of the second at their last time.
+
+    `sigma` compares ln S: S itself is skewed, since a few late meetings of large clusters make most of it; that is
+    `sigma_of_size`.
+    """
     if len(ensembles) != 2 or min(len(one.boxes) for one in ensembles) < 2:
         return None
     time = float(min(one.growth.time[-1] for one in ensembles))
     sizes = [[float(np.interp(time, box.time, box.size)) for box in one.boxes] for one in ensembles]
     first, second = (one.name for one in ensembles)
-    sigma = separation(np.array(sizes[0]), np.array(sizes[1]))
-    return {"first": first, "second": second, "time": time, "sizes": sizes, "sigma": sigma}
+    content = {"first": first, "second": second, "time": time, "sizes": sizes}
+    one, other = (np.array(size) for size in sizes)
+    return content | {"sigma": separation(np.log(one), np.log(other)), "sigma_of_size": separation(one, other)}
 
 
 def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any]) -> None:

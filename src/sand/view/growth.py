@@ -69,7 +69,7 @@ def _growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> Non
     centre = np.exp(np.log(growth.time[used]).mean())
     for text, z in (("2", PAPER["z, Brownian"]), ("3.2", PAPER["z, magnetic"])):
         reach = centre * np.array([0.7, 1.4])
-        height = growth.z.at(centre) * (reach / centre) ** z
+        height = float(growth.z.at(centre)) * (reach / centre) ** z
         axes.plot(reach / size, height, color=FAINT, lw=0.8)
         axes.annotate(f"$t^{{{text}}}$", (reach[1] / size, height[1]), color=FAINT, fontsize=7)
 
