@@ -197,7 +197,7 @@ def integrator(value: Any) -> Any:
     if isinstance(value, dict) and "method" in value:
         value = dict(value)
         method = value.pop("method")
-        if method not in INTEGRATORS:
+        if str(method) not in INTEGRATORS:
             raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
     return value
 
