@@ -8,7 +8,7 @@ import os
 import time as wall
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -64,15 +64,17 @@ class TrajectoryWriter:
         grains: Grains,
         box: Box,
         contacts: Mapping[str, np.ndarray],
+        *,
+        exact: bool = False,
     ) -> None:
-        """Append one frame; `contacts` is a `ContactTable`, by column.
+        """Append one frame; `contacts` is a `ContactTable`, by column; positions to the last bit if `exact`.
 
         Raises:
             FilesFailed: the frame could not be written; earlier ones stay.
         """
         if step <= self.last_step:
             return
-        frame = stored_frame(step, time, grains, box, contacts)
+        frame = stored_frame(step, time, grains, box, contacts, exact=exact)
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
             self._file.append(frame)
@@ -157,6 +159,18 @@ class Frames(Sequence[Frame]):
             return Frame(self._file[index % len(self)])
         except Exception as error:  # whatever a broken file makes the reader do
             raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether SAND has written it; others do not say how long their unit is."""
+        return bool(len(self._file)) and self._file.file.chunk_exists(0, "log/scale/length")
+
+    def stored(self, index: int) -> Any:
+        """A frame as the file has it.  Raises BadInput for one that is not whole."""
+        try:
+            return self._file[index % len(self._file)]
+        except Exception as error:  # whatever a broken file makes the reader do
+            raise BadInput(f"frame {index} of {self.path} cannot be read ({error})") from error
 
     @property
     def times(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Aggregates that grow grain by grain: on straight lines from all sides, from above onto a plane, or by diffusion.
+"""Aggregates that grow grain by grain: on straight lines from all sides, or by diffusion.
 
 Chance comes from `physics.noise`, by seed, number of the try, grain and purpose: an aggregate depends on nothing else.
 """
@@ -6,20 +6,15 @@ Chance comes from `physics.noise`, by seed, number of the try, grain and purpose
 import math
 
 from ..core.jit import kernel, loop
-from ..core.vec import add, across, axpy, dot, load, norm, put, scale, sub
+from ..core.vec import across, add, axpy, dot, load, norm, put, scale, sub
 from ..physics.noise import normal_pair, random_words, uniform
 from .crowd import (
-    APART,
     EMPTY,
-    add_to_cell,
-    cell_key,
-    cell_on_axis,
     clear,
     free_width,
     gap_at,
     head_around,
     join_crowd,
-    place_of,
     rest_between,
     touches_other,
 )
@@ -108,77 +103,6 @@ def grow_ballistic(crowd, position, stuff, first, last, extent, seed, tries):
         if not placed:
             return b, extent
     return last, extent
-
-
-@loop
-def wrapped_key(x, y, step, width, count):
-    """The column `step` further, of count × count with a periodic rim."""
-    cx = (cell_on_axis(x, width) + step % 3 - 1) % count
-    cy = (cell_on_axis(y, width) + step // 3 - 1) % count
-    return cell_key(0, cx, cy, 0)
-
-
-@loop
-def nearest_apart(d, side):
-    """The shortest image of a difference on a periodic axis."""
-    return d - side * math.floor(d / side + 0.5)
-
-
-@loop
-def landing(crowd, position, stuff, b, x, y, side, count):
-    """Height at which grain b, falling at x, y, comes to rest: on a grain, or on the floor at 0."""
-    height = stuff.radius[b]
-    for step in range(9):
-        at = place_of(crowd, wrapped_key(x, y, step, crowd.width, count))
-        j = crowd.head[at] if crowd.key[at] != EMPTY else EMPTY
-        while j != EMPTY:
-            dx, dy = nearest_apart(x - position[0, j], side), nearest_apart(y - position[1, j], side)
-            miss = dx * dx + dy * dy
-            if miss < (stuff.radius[b] + stuff.radius[j]) ** 2:
-                rest = rest_between(stuff, b, j)
-                if miss < rest * rest:
-                    height = max(height, position[2, j] + math.sqrt(rest * rest - miss))
-            j = crowd.before[j]
-    return height
-
-
-@loop
-def touching_here(crowd, position, stuff, b, x, side, count):
-    """How many grains grain b at x touches."""
-    found = 0
-    for step in range(9):
-        at = place_of(crowd, wrapped_key(x[0], x[1], step, crowd.width, count))
-        j = crowd.head[at] if crowd.key[at] != EMPTY else EMPTY
-        while j != EMPTY:
-            dx, dy = nearest_apart(x[0] - position[0, j], side), nearest_apart(x[1] - position[1, j], side)
-            touch = (stuff.radius[b] + stuff.radius[j]) * (1.0 + APART)
-            if dx * dx + dy * dy + (x[2] - position[2, j]) ** 2 <= touch * touch:
-                found += 1
-            j = crowd.before[j]
-    return found
-
-
-@kernel
-def deposit(crowd, position, stuff, first, last, side, count, seed, tries):
-    """Grains first … last − 1 fall on a periodic square of this side [m], of count × count columns, and stay.
-
-    Returns:
-        The next grain to fall: less than `last` if one touched two in each of `tries` tries.
-    """
-    for b in range(first, last):
-        placed = False
-        for number in range(tries):
-            words = random_words(seed, number, b, START)
-            x, y = side * uniform(words[0]), side * uniform(words[1])
-            z = landing(crowd, position, stuff, b, x, y, side, count)
-            if touching_here(crowd, position, stuff, b, (x, y, z), side, count) <= 1:
-                put(position, b, (x, y, z))
-                add_to_cell(crowd, wrapped_key(x, y, 4, crowd.width, count), b)
-                placed = True
-                break
-        if not placed:
-            return b
-    return last
 
 
 @loop

@@ -59,7 +59,7 @@ def rest_between(stuff, i, j):
 @formula
 def cell_on_axis(x, width):
     """The cell of a coordinate."""
-    return int(math.floor(x / width))
+    return math.floor(x / width)
 
 
 @formula

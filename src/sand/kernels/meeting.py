@@ -198,7 +198,7 @@ def join_ballistic(table, position, work, stuff, joins, goals, seed, tries, choi
 
 @kernel
 def join_diffusing(table, position, work, bound, stuff, joins, seed, tries):
-    """As `join_ballistic`, for clusters that diffuse without turning until they touch; `bound` is room for N numbers."""
+    """As `join_ballistic`, for clusters that diffuse without turning; `bound` is room for N numbers."""
     for k in range(joins.shape[1]):
         ends = (joins[0, k], joins[1, k], joins[2, k])
         middle1, _ = middle_of(position, stuff, ends[0], ends[1])

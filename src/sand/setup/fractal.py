@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -72,7 +73,7 @@ def _plan(count: int) -> list[tuple[int, int, int]]:
     while count // (8 * parts) >= SEED_SIZE:
         parts *= 8
     ends = [count * k // parts for k in range(parts + 1)]
-    grown = [(a, k, k + 1) for a, b in zip(ends[:-1], ends[1:], strict=True) for k in range(a + 1, b)]
+    grown = [(a, k, k + 1) for a, b in itertools.pairwise(ends) for k in range(a + 1, b)]
     return grown + [(ends[a], ends[m], ends[b]) for a, m, b in halves(0, parts)]
 
 

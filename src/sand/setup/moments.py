@@ -22,9 +22,7 @@ TOLERANCE = 1e-6
 SWEEPS = 20_000
 
 
-def magnetised(
-    body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.random.Generator, axis: int = 2
-) -> Grains:
+def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.random.Generator, axis: int = 2) -> Grains:
     """The same grains with magnetic moments, in place.
 
     Args:
@@ -77,9 +75,8 @@ def relaxed(body: Grains) -> Grains:
     moment = np.ascontiguousarray(body.arrays.body_moment[:, chosen])
     sweeps, worst = relax(position, moment, MAGNETIC, TOLERANCE, SWEEPS)
     if worst > TOLERANCE:
-        warnings.warn(
-            f"moments still turn by {worst:.1e} rad a sweep after {sweeps} sweeps; they are nearly relaxed", stacklevel=2
-        )
+        told = f"moments still turn by {worst:.1e} rad a sweep after {sweeps} sweeps: nearly at rest, no more"
+        warnings.warn(told, stacklevel=2)
     body.arrays.body_moment[:, chosen] = moment
     body.arrays.moment[...] = body.arrays.body_moment
     return body

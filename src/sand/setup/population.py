@@ -1,4 +1,4 @@
-"""What the grains of an aggregate are: their radii, materials and magnetic moments, before there are places for them."""
+"""What the grains of an aggregate are, before there are places for them: their radii and materials."""
 
 from __future__ import annotations
 
