@@ -125,13 +125,14 @@ def returned(seed, number, grain, x, size):
 
 
 @loop
-def walk_in(crowd, position, stuff, first, last, bound, size, address):
+def walk_in(crowd, position, stuff, first, last, bound, inner, size, address):
     """Grains first … last − 1, placed about their own centre, diffuse as one until they touch the crowd at the origin.
 
     A walk on spheres: each step goes as far as nothing can be touched, in any direction.  `bound` keeps for each grain
     how far it is from touching at least, so that few have to be looked at in a step.
 
     Args:
+        inner: the crowd lies within this radius [m].
         size: where the centre of the body is farther out nothing can be touched [m].
 
     Returns:
@@ -146,9 +147,10 @@ def walk_in(crowd, position, stuff, first, last, bound, size, address):
         best, who, whom = math.inf, first, EMPTY
         for k in range(last - first):
             b = near + k if near + k < last else near + k - (last - first)
-            bound[b] = bound[b] - moved if moved < math.inf else -math.inf
+            here = add(x, load(position, b))
+            bound[b] = bound[b] - moved if moved < math.inf else norm(here) - stuff.radius[b] - inner
             if bound[b] < best:
-                bound[b], j = gap_at(crowd, position, stuff, b, add(x, load(position, b)))
+                bound[b], j = gap_at(crowd, position, stuff, b, here)
                 if bound[b] < best:
                     best, who, whom = bound[b], b, j
         near = who
@@ -180,7 +182,7 @@ def grow_diffusing(crowd, position, bound, stuff, first, last, extent, seed, tri
         placed = False
         for number in range(tries):
             size = extent + stuff.radius[b]
-            x, _, mate, _ = walk_in(crowd, position, stuff, b, b + 1, bound, size, (seed, number, b))
+            x, _, mate, _ = walk_in(crowd, position, stuff, b, b + 1, bound, extent, size, (seed, number, b))
             if mate == EMPTY:
                 continue
             x = pulled(position, stuff, x, (0.0, 0.0, 0.0), b, mate)

@@ -17,8 +17,9 @@ from ..physics.adhesion import rest_overlap, rest_radius
 EMPTY = -1
 LEVELS = 8
 """Widths, each twice the one below; the widest cells are 128 w wide."""
-PLACES_PER_GRAIN = 8
-"""Least size of the table; grains occupy at most two cells each on all levels together, about."""
+PLACES_PER_GRAIN, PLACES = 4, 512
+"""Least size of the table.  Connected grains occupy at most three cells each on all levels together, and the corners of
+eight on each; a table must never be full."""
 APART = 1e-9
 """Least gap of surfaces that do not touch, in the sum of their radii."""
 _HALF = 1 << 19
@@ -70,8 +71,11 @@ def cell_key(level, x, y, z):
 
 @loop
 def place_of(crowd, key):
-    """The place of a cell in the table: where it is, or the empty place where it belongs."""
-    at = ((key * _SPREAD) >> 32) & crowd.mask
+    """The place of a cell in the table: where it is, or the empty place where it belongs.
+
+    Eight cells in a row, which differ in the last bits, lie together in memory.
+    """
+    at = ((((key >> 3) * _SPREAD) >> 32 << 3) + (key & 7)) & crowd.mask
     while crowd.key[at] != EMPTY and crowd.key[at] != key:
         at = (at + 1) & crowd.mask
     return at
@@ -79,9 +83,9 @@ def place_of(crowd, key):
 
 @loop
 def places_for(grains, most):
-    """Size of the table for so many grains, a power of two."""
-    size = 64
-    while size < PLACES_PER_GRAIN * grains and size < most:
+    """Size of the table for so many grains, a power of two, at most `most`."""
+    size = PLACES
+    while size < PLACES_PER_GRAIN * grains + PLACES and size < most:
         size *= 2
     return size
 

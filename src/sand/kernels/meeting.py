@@ -207,13 +207,15 @@ def join_diffusing(table, position, work, bound, stuff, joins, seed, tries):
         crowd = Crowd(table.key, table.head, table.before, places - 1, table.width)
         done = False
         for number in range(tries):
-            size = lay(position, work, stuff, ends[0], ends[1], middle1, random_turn(seed, number, ends[1], TURN1))
-            size += lay(position, work, stuff, ends[1], ends[2], middle2, random_turn(seed, number, ends[1], TURN2))
+            inner = lay(position, work, stuff, ends[0], ends[1], middle1, random_turn(seed, number, ends[1], TURN1))
+            size = inner + lay(
+                position, work, stuff, ends[1], ends[2], middle2, random_turn(seed, number, ends[1], TURN2)
+            )
             clear(crowd)
             for i in range(ends[0], ends[1]):
                 join_crowd(crowd, i, load(work, i))
             address = (seed, number, ends[1])
-            x, one, other, _ = walk_in(crowd, work, stuff, ends[1], ends[2], bound, size, address)
+            x, one, other, _ = walk_in(crowd, work, stuff, ends[1], ends[2], bound, inner, size, address)
             if other == EMPTY:
                 continue
             x = pulled(work, stuff, x, load(work, one), one, other)

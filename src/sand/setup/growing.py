@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.errors import BadInput
-from ..kernels.crowd import PLACES_PER_GRAIN, Crowd, Stuff
+from ..kernels.crowd import Crowd, Stuff, places_for
 
 CELL = 3.0
 """Width of the lowest cells, in largest radii: no grain reaches over more than two of them."""
@@ -16,9 +16,7 @@ TRIES = 100_000
 def room(stuff: Stuff, width: float | None = None) -> Crowd:
     """A crowd with room for all grains, nobody there yet; `width` of its cells [m]."""
     count = len(stuff.radius)
-    places = 64
-    while places < PLACES_PER_GRAIN * count:
-        places *= 2
+    places = places_for(count, 1 << 40)
     return Crowd(
         np.full(places, -1, dtype=np.int64),
         np.full(places, -1, dtype=np.int32),
