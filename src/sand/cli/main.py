@@ -10,10 +10,10 @@ import click
 
 from .. import __version__
 from ..core.errors import SandError
-from . import cite, collide, export, info, options, report, resume, run, scatter
+from . import build, cite, collide, export, info, options, report, resume, run, scatter
 from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
 
-COMMANDS = (run, resume, collide, scatter, export, info, cite)
+COMMANDS = (run, resume, build, collide, scatter, export, info, cite)
 """One module per command; each has a `command`."""
 
 

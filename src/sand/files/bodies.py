@@ -31,6 +31,7 @@ def read_body(
     radius: Any = None,
     length: str | None = None,
     materials: Mapping[str, Material] = PRESETS,
+    otherwise: Material | None = None,
 ) -> Grains:
     """Grains at rest, centred on their centre of mass.
 
@@ -41,24 +42,20 @@ def read_body(
         radius: [m] of all grains of a file without radii.
         length: what one unit of the file's numbers is, "1 nm" for example; by default 1 Å in extended XYZ (or what
             its `length_unit` says), 1 m in columns and in GSD that is not SAND's.
-        materials: those that the file may name.
+        materials: those that the file may name; otherwise: of all grains of a file that names none.
 
     Raises:
         BadInput: a missing or foreign file, lines that are not numbers, grains without a place (the first ten by
             number), no radii, or materials that are not known.
     """
     place = Path(path)
-    if place.suffix == ".gsd":
-        found = _of_gsd(place)
-    else:
-        lines = read_text(path).splitlines()
-        found = read_xyz(path, lines) if is_xyz(lines) else _of_columns(path, lines)
+    found = _of_gsd(place) if place.suffix == ".gsd" else _of_text(path)
     unit = found.unit if length is None else _unit(length)
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
     size = radius if found.radius is None else found.radius * unit
     _refuse_numbers(path, found)
-    kinds = _materials(path, found, material, materials)
+    kinds = _materials(path, found, material or (otherwise if found.names is None else None), materials)
     body = Grains(found.position * unit, size, kinds, moment=found.moment)
     middle = np.average(body.position, axis=0, weights=body.mass)
     body.arrays.position[...] -= middle[:, None]
@@ -122,6 +119,11 @@ def _of_gsd(path: Path) -> Columns:
         frames.close()
 
 
+def _of_text(path: str | Path) -> Columns:
+    lines = read_text(path).splitlines()
+    return read_xyz(path, lines) if is_xyz(lines) else _of_columns(path, lines)
+
+
 def _of_columns(path: str | Path, lines: list[str]) -> Columns:
     """Columns x y z or x y z r.  Raises BadInput."""
     rows: list[list[float]] = []
@@ -145,6 +147,16 @@ def _of_columns(path: str | Path, lines: list[str]) -> Columns:
     return Columns(table[:, :3], table[:, 3] if table.shape[1] == 4 else None, None, None, 1.0)
 
 
+def refuse_place(place: Path, *, overwrite: bool) -> None:
+    """Raises BadInput where no body can be written, before one is made."""
+    if place.suffix not in ENDINGS:
+        raise BadInput(f"{place}: the ending says in which form a body is written; allowed: {', '.join(ENDINGS)}")
+    if not place.parent.is_dir():
+        raise BadInput(f"there is no folder {place.parent}; make it first")
+    if place.is_dir() or (place.exists() and not overwrite):
+        raise BadInput(f"{place} exists; give another name, or say that it may be overwritten (--overwrite)")
+
+
 def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> Path:
     """Write a body: extended XYZ for `.xyz` and `.extxyz`, a trajectory of one frame for `.gsd`.
 
@@ -156,12 +168,7 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
         FilesFailed: the disk is full, …
     """
     place = Path(path)
-    if place.suffix not in ENDINGS:
-        raise BadInput(f"{path}: the ending says in which form a body is written; allowed: {', '.join(ENDINGS)}")
-    if not place.parent.is_dir():
-        raise BadInput(f"there is no folder {place.parent}; make it first")
-    if place.exists() and not overwrite:
-        raise BadInput(f"{path} exists; give another name, or say that it may be overwritten")
+    refuse_place(place, overwrite=overwrite)
     if place.suffix != ".gsd":
         replace_file(place, xyz_text(grains).encode())
         return place

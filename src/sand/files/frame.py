@@ -14,7 +14,7 @@ SI.  Orientations are scalar first, as GSD has them.
 | particles/orientation | rotation parameters, scalar first |
 | particles/typeid, types | materials |
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
-| log/particles/position | to the last bit [m]; in bodies, not in runs |
+| log/particles/position, radius | to the last bit [m]; in bodies, not in runs |
 | bonds/group | grains in contact |
 | log/bonds/overlap, formed | δ [m] and time of first touch [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
@@ -54,6 +54,7 @@ LOGGED = (
     "bonds/twist",
     "bonds/share",
     "particles/position",
+    "particles/radius",
 )
 """Logged arrays that the check sum is over, in its order."""
 MODES = ("stretch", "slide", "roll", "twist")
@@ -63,7 +64,7 @@ MODES = ("stretch", "slide", "roll", "twist")
 def stored_frame(
     step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray], *, exact: bool = False
 ) -> Any:
-    """A GSD frame of these grains and contacts (a `ContactTable`, by column); positions to the last bit if `exact`."""
+    """A GSD frame of these grains and contacts (a `ContactTable`, by column); lengths to the last bit if `exact`."""
     import gsd.hoomd
 
     scale = float(grains.radius.mean())
@@ -101,6 +102,7 @@ def stored_frame(
     }
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
+        frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
     frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
     return frame
 
@@ -135,7 +137,7 @@ class Frame:
         p = stored.particles
         rounded_places = np.asarray(p.position, dtype=np.float64) * scale
         self.position = np.array(stored.log.get("particles/position", rounded_places))
-        self.radius = 0.5 * np.asarray(p.diameter, dtype=np.float64) * scale
+        self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
         self.materials, self.material = list(p.types), np.asarray(p.typeid)

@@ -67,7 +67,7 @@ class TrajectoryWriter:
         *,
         exact: bool = False,
     ) -> None:
-        """Append one frame; `contacts` is a `ContactTable`, by column; positions to the last bit if `exact`.
+        """Append one frame; `contacts` is a `ContactTable`, by column; lengths to the last bit if `exact`.
 
         Raises:
             FilesFailed: the frame could not be written; earlier ones stay.
