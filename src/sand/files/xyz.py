@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.errors import BadInput
 from ..core.grains import Grains
+from ..core.units import in_unit
 from .export import ANGSTROM, SYMBOLS
 
 PLACES, SIZES, MOMENTS = ("pos", "position", "positions"), ("radius", "radii"), ("moment", "moments", "dipole")
@@ -71,7 +72,9 @@ def read_xyz(path: Any, lines: list[str]) -> Columns:
     if position is None:
         raise BadInput(f"{path} has no positions; its Properties must have pos:R:3")
     size, moment = (_numbers(path, rows, layout, n, w, first) for n, w in ((SIZES, 1), (MOMENTS, 3)))
-    unit = 1.0 if head.get("length_unit") in ("m", "metre", "meter") else ANGSTROM
+    unit = in_unit(f"1 {head.get('length_unit', 'angstrom')}", "m")
+    if unit is None:
+        raise BadInput(f"{path}, line 2: length_unit={head['length_unit']!r} is no unit of length")
     return Columns(position, None if size is None else size[:, 0], moment, _names(path, rows, layout, head), unit)
 
 
@@ -90,9 +93,9 @@ def _last_frame(path: Any, lines: list[str]) -> tuple[int, int]:
 def _layout(path: Any, text: str) -> tuple[dict[str, tuple[int, int]], int]:
     """First column and number of columns by name, and how many there are.  Raises BadInput."""
     parts, layout, at = text.split(":"), {}, 0
-    for name, width in zip(parts[::3], parts[2::3], strict=False):
-        if not width.isdecimal() or len(parts) % 3:
-            raise BadInput(f"{path}, line 2: Properties={text[:60]!r} is not made of name:type:number")
+    if len(parts) % 3 or not all(width.isdecimal() for width in parts[2::3]):
+        raise BadInput(f"{path}, line 2: Properties={text[:60]!r} is not made of name:type:number")
+    for name, width in zip(parts[::3], parts[2::3], strict=True):
         layout[name.lower()] = (at, int(width))
         at += int(width)
     return layout, at
