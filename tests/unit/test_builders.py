@@ -10,12 +10,15 @@ from scipy.sparse.csgraph import connected_components
 import sand
 from sand.cli.main import main
 from sand.files.bodies import read_body, write_body
+from sand.kernels.aggregation import returned
+from sand.kernels.crowd import gap_at, join_crowd
 from sand.physics.adhesion import rest_overlap, rest_radius
 from sand.physics.mixing import pairing_between
 from sand.run.bodies import body_from_file
 from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
 from sand.setup.aggregates import rest_distance
-from sand.setup.population import Lognormal, PowerLaw
+from sand.setup.growing import room
+from sand.setup.population import Lognormal, PowerLaw, stuff_of
 
 R, M = 3e-7, sand.SILICA
 GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}
@@ -127,6 +130,39 @@ def test_a_chosen_dimension(asked):
         sizes.append(np.exp(np.mean(np.log(some))))
         assert np.abs(np.array(some) / R / (n / 1.3) ** (1 / asked) - 1.0).max() < 0.05
     assert np.log(8.0) / np.log(sizes[1] / sizes[0]) == pytest.approx(asked, abs=0.05)
+
+
+def test_walkers_come_back_as_brownian_motion_does():
+    """From 2R outside a sphere it is hit with probability R/|x| = ½, and cos of the angle to where the walker was has
+    the mean R/|x|: both harmonic functions.  Four standard errors of 4000 walkers."""
+    x, count, cosines = (0.0, 0.0, 2.0), 4000, []
+    for number in range(count):
+        there, back = returned(np.uint64(5), number, 1, x, 1.0)
+        if back:
+            assert np.linalg.norm(there) == pytest.approx(1.0, rel=1e-12, abs=0.0)
+            cosines.append(there[2])
+    assert len(cosines) / count == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(count))
+    assert np.mean(cosines) == pytest.approx(0.5, abs=4 * np.std(cosines) / np.sqrt(len(cosines)))
+
+
+def test_gaps_are_never_overrated():
+    """Against all grains: `gap_at` is at most the gap of surfaces, and just that where it names a grain."""
+    body, rng, named = dla(60, seed=1, **MIXED), np.random.default_rng(2), 0
+    stuff = stuff_of(body.radius, [body.materials[k] for k in body.material])
+    crowd = room(stuff)
+    for i in range(60):
+        join_crowd(crowd, i, tuple(body.position[i]))
+    for _ in range(300):
+        x = rng.normal(size=3) * size_of(body) * rng.choice([0.3, 1.0, 5.0, 50.0])
+        gap, mate = gap_at(crowd, body.arrays.position, stuff, 0, tuple(x))
+        true = np.linalg.norm(body.position - x, axis=1) - body.radius - body.radius[0]
+        assert gap <= true.min() + 1e-20
+        if mate >= 0:
+            named += 1
+            assert mate == true.argmin() and gap == pytest.approx(true.min(), rel=1e-9, abs=1e-18)
+        else:
+            assert gap > 0.0
+    assert 30 < named < 270
 
 
 def test_radii_follow_their_laws():
