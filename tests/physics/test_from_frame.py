@@ -20,7 +20,7 @@ STIFFNESS = 100.0
 def crash(tmp_path_factory):
     """A run in which a fast grain hits a compact cluster in a corner of a periodic box; its folder and frames."""
     folder = tmp_path_factory.mktemp("frames") / "crash"
-    cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=4)
+    cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=6)
     place = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
     place += [1.4e-7, 0.9e-7, 1.4e-7]
     speed = np.zeros((41, 3))
@@ -218,7 +218,7 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
         (["soft.toml", "--from", "RUN", "--frame", "STRETCHED"], ["soft.toml", "beyond its break"]),
         (["both.toml"], ["number", "remove it"]),
         (["fileless.toml"], ["file is missing"]),
-        (["foreign.toml"], ["foreign.toml", "not a trajectory"]),
+        (["foreign.toml"], ["foreign.gsd", "not a trajectory"]),
     ],
 )
 def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
@@ -235,10 +235,11 @@ def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
         "both": run + f"[grains]\nkind = 'file'\nnumber = 4\nfile = '{folder}'\n",
         "iron": run + f"[grains]\nkind = 'file'\nmaterial = 'iron'\nfile = '{folder}'\n" + forces,
         "fileless": run + "[grains]\nkind = 'file'\n",
-        "foreign": run + "[grains]\nkind = 'file'\nfile = 'foreign.toml'\n",
+        "foreign": run + "[grains]\nkind = 'file'\nfile = 'foreign.gsd'\n",
     }
     for name, text in cases.items():
         (tmp_path / f"{name}.toml").write_text(text)
+    (tmp_path / "foreign.gsd").write_text("hello")
     before = sorted(tmp_path.iterdir())
     meant = {"RUN": str(folder), "STRETCHED": str(stretched)}
     assert main(["run", *(meant.get(word, word) for word in words)]) == 2

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import pdist
 
 from ..core.errors import BadInput
 from .fits import PowerLaw, power_law
@@ -23,12 +22,12 @@ FEWEST = 32
 """Grains that one aggregate must have for the methods that look at one."""
 WINDOW = (2.0, 0.7)
 """Distances of the correlation integral: from so many grain distances to so many radii of gyration."""
+CORE = 1.0
+"""It is looked around from grains within so many radii of gyration of the centre: the rim has nothing beyond it."""
 BOXES = (2.0, 0.5)
 """Sides of boxes: from so many grain distances to so many radii of gyration."""
 POINTS = 12
 SHIFTS = 32
-MOST_PAIRS = 3000
-"""Grains up to which all distances are taken at once; above, a tree counts them."""
 
 
 class Dimension(NamedTuple):
@@ -75,7 +74,7 @@ def _one(position: np.ndarray) -> tuple[np.ndarray, float, float]:
 
 
 def correlation_dimension(position: np.ndarray, window: tuple[float, float] | None = None) -> Dimension:
-    """D of the correlation integral C(r) ∝ r^D, the share of pairs closer than r.
+    """D of n(r) ∝ r^D, the mean number of grains within r of a grain that is not at the rim, itself counted.
 
     Args:
         position: (N, 3) [m], N ≥ 32, of a whole aggregate.
@@ -88,16 +87,15 @@ def correlation_dimension(position: np.ndarray, window: tuple[float, float] | No
     """
     place, unit, size = _one(position)
     low, high = window or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
-    radii = _spaced(low, high)
-    return _of_slopes(radii, pairs_within(place, radii) * 2.0 / len(place), unit, (low, high))
+    # half-way between shells of neighbours: a straight chain then has dimension 1 exactly
+    radii = (np.unique((_spaced(low, high) / unit).astype(int)) + 0.5) * unit
+    core = np.linalg.norm(place - place.mean(axis=0), axis=1) <= CORE * size
+    return _of_slopes(radii, grains_within(place[core], place, radii), unit, (low, high))
 
 
-def pairs_within(place: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Number of pairs closer than each distance."""
-    if len(place) <= MOST_PAIRS:
-        return np.searchsorted(np.sort(pdist(place)), radii, side="right").astype(float)
-    tree = cKDTree(place)
-    return (tree.count_neighbors(tree, radii) - len(place)) / 2.0
+def grains_within(centres: np.ndarray, place: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Mean number of grains within each distance (K,) of the centres, which count themselves."""
+    return cKDTree(centres).count_neighbors(cKDTree(place), radii) / len(centres)
 
 
 def box_dimension(position: np.ndarray, window: tuple[float, float] | None = None, seed: int = 0) -> Dimension:
@@ -134,10 +132,11 @@ def _spaced(low: float, high: float) -> np.ndarray:
 def _of_slopes(x: np.ndarray, y: np.ndarray, unit: float, window: tuple[float, float]) -> Dimension:
     """The slope over the whole window; its error from the slopes of the three thirds."""
     used = y > 0
-    if used.sum() < POINTS // 2:
+    if used.sum() < 3:
         raise BadInput("there is nothing within most of the window")
     whole: PowerLaw = power_law(x[used], y[used])
     thirds = [part for part in np.array_split(np.flatnonzero(used), 3) if len(part) > 1]
+    thirds = thirds if len(thirds) > 1 else [np.arange(2), np.arange(len(x) - 2, len(x))]
     slopes = [power_law(x[part], y[part]).exponent for part in thirds]
     error = float(np.std(slopes, ddof=1) / np.sqrt(len(slopes)))
     return Dimension(whole.exponent, error, whole.prefactor * (0.5 * unit) ** whole.exponent, window)

@@ -12,8 +12,8 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import Grains, moment_size
 from ..core.material import PRESETS, Material
-from ..files.bodies import read_body
 from ..files.folder import read_toml
+from ..run.bodies import body_from_file
 from ..run.case import (
     INTEGRATORS,
     ForcesSection,
@@ -25,22 +25,43 @@ from ..run.case import (
     wrong_materials,
 )
 from ..run.mistakes import complaints
-from ..setup.aggregates import KINDS
+from ..setup.aggregates import build
+from ..setup.moments import WAYS
+from ..setup.population import radii_of
 from ..stepping.verlet import Verlet
 from .collision import Collision, collide
 
+Kind = Literal["grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"]
+"""The builders, `setup.aggregates.KINDS`, and a file."""
+
 
 class BodySection(Section):
-    """[target] and [projectile]: a grain, chain, lattice, ballistic aggregate (another for each seed), or a file."""
+    """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
 
-    kind: Literal["grain", "chain", "lattice", "pca", "file"]
+    kind: Kind
     path: str | None = None
-    length: str = "1 m"
+    length: str | None = None
     grains: Annotated[int, Field(ge=1, strict=True)] | None = None
     shape: list[Annotated[int, Field(ge=1, strict=True)]] | None = None
-    radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
+    radius: Any = None
     material: str = "silica"
     moment: Any = None
+    moments: str | None = None
+    magnetic: Any = None
+    dimension: Any = None
+    prefactor: Any = None
+
+    @field_validator("radius")
+    @classmethod
+    def _radius(cls, value: Any) -> Any:
+        return value if value is None else radii_of(value)
+
+    @field_validator("moments")
+    @classmethod
+    def _moments(cls, value: str | None) -> str | None:
+        if value is not None and value not in WAYS:
+            raise ValueError(f"moments = {value!r}; {did_you_mean(value, list(WAYS))}")
+        return value
 
     @field_validator("moment")
     @classmethod
@@ -57,25 +78,24 @@ class BodySection(Section):
             raise ValueError("path is missing: which file holds the grains?")
         if self.kind != "file" and self.radius is None:
             raise ValueError("radius is missing; add it, for example radius = '0.1 um'")
-        if self.kind in ("chain", "pca") and self.grains is None:
+        regular = self.kind in ("lattice", "hexagonal")
+        if self.kind not in ("grain", "file") and not regular and self.grains is None:
             raise ValueError(f"grains is missing: how many does the {self.kind} have?")
-        if self.kind == "lattice" and (self.shape is None or len(self.shape) != 3):
+        if regular and (self.shape is None or len(self.shape) != 3):
             raise ValueError("shape is missing: three whole numbers, such as [5, 5, 5]")
-        if self.moment is not None and self.kind in ("lattice", "pca", "file"):
-            raise ValueError(f"moment: a {self.kind} has no moments yet; leave it out")
+        if self.moment is not None and self.kind == "file":
+            raise ValueError("moment: a file brings its own moments; leave it out")
         return self
 
     def build(self, materials: dict[str, Material], seed: int) -> Grains:
         """Raises BadInput."""
-        given: dict[str, Any] = {"radius": self.radius, "material": materials[self.material]}
         if self.kind == "file":
-            return read_body(str(self.path), materials[self.material], self.radius, self.length)
-        if self.kind == "lattice":
-            return KINDS["lattice"](*(self.shape or ()), **given)
-        if self.kind == "pca":
-            return KINDS["pca"](self.grains, seed=seed, **given)
-        given["moment"] = self.moment
-        return KINDS["grain"](**given) if self.kind == "grain" else KINDS["chain"](self.grains, **given)
+            own = materials[self.material]
+            one = own if "material" in self.model_fields_set else None
+            return body_from_file(str(self.path), one, self.radius, self.length, materials, otherwise=own)
+        names = ("radius", "moment", "moments", "magnetic", "dimension", "prefactor")
+        given = {name: getattr(self, name) for name in names}
+        return build(self.kind, self.grains, shape=self.shape, seed=seed, material=materials[self.material], **given)
 
 
 class ImpactSection(Section):

@@ -14,7 +14,7 @@ from ..core.material import PRESETS
 from ..files.folder import read_toml
 from ..run.case import MaterialSection, Section
 from ..run.mistakes import complaints
-from .collision_case import BodySection, wrong_bodies
+from .collision_case import BodySection, Kind, wrong_bodies
 from .encounters import Flight
 from .scattering_input import Asking, flight, impact_parameter
 
@@ -22,7 +22,7 @@ from .scattering_input import Asking, flight, impact_parameter
 class ScatterBody(BodySection):
     """[projectile] and [target]: a grain, or an aggregate as in `sand collide`."""
 
-    kind: Literal["grain", "chain", "lattice", "pca", "file"] = "grain"
+    kind: Kind = "grain"
 
 
 class FlightSection(Section):

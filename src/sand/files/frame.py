@@ -14,6 +14,7 @@ SI.  Orientations are scalar first, as GSD has them.
 | particles/orientation | rotation parameters, scalar first |
 | particles/typeid, types | materials |
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
+| log/particles/position, radius | to the last bit [m]; in bodies, not in runs |
 | bonds/group | grains in contact |
 | log/bonds/overlap, formed | δ [m] and time of first touch [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
@@ -52,14 +53,18 @@ LOGGED = (
     "bonds/roll",
     "bonds/twist",
     "bonds/share",
+    "particles/position",
+    "particles/radius",
 )
 """Logged arrays that the check sum is over, in its order."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 
 
-def stored_frame(step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray]) -> Any:
-    """A GSD frame of these grains and contacts (a `ContactTable`, by column)."""
+def stored_frame(
+    step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray], *, exact: bool = False
+) -> Any:
+    """A GSD frame of these grains and contacts (a `ContactTable`, by column); lengths to the last bit if `exact`."""
     import gsd.hoomd
 
     scale = float(grains.radius.mean())
@@ -95,6 +100,9 @@ def stored_frame(step: int, time: float, grains: Grains, box: Box, contacts: Map
         "bonds/twist": contacts["twist"].astype(np.float32),
         "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
     }
+    if exact:
+        frame.log["particles/position"] = np.ascontiguousarray(grains.position)
+        frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
     frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
     return frame
 
@@ -127,8 +135,9 @@ class Frame:
         self.time = float(stored.log["time"][0])
         scale = float(stored.log["scale/length"][0])
         p = stored.particles
-        self.position = np.asarray(p.position, dtype=np.float64) * scale
-        self.radius = 0.5 * np.asarray(p.diameter, dtype=np.float64) * scale
+        rounded_places = np.asarray(p.position, dtype=np.float64) * scale
+        self.position = np.array(stored.log.get("particles/position", rounded_places))
+        self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
         names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII

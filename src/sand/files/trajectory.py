@@ -70,13 +70,15 @@ class TrajectoryWriter:
         grains: Grains,
         box: Box,
         contacts: Mapping[str, np.ndarray],
+        *,
+        exact: bool = False,
     ) -> None:
-        """Append one frame; `contacts` is a `ContactTable`, by column.
+        """Append one frame; `contacts` is a `ContactTable`, by column; lengths to the last bit if `exact`.
 
         Raises:
             FilesFailed: the frame could not be written; earlier ones stay.
         """
-        frame = stored_frame(step, time, grains, box, contacts)
+        frame = stored_frame(step, time, grains, box, contacts, exact=exact)
         if self._is_there(step, int(frame.log["crc32"][0])):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + CHUNKS
@@ -183,6 +185,18 @@ class Frames(Sequence[Frame]):
             return Frame(self._file[index % len(self)])
         except Exception as error:  # whatever a broken file makes the reader do
             raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether SAND has written it; others do not say how long their unit is."""
+        return bool(len(self._file)) and self._file.file.chunk_exists(0, "log/scale/length")
+
+    def stored(self, index: int) -> Any:
+        """A frame as the file has it.  Raises BadInput for one that is not whole."""
+        try:
+            return self._file[index % len(self._file)]
+        except Exception as error:  # whatever a broken file makes the reader do
+            raise BadInput(f"frame {index} of {self.path} cannot be read ({error})") from error
 
     @property
     def times(self) -> np.ndarray:

@@ -17,6 +17,7 @@ from ..files.trajectory import Frames
 from ..forces.base import FarForce
 from ..setup.frame import Start, from_frame
 from ..setup.gas import gas
+from .bodies import body_from_file
 from .case import Case, check_case, read_case
 from .simulation import Simulation
 
@@ -78,9 +79,12 @@ def _of_gas(case: Case) -> Start:
 
 
 def _of_file(case: Case) -> Start:
-    section = case.grains
+    section, path = case.grains, Path(case.grains.file or "")
     try:
-        start = from_trajectory(section.file or "", section.frame, case.materials_by_name())
+        if path.is_dir() or path.suffix == ".gsd":
+            start = from_trajectory(path, section.frame, case.materials_by_name())
+        else:
+            start = _of_body(case, path)
     except BadInput as error:
         raise error.at("grains") from None
     told = section.material if isinstance(section.material, list) else [section.material]
@@ -93,6 +97,18 @@ def _of_file(case: Case) -> Start:
             "leave [box] out, the file's is taken then"
         )
     return start
+
+
+def _of_body(case: Case, path: Path) -> Start:
+    """Grains of extended XYZ or of plain columns, as they lie there but for their centre of mass."""
+    section, library = case.grains, case.materials_by_name()
+    if not isinstance(section.material, str):
+        raise BadInput("material of grains in a file must be one name; several stand in the file itself")
+    own = library[section.material]
+    one = own if "material" in section.model_fields_set else None
+    body = body_from_file(path, one, section.radius, section.length, library, otherwise=own)
+    note = f"{path}, centred on the centre of mass"
+    return Start(body, None, as_box(case.box.periodic), note)
 
 
 def same_box(first: Box, second: Box) -> bool:

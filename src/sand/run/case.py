@@ -109,7 +109,7 @@ class MaterialSection(Section):
 
 
 class GrainsSection(Section):
-    """[grains]: a gas of grains, or those of a `file`: a frame of a trajectory; "given" marks grains from a script."""
+    """[grains]: a gas of grains, or those of a `file`: a frame of a trajectory, or a body; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
     number: Annotated[int, Field(ge=1, strict=True)] | None = None
@@ -121,6 +121,7 @@ class GrainsSection(Section):
     spins: str = "kT/2"
     file: str | None = None
     frame: Annotated[int, Field(strict=True)] = -1
+    length: str | None = None
 
     @field_validator("moment")
     @classmethod
@@ -157,9 +158,9 @@ class GrainsSection(Section):
 
 
 GRAINS_NEED: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
-    "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame")),
-    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "radius", "moment", "charge", "temperature", "spins")),
-    "given": ({"number": "125"}, ("file", "frame")),
+    "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame", "length")),
+    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "temperature", "spins")),
+    "given": ({"number": "125"}, ("file", "frame", "length")),
 }
 """By kind: keys it cannot do without, with an example, and keys that it has no use for."""
 

@@ -22,6 +22,7 @@ from ..kernels.outside import is_ours
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
 from ..setup.frame import Bonds
+from ..setup.soundness import most_overlap
 from ..stepping.adaptive import Adaptive
 from ..stepping.control import IMPACT_PART, Control
 from ..stepping.neighbours import Found, Neighbours
@@ -33,8 +34,6 @@ SPREAD = 8
 """Columns for contacts and near pairs per grain to begin with; they grow when needed."""
 IDLE = 1e5
 """Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
-MOST_OVERLAP = (2.0, 1e-3)
-"""Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
 STIR_PART = 0.05
 """Time between two kicks of the gas, in shortest stopping times.
 
@@ -277,7 +276,7 @@ def _refuse_overlaps(engine: Engine, contact: Contact, held: set[tuple[int, ...]
         reduced = radius[i] * radius[j] / (radius[i] + radius[j])
         gamma, modulus = table[:2, grains.material[i], grains.material[j]]
         rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
-        limit = max(MOST_OVERLAP[0] * rest, MOST_OVERLAP[1] * min(radius[i], radius[j]))
+        limit = float(most_overlap(rest, min(radius[i], radius[j])))
         if delta > limit:
             problems.append(
                 f"grains {i} and {j} overlap by {delta:.3g} m at the start; at most {limit:.3g} m may be: "

@@ -1,21 +1,43 @@
 """How simulations begin."""
 
-from .aggregates import chain, grain, lattice, pca
+from .aggregates import KINDS, build, chain, grain, hexagonal, lattice
+from .ballistic import bcca, bpca
+from .deposit import rbd
+from .diffusion import dla, dlca
 from .encounters import Encounter, encounter, turned, turned_at_random
+from .fractal import fractal
 from .frame import Bonds, Start, from_frame
 from .gas import gas
+from .moments import magnetic_energy, relaxed
+from .population import Lognormal, PowerLaw
+
+pca = bpca
+"""The former name."""
 
 __all__ = [
+    "KINDS",
     "Bonds",
     "Encounter",
+    "Lognormal",
+    "PowerLaw",
     "Start",
+    "bcca",
+    "bpca",
+    "build",
     "chain",
+    "dla",
+    "dlca",
     "encounter",
+    "fractal",
     "from_frame",
     "gas",
     "grain",
+    "hexagonal",
     "lattice",
+    "magnetic_energy",
     "pca",
+    "rbd",
+    "relaxed",
     "turned",
     "turned_at_random",
 ]

@@ -1,0 +1,158 @@
+"""`sand build KIND`: an aggregate in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..core.errors import BadInput
+from . import options, report
+from .exits import DONE
+
+KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")
+
+
+@click.command("build", short_help="Make an aggregate and write it to a file.")
+@click.argument("kind", metavar="KIND", type=click.Choice((*KINDS, "pca")))
+@click.option("--grains", type=int, metavar="N", help="Number of grains.")
+@click.option("--shape", metavar="NX,NY,NZ", help="Sides of a lattice, instead of a cube number of grains.")
+@click.option(
+    "--radius",
+    default="0.1 um",
+    show_default=True,
+    metavar="R",
+    help="A length, 'lognormal(MEDIAN, SIGMA, LEAST, MOST)' or 'power law(EXPONENT, LEAST, MOST)'.",
+)
+@click.option(
+    "--material", default="silica", show_default=True, metavar="M", help="A preset, or parts: 'silica:0.7,iron:0.3'."
+)
+@click.option("--moment", metavar="SIZE", help="Of each grain: '6.6e-18 A m^2', '200 A m^2/kg' or 'material'.")
+@click.option("--moments", type=click.Choice(("random", "aligned", "relaxed")), help="How moments point.")
+@click.option("--magnetic", metavar="PART", help="Part of the grains that have a moment, 0 to 1.")
+@click.option("--dimension", metavar="D", help="Fractal dimension of a fractal (default 1.8).")
+@click.option("--prefactor", metavar="K", help="Fractal prefactor of a fractal (default 1.3).")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Same seed, same aggregate.")
+@click.option("--out", required=True, metavar="FILE", help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd).")
+@click.option("--overwrite", is_flag=True, help="Replace the file if it is there.")
+@options.as_json
+@options.debug
+def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> int:
+    """Make an aggregate, all contacts at rest, and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
+
+    \b
+    grain, chain          one grain, a straight chain
+    lattice, hexagonal    cubic lattice, hexagonal close packing
+    bpca, bcca            ballistic particle-cluster, cluster-cluster aggregate
+    dla, dlca             the same by diffusion
+    fractal               cluster-cluster, of a chosen dimension and prefactor
+    rbd                   compact sphere cut from a random ballistic deposit
+    """
+    from ..files.bodies import refuse_place, write_body
+
+    place = Path(out)
+    refuse_place(place, overwrite=overwrite)
+    from ..setup.aggregates import build
+
+    with report.compiling(as_json):
+        body = report.with_notes(lambda: build(kind, **_arguments(given)))
+    write_body(place, body, overwrite=overwrite)
+    content = {"kind": kind, "file": str(place), "seed": given["seed"], **described(body)}
+    if as_json:
+        report.emit(content)
+    else:
+        report.show(f"build {kind}", _rows(content))
+    return DONE
+
+
+def _arguments(given: dict[str, Any]) -> dict[str, Any]:
+    """Words of the command line as arguments of `setup.aggregates.build`.  Raises BadInput."""
+    found = dict(given)
+    shape = found.pop("shape")
+    if shape is not None:
+        words = [word.strip() for word in shape.split(",")]
+        if len(words) != 3 or not all(word.isdecimal() and int(word) > 0 for word in words):
+            raise BadInput(f"--shape {shape!r} must be three whole numbers above 0, such as 5,5,5")
+        found["shape"] = [int(word) for word in words]
+        if found["grains"] is not None:
+            raise BadInput("--shape already says how many grains there are; leave --grains out")
+    for name in ("dimension", "prefactor", "magnetic"):
+        found[name] = None if found[name] is None else _number(found[name], name)
+    found["material"] = _material(found["material"])
+    return found
+
+
+def _number(text: str, name: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise BadInput(f"--{name} {text!r} is not a number") from None
+
+
+def _material(text: str) -> str | dict[str, float]:
+    """'silica', or parts as in 'silica:0.7,iron:0.3'.  Raises BadInput."""
+    if ":" not in text:
+        return text
+    parts: dict[str, float] = {}
+    for word in text.split(","):
+        name, _, part = word.partition(":")
+        try:
+            parts[name.strip()] = float(part)
+        except ValueError:
+            raise BadInput(f"--material {text!r} must be a name, or parts such as 'silica:0.7,iron:0.3'") from None
+    return parts
+
+
+def described(body: Any) -> dict[str, Any]:
+    """What is told of an aggregate: grains, radii, mass, size, dimension, contacts, energy of the moments."""
+    from ..files.bodies import contacts_of
+
+    size, dimension, error = _shape(body)
+    contacts = len(contacts_of(body)["pair"])
+    content = {
+        "grains": len(body),
+        "materials": [m.name for m in body.materials],
+        "radius": [float(body.radius.min()), float(body.radius.max())],
+        "mass": float(body.mass.sum()),
+        "radius_of_gyration": size,
+        "fractal_dimension": dimension,
+        "fractal_dimension_error": error,
+        "contacts": contacts,
+        "mean_coordination": 2.0 * contacts / len(body),
+    }
+    magnetic = int(((body.moment**2).sum(axis=1) > 0.0).sum())
+    if magnetic:
+        content |= {"magnetic_grains": magnetic, "net_moment": [float(v) for v in body.moment.sum(axis=0)]}
+    return content
+
+
+def _shape(body: Any) -> tuple[float, float | None, float | None]:
+    """Radius of gyration [m], fractal dimension of the correlation integral and its error (None: too few grains)."""
+    from ..analysis.fractal import correlation_dimension
+    from ..analysis.shape import gyration_radius
+
+    size = gyration_radius(body.position, body.mass)
+    try:
+        found = correlation_dimension(body.position)
+    except BadInput:
+        return size, None, None
+    return size, found.value, found.error
+
+
+def _rows(content: dict[str, Any]) -> report.Rows:
+    from ..core.units import spoken
+
+    low, high = content["radius"]
+    size = spoken(low, "m") if low == high else f"{spoken(low, 'm')} to {spoken(high, 'm')}"
+    dimension, error = content["fractal_dimension"], content["fractal_dimension_error"]
+    rows = [
+        ("grains", f"{content['grains']} of {', '.join(content['materials'])}, radius {size}"),
+        ("radius of gyration", spoken(content["radius_of_gyration"], "m")),
+        ("fractal dimension", "too few grains" if dimension is None else f"{dimension:.2f} ± {error or 0.0:.2f}"),
+        ("contacts", f"{content['contacts']}, {content['mean_coordination']:.2f} for each grain"),
+    ]
+    if "magnetic_grains" in content:
+        net = sum(v * v for v in content["net_moment"]) ** 0.5
+        rows.append(("moments", f"{content['magnetic_grains']} grains, together {net:.3g} A m^2"))
+    return [*rows, ("seed", str(content["seed"])), ("file", content["file"])]

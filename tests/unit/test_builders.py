@@ -1,0 +1,408 @@
+"""Aggregates by chance: contacts at rest, nothing else touching, seeded; their laws; from and to files."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+import sand
+from sand.cli.main import main
+from sand.files.bodies import read_body, write_body
+from sand.kernels.aggregation import returned
+from sand.kernels.crowd import gap_at, join_crowd
+from sand.physics.adhesion import rest_overlap, rest_radius
+from sand.physics.mixing import pairing_between
+from sand.run.bodies import body_from_file
+from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
+from sand.setup.aggregates import rest_distance
+from sand.setup.growing import room
+from sand.setup.population import Lognormal, PowerLaw, stuff_of
+
+R, M = 3e-7, sand.SILICA
+GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}
+MIXED = {"radius": "lognormal(0.1 um, 0.4)", "material": {"silica": 0.6, "ice": 0.4}}
+
+
+def touching(body):
+    """Brute force over all pairs: those that touch (C, 2), their distances, and the distances at rest."""
+    i, j = np.triu_indices(len(body), 1)
+    d = np.linalg.norm(body.position[i] - body.position[j], axis=1)
+    near = d <= body.radius[i] + body.radius[j]
+    i, j, d = i[near], j[near], d[near]
+    rest = []
+    for a, b in zip(i, j, strict=True):
+        both = pairing_between(*(body.materials[body.material[k]] for k in (a, b)))
+        r1, r2 = body.radius[a], body.radius[b]
+        reduced = r1 * r2 / (r1 + r2)
+        rest.append(r1 + r2 - rest_overlap(rest_radius(both.surface_energy, reduced, both.modulus), reduced))
+    return np.column_stack([i, j]), d, np.array(rest)
+
+
+def pieces(body, pairs):
+    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(body), len(body)))
+    return connected_components(graph, directed=False)[0]
+
+
+def size_of(body):
+    return float(np.sqrt(np.average((body.position**2).sum(axis=1), weights=body.mass)))
+
+
+@pytest.mark.parametrize("what", [{"radius": R, "material": M}, {"radius": "12 nm", "material": "iron"}, MIXED])
+@pytest.mark.parametrize("kind", list(GROWN))
+def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
+    """Every pair that touches is at r1 + r2 − δ0, to the rounding of coordinates of ten diameters and ten turns,
+    1e-13; one cluster; trees but for rbd; the centre of mass at the origin; the same seed gives the same bits."""
+    body = GROWN[kind](150, seed=7, **what)
+    pairs, distance, rest = touching(body)
+    assert np.abs(distance / rest - 1.0).max() < 1e-13
+    assert pieces(body, pairs) == 1
+    assert len(pairs) == 149 if kind != "rbd" else len(pairs) > 200
+    assert np.abs(np.average(body.position, axis=0, weights=body.mass)).max() < 1e-12 * size_of(body)
+    again, other = (GROWN[kind](150, seed=s, **what) for s in (7, 8))
+    assert (again.position == body.position).all() and (again.radius == body.radius).all()
+    assert (other.position != body.position).any()
+
+
+def test_a_simulation_finds_the_contacts_that_were_made():
+    """N − 1 contacts, forces below 1e-9 of what a contact bears, in a simulation of its own."""
+    sim = sand.Simulation(bcca(80, radius=R, material=M, seed=2), [sand.Contact()])
+    assert len(sim.contacts["pair"]) == 79
+    assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("kind", list(GROWN))
+def test_few_grains(kind, count):
+    """One, two, three grains make an aggregate, too."""
+    body = GROWN[kind](count, radius=R, material=M)
+    pairs, _, _ = touching(body)
+    assert len(body) == count and pieces(body, pairs) == 1
+
+
+def test_hexagonal_packing():
+    """Inside each grain has twelve contacts, all at rest; 5³ grains have 3·125 − … of them: counted by brute force."""
+    body = hexagonal(5, radius=R, material=M)
+    pairs, distance, rest = touching(body)
+    contacts = np.bincount(pairs.ravel())
+    inside = (np.abs(body.position) < 1.4 * R).all(axis=1)
+    assert inside.any() and (contacts[inside] == 12).all() and contacts.max() == 12
+    assert distance == pytest.approx(rest, rel=1e-12, abs=0.0)
+    layer = hexagonal(5, 5, 1, radius=R, material=M)
+    assert np.bincount(touching(layer)[0].ravel()).max() == 6
+
+
+def test_a_chain_of_unequal_grains():
+    """N − 1 contacts at rest, straight."""
+    body = chain(40, seed=3, **MIXED)
+    pairs, distance, rest = touching(body)
+    assert (np.diff(pairs, axis=1) == 1).all() and len(pairs) == 39
+    assert distance == pytest.approx(rest, rel=1e-12, abs=0.0)
+
+
+def dimension(make, few, many, count):
+    """D = ln(N2/N1) / (mean ln r_g2 − mean ln r_g1) over seeds, and its standard error."""
+    logs = [np.log([size_of(make(n, radius=R, material=M, seed=s)) for s in range(count)]) for n in (few, many)]
+    step = logs[1].mean() - logs[0].mean()
+    wrong = np.sqrt(sum(one.var(ddof=1) / count for one in logs)) / step
+    return np.log(many / few) / step, np.log(many / few) / step * wrong
+
+
+@pytest.mark.parametrize(
+    ("make", "count", "expected", "bound"), [(bpca, 60, 2.95, 0.2), (bcca, 150, 1.9, 0.15), (dla, 20, 2.5, 0.2)]
+)
+def test_fractal_dimensions(make, count, expected, bound):
+    """N ∝ r_g^D from 64 to 512 grains.  The known dimensions, 3 (2.9 at finite size), 1.9 and 2.5; the bound adds
+    what small aggregates are off, about 0.1, to three standard errors of this many seeds."""
+    found, wrong = dimension(make, 64, 512, count)
+    assert 3.0 * wrong < bound
+    assert found == pytest.approx(expected, abs=bound)
+
+
+@pytest.mark.parametrize("asked", [1.6, 2.0, 2.4])
+def test_a_chosen_dimension(asked):
+    """N = k_f (r_g/a)^D_f by definition: r_g within 5 % at the end as promised, D_f between 100 and 800 grains within
+    D² · 0.02/ln 8 · √2 < 0.05 for the 2 % that it usually is at most; the internal structure has it within 0.3."""
+    sizes = []
+    for n in (100, 800):
+        some = [size_of(fractal(n, dimension=asked, radius=R, material=M, seed=s)) for s in range(6)]
+        sizes.append(np.exp(np.mean(np.log(some))))
+        assert np.abs(np.array(some) / R / (n / 1.3) ** (1 / asked) - 1.0).max() < 0.05
+    assert np.log(8.0) / np.log(sizes[1] / sizes[0]) == pytest.approx(asked, abs=0.05)
+
+
+def test_walkers_come_back_as_brownian_motion_does():
+    """From 2R outside a sphere it is hit with probability R/|x| = ½, and cos of the angle to where the walker was has
+    the mean R/|x|: both harmonic functions.  Four standard errors of 4000 walkers."""
+    x, count, cosines = (0.0, 0.0, 2.0), 4000, []
+    for number in range(count):
+        there, back = returned(np.uint64(5), number, 1, x, 1.0)
+        if back:
+            assert np.linalg.norm(there) == pytest.approx(1.0, rel=1e-12, abs=0.0)
+            cosines.append(there[2])
+    assert len(cosines) / count == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(count))
+    assert np.mean(cosines) == pytest.approx(0.5, abs=4 * np.std(cosines) / np.sqrt(len(cosines)))
+
+
+def test_gaps_are_never_overrated():
+    """Against all grains: `gap_at` is at most the gap of surfaces, and just that where it names a grain."""
+    body, rng, named = dla(60, seed=1, **MIXED), np.random.default_rng(2), 0
+    stuff = stuff_of(body.radius, [body.materials[k] for k in body.material])
+    crowd = room(stuff)
+    for i in range(60):
+        join_crowd(crowd, i, tuple(body.position[i]))
+    for _ in range(300):
+        x = rng.normal(size=3) * size_of(body) * rng.choice([0.3, 1.0, 5.0, 50.0])
+        gap, mate = gap_at(crowd, body.arrays.position, stuff, 0, tuple(x))
+        true = np.linalg.norm(body.position - x, axis=1) - body.radius - body.radius[0]
+        assert gap <= true.min() + 1e-20
+        if mate >= 0:
+            named += 1
+            assert mate == true.argmin() and gap == pytest.approx(true.min(), rel=1e-9, abs=1e-18)
+        else:
+            assert gap > 0.0
+    assert 30 < named < 270
+
+
+def test_radii_follow_their_laws():
+    """Moments of 20 000 radii to five standard errors: ⟨ln r⟩ and its spread, cut at 3 σ (which takes 0.9865 of it);
+    ⟨r⟩ of r^−3.5 between 1 and 10 is (2.5/1.5)(1 − 10^−1.5)/(1 − 10^−2.5)."""
+    rng, count = np.random.default_rng(1), 20_000
+    logs = np.log(Lognormal(1e-7, 0.3).draw(count, rng) / 1e-7)
+    assert logs.mean() == pytest.approx(0.0, abs=5 * 0.3 / np.sqrt(count))
+    assert logs.std() == pytest.approx(0.3 * 0.9866, rel=5 / np.sqrt(2 * count), abs=0.0)
+    assert np.abs(logs).max() <= 0.9 + 1e-12
+    drawn = PowerLaw(-3.5, "1 nm", "10 nm").draw(count, rng) / 1e-9
+    expected = 2.5 / 1.5 * (1 - 10**-1.5) / (1 - 10**-2.5)
+    assert drawn.mean() == pytest.approx(expected, abs=5 * drawn.std() / np.sqrt(count))
+    assert drawn.min() >= 1.0 and drawn.max() <= 10.0
+    flat = PowerLaw(-1, 1.0, 10.0).draw(count, rng)
+    assert np.log(flat).mean() == pytest.approx(np.log(10) / 2, abs=5 * np.log(10) / np.sqrt(12 * count))
+
+
+def test_populations():
+    """Parts of materials and of magnetic grains to within one grain; sizes of moments by the material."""
+    body = bpca(200, radius=R, material={"silica": 0.7, "iron": 0.3}, moment="material", seed=1)
+    names = np.array([m.name for m in body.materials])[body.material]
+    assert (names == "iron").sum() == 60
+    size = np.linalg.norm(body.moment, axis=1)
+    assert size == pytest.approx(np.where(names == "iron", 200.0 * body.mass, 0.0), rel=1e-12, abs=0.0)
+    some = bpca(200, radius=R, material="iron", moment="1e-18 A m^2", magnetic=0.25, moments="aligned", seed=1)
+    assert (some.moment[:, 2] == 1e-18).sum() == 50 and not some.moment[:, :2].any()
+
+
+def flux_densities(body):
+    """B [T] at each grain from the others, k (3 r̂ (μ·r̂) − μ)/r³, by brute force."""
+    apart = body.position[:, None] - body.position[None]
+    distance = np.linalg.norm(apart, axis=2) + np.where(np.eye(len(body)), np.inf, 0.0)
+    along = np.einsum("ijk,jk->ij", apart, body.moment) / distance**2
+    return 1e-7 * ((3.0 * along[..., None] * apart - body.moment[None]) / distance[..., None] ** 3).sum(axis=1)
+
+
+def test_relaxed_moments():
+    """U is below that of random and of aligned moments, it falls with every sweep, and no torque is left: |μ × B| is
+    below 1e-5 of |μ||B|, ten times the angle at which sweeps end.  k is 1e-7 to nine digits here.
+    Two moments lie head to tail, U = −2kμ²/d³."""
+    body, flat = (
+        bpca(60, radius=R, material="iron", moment="1e-16 A m^2", moments=how, seed=4) for how in ("random", "aligned")
+    )
+    before = magnetic_energy(body)
+    done = relaxed(body.copy())
+    assert magnetic_energy(done) < min(before, magnetic_energy(flat))
+    field = flux_densities(done)
+    torque = np.linalg.norm(np.cross(done.moment, field), axis=1)
+    assert (torque < 1e-5 * 1e-16 * np.linalg.norm(field, axis=1)).all()
+    assert ((done.moment * field).sum(axis=1) > 0.0).all()
+    assert magnetic_energy(done) == pytest.approx(-0.5 * (done.moment * field).sum(), rel=1e-8, abs=0.0)
+    assert np.linalg.norm(done.moment, axis=1) == pytest.approx(1e-16, rel=1e-12, abs=0.0)
+    pair = bpca(2, radius=R, material="iron", moment="1e-16 A m^2", moments="relaxed", seed=4)
+    deepest = -2e-7 * 1e-32 / rest_distance("iron", R) ** 3
+    assert magnetic_energy(pair) == pytest.approx(deepest, rel=1e-8, abs=0.0)
+
+
+@pytest.mark.parametrize("ending", ["xyz", "extxyz", "gsd"])
+def test_bodies_come_back_from_files(tmp_path, ending):
+    """Places, radii, moments and materials to rounding (twelve ulps through ångström); contacts are still at rest."""
+    body = bcca(60, radius="power law(-2, 0.1 um, 0.3 um)", material={"silica": 0.5, "iron": 0.5}, moment="material")
+    path = write_body(tmp_path / f"body.{ending}", body)
+    again = body_from_file(path)
+    assert again.position == pytest.approx(body.position, rel=1e-14, abs=1e-14 * size_of(body))
+    assert again.radius == pytest.approx(body.radius, rel=1e-15, abs=0.0)
+    assert again.moment == pytest.approx(body.moment, rel=1e-15, abs=0.0)
+    assert [again.materials[k] for k in again.material] == [body.materials[k] for k in body.material]
+    _, distance, rest = touching(again)
+    assert len(rest) == 59 and np.abs(distance / rest - 1.0).max() < 1e-13
+    with pytest.raises(sand.BadInput, match="exists; give another name"):
+        write_body(path, body)
+    write_body(path, body, overwrite=True)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_other_programs_read_bodies(tmp_path):
+    """ASE and gsd itself: as many grains, radii, places."""
+    body = bpca(20, radius=R, material=M)
+    ase_io = pytest.importorskip("ase.io")
+    atoms = ase_io.read(write_body(tmp_path / "a.xyz", body))
+    assert atoms.positions == pytest.approx(body.position * 1e10, rel=1e-12, abs=1e-6)
+    assert atoms.arrays["radius"] == pytest.approx(body.radius * 1e10)
+    again = tmp_path / "b.xyz"
+    ase_io.write(again, atoms, format="extxyz")
+    assert body_from_file(again, M).position == pytest.approx(body.position, abs=1e-17)
+
+
+def test_foreign_gsd(tmp_path):
+    """A frame of another program: positions and diameters in a unit that is given, materials by the key."""
+    import gsd.hoomd
+
+    frame = gsd.hoomd.Frame()
+    frame.particles.N = 2
+    frame.particles.position, frame.particles.diameter = [[0, 0, 0], [0.999, 0, 0]], [1.0, 1.0]
+    with gsd.hoomd.open(str(tmp_path / "two.gsd"), "w") as file:
+        file.append(frame)
+    body = read_body(tmp_path / "two.gsd", M, length="2 um")
+    assert body.radius == pytest.approx([1e-6, 1e-6]) and np.ptp(body.position[:, 0]) == pytest.approx(1.998e-6)
+
+
+HEAD = "length_unit=um Properties=species:S:1:pos:R:3:radius:R:1"
+PLACES = ["0 0 0", "1.9995 0 0", "3.999 0 0"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "1.9 0 0", "3.8 0 0"))], "grains 0 and 1 overlap by 1e-07 m"),
+        (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "1.9995 0 0", "5 0 0"))], "grain 2 has no contact .* to grain 1"),
+        (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "nan 0 0", "3 0 0"))], "position of grain 1 is .* finite"),
+        (["3", HEAD, *(f"Si {p} -1" for p in PLACES)], "radius of grain 0 is -1.* above 0"),
+        (["3", HEAD, *(f"Si {p}" for p in PLACES)], "line 3: 4 columns, not the 5"),
+        (["4", HEAD, *(f"Si {p} 1" for p in PLACES)], "line 1: '4' is not the number of grains"),
+        (["3", HEAD, *(f"Si x{p} 1" for p in PLACES)], "line 3: .* has no numbers for pos"),
+        (["3", "Properties=species:S:1", "Si", "Si", "Si"], "has no positions"),
+        (["3", "Properties=species:S", "Si", "Si", "Si"], "is not made of name:type:number"),
+        (["1", HEAD + ":material:S:1", "Si 0 0 0 1 quarz"], "unknown material 'quarz'"),
+    ],
+)
+def test_bad_bodies(tmp_path, lines, message):
+    """One line each with file and grain or line; ten of them at most, then how many there are more."""
+    path = tmp_path / "bad.xyz"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(sand.BadInput, match=message) as caught:
+        body_from_file(path, otherwise=M)
+    assert all(problem.startswith(str(path)) for problem in caught.value.problems)
+
+
+def test_only_ten_grains_are_named(tmp_path):
+    """Thirty grains apart: twenty-nine gaps, ten lines and one that counts the rest."""
+    path = tmp_path / "loose.txt"
+    path.write_text("".join(f"{3 * k} 0 0 1\n" for k in range(30)))
+    with pytest.raises(sand.BadInput, match="and 19 more") as caught:
+        body_from_file(path, M)
+    assert len(caught.value.problems) == 11
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: build("chain", 10_000, dimension=3, radius=R, material=M), "a chain has a dimension of its own"),
+        (lambda: fractal(10_000, dimension=3, radius=R, material=M), "dimension = 3 must not exceed 2.4"),
+        (lambda: fractal(100, dimension=1.1, radius=R, material=M), "at least 1.3"),
+        (lambda: fractal(100, dimension=1.3, prefactor=0.1, radius=R, material=M), "even a straight chain has only"),
+        (lambda: fractal(100, dimension=2.4, prefactor=20, radius=R, material=M), "packed as densely as can be"),
+        (lambda: bpca(9, radius="power law(-3.5, 1 nm, 1 um)", material=M), "at most 200 is allowed"),
+        (lambda: bpca(9, radius="lognormal(1 nm)", material=M), "wrong number of arguments"),
+        (lambda: bpca(9, radius="lognormal(9 nm, 3)", material=M), "must not exceed 2"),
+        (lambda: bpca(9, radius="gauss(1 nm, 1)", material=M), "give a length, N of them, 'lognormal"),
+        (lambda: bpca(9, radius=[R] * 8, material=M), "radius has 8 entries but there are 9 grains"),
+        (lambda: bpca(9, radius=[R, -R], material=M), "that of grain 1 is not"),
+        (lambda: bpca(9, radius="0.01 nm", material="iron"), "too small for JKR"),
+        (lambda: bpca(9, radius=R, material={"silica": -1.0}), "part of silica = -1.0"),
+        (lambda: bpca(9, radius=R, material=M, moments="relax"), "did you mean 'relaxed'"),
+        (lambda: bpca(9, radius=R, material=M, magnetic=1.5), "must not exceed 1"),
+        (lambda: bpca(9, radius=R, material=M, seed=-1), "seed = -1"),
+        (lambda: rbd(9, radius=[R] * 9, material=M), "is cut from more grains"),
+        (lambda: hexagonal(3, radius="lognormal(9 nm, 0.1)", material=M), "only if its grains are equal"),
+        (lambda: build("lattice", 10, radius=R, material=M), "10 grains are no cube"),
+        (lambda: build("bpca", radius=R, material=M), "grains is missing"),
+        (lambda: build("bpca", 8, shape=[2, 2, 2], radius=R, material=M), "shape = .* is for lattice"),
+    ],
+)
+def test_impossible_requests(make, message):
+    """One line each, at once, with the reason."""
+    with pytest.raises(sand.BadInput, match=message):
+        make()
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"grain"}))
+def test_the_command(tmp_path, capsys, monkeypatch, kind):
+    """`sand build KIND` writes a body and says what it is; the dimension of a chain is 1."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", kind, "--grains", "64", "--out", "a.xyz", "--seed", "2", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["grains"] == 64 and told["file"] == "a.xyz"
+    body = body_from_file("a.xyz")
+    assert told["radius_of_gyration"] == pytest.approx(size_of(body))
+    assert told["contacts"] == len(touching(body)[0])
+    if kind == "chain":
+        assert told["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)
+    assert main(["build", kind, "--grains", "64", "--out", "a.xyz"]) == 2
+    assert "exists" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["bpca", "--out", "a.xyz"], "grains is missing"),
+        (["bpca", "--grains", "9", "--out", "a.pdb"], "allowed: .xyz, .extxyz, .gsd"),
+        (["bpca", "--grains", "9", "--out", "no/a.xyz"], "there is no folder no"),
+        (["chain", "--grains", "10000", "--dimension", "3", "--out", "a.xyz"], "dimension of its own, about 1"),
+        (["lattice", "--shape", "2,2", "--out", "a.xyz"], "three whole numbers"),
+        (["lattice", "--grains", "8", "--shape", "2,2,2", "--out", "a.xyz"], "leave --grains out"),
+        (["bpca", "--grains", "9", "--material", "silica:x", "--out", "a.xyz"], "--material 'silica:x'"),
+        (["bpca", "--grains", "9", "--magnetic", "x", "--out", "a.xyz"], "--magnetic 'x' is not a number"),
+        (["bcpa", "--grains", "9", "--out", "a.xyz"], "'bcpa' is not one of"),
+    ],
+)
+def test_mistakes_on_the_command_line(tmp_path, capsys, monkeypatch, words, message):
+    """Exit 2, one line on stderr, no file."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["build", *words]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_built_collides_and_runs(tmp_path, capsys, monkeypatch):
+    """A body from a file, one by its kind and one with laws and moments, in `sand collide` and `sand run`."""
+    monkeypatch.chdir(tmp_path)
+    laws = ["--radius", "lognormal(0.1 um, 0.2)", "--material", "silica:0.5,ice:0.5"]
+    assert main(["build", "bcca", "--grains", "12", *laws, "--out", "a.xyz"]) == 0
+    assert "fractal dimension" in capsys.readouterr().out
+    (tmp_path / "hit.toml").write_text(
+        '[target]\nkind = "file"\npath = "a.xyz"\n[projectile]\nkind = "dla"\ngrains = 6\nradius = "0.1 um"\n'
+        'moment = "1e-18 A m^2"\nmoments = "relaxed"\n[impact]\nspeed = "0.1 m/s"\n[forces.contact]\n'
+    )
+    from sand.experiments.collision_case import read_collision
+
+    case = read_collision("hit.toml")
+    materials = {"silica": sand.SILICA, "ice": sand.ICE}
+    assert {m.name for m in case.target.build(materials, 1).materials} == {"silica", "ice"}
+    assert case.projectile.build(materials, 1).moment.any()
+    for name, file in (("xyz", "a.xyz"), ("gsd", "b.gsd")):
+        if name == "gsd":
+            write_body("b.gsd", body_from_file("a.xyz"))
+        text = f'[run]\nsteps = 3\n[grains]\nkind = "file"\nfile = "{file}"\n[forces.contact]\n'
+        (tmp_path / f"{name}.toml").write_text(text)
+        assert main(["run", f"{name}.toml", "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert told["grains"] == 12
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize(
+    ("make", "few", "many", "count", "expected", "bound"),
+    [(bpca, 1000, 10_000, 6, 2.9, 0.15), (bcca, 100, 1000, 100, 1.9, 0.1), (dlca, 100, 1000, 40, 1.8, 0.1)],
+)
+def test_dimensions_of_large_aggregates(make, few, many, count, expected, bound):
+    """N ∝ r_g^D over a decade, within what is known of these aggregates at finite size."""
+    found, _ = dimension(make, few, many, count)
+    assert found == pytest.approx(expected, abs=bound)
