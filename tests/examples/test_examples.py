@@ -18,7 +18,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda p: p.name)
 def test_case_files_are_without_mistakes(path):
     """Each is read by the command that its first comment names."""
-    reads = {"run": read_case, "collide": read_collision, "scatter": read_scattering}
+    reads = {"run": read_case, "grow": read_case, "collide": read_collision, "scatter": read_scattering}
     comment = path.read_text().split("[", 1)[0]
     command = next(word for word in reads if f"sand {word} examples/{path.name}" in comment)
     reads[command](path)
@@ -47,3 +47,13 @@ def test_cross_sections(monkeypatch, capsys):
     for name in list(made)[1:]:
         error = float(made[name][1])
         assert abs(float(made[name][0]) - float(kept[name][0])) < 4.0 * error, name
+
+
+def test_growth_variants(tmp_path, monkeypatch, capsys):
+    """Two variants for a nanosecond: a row each, what is not known is a dash."""
+    words = ["growth_variants.py", "--boxes", "1", "--until", "1 ns", "--only", "cold", "--only", "field"]
+    monkeypatch.setattr(sys, "argv", [*words, "--out", str(tmp_path / "out")])
+    runpy.run_path(str(EXAMPLES / "growth_variants.py"), run_name="__main__")
+    rows = capsys.readouterr().out.splitlines()[1:]
+    assert [row.split()[0] for row in rows] == ["cold", "field"]
+    assert all(row.split()[1] == "1.00" for row in rows)

@@ -1,0 +1,58 @@
+"""How the growth of magnetic grains depends on heat, on an outside field and on a gas.
+
+Run it with:  python examples/growth_variants.py --boxes 3 --until "4 us" --workers 2 --out variants
+Interrupted, the same command goes on; `sand analyse variants/cold variants/hot` compares two of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+from pathlib import Path
+
+from sand.experiments.executors import executor_for
+from sand.experiments.growth import grow
+from sand.experiments.growth_report import ensemble_in
+from sand.files.folder import read_toml
+
+CASE = read_toml(Path(__file__).with_name("growth.toml"))
+VARIANTS = {
+    "as it is": {},
+    "cold": {"grains": {"temperature": "10 K"}},
+    "hot": {"grains": {"temperature": "1000 K"}},
+    "field": {"forces": {"field": {"flux_density": [0, 0, 0.05]}}},
+    "drag": {"forces": {"gas": {"temperature": "100 K", "pressure": "10 mbar"}}},
+}
+
+
+def variant(name: str, until: str) -> dict:
+    """The case of growth.toml with some tables changed."""
+    case = copy.deepcopy(CASE)
+    case["run"]["until"] = until
+    for table, changes in VARIANTS[name].items():
+        case[table].update(changes)
+    return case
+
+
+def main() -> None:
+    """Grow each variant and tell what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--boxes", type=int, default=3)
+    parser.add_argument("--until", default="4 us")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--out", default="variants")
+    parser.add_argument("--only", choices=list(VARIANTS), action="append")
+    options = parser.parse_args()
+    print(f"{'':10} {'S at the end':>16} {'z':>12} {'gamma':>12} {'D_f':>12}")
+    with executor_for(options.workers) as executor:
+        for name in options.only or VARIANTS:
+            folder = Path(options.out) / name.replace(" ", "-")
+            grow(variant(name, options.until), range(1, options.boxes + 1), folder, executor)
+            growth = ensemble_in(folder).growth
+            laws = [(growth.z, "exponent"), (growth.moment, "exponent"), (growth.dimension, "value")]
+            told = ["-" if law is None else f"{getattr(law, key):.2f} ± {law.error:.2f}" for law, key in laws]
+            print(f"{name:10} {growth.mean[-1]:8.2f} ± {growth.error[-1]:.2f}", *(f"{one:>12}" for one in told))
+
+
+if __name__ == "__main__":
+    main()
