@@ -5,6 +5,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sand.experiments import sampling
@@ -57,3 +58,15 @@ def test_growth_variants(tmp_path, monkeypatch, capsys):
     rows = capsys.readouterr().out.splitlines()[1:]
     assert [row.split()[0] for row in rows] == ["cold", "field"]
     assert all(row.split()[1] == "1.00" for row in rows)
+
+
+def test_measured_kernel(tmp_path, monkeypatch, capsys):
+    """Six pairs at an error of 50 %: σv is a third to two thirds of Eq. 14 with μ ∝ N, and DustPy's table is symmetric."""
+    monkeypatch.setattr(sampling, "PILOT", 4)
+    monkeypatch.setattr(sys, "argv", ["measured_kernel.py", "0.5", str(tmp_path / "kernel")])
+    runpy.run_path(str(EXAMPLES / "measured_kernel.py"), run_name="__main__")
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:-1]]
+    assert len(rows) == 6
+    assert all(0.2 < float(row[-2]) < 1.2 for row in rows)
+    table = np.loadtxt(tmp_path / "kernel.txt")
+    assert np.allclose(table[1:], table[1:].T)
