@@ -73,11 +73,11 @@ def test_a_simulation_finds_the_contacts_that_were_made():
     assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
 
 
-@pytest.mark.parametrize("rolls", [False, True])
-def test_spheres_are_cut_in_one_piece(rolls):
+@pytest.mark.parametrize("make", [bpca, rbd])
+def test_spheres_are_cut_in_one_piece(make):
     """From a heap of 400 grains any number: so many, one cluster, and compact: r_g at most twice that of a ball which
-    fills 0.1 of space."""
-    heap = rbd(400, radius=R, material=M, seed=3, rolls=rolls)
+    fills 0.1 of space; of trees (bpca) and of a net (rbd)."""
+    heap = make(400, radius=R, material=M, seed=3)
     for count in range(20, 400, 13):
         kept = cut_sphere(heap.position, heap.radius, count)
         body = sand.Grains(heap.position[kept] - heap.position[kept].mean(axis=0), R, M)
