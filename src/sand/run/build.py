@@ -21,7 +21,6 @@ from .bodies import body_from_file
 from .case import Case, check_case, read_case
 from .simulation import Simulation
 
-
 BODIES = (".xyz", ".extxyz", ".txt", ".dat")
 """Endings of files that hold a body as text; all others are taken for trajectories."""
 
