@@ -461,7 +461,8 @@ CASE_KEYS = {
     "grains.moment": '[A m^2] size of each, absolute or per mass ("200 A m^2/kg"), or "material"; none by default',
     "grains.charge": "[C] charge of each grain; none by default",
     "grains.temperature": "temperature of velocities and spins",
-    "grains.file": "a trajectory (`.gsd`), the folder of a run, extended XYZ, or columns x y z or x y z r",
+    "grains.file": "a trajectory or body (`.gsd`), the folder of a run, extended XYZ (`.xyz`), or columns x y z or "
+    "x y z r (`.txt`, `.dat`)",
     "grains.frame": "which frame of a trajectory, −1 being the last",
     "grains.length": "what one unit of the file's lengths is, such as 1 nm; 1 Å in extended XYZ, 1 m in columns",
     "grains.spins": "mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`",

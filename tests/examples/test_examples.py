@@ -61,7 +61,7 @@ def test_growth_variants(tmp_path, monkeypatch, capsys):
 
 
 def test_measured_kernel(tmp_path, monkeypatch, capsys):
-    """Six pairs at an error of 50 %: σv is a third to two thirds of Eq. 14 with μ ∝ N, and DustPy's table is symmetric."""
+    """Six pairs at an error of 50 %: σv is of the order of Eq. 14 with μ ∝ N; the table of DustPy is symmetric."""
     monkeypatch.setattr(sampling, "PILOT", 4)
     monkeypatch.setattr(sys, "argv", ["measured_kernel.py", "0.5", str(tmp_path / "kernel")])
     runpy.run_path(str(EXAMPLES / "measured_kernel.py"), run_name="__main__")

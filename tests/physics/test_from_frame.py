@@ -20,7 +20,7 @@ STIFFNESS = 100.0
 def crash(tmp_path_factory):
     """A run in which a fast grain hits a compact cluster in a corner of a periodic box; its folder and frames."""
     folder = tmp_path_factory.mktemp("frames") / "crash"
-    cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=6)
+    cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=1)
     place = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
     place += [1.4e-7, 0.9e-7, 1.4e-7]
     speed = np.zeros((41, 3))
@@ -243,8 +243,8 @@ def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
     before = sorted(tmp_path.iterdir())
     meant = {"RUN": str(folder), "STRETCHED": str(stretched)}
     assert main(["run", *(meant.get(word, word) for word in words)]) == 2
-    told = said(capsys).err
-    assert told.count("\n") == 1, told
+    told = "\n".join(line for line in said(capsys).err.splitlines() if "compiling" not in line)
+    assert told.count("\n") == 0, told
     assert all(part in told for part in parts), told
     assert sorted(tmp_path.iterdir()) == before
 

@@ -98,11 +98,10 @@ def rolled(crowd, position, stuff, b, x, mate, side, count):
 
 
 @kernel
-def deposit(crowd, position, stuff, side, count, rolls, seed, tries):
-    """All grains fall one by one on a periodic square of this side [m], of count × count columns, and stay.
+def deposit(crowd, position, stuff, side, count, seed, tries):
+    """All grains fall one by one on a periodic square of this side [m], of count × count columns.
 
-    Args:
-        rolls: whether a grain that has landed on another rolls on it to the nearest place where it touches a second.
+    One that has landed on another rolls on it to the nearest place where it touches a second.
 
     Returns:
         The next grain to fall: less than all if one touched more than it may in each of `tries` tries.
@@ -115,7 +114,7 @@ def deposit(crowd, position, stuff, side, count, rolls, seed, tries):
             x, y = side * uniform(words[0]), side * uniform(words[1])
             z, mate = landing(crowd, position, stuff, b, x, y, side, count)
             place, second = (x, y, z), EMPTY
-            if rolls and mate != EMPTY:
+            if mate != EMPTY:
                 place, second = rolled(crowd, position, stuff, b, place, mate, side, count)
             if second != EMPTY or not touching_here(crowd, position, stuff, b, place, side, count, mate, second):
                 place = (place[0] % side, place[1] % side, place[2])

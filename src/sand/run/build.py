@@ -21,6 +21,9 @@ from .bodies import body_from_file
 from .case import Case, check_case, read_case
 from .simulation import Simulation
 
+BODIES = (".xyz", ".extxyz", ".txt", ".dat")
+"""Endings of files that hold a body as text; all others are taken for trajectories."""
+
 
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
     """The simulation a case describes.
@@ -81,10 +84,10 @@ def _of_gas(case: Case) -> Start:
 def _of_file(case: Case) -> Start:
     section, path = case.grains, Path(case.grains.file or "")
     try:
-        if path.is_dir() or path.suffix == ".gsd":
-            start = from_trajectory(path, section.frame, case.materials_by_name())
-        else:
+        if path.suffix in BODIES:
             start = _of_body(case, path)
+        else:
+            start = from_trajectory(path, section.frame, case.materials_by_name())
     except BadInput as error:
         raise error.at("grains") from None
     told = section.material if isinstance(section.material, list) else [section.material]

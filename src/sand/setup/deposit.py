@@ -21,25 +21,26 @@ from .growing import CELL, TRIES, refuse_unmet, room
 from .moments import magnetised
 from .population import Lognormal, Population, PowerLaw, at_home, population, radii_of, streams, stuff_of, whole
 
-FILLING = {False: 0.15, True: 0.26}
-"""Of a deposit of equal grains, about, by whether they roll (Watson et al. 1997: 0.1469; Shen et al. 2008)."""
-SPARE = {False: 8.0, True: 1.6}
-"""A deposit has this many times the grains that the sphere needs: without rolling it consists of separate trees."""
+FILLING = 0.23
+"""Of a deposit of equal grains that roll once, about."""
+SPARE = 1.6
+"""A deposit has this many times the grains that the sphere needs."""
+DOUBLED = 6
+"""Deposits of twice the size each that are tried."""
 
 
 def rbd(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
-    seed: int = 0, rolls: bool = True,
+    seed: int = 0,
 ) -> Grains:  # fmt: skip
     """A compact sphere cut from a random ballistic deposit: grains fall one by one onto a plane and stay.
 
-    A deposit in which nothing rolls consists of separate trees, whose crowns fill 0.15 of space together.  By default
-    each grain therefore rolls on the one it has landed on to the nearest place where it touches a second (once, as in
-    the BAM1 aggregates of Shen, Draine & Johnson 2008).  The sphere is the smallest about the middle that holds a
-    cluster of N grains; outermost grains with a single contact go until it is N.
+    A deposit in which nothing rolls fills 0.15 of space, but with separate trees, of which no sphere can be cut in one
+    piece.  Each grain therefore rolls on the one it has landed on to the nearest place where it touches a second, once,
+    as in the BAM1 aggregates of Shen, Draine & Johnson (2008); about 0.23 of space is filled then.  The sphere is the
+    smallest about the middle that holds a cluster of N grains; outermost grains with a single contact go until it is N.
 
     Args:
-        rolls: False: grains stay where they land; the sphere then is one tree, and looser.
         grains, radius, …: as for `bpca`; but N radii or materials cannot be given one by one, since most grains of
             the deposit are cut off.
 
@@ -50,35 +51,40 @@ def rbd(
     law = radii_of(radius)
     if isinstance(law, np.ndarray) or not isinstance(material, (str, Material, Mapping)):
         raise BadInput("an rbd is cut from more grains than it has; give one radius or a law, and no list of materials")
-    every, side = _of_deposit(count, law, material, chance.population, bool(rolls))
-    columns = max(3, int(side / (CELL * every.stuff.largest)))
-    position, crowd = np.zeros((3, len(every.radius))), room(every.stuff, side / columns)
-    done = deposit(crowd, position, every.stuff, side, columns, bool(rolls), chance.places, TRIES)
-    refuse_unmet(done, len(every.radius), f"grain {done} of the deposit", ADVICE)
-    kept = cut_sphere(position.T, every.radius, count)
+    for doubled in range(DOUBLED):
+        spare = SPARE * 2**doubled
+        every, side = _of_deposit(count, law, material, chance.population, spare)
+        columns = max(3, int(side / (CELL * every.stuff.largest)))
+        position, crowd = np.zeros((3, len(every.radius))), room(every.stuff, side / columns)
+        done = deposit(crowd, position, every.stuff, side, columns, chance.places, TRIES)
+        refuse_unmet(done, len(every.radius), f"grain {done} of the deposit", ADVICE)
+        kept = cut_sphere(position.T, every.radius, count)
+        if len(kept):
+            break
+    else:
+        raise BadInput(f"no deposit had a cluster of {count} grains; take another seed")
     kinds = [every.material[k] for k in kept]
     cut = Population(every.radius[kept], kinds, stuff_of(every.radius[kept], kinds))
     return magnetised(at_home(position.T[kept], cut), moment, moments, magnetic, chance.moments)
 
 
 def _of_deposit(
-    count: int, law: float | Lognormal | PowerLaw, material: Any, rng: np.random.Generator, rolls: bool
+    count: int, law: float | Lognormal | PowerLaw, material: Any, rng: np.random.Generator, spare: float
 ) -> tuple[Population, float]:
     """Grains that fill a cube, and its side [m]: larger than the sphere by a part, and by a rim of large grains."""
     few = population(max(count, 100), law, material, rng)
     volume = 4.0 / 3.0 * math.pi * float((few.radius**3).mean())
-    side = (SPARE[rolls] * count * volume / FILLING[rolls]) ** (1.0 / 3.0) + 3.0 * CELL * few.stuff.largest
-    return population(int(FILLING[rolls] * side**3 / volume) + 10, law, material, rng), side
+    side = (spare * count * volume / FILLING) ** (1.0 / 3.0) + 3.0 * CELL * few.stuff.largest
+    return population(int(FILLING * side**3 / volume) + 10, law, material, rng), side
 
 
 def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarray:
     """Numbers (count,) of grains in one cluster, as compact as can be about the middle of a heap of grains.
 
+    Of length 0 if there is no cluster that large.
+
     Args:
         position, radius: (M, 3) and (M,) [m] of the heap.
-
-    Raises:
-        BadInput: there is no cluster that large.
     """
     pairs = Box.open().close_pairs(position, 2.0 * float(radius.max()))
     apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
@@ -90,7 +96,7 @@ def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarr
     bonds = place[pairs]  # by rank of the distance from the centre
     low, high = count, len(order)
     if len(_largest(bonds, high)) < count:
-        raise BadInput(f"the deposit has no cluster of {count} grains; take another seed")
+        return np.zeros(0, dtype=np.int64)
     while low < high:  # the smallest ball whose largest cluster has enough
         trial = (low + high) // 2
         low, high = (low, trial) if len(_largest(bonds, trial)) >= count else (trial + 1, high)
