@@ -26,6 +26,8 @@ CORE = 1.0
 """It is looked around from grains within so many radii of gyration of the centre: the rim has nothing beyond it."""
 BOXES = (2.0, 0.5)
 """Sides of boxes: from so many grain distances to so many radii of gyration."""
+RANGE = 3.0
+"""Largest over smallest number of grains that an ensemble must have at least."""
 POINTS = 12
 SHIFTS = 32
 
@@ -56,10 +58,15 @@ def ensemble_dimension(
     """
     n, r = np.asarray(sizes, float), np.asarray(gyration, float)
     used = n >= least
-    if len(np.unique(n[used])) < 2:
-        raise BadInput(f"a fractal dimension needs aggregates of at least two different sizes from {least} grains on")
+    if not used.any() or n[used].max() < RANGE * n[used].min():
+        raise BadInput(
+            f"a fractal dimension needs aggregates from {least} grains on, "
+            f"the largest at least {RANGE:g} times the smallest"
+        )
     # N is what is known, r_g scatters about what N makes of it
     fit = power_law(n[used], r[used] / grain_radius, None if groups is None else np.asarray(groups)[used])
+    if not fit.exponent > 0.1:
+        raise BadInput("the sizes of aggregates do not grow with their number of grains: too few of them")
     value = 1.0 / fit.exponent
     return Dimension(value, fit.error * value**2, fit.prefactor**-value, (float(n[used].min()), float(n[used].max())))
 

@@ -35,6 +35,8 @@ def command(
 
     if window is not None and not 1.0 <= window[0] < window[1]:
         raise BadInput(f"--window {window[0]:g} {window[1]:g}: the first must be at least 1, the second above it")
+    if len({Path(folder).absolute() for folder in folders}) < len(folders):
+        raise BadInput("the same folder is given twice")
     place = None if out is None else _place(Path(out), NAMES, overwrite)
     ensembles = [ensemble_in(folder, window) for folder in folders]
     content = {"ensembles": [numbers(one) for one in ensembles], "comparison": compared(ensembles)}
@@ -65,11 +67,16 @@ def _tell(content: dict[str, Any], place: Path | None) -> None:
             ("S", f"{one['mean_size']:.3g}{_pm(one['mean_size_error'])} at {spoken(one['time'], 's')}"),
             (
                 "z",
-                _line(one, "z", "S = (1 + t/zτ)^", f", fitted from S = {one['window'][0]:g} to {one['window'][1]:.4g}"),
+                _line(
+                    one,
+                    "z",
+                    "S = (1 + t/zτ)^",
+                    f", fitted from S = {one['window'][0]:g} until a box has {one['window'][1]:.4g}",
+                ),
             ),
-            ("", _line(one, "slope", "ln S over ln t has slope ", "")),
+            ("", _line(one, "slope", "ln S over ln t has slope ", "") if one["slope"] else ""),
             ("moments", _line(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
-            ("", _line(one, "moment_without_rings", "without rings N^", "")),
+            ("", _line(one, "moment_without_rings", "without rings N^", "") if one["moment"] else ""),
             ("D_f", _line(one, "dimension", "", " from N(r_g)")),
         ]
         report.show(one["name"], [row for row in rows if row[1]])

@@ -97,6 +97,8 @@ def _material(text: str) -> str | dict[str, float]:
     parts: dict[str, float] = {}
     for word in text.split(","):
         name, _, part = word.partition(":")
+        if name.strip() in parts:
+            raise BadInput(f"--material {text!r} names {name.strip()} twice")
         try:
             parts[name.strip()] = float(part)
         except ValueError:

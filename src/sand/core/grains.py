@@ -14,6 +14,9 @@ from .fields import BY_NAME, FIELDS, blank, public, stored
 from .material import Material, material_named
 from .units import in_unit
 
+ROUNDING = 1e-7
+"""Gap that still is a contact, as a part of the sum of radii: coordinates of seven digits; no adhesion."""
+
 
 class GrainArrays(NamedTuple):
     """Every array of the field table in stored shape, (N,) or (width, N); what kernels read and write."""

@@ -55,6 +55,14 @@ def grow(
     place = Path(folder)
     check_case(content, "case")
     places = [place / f"seed-{seed}" for seed in seeds]
+    for there in place.glob(f"seed-*/{files.CASE}"):
+        seed = int(there.parent.name.removeprefix("seed-"))
+        if seed in seeds and there.parent.exists():
+            continue  # looked at by one_box
+        known = alike(files.read_toml(there))
+        asked = alike(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
+        if changed := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
+            raise BadInput(f"{there.parent} holds a box with other [{changed[0]}]; give another folder")
     jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
     if executor is None:
         outcomes: Any = (one_box(*job) for job in jobs)
@@ -105,6 +113,7 @@ class Box(NamedTuple):
     radius: float  # mean of the grains [m]
     moment: float  # mean size of theirs [A m²]
     aggregates: dict[str, np.ndarray]  # census of all looks, and `time` [s] of each row
+    case: dict[str, Any]  # as understood, without [run]
 
 
 def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
@@ -131,9 +140,24 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
         ledger["mean_cluster_size"],
         len(first),
         float(first.radius.mean()),
-        float(np.linalg.norm(first.moment, axis=1).mean()),
+        _usual(np.linalg.norm(first.moment, axis=1)),
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
+        alike(run.case),
     )
+
+
+def _usual(moments: np.ndarray) -> float:
+    """Mean size of the moments of the grains that have one; 0 if none has."""
+    return float(moments[moments > 0.0].mean()) if (moments > 0.0).any() else 0.0
+
+
+def alike(case: dict[str, Any]) -> dict[str, Any]:
+    """What boxes of an ensemble have in common: the case but for [run] and for cut-offs, which follow the grains."""
+    forces = {
+        name: {key: value for key, value in table.items() if key != "cutoff"}
+        for name, table in case.get("forces", {}).items()
+    }
+    return {name: table for name, table in case.items() if name != "run"} | {"forces": forces}
 
 
 def boxes_in(folder: str | Path) -> list[Path]:
@@ -160,7 +184,7 @@ class Growth(NamedTuple):
     z: RateLaw | None  # dS/dt ∝ S^λ, S = (1 + t/zτ)^z
     slope: PowerLaw | None  # the straight line S ∝ t^slope
     moment: PowerLaw | None  # μ/μ1 = N^γ
-    open_moment: PowerLaw | None  # the same, of aggregates without rings
+    moment_without_rings: PowerLaw | None  # the same, of aggregates without rings
     dimension: Dimension | None  # N = k (r_g/a)^D
     missing: dict[str, str]
 
@@ -182,19 +206,22 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
 
     Args:
         boxes: alike but for their seeds.
-        window: values of S between which z is fitted; by default 2 to 0.15 N, where a box runs out of partners.
+        window: values of S for z: from where the mean over boxes is at the first until any box is at the second; by
+            default 2 and 0.15 N, where a box runs out of partners.
 
     Raises:
         BadInput: no box, or boxes that are not alike.
     """
     if not boxes:
         raise BadInput("an ensemble needs at least one box")
-    if len({(box.grains, round(box.radius * 1e15)) for box in boxes}) > 1:
-        raise BadInput("the boxes of an ensemble must have the same number and size of grains")
+    for box in boxes[1:]:
+        for name in {**boxes[0].case, **box.case}:
+            if boxes[0].case.get(name) != box.case.get(name):
+                raise BadInput(f"{box.folder} is not like {boxes[0].folder}: [{name}] differs; put it elsewhere")
     last = min(box.time[-1] for box in boxes)
     time = np.append(boxes[0].time[boxes[0].time < last], last)
     sizes = np.array([np.interp(time, box.time, box.size) for box in boxes])
-    chosen = window or (FIRST_SIZE, LARGEST_PART * boxes[0].grains)
+    chosen = window or (FIRST_SIZE, max(LARGEST_PART * boxes[0].grains, FIRST_SIZE))
     missing: dict[str, str] = {}
 
     def law(name: str, fit: Callable[[], Any]) -> Any:
@@ -211,7 +238,8 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
             raise BadInput("the grains have no moments")
         return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
 
-    heavy = rows["grains"] >= LEAST
+    # moments that cancel to rounding, or of grains without any, have no logarithm
+    heavy = (rows["grains"] >= LEAST) & (rows["moment"] > 1e-9 * boxes[0].moment)
     return Growth(
         time,
         sizes,
@@ -219,19 +247,19 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
         law("z", lambda: rate_law(*_within(time, sizes, chosen))),
         law("slope", lambda: _slope(*_within(time, sizes, chosen))),
         law("moment", lambda: moment_law(heavy)),
-        law("open_moment", lambda: moment_law(heavy & (rows["rings"] == 0))),
+        law("moment_without_rings", lambda: moment_law(heavy & (rows["rings"] == 0))),
         law("dimension", lambda: ensemble_dimension(rows["grains"], rows["gyration_radius"], boxes[0].radius, of_box)),
         missing,
     )
 
 
 def _within(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Times at which the mean over boxes is within the window, and S (boxes, K) then."""
-    mean = sizes.mean(axis=0)
-    used = (mean >= window[0]) & (mean <= window[1]) & (time > 0.0)
+    """Times from which the mean over boxes is in the window until any box leaves it, and S (boxes, K) then."""
+    used = (sizes.mean(axis=0) >= window[0]) & (sizes.max(axis=0) <= window[1]) & (time > 0.0)
     if used.sum() < 3:
         raise BadInput(
-            f"S does not stay between {window[0]:g} and {window[1]:g} for three frames; it ends at {mean[-1]:.3g}"
+            f"the boxes are not between S = {window[0]:g} and {window[1]:g} at three times or more; "
+            f"their mean goes from {sizes.mean(axis=0)[0]:.3g} to {sizes.mean(axis=0)[-1]:.3g}"
         )
     return time[used], sizes[:, used]
 

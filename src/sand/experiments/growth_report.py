@@ -61,7 +61,7 @@ def numbers(one: Ensemble) -> dict[str, Any]:
         "z": law(growth.z),
         "slope": law(growth.slope),
         "moment": law(growth.moment),
-        "moment_without_rings": law(growth.open_moment),
+        "moment_without_rings": law(growth.moment_without_rings),
         "dimension": law(growth.dimension),
         "missing": growth.missing,
     }

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.box import Box
 from ..core.errors import BadInput, FilesFailed, did_you_mean
-from ..core.grains import Grains
+from ..core.grains import ROUNDING, Grains
 from ..core.material import PRESETS, Material
 from ..core.units import in_unit
 from .folder import read_text, replace_file
@@ -160,7 +160,7 @@ def refuse_place(place: Path, *, overwrite: bool) -> None:
 def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> Path:
     """Write a body: extended XYZ for `.xyz` and `.extxyz`, a trajectory of one frame for `.gsd`.
 
-    Places are written to the last bit, so that contacts at rest stay so; `read_body`, `sand collide`, `sand run`,
+    Places are written to rounding, so that contacts at rest stay so; `read_body`, `sand collide`, `sand run`,
     OVITO and ASE read both.
 
     Raises:
@@ -189,9 +189,10 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
 
 def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
     """The unstrained contacts of grains in open space as a table, by column: what a frame wants to know of them."""
-    pair = Box.open().close_pairs(grains.position, 2.0 * float(grains.radius.max()))
+    pair = Box.open().close_pairs(grains.position, 2.0 * float(grains.radius.max()) * (1.0 + ROUNDING))
     overlap = grains.overlaps(pair, Box.open())
-    pair, overlap = pair[overlap >= 0.0], overlap[overlap >= 0.0]
+    near = overlap >= -ROUNDING * grains.radius[pair].sum(axis=1)
+    pair, overlap = pair[near], np.maximum(overlap[near], 0.0)
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)

@@ -27,7 +27,7 @@ class Columns(NamedTuple):
 
 
 def xyz_text(grains: Grains) -> str:
-    """Grains as extended XYZ: species, position and radius [Å], moment [A m²], material; to the last bit.
+    """Grains as extended XYZ: species, position and radius [Å], moment [A m²], material; to rounding.
 
     Materials are numbers, whose names stand in the second line.
     """

@@ -15,8 +15,8 @@ from ..kernels.alignment import alignment_energy, relax
 from .gas import directions
 
 WAYS = ("random", "aligned", "relaxed")
-MOST_RELAXED = 20_000
-"""Magnetic grains that can be relaxed: each sweep looks at all pairs."""
+MOST_RELAXED = 3000
+"""Magnetic grains that can be relaxed: sweeps look at all pairs and grow in number; these take half a minute."""
 TOLERANCE = 1e-6
 """Relaxed moments make at most this angle with the field at their place [rad], about."""
 SWEEPS = 20_000
@@ -39,6 +39,9 @@ def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.rand
     if part > 1.0:
         raise BadInput(f"magnetic = {magnetic!r} is the part of grains with a moment; it must not exceed 1")
     if moment is None:
+        if ways == "relaxed" or part < 1.0:
+            given = f"moments = {ways!r}" if ways == "relaxed" else f"magnetic = {magnetic!r}"
+            raise BadInput(f"{given} needs a moment; give one, such as moment = '200 A m^2/kg' or 'material'")
         return body
     count = len(body)
     specific = np.array([m.specific_moment for m in body.materials])[body.material]
@@ -58,10 +61,11 @@ def relaxed(body: Grains) -> Grains:
 
     Gauss–Seidel: one after the other, each moment is laid along the flux density at its place from all others in open
     space, which lowers U = ½ Σ −μ·B by what it can; sweeps go on until no moment turns by more than 1e-6.  That is a
-    minimum of the energy near the start, not always the deepest; sizes do not change.
+    minimum of the energy near the start, not always the deepest; sizes do not change.  The grains must not have turned
+    yet: moments in their own frames are taken for those in the laboratory.
 
     Raises:
-        BadInput: more than 20 000 moments, or none.
+        BadInput: more than 3000 moments.
     """
     chosen = np.flatnonzero((body.moment**2).sum(axis=1) > 0.0)
     if len(chosen) > MOST_RELAXED:

@@ -9,13 +9,11 @@ from scipy.spatial import cKDTree
 
 from ..core.box import Box
 from ..core.errors import BadInput
-from ..core.grains import Grains
+from ..core.grains import ROUNDING, Grains
 from .population import rest_distances, stuff_of
 
 MOST_OVERLAP = (2.0, 1e-3)
 """Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
-ROUNDING = 1e-7
-"""Gap that still is a contact, as a part of the sum of radii: coordinates of seven digits."""
 TOLD = 10
 
 

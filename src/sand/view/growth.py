@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
         figure = Figure(figsize=(9.6, 3.3), layout="constrained")
         left, middle, right = figure.subplots(1, 3)
         size, unit = with_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
-        for (name, growth, rows), colour in zip(ensembles, COLOURS, strict=False):
+        for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _growth(left, name, growth, size, colour)
             _moments(middle, growth, rows, colour)
             _dimension(right, growth, rows, colour)
@@ -63,7 +64,7 @@ def _growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> Non
         axes.fill_between(time[later], low[later], high[later], color=colour, alpha=0.2, lw=0)
     if growth.z is None:
         return
-    used = (growth.mean >= growth.window[0]) & (growth.mean <= growth.window[1]) & later
+    used = (growth.mean >= growth.window[0]) & (growth.sizes.max(axis=0) <= growth.window[1]) & later
     axes.plot(time[used], growth.z.at(growth.time[used]), color=INK, lw=0.8, ls="--")
     axes.axhline(growth.window[1], color=FAINT, lw=0.6, ls=":")
     centre = np.exp(np.log(growth.time[used]).mean())
@@ -83,9 +84,9 @@ def _moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None
     axes.plot(rows["grains"][~free], moment[~free], "x", ms=3, mew=0.6, color=FAINT, alpha=0.7, label="with rings")
     n = np.array([2.0, rows["grains"].max()])
     axes.plot(n, growth.moment.at(n), color=INK, ls="--", lw=0.9, label=f"all: $N^{{{_spoken(growth.moment)}}}$")
-    if growth.open_moment is not None:
-        text = f"without rings: $N^{{{_spoken(growth.open_moment)}}}$"
-        axes.plot(n, growth.open_moment.at(n), color=colour, lw=0.9, label=text)
+    if growth.moment_without_rings is not None:
+        text = f"without rings: $N^{{{_spoken(growth.moment_without_rings)}}}$"
+        axes.plot(n, growth.moment_without_rings.at(n), color=colour, lw=0.9, label=text)
     axes.plot(n, n ** PAPER["moment"], color=FAINT, lw=0.9, label="the paper: $N^{0.63}$")
     axes.set_ylim(bottom=0.1)
 
