@@ -345,14 +345,20 @@ def same_state(one, other):
 def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number):
     """Exit 130 with the time and what to type; then `sand resume` ends in the same bits as one run without a stop."""
     words = [*SAND, "run", "small.toml", "--until", "1 s"]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as started:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # tests that run in the background of a shell hand on that Ctrl-C is to be ignored
+    heed = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    with subprocess.Popen(words, **pipes, **heed) as started:
         for _ in range(1200):
             if started.poll() is not None or list((place / "small").glob("checkpoint-*.npz")):
                 break
             time.sleep(0.05)
         time.sleep(0.3)
         started.send_signal(number)
-        _, err = started.communicate(timeout=60)
+        try:
+            _, err = started.communicate(timeout=60)
+        finally:
+            started.kill()
     assert started.returncode == 130, err
     last = err.splitlines()[-1]
     assert last.startswith("sand: interrupted at t = ")
