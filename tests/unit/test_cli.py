@@ -346,9 +346,7 @@ def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number
     """Exit 130 with the time and what to type; then `sand resume` ends in the same bits as one run without a stop."""
     words = [*SAND, "run", "small.toml", "--until", "1 s"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    # tests that run in the background of a shell hand on that Ctrl-C is to be ignored
-    heed = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
-    with subprocess.Popen(words, **pipes, **heed) as started:
+    with subprocess.Popen(words, **pipes) as started:
         for _ in range(1200):
             if started.poll() is not None or list((place / "small").glob("checkpoint-*.npz")):
                 break
