@@ -21,8 +21,9 @@ def dla(
 ) -> Grains:  # fmt: skip
     """Diffusion-limited particle–cluster aggregate (Witten & Sander 1981): grains diffuse in one by one and stay.
 
-    Off-lattice: each walk is exact, on spheres that reach to the nearest grain; a grain that leaves comes back where
-    Brownian motion would, or never.  Fractal dimension about 2.5.  Arguments and errors as for `bpca`.
+    Off-lattice: each walk is exact to 1e-3 of the largest radius, on spheres that reach to the nearest grain; a grain
+    that leaves comes back where Brownian motion would, or never.  Fractal dimension about 2.5.  Arguments and errors as
+    for `bpca`.
     """
     chance = streams(seed)
     made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)

@@ -32,7 +32,7 @@ def fractal(
     grains: int, *, dimension: Any = 1.8, prefactor: Any = 1.3, radius: Any, material: Any, moment: Any = None,
     moments: str = "random", magnetic: Any = 1.0, seed: int = 0,
 ) -> Grains:  # fmt: skip
-    """Aggregate of a chosen fractal dimension: N = k_f (r_g/a)^D_f, at every size on the way to N.
+    """Aggregate of a chosen fractal dimension: N = k_f (r_g/a)^D_f, at every size from 4 on the way to N.
 
     After Filippov, Zurita & Rosner (2000): small clusters grow grain by grain, then clusters of equal size meet, each
     time at the distance Γ of their centres of mass that gives the new one the wanted radius of gyration:

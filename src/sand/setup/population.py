@@ -157,7 +157,7 @@ def population(count: int, radius: Any, material: Any, rng: np.random.Generator)
     Args:
         radius: as for `radii_of`.
         material: one, or N of them, or parts of each as {"silica": 0.7, "iron": 0.3}: the grains that get it are
-            drawn by chance, their number is N times the part to within rounding.
+            drawn by chance, their number is N times the part to within rounding (of a whole deposit for `rbd`).
 
     Raises:
         BadInput: numbers of radii or materials that are not N, parts that are not positive, or grains so small that
