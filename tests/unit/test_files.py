@@ -175,8 +175,11 @@ def test_the_checkpoint_knows_case_and_ledger(tmp_path):
         (folder / "case.toml").write_text(wrong)
         with pytest.raises(sand.BadInput):
             sand.resume(folder)
-    (folder / "case.toml").write_text(case.replace("until = 5e-10", "until = 6e-10"))  # the end may change
+    (folder / "case.toml").write_text(case.replace("until = 5e-10", 'until = "0.6 ns"'))  # the end may change
     assert sand.resume(folder).run().time >= 6e-10
+    (folder / "case.toml").write_text("grains = 3\n")
+    with pytest.raises(sand.BadInput, match=r"case\.toml"):
+        sand.resume(folder)
 
 
 def test_forces_and_columns_keep_the_order_of_the_script(tmp_path):

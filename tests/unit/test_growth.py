@@ -65,6 +65,7 @@ def test_called_again_it_goes_on(tmp_path):
     other = CASE | {"box": {"periodic": "0.26 um"}}
     with pytest.raises(sand.BadInput, match=r"other \[box\]"):
         one_box(other, 1, str(tmp_path / "seed-1"))
+    (tmp_path / "seed-x").mkdir()  # not ours, and no hindrance
     with pytest.raises(sand.BadInput, match=r"seed-1 holds a box with other \[box\]"):
         grow(other, [2], tmp_path)
 

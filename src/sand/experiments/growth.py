@@ -55,14 +55,15 @@ def grow(
     place = Path(folder)
     check_case(content, "case")
     places = [place / f"seed-{seed}" for seed in seeds]
-    for there in place.glob(f"seed-*/{files.CASE}"):
-        seed = int(there.parent.name.removeprefix("seed-"))
-        if seed in seeds and there.parent.exists():
-            continue  # looked at by one_box
-        known = alike(files.read_toml(there))
+    others = [
+        there for there in boxes_of(place) if there not in places
+    ]  # those of these seeds are looked at by one_box
+    if others:
         asked = alike(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
-        if changed := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
-            raise BadInput(f"{there.parent} holds a box with other [{changed[0]}]; give another folder")
+        for there in others:
+            known = alike(files.read_toml(there / files.CASE))
+            if changed := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
+                raise BadInput(f"{there} holds a box with other [{changed[0]}]; give another folder")
     jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
     if executor is None:
         outcomes: Any = (one_box(*job) for job in jobs)
@@ -78,6 +79,11 @@ def grow(
     if wrong:
         raise BadInput(wrong)
     return places
+
+
+def boxes_of(folder: Path) -> list[Path]:
+    """The folders that `grow` has begun in a folder."""
+    return [there.parent for there in folder.glob(f"seed-*/{files.CASE}")]
 
 
 def one_box(content: dict[str, Any], seed: int, folder: str) -> str:

@@ -21,6 +21,8 @@ from .bodies import body_from_file
 from .case import Case, check_case, read_case
 from .simulation import Simulation
 
+ENDS = (("run", "until"), ("run", "steps"))
+"""What may be changed in the case.toml of a run that goes on."""
 BODIES = (".xyz", ".extxyz", ".txt", ".dat")
 """Endings of files that hold a body as text; all others are taken for trajectories."""
 
@@ -184,19 +186,20 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
         return read_case(path)
     begun: dict[str, Any] = meta["case"]
     there = read_toml(path) if path.exists() else begun
-    ends = {"until", "steps"}
+    case = check_case(there, str(path))
+
+    def fixed(content: dict[str, Any], name: str) -> Any:
+        """A table but for the end of the run, which may be changed."""
+        return {key: value for key, value in content.get(name, {}).items() if (name, key) not in ENDS}
+
     for name in {**begun, **there}:
-        old, new = (dict(case.get(name, {})) for case in (begun, there))
-        if name == "run":
-            old, new = ({k: v for k, v in run.items() if k not in ends} for run in (old, new))
-        if old != new:
+        if fixed(begun, name) != fixed(there, name):
             raise BadInput(
                 f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; put it "
                 f"back, or start a new run from the last frame: sand run CASE.toml --from {folder}"
             )
-    for name in ends & there["run"].keys():  # an end may be changed
-        meta["last_step" if name == "steps" else name] = there["run"][name]
-    return check_case(there, str(path))
+    meta["until"], meta["last_step"] = case.run.until, case.run.steps
+    return case
 
 
 def resume(folder: str | Path, **options: Any) -> Simulation:
