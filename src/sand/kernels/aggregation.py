@@ -74,6 +74,16 @@ def first_touch(crowd, position, stuff, b, start, u, way):
     return way, EMPTY
 
 
+@loop
+def stays(crowd, position, stuff, b, x, mate):
+    """Put grain b at x, where it touches its mate, unless it touched another there; whether it stays."""
+    if touches_other(crowd, position, stuff, b, x, mate):
+        return False
+    put(position, b, x)
+    join_crowd(crowd, b, x)
+    return True
+
+
 @kernel
 def grow_ballistic(crowd, position, stuff, first, last, extent, seed, tries):
     """Grains first … last − 1 fly in from all sides, one by one, and stay where they touch first.
@@ -94,9 +104,7 @@ def grow_ballistic(crowd, position, stuff, first, last, extent, seed, tries):
             start = axpy(-back, u, offset)
             way, mate = first_touch(crowd, position, stuff, b, start, u, 2.0 * back)
             x = axpy(way, u, start)
-            if mate != EMPTY and not touches_other(crowd, position, stuff, b, x, mate):
-                put(position, b, x)
-                join_crowd(crowd, b, x)
+            if mate != EMPTY and stays(crowd, position, stuff, b, x, mate):
                 extent = max(extent, norm(x) + stuff.radius[b])
                 placed = True
                 break
@@ -186,9 +194,7 @@ def grow_diffusing(crowd, position, bound, stuff, first, last, extent, seed, tri
             if mate == EMPTY:
                 continue
             x = pulled(position, stuff, x, (0.0, 0.0, 0.0), b, mate)
-            if not touches_other(crowd, position, stuff, b, x, mate):
-                put(position, b, x)
-                join_crowd(crowd, b, x)
+            if stays(crowd, position, stuff, b, x, mate):
                 extent = max(extent, norm(x) + stuff.radius[b])
                 placed = True
                 break
