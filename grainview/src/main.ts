@@ -1,0 +1,3 @@
+// placeholder until the page is written
+import "./style.css";
+document.body.append("Grainview");
