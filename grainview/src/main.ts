@@ -1,3 +1,38 @@
-// placeholder until the page is written
+// Where the page begins: of its own accord in a page of SAND, and `render` for a notebook (anywidget).
+
+import "uplot/dist/uPlot.min.css";
 import "./style.css";
-document.body.append("Grainview");
+import type { App } from "./app";
+import { show } from "./boot";
+import { EmbeddedSource, ServerSource } from "./data/source";
+import { h } from "./ui/dom";
+import { type Model, WidgetSource } from "./widget";
+
+declare global {
+  interface Window {
+    grainview?: App | null; // for tests, and for those who want to script the page
+  }
+}
+
+const place = document.getElementById("grainview");
+if (place) {
+  const source = EmbeddedSource.isThere() ? new EmbeddedSource() : new ServerSource();
+  void show(place, source, true).then((app) => (window.grainview = app));
+}
+
+function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
+  const inside = h("div", { class: "gv-cell" });
+  el.append(inside);
+  const source = new WidgetSource(model);
+  const coming = show(inside, source, false);
+  return () => {
+    source.close();
+    void coming.then((app) => {
+      app?.player.stop();
+      app?.plot.dispose();
+      app?.stage.dispose();
+    });
+  };
+}
+
+export default { render };

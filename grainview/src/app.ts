@@ -1,0 +1,276 @@
+// The app: brings source, stage, settings and the parts of the page together.
+
+import { lookText } from "./address";
+import { Choosing } from "./choosing";
+import { Frames } from "./data/frames";
+import { fieldDirection, type Known } from "./data/quantities";
+import type { Manifest, Series, Source } from "./data/types";
+import { headerButtons, type Layout } from "./layout";
+import { Picture } from "./picture";
+import { Player } from "./player";
+import type { Stage } from "./scene/stage";
+import { DARK, LIGHT, World } from "./scene/world";
+import type { State } from "./state";
+import { actionsOf } from "./actions";
+import { Studio } from "./studio";
+import { openDialog } from "./ui/dialogs";
+import { Inspector } from "./ui/inspector";
+import { type Action, Keys } from "./ui/keys";
+import { legend } from "./ui/legend";
+import { Overlay } from "./ui/overlay";
+import { Panel } from "./ui/panel";
+import { LinkedPlot } from "./ui/plot";
+import { nearestFrame, TimeLine } from "./ui/timeline";
+import { Views } from "./views";
+
+/** Settings that need no new picture. */
+const QUIET = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "follow", "field", "ortho", "size"]);
+const SYSTEM_DARK = window.matchMedia("(prefers-color-scheme: dark)");
+
+export class App {
+  readonly frames: Frames;
+  readonly world: World;
+  readonly picture: Picture;
+  readonly player: Player;
+  readonly choosing: Choosing;
+  readonly timeline: TimeLine;
+  readonly plot: LinkedPlot;
+  readonly overlay: Overlay;
+  readonly inspector: Inspector;
+  readonly panel: Panel;
+  readonly actions: Action[];
+  readonly keys: Keys;
+  readonly views: Views;
+  readonly studio: Studio;
+  private showing: Promise<void> = Promise.resolve();
+  private wanted = 0;
+
+  constructor(
+    readonly source: Source,
+    readonly state: State,
+    readonly stage: Stage,
+    readonly known: Known,
+    public series: Series,
+    readonly page: Layout,
+  ) {
+    this.frames = new Frames(source);
+    this.world = new World(stage);
+    this.picture = new Picture(this.world, state, this.frames, known);
+    this.overlay = new Overlay(stage, known.manifest.unit);
+    this.inspector = new Inspector(() => this.choosing.clear());
+    this.choosing = new Choosing(state, this.picture, this.world, this.inspector, this.overlay, known, source);
+    this.player = new Player(state, () => this.manifest.times.length, (k) => this.go(k));
+    this.plot = new LinkedPlot((time) => void this.go(nearestFrame(this.manifest.times, time)));
+    this.timeline = new TimeLine({
+      play: () => this.player.toggle(),
+      step: (by) => void this.go(state.number("frame") + by),
+      go: (k) => void this.go(k),
+      event: (direction) => this.toEvent(direction),
+    });
+    this.views = new Views(stage, this.picture, this.choosing);
+    this.studio = new Studio(this);
+    this.panel = new Panel(state);
+    this.actions = actionsOf(this);
+    this.keys = new Keys(state, this.actions);
+    this.place();
+    this.wire();
+  }
+
+  get manifest(): Manifest {
+    return this.known.manifest;
+  }
+
+  get dark(): boolean {
+    const theme = this.state.get<string>("theme");
+    return theme === "dark" || (theme === "auto" && SYSTEM_DARK.matches);
+  }
+
+  private place(): void {
+    const { page } = this;
+    page.title.textContent = this.manifest.name;
+    page.view.append(this.overlay.element, this.inspector.element);
+    page.side.append(this.panel.element);
+    page.bottom.append(this.timeline.element, this.plot.element);
+    page.header.append(headerButtons({
+      centre: () => this.views.centre(), picture: () => this.studio.ask("png"), link: () => void this.copyAddress(),
+      help: () => this.help(), panel: () => this.togglePanel(),
+    }));
+    this.timeline.setFrames(this.manifest.times, this.series.events);
+    this.tellRun();
+  }
+
+  private wire(): void {
+    const { stage, page, state } = this;
+    new ResizeObserver(() => stage.resize(page.view.clientWidth, page.view.clientHeight)).observe(page.view);
+    stage.resize(page.view.clientWidth, page.view.clientHeight);
+    const drawWorld = stage.onDraw;
+    stage.onDraw = () => {
+      drawWorld();
+      this.overlay.draw();
+    };
+    stage.onLook = () => state.set("look", lookText(stage));
+    let down: [number, number] | null = null;
+    page.canvas.addEventListener("pointerdown", (e) => (down = [e.clientX, e.clientY]));
+    page.canvas.addEventListener("pointerup", (e) => {
+      const still = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 4;
+      const box = page.canvas.getBoundingClientRect();
+      if (still) this.choosing.clickAt(e.clientX - box.left, e.clientY - box.top);
+    });
+    this.keys.listen(page.root);
+    this.player.onPlaying = (on) => {
+      this.timeline.setPlaying(on);
+      this.timeline.told.setAttribute("aria-live", on ? "off" : "polite");
+      if (!on) this.redress();
+    };
+    SYSTEM_DARK.addEventListener("change", () => this.setTheme());
+    state.onChange((id) => this.changed(id));
+  }
+
+  /** The first picture; settings are already as the address has them. */
+  async begin(): Promise<void> {
+    this.applyLook();
+    this.setTheme();
+    await this.go(this.state.number("frame"));
+    if (!this.state.get("look")) this.views.reset();
+    this.redress();
+  }
+
+  private changed(id: string): void {
+    if (id === "frame") void this.show();
+    if (id === "theme") this.setTheme();
+    if (["ortho", "size", "shade", "field"].includes(id)) this.applyLook();
+    if (id === "plot") this.showPlot();
+    if (id === "follow") this.choosing.follow();
+    if (!QUIET.has(id)) this.redress();
+  }
+
+  private applyLook(): void {
+    const { state, stage, world } = this;
+    stage.setOrthographic(state.get("ortho"));
+    world.uniforms.uSize.value = state.number("size");
+    world.haze = 1.1 * state.number("shade");
+    this.overlay.axes = state.get("field");
+    stage.redraw();
+  }
+
+  private setTheme(): void {
+    this.page.root.dataset.theme = this.dark ? "dark" : "light";
+    this.world.setTheme(this.dark ? DARK : LIGHT);
+    this.showPlot();
+  }
+
+  private showPlot(): void {
+    const plot = this.series.plots.find((p) => p.id === this.state.get("plot")) ?? this.series.plots[0];
+    if (plot) this.plot.show(this.series, plot, this.dark);
+  }
+
+  /** Go to a frame; what is beyond the last is the last. */
+  go(frame: number): Promise<void> {
+    const last = this.manifest.times.length - 1;
+    const k = Math.min(Math.max(Math.round(Math.min(frame, last)), 0), last);
+    if (k === this.state.number("frame") && this.picture.frame?.frame !== k) void this.show();
+    else this.state.set("frame", k);
+    return this.showing;
+  }
+
+  private show(): Promise<void> {
+    const k = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
+    this.wanted = k;
+    this.showing = this.frames.get(k).then(
+      (frame) => {
+        if (this.wanted !== k) return this.showing; // a later wish
+        this.picture.setFrame(frame);
+        this.redress();
+        this.choosing.follow();
+        this.stage.draw();
+        this.timeline.show(k, frame.step);
+        this.plot.moveTo(frame.time);
+        this.tell("");
+        const ahead = k + 1 < this.manifest.times.length ? k + 1 : 0;
+        this.frames.prefetch(ahead, this.manifest.times.length);
+        return undefined;
+      },
+      (error: Error) => {
+        this.player.stop();
+        this.tell(error.message);
+      },
+    );
+    return this.showing;
+  }
+
+  /** Draw the frame anew with the settings of now. */
+  redress(): void {
+    const { picture, state } = this;
+    if (!picture.frame) return;
+    picture.dress(this.player.playing);
+    this.stage.reach = picture.reachFrom(this.stage.look.target);
+    this.overlay.field = fieldDirection(this.manifest, picture.frame.frame);
+    this.choosing.show();
+    const bonds = { kind: state.get<string>("bonds"), scale: picture.bondScale!, count: picture.frame.pair.length / 2 };
+    const choose = (grain: number): void => this.choosing.choose(grain);
+    if (picture.painted) {
+      this.page.legend.replaceChildren(...legend(picture.quantity, picture.painted, this.known, bonds, choose));
+    }
+    const scaled = picture.quantity.kind === "sequential";
+    for (const id of ["palette", "log", "low", "high"]) this.panel.enable(id, scaled);
+    const told = `${this.manifest.grains} grains, ${bonds.count} contacts, coloured by ${picture.quantity.label}`;
+    this.page.canvas.setAttribute("aria-label", `${told}; press ? for keys`);
+  }
+
+  /** A sentence over the picture; nothing takes it away. */
+  tell(sentence: string): void {
+    this.page.note.textContent = sentence;
+    this.page.note.hidden = !sentence;
+  }
+
+  tellRun(): void {
+    const { manifest } = this;
+    const parts = [`${manifest.grains} grains`, `${manifest.times.length} frames`];
+    if (manifest.running) parts.push("still running");
+    else if (manifest.outcome) parts.push(manifest.outcome);
+    if (manifest.field) parts.push(manifest.field.text);
+    if (manifest.note) parts.push(manifest.note);
+    this.page.told.textContent = parts.join("  ·  ");
+  }
+
+  /** What has come since, of a run that is going on. */
+  take(more: Manifest, series: Series): void {
+    const { manifest } = this;
+    const atEnd = this.state.number("frame") >= manifest.times.length - 1;
+    manifest.times.push(...more.times);
+    manifest.steps.push(...more.steps);
+    if (manifest.field && more.field?.directions) manifest.field.directions = more.field.directions;
+    Object.assign(manifest, { running: more.running, outcome: more.outcome, note: more.note, bytes: more.bytes });
+    this.series = series;
+    this.timeline.setFrames(manifest.times, series.events);
+    this.showPlot();
+    this.tellRun();
+    if (atEnd && this.state.get<boolean>("live") && !this.player.playing) void this.go(Infinity);
+    else if (this.picture.frame) this.timeline.show(this.picture.frame.frame, this.picture.frame.step);
+  }
+
+  help(): void {
+    const words = "Drag to turn, with the right button or two fingers to move, wheel or pinch to go nearer. Click a grain or " +
+      "a contact for its numbers. The address of the page holds the view: share it, or keep it.";
+    openDialog(this.page.root, "Keys and help", words, this.keys.help());
+  }
+
+  togglePanel(): void {
+    this.page.root.classList.toggle("gv-panel-away");
+  }
+
+  async copyAddress(): Promise<void> {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.tell("The address of this view is on the clipboard.");
+    } catch {
+      this.tell("The browser does not let this page copy; take the address from its bar.");
+    }
+    window.setTimeout(() => this.tell(""), 2500);
+  }
+
+  toEvent(direction: 1 | -1): void {
+    const frame = this.timeline.eventFrom(this.state.number("frame"), direction);
+    if (frame !== null) void this.go(frame);
+  }
+}

@@ -1,0 +1,118 @@
+// What grains can be coloured by: one table, from which controls, legends and rows of numbers are made.
+
+import { clusterSizes, coordination } from "./clusters";
+import { type Frame, type Grains, type Manifest, SINGLE } from "./types";
+
+export interface Known {
+  manifest: Manifest;
+  grains: Grains;
+}
+
+export interface Quantity {
+  id: string;
+  label: string;
+  unit: string;
+  kind: "names" | "sequential" | "diverging";
+  whole?: boolean; // counts: ticks at whole numbers
+  available?: (known: Known) => boolean;
+  values: (frame: Frame, known: Known) => Float32Array;
+}
+
+function sizes3(vectors: Float32Array): Float32Array {
+  const out = new Float32Array(vectors.length / 3);
+  for (let i = 0; i < out.length; i++) out[i] = Math.hypot(vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]);
+  return out;
+}
+
+/** Total moments of named clusters. */
+function clusterMoments(frame: Frame): Map<number, [number, number, number]> {
+  const sums = new Map<number, [number, number, number]>();
+  frame.cluster.forEach((name, i) => {
+    if (name === SINGLE) return;
+    const sum = sums.get(name) ?? [0, 0, 0];
+    for (let a = 0; a < 3; a++) sum[a] += frame.moment[3 * i + a];
+    sums.set(name, sum);
+  });
+  return sums;
+}
+
+function cosine(m: Float32Array, i: number, b: ArrayLike<number>): number {
+  const [x, y, z] = [m[3 * i], m[3 * i + 1], m[3 * i + 2]];
+  const size = Math.hypot(x, y, z) * Math.hypot(b[0], b[1], b[2]);
+  return size > 0 ? (x * b[0] + y * b[1] + z * b[2]) / size : NaN;
+}
+
+/** The direction of the magnetic field in a frame, or null. */
+export function fieldDirection(manifest: Manifest, frame: number): number[] | null {
+  const field = manifest.field;
+  return field?.directions?.[frame] ?? field?.direction ?? null;
+}
+
+function kinetic(frame: Frame, { grains, manifest }: Known): Float32Array {
+  const out = new Float32Array(grains.mass.length);
+  for (let i = 0; i < out.length; i++) {
+    const [v, w] = [frame.velocity, frame.spin];
+    const speed2 = v[3 * i] ** 2 + v[3 * i + 1] ** 2 + v[3 * i + 2] ** 2;
+    const spin2 = w[3 * i] ** 2 + w[3 * i + 1] ** 2 + w[3 * i + 2] ** 2;
+    const radius = grains.radius[i] * manifest.unit;
+    out[i] = 0.5 * grains.mass[i] * (speed2 + 0.4 * radius * radius * spin2);
+  }
+  return out;
+}
+
+const hasMoments = ({ manifest }: Known): boolean => manifest.ranges.moment === undefined || manifest.ranges.moment[1] > 0;
+
+export const QUANTITIES: Quantity[] = [
+  {
+    id: "cluster", label: "cluster", unit: "", kind: "names",
+    values: (frame) => Float32Array.from(frame.cluster, (n) => (n === SINGLE ? NaN : n)),
+  },
+  {
+    id: "size", label: "size of its cluster", unit: "grains", kind: "sequential", whole: true,
+    values: (frame) => {
+      const sizes = clusterSizes(frame);
+      return Float32Array.from(frame.cluster, (n) => sizes.get(n) ?? 1);
+    },
+  },
+  {
+    id: "radius", label: "radius", unit: "m", kind: "sequential",
+    values: (_, { grains, manifest }) => grains.radius.map((r) => r * manifest.unit),
+  },
+  {
+    id: "coordination", label: "contacts of the grain", unit: "", kind: "sequential", whole: true,
+    values: (frame, { manifest }) => coordination(manifest.grains, frame.pair),
+  },
+  { id: "speed", label: "speed", unit: "m/s", kind: "sequential", values: (frame) => sizes3(frame.velocity) },
+  { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => sizes3(frame.spin) },
+  { id: "kinetic", label: "kinetic energy", unit: "J", kind: "sequential", values: kinetic },
+  {
+    id: "alignment", label: "moment along that of its cluster (cosine)", unit: "", kind: "diverging",
+    available: hasMoments,
+    values: (frame) => {
+      const sums = clusterMoments(frame);
+      return Float32Array.from(frame.cluster, (n, i) => cosine(frame.moment, i, sums.get(n) ?? [0, 0, 0]));
+    },
+  },
+  {
+    id: "field", label: "moment along the field (cosine)", unit: "", kind: "diverging",
+    available: (known) => known.manifest.field !== null && hasMoments(known),
+    values: (frame, { manifest }) => {
+      const b = fieldDirection(manifest, frame.frame) ?? [0, 0, 0];
+      return Float32Array.from(frame.cluster, (_, i) => cosine(frame.moment, i, b));
+    },
+  },
+  {
+    id: "material", label: "material", unit: "", kind: "names",
+    values: (_, { grains }) => Float32Array.from(grains.material),
+  },
+];
+
+/** The smallest and largest finite number, or null. */
+export function extent(values: ArrayLike<number>): [number, number] | null {
+  let [low, high] = [Infinity, -Infinity];
+  for (let i = 0; i < values.length; i++) {
+    if (values[i] < low) low = values[i];
+    if (values[i] > high && values[i] < Infinity) high = values[i];
+  }
+  return low <= high ? [low, high] : null;
+}

@@ -1,0 +1,36 @@
+// Numbers for people: SI prefixes, four digits.
+
+const PREFIXES = ["y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"];
+
+/** Units that take a prefix; others, as A m², get a power of ten. */
+const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "rad/s", "kg", "C"]);
+
+/** A number with at most `digits` digits: 0.001234, 1.234e-7, −12.3. */
+export function digits(value: number, count = 4): string {
+  if (!Number.isFinite(value)) return Number.isNaN(value) ? "not known" : value > 0 ? "∞" : "−∞";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  const plain = size >= 1e-3 && size < 1e6;
+  const text = plain ? String(Number(value.toPrecision(count))) : superscript(value, count);
+  return text.replace("-", "−");
+}
+
+function superscript(value: number, count: number): string {
+  const [mantissa, exponent] = value.toExponential(count - 1).split("e");
+  const raised = [...exponent.replace("+", "")].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)])).join("");
+  return `${Number(mantissa)}×10${raised}`;
+}
+
+/** The prefix that suits a size: of 3e-7 m, [1e-9, "nm"]. */
+export function prefixed(size: number, unit: string): [number, string] {
+  if (!(size > 0) || !Number.isFinite(size) || !PREFIXED.has(unit) || unit === "kg") return [1, unit];
+  const step = Math.min(Math.max(Math.floor(Math.log10(size) / 3 + 1e-9), -8), 5);
+  return [10 ** (3 * step), PREFIXES[step + 8] + unit];
+}
+
+/** A quantity with its unit: 1.2e-6 m → "1.2 µm". */
+export function quantity(value: number, unit: string, count = 4): string {
+  if (!Number.isFinite(value)) return digits(value);
+  const [one, name] = prefixed(Math.abs(value), unit);
+  return `${digits(value / one, count)}${name ? ` ${name}` : ""}`;
+}

@@ -1,0 +1,123 @@
+// From a frame and the settings to what is on the stage: places, colours, contacts, arrows, trails.
+
+import { bondPaint, bondPieces, loadScale } from "./data/bonds";
+import { wholePositions } from "./data/clusters";
+import { paint, type Painted, type Scale } from "./data/colours";
+import type { Frames } from "./data/frames";
+import { coverOf } from "./data/openness";
+import { type Known, QUANTITIES, type Quantity } from "./data/quantities";
+import { type Frame, SINGLE } from "./data/types";
+import { MOST_TRAILS, trailSegments } from "./scene/lines";
+import type { World } from "./scene/world";
+import type { State } from "./state";
+
+/** With more grains, shade from neighbours waits until nothing plays. */
+const MANY = 30_000;
+
+export class Picture {
+  frame: Frame | null = null;
+  whole: Float32Array = new Float32Array();
+  painted: Painted | null = null;
+  bondScale: Scale | null = null;
+  private readonly middle: number; // radius of the middle one of the grains
+
+  constructor(
+    private readonly world: World,
+    private readonly state: State,
+    private readonly frames: Frames,
+    private readonly known: Known,
+  ) {
+    const radii = Float32Array.from(known.grains.radius).sort();
+    this.middle = radii[radii.length >> 1] ?? 1;
+  }
+
+  get quantity(): Quantity {
+    return QUANTITIES.find((q) => q.id === this.state.get("colour")) ?? QUANTITIES[0];
+  }
+
+  /** Places at which grains are drawn. */
+  get place(): Float32Array {
+    return this.state.get<boolean>("whole") || this.state.get<boolean>("isolate") ? this.whole : this.frame?.position ?? this.whole;
+  }
+
+  setFrame(frame: Frame): void {
+    this.frame = frame;
+    this.whole = wholePositions(frame, this.known.manifest.periodic);
+  }
+
+  /** Everything anew, of this frame and these settings. */
+  dress(playing: boolean): void {
+    const { frame, state, world, known } = this;
+    if (!frame) return;
+    this.painted = paint(this.quantity, frame, known, {
+      low: state.number("low"), high: state.number("high"), log: state.get("log"), palette: state.get("palette"),
+    });
+    world.shown = this.shownGrains(frame);
+    const colour = this.painted.colour;
+    if (world.shown) world.shown.forEach((on, i) => on || (colour[4 * i + 3] = 0));
+    const shade = state.number("shade") > 0 && !(playing && known.manifest.grains > MANY);
+    const cover = shade ? coverOf(this.place, 5 * this.middle).map((c) => c * Math.min(1, 2 * state.number("shade"))) : null;
+    world.setGrains(this.place, known.grains.radius, colour, cover);
+    this.dressBonds();
+    world.setArrows(state.get<boolean>("arrows") ? frame.moment : null);
+    world.setBox(state.get<boolean>("box") && known.manifest.periodic.some(Boolean) ? frame.box : null);
+    void this.dressTrails();
+  }
+
+  dressBonds(): void {
+    const { frame, state, world, known } = this;
+    if (!frame) return;
+    const kind = state.get<string>("bonds");
+    this.bondScale = loadScale(known.manifest, frame);
+    const brush = bondPaint(kind, frame, known.manifest, this.bondScale);
+    const pieces = kind === "off" ? null : bondPieces(frame, this.place, world.shown, known.manifest, brush);
+    world.setBonds(pieces, state.number("bar") * this.middle);
+  }
+
+  private shownGrains(frame: Frame): Uint8Array | null {
+    const grain = this.state.number("grain");
+    if (!this.state.get<boolean>("isolate") || grain < 0) return null;
+    const name = frame.cluster[grain];
+    return Uint8Array.from(frame.cluster, (n, i) => Number(name === SINGLE ? i === grain : n === name));
+  }
+
+  /** Trails come when their frames have come. */
+  private async dressTrails(): Promise<void> {
+    const { frame, state, world, known } = this;
+    const length = state.number("trails");
+    world.trails.lines.visible = length > 0;
+    if (!frame || !length || !this.painted) return;
+    const first = Math.max(frame.frame - length, 0);
+    const numbers = Array.from({ length: frame.frame - first + 1 }, (_, k) => first + k);
+    const earlier = await Promise.all(numbers.map((k) => this.frames.get(k)));
+    if (this.frame !== frame || state.number("trails") !== length) return; // it is too late for these
+    const who: number[] = [];
+    const grain = state.number("grain");
+    const name = grain >= 0 ? frame.cluster[grain] : -1;
+    for (let i = 0; i < known.manifest.grains && who.length < MOST_TRAILS; i++) {
+      if (grain < 0 || i === grain || (name !== SINGLE && frame.cluster[i] === name)) who.push(i);
+    }
+    const box = frame.box.map((l, a) => (known.manifest.periodic[a] ? l : Infinity));
+    const { ends, colours } = trailSegments(earlier.map((f) => f.position), who, this.painted.colour, box);
+    world.trails.set(ends, colours);
+    world.stage.redraw();
+  }
+
+  /** Radius about a place within which all there is lies. */
+  reachFrom(target: number[]): number {
+    const box = this.frame && this.known.manifest.periodic.some(Boolean) ? this.frame.box : [0, 0, 0];
+    return Math.max(this.world.reachFrom(target), Math.hypot(...box) / 2 + Math.hypot(...target));
+  }
+
+  /** The number of the contact between two grains, told as "i-j"; −1: they do not touch. */
+  contactOf(pair: string): number {
+    const match = /^(\d+)-(\d+)$/.exec(pair);
+    if (!match || !this.frame) return -1;
+    const [i, j] = [Number(match[1]), Number(match[2])];
+    const { pair: all } = this.frame;
+    for (let c = 0; 2 * c < all.length; c++) {
+      if ((all[2 * c] === i && all[2 * c + 1] === j) || (all[2 * c] === j && all[2 * c + 1] === i)) return c;
+    }
+    return -1;
+  }
+}

@@ -1,0 +1,120 @@
+// Moments as arrows through the centres of grains: shaft and head ray-cast on one square each.
+
+import { COMMON } from "./glsl";
+import { Instances } from "./instances";
+import type * as three from "three";
+
+const VERTEX = /* glsl */ `
+uniform mat4 modelViewMatrix;
+uniform float uPixel;   // pixels for a length of one at distance one (or at any, orthographic)
+in vec2 corner;
+in vec3 place;
+in vec3 arrow;          // from tail to tip
+in float shown;
+out vec3 vOnQuad;
+flat out vec3 vTail;
+flat out vec3 vAxis;
+flat out float vFlat;
+
+void main() {
+  vec3 c = (modelViewMatrix * vec4(place, 1.0)).xyz;
+  vec3 d = mat3(modelViewMatrix) * arrow;
+  float size = length(d);
+  float wide = 0.13 * size;
+  vTail = c - 0.5 * d;
+  vAxis = d;
+  vec3 toEye = isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-c);
+  // the square's long side is the arrow as it is seen; seen along its axis it is a disc
+  vec3 seen = d - dot(d, toEye) * toEye;
+  float seenSize = length(seen);
+  vec3 along = seenSize > 1e-4 * size ? seen / seenSize : normalize(cross(toEye, vec3(0.3, 1.0, 0.2)));
+  vec3 side = cross(toEye, along);
+  vec3 middle = c + toEye * 0.5 * size; // what is nearer the eye covers what lies behind
+  vOnQuad = middle + corner.x * (0.5 * seenSize + wide) * along + corner.y * wide * side;
+  gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
+  float pixels = size * uPixel / (isOrtho() ? 1.0 : max(-c.z, 1e-6));
+  vFlat = pixels < 14.0 ? 1.0 : 0.0;
+  // arrows too small to be seen are left out: this is what keeps crowds fast
+  if (shown < 0.5 || size == 0.0 || pixels < 2.5 || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+}
+`;
+
+const FRAGMENT = /* glsl */ `
+uniform vec3 uInk;
+uniform vec3 uTip;
+in vec3 vOnQuad;
+flat in vec3 vTail;
+flat in vec3 vAxis;
+flat in float vFlat;
+out vec4 outColour;
+
+const float SHAFT = 0.042; // radii and where the head begins, in lengths of the arrow
+const float HEAD = 0.125;
+const float NECK = 0.64;
+
+// nearest way along the ray to the shaft, the head or one of their flat ends; the normal there; -1: none
+float meet(vec3 o, vec3 ray, float size, vec3 axis, out vec3 normal) {
+  float best = -1.0;
+  float oz = dot(o, axis), rz = dot(ray, axis);
+  vec3 oa = o - oz * axis, ra = ray - rz * axis;
+  float s = SHAFT * size, neck = NECK * size, h = HEAD * size;
+  // shaft
+  float a = dot(ra, ra), b = dot(ra, oa), c = dot(oa, oa) - s * s;
+  float room = b * b - a * c;
+  if (room > 0.0 && a > 1e-10) {
+    float t = (-b - sqrt(room)) / a, z = oz + t * rz;
+    if (z > 0.0 && z < neck) { best = t; normal = (oa + t * ra) / s; }
+  }
+  // head: radius h (size - z) / (size - neck)
+  float k = h / (size - neck), m = size - oz;
+  a = dot(ra, ra) - k * k * rz * rz;
+  b = dot(ra, oa) + k * k * rz * m;
+  c = dot(oa, oa) - k * k * m * m;
+  room = b * b - a * c;
+  if (room > 0.0) {
+    float root = sqrt(room);
+    for (int i = 0; i < 2; i++) {
+      float t = abs(a) > 1e-9 ? (-b + (i == 0 ? -root : root)) / a : -0.5 * c / b;
+      float z = oz + t * rz;
+      if (z >= neck && z <= size && (best < 0.0 || t < best)) {
+        best = t;
+        normal = normalize(normalize(oa + t * ra) + k * axis);
+      }
+    }
+  }
+  // back of the head, end of the shaft
+  if (rz > 1e-6) {
+    for (int i = 0; i < 2; i++) {
+      float t = ((i == 0 ? neck : 0.0) - oz) / rz, wide = i == 0 ? h : s;
+      vec3 p = oa + t * ra;
+      if (dot(p, p) < wide * wide && (best < 0.0 || t < best)) { best = t; normal = -axis; }
+    }
+  }
+  return best;
+}
+
+void main() {
+  vec3 origin = rayOrigin(vOnQuad);
+  vec3 ray = rayDirection(vOnQuad);
+  float size = length(vAxis);
+  vec3 axis = vAxis / size;
+  // starting near the arrow keeps single precision out of trouble
+  float near = dot(vTail + 0.5 * vAxis - origin, ray) - size;
+  vec3 start = origin + near * ray;
+  vec3 normal;
+  float t = meet(start - vTail, ray, size, axis, normal);
+  if (t < 0.0) discard;
+  vec3 p = start + t * ray;
+  vec3 colour = dot(p - vTail, axis) > NECK * size ? uTip : uInk;
+  outColour = vec4(vFlat > 0.5 ? colour : lit(colour, normal, -ray, 1.0, -p.z), 1.0);
+  gl_FragDepth = depthOf(p);
+}
+`;
+
+export class ArrowsMesh extends Instances {
+  constructor(uniforms: Record<string, three.IUniform>) {
+    super(COMMON + VERTEX, COMMON + FRAGMENT, uniforms, [
+      ["place", 3, Float32Array], ["arrow", 3, Float32Array], ["shown", 1, Float32Array],
+    ]);
+  }
+}

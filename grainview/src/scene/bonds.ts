@@ -1,0 +1,74 @@
+// Contacts as round bars between the centres of two grains: where these have their true size, a collar at the neck.
+
+import { COMMON } from "./glsl";
+import { Instances } from "./instances";
+import type * as three from "three";
+
+const VERTEX = /* glsl */ `
+uniform mat4 modelViewMatrix;
+uniform float uBar;
+in vec2 corner;
+in vec3 from;
+in vec3 to;
+in vec4 colour;
+out vec3 vOnQuad;
+flat out vec3 vFrom;
+flat out vec3 vAxis;
+flat out vec3 vColour;
+
+void main() {
+  vec3 a = (modelViewMatrix * vec4(from, 1.0)).xyz;
+  vec3 b = (modelViewMatrix * vec4(to, 1.0)).xyz;
+  vFrom = a;
+  vAxis = b - a;
+  vColour = colour.rgb;
+  vec3 toEye = isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-0.5 * (a + b));
+  vec3 along = normalize(vAxis);
+  vec3 side = cross(along, toEye);
+  side = dot(side, side) < 1e-6 ? vec3(1.0, 0.0, 0.0) : normalize(side);
+  vec3 front = normalize(cross(side, along));
+  // the square lies at the side of the bar that faces the eye, a little longer than it
+  vec3 middle = 0.5 * (a + b) + front * uBar;
+  vOnQuad = middle + corner.x * (0.5 * vAxis + along * uBar) + corner.y * side * uBar * 1.2;
+  gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
+  if (colour.a < 0.5 || max(a.z, b.z) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+}
+`;
+
+const FRAGMENT = /* glsl */ `
+uniform float uBar;
+in vec3 vOnQuad;
+flat in vec3 vFrom;
+flat in vec3 vAxis;
+flat in vec3 vColour;
+out vec4 outColour;
+
+void main() {
+  vec3 origin = rayOrigin(vOnQuad);
+  vec3 ray = rayDirection(vOnQuad);
+  float size = length(vAxis);
+  vec3 axis = vAxis / size;
+  vec3 off = origin - vFrom;
+  vec3 rayAcross = ray - dot(ray, axis) * axis;
+  vec3 offAcross = off - dot(off, axis) * axis;
+  float a = dot(rayAcross, rayAcross);
+  float b = dot(rayAcross, offAcross);
+  float c = dot(offAcross, offAcross) - uBar * uBar;
+  float room = b * b - a * c;
+  if (room < 0.0 || a < 1e-12) discard;
+  vec3 p = origin + (-b - sqrt(room)) / a * ray;
+  float at = dot(p - vFrom, axis);
+  if (at < 0.0 || at > size) discard;
+  vec3 normal = (p - vFrom - at * axis) / uBar;
+  outColour = vec4(lit(vColour, normal, -ray, 1.0, -p.z), 1.0);
+  gl_FragDepth = depthOf(p);
+}
+`;
+
+export class BondsMesh extends Instances {
+  constructor(uniforms: Record<string, three.IUniform>) {
+    super(COMMON + VERTEX, COMMON + FRAGMENT, { ...uniforms, uBar: { value: 1 } }, [
+      ["from", 3, Float32Array], ["to", 3, Float32Array], ["colour", 4, Uint8Array],
+    ]);
+  }
+}

@@ -1,0 +1,65 @@
+// What lies under a pixel: every grain and every contact is asked where the ray meets it.
+
+import type { Ray } from "three";
+import type { Bonds } from "../data/bonds";
+
+export type Hit = { kind: "grain"; index: number; distance: number } | { kind: "contact"; index: number; distance: number };
+
+/** The first grain along a ray. */
+export function pickGrain(
+  ray: Ray,
+  place: Float32Array,
+  radius: Float32Array,
+  size: number,
+  shown: Uint8Array | null,
+): Hit | null {
+  const [ox, oy, oz] = ray.origin.toArray();
+  const [dx, dy, dz] = ray.direction.toArray();
+  let [best, nearest] = [-1, Infinity];
+  for (let i = 0; i < radius.length; i++) {
+    if (shown && !shown[i]) continue;
+    const [x, y, z] = [place[3 * i] - ox, place[3 * i + 1] - oy, place[3 * i + 2] - oz];
+    const b = x * dx + y * dy + z * dz;
+    const r = radius[i] * size;
+    const room = r * r - (x * x + y * y + z * z - b * b);
+    if (room < 0) continue;
+    const t = b - Math.sqrt(room);
+    if (t > 0 && t < nearest) [best, nearest] = [i, t];
+  }
+  return best < 0 ? null : { kind: "grain", index: best, distance: nearest };
+}
+
+/** The first contact along a ray, its bar as thick as it is drawn. */
+export function pickContact(ray: Ray, bonds: Bonds, bar: number): Hit | null {
+  const o = ray.origin.toArray();
+  const d = ray.direction.toArray();
+  let [best, nearest] = [-1, Infinity];
+  const [axis, off] = [[0, 0, 0], [0, 0, 0]];
+  for (let k = 0; k < bonds.contact.length; k++) {
+    let [size, da, oa] = [0, 0, 0];
+    for (let a = 0; a < 3; a++) {
+      axis[a] = bonds.to[3 * k + a] - bonds.from[3 * k + a];
+      off[a] = o[a] - bonds.from[3 * k + a];
+      size += axis[a] * axis[a];
+    }
+    size = Math.sqrt(size);
+    for (let a = 0; a < 3; a++) {
+      axis[a] /= size;
+      da += d[a] * axis[a];
+      oa += off[a] * axis[a];
+    }
+    let [A, B, C] = [0, 0, -bar * bar];
+    for (let a = 0; a < 3; a++) {
+      const [dp, op] = [d[a] - da * axis[a], off[a] - oa * axis[a]];
+      A += dp * dp;
+      B += dp * op;
+      C += op * op;
+    }
+    const room = B * B - A * C;
+    if (room < 0 || A < 1e-12) continue;
+    const t = (-B - Math.sqrt(room)) / A;
+    const at = oa + t * da;
+    if (t > 0 && at >= 0 && at <= size && t < nearest) [best, nearest] = [bonds.contact[k], t];
+  }
+  return best < 0 ? null : { kind: "contact", index: best, distance: nearest };
+}

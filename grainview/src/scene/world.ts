@@ -1,0 +1,146 @@
+// All that is on the stage: grains, contacts, arrows, box, trails; told what to show by the app.
+
+import * as three from "three";
+import type { Bonds } from "../data/bonds";
+import { rgb } from "../data/colours";
+import { ArrowsMesh } from "./arrows";
+import { BondsMesh } from "./bonds";
+import { GrainsMesh } from "./grains";
+import { boxEdges, Segments } from "./lines";
+import { type Hit, pickContact, pickGrain } from "./pick";
+import { Stage } from "./stage";
+
+export interface Theme {
+  background: string;
+  ink: string;
+  tip: string;
+  line: string;
+  dark: boolean;
+}
+
+export const LIGHT: Theme = { background: "#fbfaf7", ink: "#22262b", tip: "#16181c", line: "#9aa0a6", dark: false };
+export const DARK: Theme = { background: "#10131a", ink: "#e8e6df", tip: "#ffffff", line: "#5b626d", dark: true };
+
+/** Length of arrows in radii of their grain. */
+const ARROW = 3.4;
+
+const linear = (hex: string): three.Vector3 => new three.Vector3(...rgb(hex).map((c) => c / 255));
+
+export class World {
+  readonly uniforms = {
+    uBackground: { value: new three.Vector3(1, 1, 1) },
+    uInk: { value: new three.Vector3() },
+    uTip: { value: new three.Vector3() },
+    uDepth: { value: new three.Vector2(0, 1) },
+    uHaze: { value: 0 },
+    uAmbient: { value: 0.5 },
+    uSize: { value: 1 },
+    uPixel: { value: 1 },
+  };
+  readonly grains = new GrainsMesh(this.uniforms);
+  readonly bonds = new BondsMesh(this.uniforms);
+  readonly arrows = new ArrowsMesh(this.uniforms);
+  readonly box = new Segments(false);
+  readonly trails = new Segments(true);
+  place: Float32Array = new Float32Array();
+  radius: Float32Array = new Float32Array();
+  shown: Uint8Array | null = null;
+  pieces: Bonds | null = null;
+  haze = 0.5;
+  private bar = 1;
+
+  constructor(readonly stage: Stage) {
+    const parts = [this.trails.lines, this.box.lines, this.grains.mesh, this.bonds.mesh, this.arrows.mesh];
+    stage.scene.add(...parts);
+    stage.onDraw = () => this.beforeDraw();
+  }
+
+  setTheme(theme: Theme, transparent = false): void {
+    this.uniforms.uBackground.value.copy(linear(theme.background));
+    this.uniforms.uInk.value.copy(linear(theme.ink));
+    this.uniforms.uTip.value.copy(linear(theme.tip));
+    this.uniforms.uAmbient.value = theme.dark ? 0.44 : 0.56;
+    this.box.lines.material.color.setStyle(theme.line, three.LinearSRGBColorSpace);
+    this.stage.renderer.outputColorSpace = three.LinearSRGBColorSpace; // colours are meant as they are given
+    const colour = new three.Color().setStyle(theme.background, three.LinearSRGBColorSpace);
+    this.stage.renderer.setClearColor(colour, transparent ? 0 : 1);
+    this.stage.redraw();
+  }
+
+  setGrains(place: Float32Array, radius: Float32Array, colour: Uint8Array, cover: Float32Array | null): void {
+    const count = radius.length;
+    [this.place, this.radius] = [place, radius];
+    const values: Record<string, Float32Array | Uint8Array> = { place, radius, colour };
+    values.cover = cover ?? new Float32Array(3 * count);
+    this.grains.set(count, values);
+    this.stage.redraw();
+  }
+
+  /** Marks of grains: 1 chosen, 2 an end of what is measured. */
+  setMarks(marks: Map<number, number>): void {
+    const mark = new Float32Array(this.radius.length);
+    for (const [grain, kind] of marks) mark[grain] = kind;
+    this.grains.set(this.radius.length, { mark });
+    this.stage.redraw();
+  }
+
+  setBonds(pieces: Bonds | null, bar: number): void {
+    [this.pieces, this.bar] = [pieces, bar];
+    this.bonds.visible = pieces !== null;
+    this.bonds.uniforms.uBar.value = bar;
+    if (pieces) this.bonds.set(pieces.contact.length, { from: pieces.from, to: pieces.to, colour: pieces.colour });
+    this.stage.redraw();
+  }
+
+  /** Arrows along the moments (N, 3), each as long as its grain allows; null: none. */
+  setArrows(moment: Float32Array | null): void {
+    this.arrows.visible = moment !== null;
+    if (moment) {
+      const count = this.radius.length;
+      const arrow = new Float32Array(3 * count);
+      const shown = new Float32Array(count);
+      for (let i = 0; i < count; i++) {
+        const size = Math.hypot(moment[3 * i], moment[3 * i + 1], moment[3 * i + 2]);
+        shown[i] = this.shown && !this.shown[i] ? 0 : 1;
+        if (!(size > 0)) continue;
+        const factor = (ARROW * this.radius[i]) / size;
+        for (let a = 0; a < 3; a++) arrow[3 * i + a] = factor * moment[3 * i + a];
+      }
+      this.arrows.set(count, { place: this.place, arrow, shown });
+    }
+    this.stage.redraw();
+  }
+
+  setBox(lengths: number[] | null): void {
+    this.box.lines.visible = lengths !== null;
+    if (lengths) this.box.set(boxEdges(lengths));
+    this.stage.redraw();
+  }
+
+  /** Radius about a place within which all shown grains lie. */
+  reachFrom(target: number[]): number {
+    let most = 0;
+    for (let i = 0; i < this.radius.length; i++) {
+      const [x, y, z] = [0, 1, 2].map((a) => this.place[3 * i + a] - target[a]);
+      most = Math.max(most, Math.sqrt(x * x + y * y + z * z) + ARROW * this.radius[i]);
+    }
+    return most || 1;
+  }
+
+  private beforeDraw(): void {
+    const { stage, uniforms } = this;
+    const distance = stage.camera.position.distanceTo(stage.controls.target);
+    const depth = Math.min(stage.reach, 1.5 * stage.look.height);
+    uniforms.uDepth.value.set(distance - 0.35 * depth, distance + depth);
+    uniforms.uHaze.value = this.haze;
+    uniforms.uPixel.value = stage.pixelsPerLength * (stage.isOrthographic ? 1 : distance);
+  }
+
+  /** The grain or contact at a pixel of the canvas. */
+  pick(x: number, y: number): Hit | null {
+    const ray = this.stage.rayAt(x, y);
+    const grain = pickGrain(ray, this.place, this.radius, this.uniforms.uSize.value, this.shown);
+    const contact = this.pieces ? pickContact(ray, this.pieces, this.bar) : null;
+    return contact && (!grain || contact.distance < grain.distance) ? contact : grain;
+  }
+}

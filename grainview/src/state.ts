@@ -1,0 +1,136 @@
+// What is looked at and how: one table of settings, from which controls, keys, help and the address are made.
+
+export type Value = number | boolean | string;
+
+export interface Setting {
+  id: string;
+  label: string;
+  group: "Colour" | "Show" | "Contacts" | "Camera" | "Time" | "";
+  kind: "toggle" | "choice" | "range" | "number" | "hidden";
+  initial: Value;
+  options?: [value: string, label: string][];
+  from?: number;
+  to?: number;
+  by?: number;
+  key?: string; // toggles or goes to the next option; with shift to the one before
+  down?: string; // ranges: less (key: more)
+}
+
+export const SETTINGS: Setting[] = [
+  { id: "colour", label: "Colour by", group: "Colour", kind: "choice", initial: "cluster", options: [], key: "c" },
+  { id: "palette", label: "Scale of colours", group: "Colour", kind: "choice", initial: "cividis", options: [] },
+  { id: "log", label: "Logarithmic", group: "Colour", kind: "toggle", initial: false, key: "q" },
+  { id: "low", label: "From", group: "Colour", kind: "number", initial: NaN },
+  { id: "high", label: "To", group: "Colour", kind: "number", initial: NaN },
+  { id: "theme", label: "Theme", group: "Colour", kind: "choice", initial: "auto", key: "d",
+    options: [["auto", "as the system"], ["light", "light"], ["dark", "dark"]] },
+  { id: "size", label: "Size of grains", group: "Show", kind: "range", initial: 1, from: 0.1, to: 1.5, by: 0.05,
+    key: "]", down: "[" },
+  { id: "arrows", label: "Moments", group: "Show", kind: "toggle", initial: true, key: "m" },
+  { id: "box", label: "Box", group: "Show", kind: "toggle", initial: true, key: "x" },
+  { id: "field", label: "Field and axes", group: "Show", kind: "toggle", initial: true, key: "f" },
+  { id: "whole", label: "Keep clusters whole", group: "Show", kind: "toggle", initial: false, key: "w" },
+  { id: "isolate", label: "Only the chosen cluster", group: "Show", kind: "toggle", initial: false, key: "i" },
+  { id: "trails", label: "Trails (frames)", group: "Show", kind: "range", initial: 0, from: 0, to: 40, by: 1,
+    key: "t", down: "T" },
+  { id: "shade", label: "Shade and haze", group: "Show", kind: "range", initial: 0.5, from: 0, to: 1, by: 0.1,
+    key: "h", down: "H" },
+  { id: "bonds", label: "Contacts", group: "Contacts", kind: "choice", initial: "plain", key: "b",
+    options: [["off", "not shown"], ["plain", "plain"], ["load", "by normal force"], ["mode", "by mode at its limit"]] },
+  { id: "bar", label: "Thickness", group: "Contacts", kind: "range", initial: 0.45, from: 0.05, to: 0.8, by: 0.05,
+    key: "}", down: "{" },
+  { id: "ortho", label: "Orthographic", group: "Camera", kind: "toggle", initial: false, key: "o" },
+  { id: "follow", label: "Follow the chosen cluster", group: "Camera", kind: "toggle", initial: false, key: "g" },
+  { id: "measure", label: "Measure distances", group: "Camera", kind: "toggle", initial: false, key: "u" },
+  { id: "speed", label: "Frames per second", group: "Time", kind: "range", initial: 20, from: 1, to: 60, by: 1,
+    key: "+", down: "-" },
+  { id: "loop", label: "Loop", group: "Time", kind: "toggle", initial: false, key: "l" },
+  { id: "live", label: "Go along with the run", group: "Time", kind: "toggle", initial: true, key: "a" },
+  { id: "plot", label: "Plot", group: "Time", kind: "choice", initial: "size", options: [], key: "p" },
+  { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0 },
+  { id: "grain", label: "Chosen grain", group: "", kind: "hidden", initial: -1 },
+  { id: "contact", label: "Chosen contact", group: "", kind: "hidden", initial: "" }, // "i-j": its grains
+  { id: "ends", label: "Measured", group: "", kind: "hidden", initial: "" }, // "i-j"
+  { id: "look", label: "Camera", group: "", kind: "hidden", initial: "" },
+];
+
+const same = (a: Value, b: Value): boolean => a === b || (Number.isNaN(a) && Number.isNaN(b));
+
+/** Values of all settings; tells those who listen what has changed. */
+export class State {
+  readonly settings: Setting[] = SETTINGS.map((one) => ({ ...one }));
+  private readonly values = new Map<string, Value>(this.settings.map((s) => [s.id, s.initial]));
+  private readonly listeners: ((id: string) => void)[] = [];
+
+  setting(id: string): Setting {
+    const found = this.settings.find((s) => s.id === id);
+    if (!found) throw new Error(`there is no setting “${id}”`);
+    return found;
+  }
+
+  get<T extends Value>(id: string): T {
+    return this.values.get(id) as T;
+  }
+
+  number(id: string): number {
+    return this.values.get(id) as number;
+  }
+
+  /** Set a value, brought into what is allowed; nothing happens if it is none. */
+  set(id: string, value: Value): void {
+    const setting = this.setting(id);
+    const clean = allowed(setting, value);
+    if (clean === undefined || same(clean, this.values.get(id) as Value)) return;
+    this.values.set(id, clean);
+    for (const tell of this.listeners) tell(id);
+  }
+
+  /** The next value of a setting, or the one before. */
+  step(id: string, direction: 1 | -1): void {
+    const s = this.setting(id);
+    if (s.kind === "toggle") this.set(id, !this.get<boolean>(id));
+    if (s.kind === "range") this.set(id, Number((this.number(id) + direction * (s.by ?? 1)).toFixed(6)));
+    if (s.kind === "choice" && s.options?.length) {
+      const at = s.options.findIndex(([value]) => value === this.get(id));
+      this.set(id, s.options[(at + direction + s.options.length) % s.options.length][0]);
+    }
+  }
+
+  onChange(tell: (id: string) => void): void {
+    this.listeners.push(tell);
+  }
+
+  /** All that differs from the beginning, for the address of the page. */
+  toAddress(): string {
+    const parts = new URLSearchParams();
+    for (const s of this.settings) {
+      const value = this.values.get(s.id) as Value;
+      if (!same(value, s.initial)) parts.set(s.id, typeof value === "boolean" ? (value ? "1" : "0") : String(value));
+    }
+    return parts.toString();
+  }
+
+  /** Take what an address says; settings it does not name go back to their beginning. */
+  fromAddress(text: string): void {
+    const parts = new URLSearchParams(text.replace(/^#/, ""));
+    for (const s of this.settings) {
+      const told = parts.get(s.id);
+      if (told === null) this.set(s.id, s.initial);
+      else if (typeof s.initial === "boolean") this.set(s.id, told === "1");
+      else if (typeof s.initial === "number") this.set(s.id, Number(told));
+      else this.set(s.id, told);
+    }
+  }
+}
+
+function allowed(setting: Setting, value: Value): Value | undefined {
+  if (setting.kind === "choice") return setting.options?.some(([v]) => v === value) ? value : undefined;
+  if (setting.kind === "number") return typeof value === "number" ? value : undefined;
+  if (typeof value !== typeof setting.initial) return undefined;
+  if (typeof value === "number") {
+    if (Number.isNaN(value)) return undefined;
+    if (setting.kind === "range") return Math.min(Math.max(value, setting.from ?? 0), setting.to ?? 1);
+    return Math.round(value);
+  }
+  return value;
+}
