@@ -27,7 +27,7 @@ def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
     with pytest.raises(BadInput) as told:
         page.read_bundle(tmp_path)
     assert len(told.value.problems) == 1 and "\n" not in str(told.value)
-    assert "npm failed: no network." in str(told.value) and "pip install" in str(told.value)
+    assert "npm failed: no network." in str(told.value) and "pip" in str(told.value)
 
 
 def test_remedy_fits_the_installation(tmp_path, monkeypatch):

@@ -38,4 +38,4 @@ def _remedy(folder: Path) -> str:
     clone = PAGE.parents[3]
     if (clone / "grainview" / "package.json").is_file():
         return f"With node: cd {clone / 'grainview'} && npm ci && npm run build; without: pip install -e {clone}"
-    return "With access to the network: pip install --force-reinstall --no-deps --no-cache-dir sand-dust"
+    return "Install SAND again with access to the network, with pip's --force-reinstall --no-deps --no-cache-dir"
