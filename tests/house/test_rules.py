@@ -1,6 +1,7 @@
 """The rules of the house: which room may open which door, how long things may be, who names the compiler."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 TOP = Path(__file__).parents[2]
 HOUSE = TOP / "src" / "sand"
 SOURCES = sorted(HOUSE.rglob("*.py"))
+PAGE = sorted((TOP / "grainview" / "src").rglob("*.*"))
 EVERYTHING = {"core", "physics", "kernels", "forces", "stepping", "theory", "setup", "run", "files",
               "analysis", "experiments", "view"}  # fmt: skip
 MAY_IMPORT = {
@@ -160,10 +162,51 @@ def test_help_is_light():
     assert done.stdout.strip() == "[]"
 
 
-def test_no_large_files():
-    """Nothing above 300 kB in git."""
+def without_comments(text: str) -> str:
+    """TypeScript or CSS without comments; `//` after a colon belongs to an address."""
+    return re.sub(r"/\*.*?\*/|(?<!:)//[^\n]*", "", text, flags=re.DOTALL)
+
+
+def test_comments_are_told_from_addresses():
+    """The next test would be blind if an address were taken for a comment."""
+    assert without_comments("a /* http://b\n */ c // https://d\ne") == "a  c \ne"
+    assert "http://b" in without_comments('fetch("http://b"); // of https://c')
+
+
+def test_the_page_is_written_like_the_rest():
+    """TypeScript: files under 300 lines, lines of at most 120 characters."""
+    scripts = [path for path in PAGE if path.suffix == ".ts"]
+    assert scripts
+    for path in scripts:
+        lines = path.read_text("utf-8").splitlines()
+        assert len(lines) < 300, path.relative_to(TOP)
+        wide = [number for number, line in enumerate(lines, 1) if len(line) > 120]
+        assert not wide, f"{path.relative_to(TOP)}: lines {wide}"
+
+
+def test_the_page_needs_no_network():
+    """No address of another machine, but for names of XML such as http://www.w3.org/2000/svg, which nobody fetches."""
+    for path in PAGE:
+        strangers = re.findall(
+            r"(?:https?|wss?)://(?!www\.w3\.org/)[^\s\"'`)]*", without_comments(path.read_text("utf-8"))
+        )
+        assert not strangers, f"{path.relative_to(TOP)}: {strangers}"
+
+
+def tracked_files() -> list[str]:
     tracked = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True)
     if tracked.returncode != 0:
         pytest.skip("not a git checkout")
-    large = [n for n in tracked.stdout.splitlines() if (TOP / n).is_file() and (TOP / n).stat().st_size > 300_000]
+    return tracked.stdout.splitlines()
+
+
+def test_nothing_built_is_in_git():
+    """Neither the bundle of the page nor what npm installs."""
+    built = [n for n in tracked_files() if n.startswith("src/sand/view/page/") or "node_modules/" in n]
+    assert not built, built
+
+
+def test_no_large_files():
+    """Nothing above 300 kB in git."""
+    large = [n for n in tracked_files() if (TOP / n).is_file() and (TOP / n).stat().st_size > 300_000]
     assert not large, large

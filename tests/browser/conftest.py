@@ -1,0 +1,104 @@
+"""A browser for the tests of the page, and a page that lets no error pass unseen.
+
+Without Playwright, Chromium or the bundle the tests are skipped; SAND_NEED_BROWSER=1 makes that a failure.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import pytest
+
+from sand.core.errors import BadInput
+from sand.files.page import read_bundle
+
+from .chromium import FLAGS, find
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page, Request
+
+PATIENCE = 60_000  # ms, for whatever a test waits for: software draws slowly on a busy machine
+
+
+def lacking(reason: str) -> None:
+    """Skip the test, or fail it where the browser must be there."""
+    if os.environ.get("SAND_NEED_BROWSER"):
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    """Chromium without a window, one for each worker.
+
+    Not for the whole session: while Playwright runs, asyncio has a running loop in this thread, and tests of other
+    packages that start one would fail.
+    """
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        lacking("Playwright is not installed: pip install -e '.[interop]'")
+    path = find()
+    if path is None:
+        lacking("no Chromium: apt install chromium, or playwright install chromium")
+    with sync_playwright() as playwright:
+        # Playwright's default is no sandbox, which root and most containers need; only our own pages are opened
+        started = playwright.chromium.launch(executable_path=path, headless=True, args=list(FLAGS))
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="session")
+def bundle() -> tuple[str, str]:
+    """Script and style sheet of the page, as built."""
+    try:
+        return read_bundle()
+    except BadInput as error:
+        lacking(str(error))
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """An empty tab of 1280 × 800.
+
+    What goes wrong in it (errors on the console, exceptions, failed requests, requests to another machine) is listed in
+    `page.errors`. At the end of the test every entry must contain one of `page.expected_errors`, and each of these must
+    have come; the test sets that list where it provokes errors.
+    """
+    yield from page_of(browser)
+
+
+def page_of(browser: Browser) -> Iterator[Page]:
+    """What the fixture `page` does."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(PATIENCE)
+    tab = context.new_page()
+    errors: list[str] = []
+    tab.errors, tab.expected_errors = errors, []  # type: ignore[attr-defined]
+    tab.on("console", lambda message: errors.append(f"console: {message.text}") if message.type == "error" else None)
+    tab.on("pageerror", lambda error: errors.append(f"exception: {error}"))
+    tab.on("requestfailed", lambda request: _note_failure(request, errors))
+    tab.on("request", lambda request: _note_stranger(request, errors))
+    yield tab
+    tab.evaluate("() => new Promise(requestAnimationFrame)")  # what the browser has told by now is heard
+    expected = tab.expected_errors  # type: ignore[attr-defined]
+    seen = list(errors)
+    context.close()
+    wrong = [error for error in seen if not any(word in error for word in expected)]
+    assert not wrong, f"errors in the page: {wrong}"
+    silent = [word for word in expected if not any(word in error for error in seen)]
+    assert not silent, f"expected, but not seen in the page: {silent}"
+
+
+def _note_failure(request: Request, errors: list[str]) -> None:
+    if request.failure != "net::ERR_ABORTED":  # the page itself gave it up, as it does with frames it skips
+        errors.append(f"request: {request.url} {request.failure}")
+
+
+def _note_stranger(request: Request, errors: list[str]) -> None:
+    parts = urlsplit(request.url)
+    if parts.scheme in ("http", "https", "ws", "wss") and parts.hostname != "127.0.0.1":
+        errors.append(f"stranger: {request.url}")

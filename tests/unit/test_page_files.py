@@ -1,0 +1,49 @@
+"""What is said where the page was not built, and that it is read where it was."""
+
+from pathlib import Path
+
+import pytest
+
+from sand.core.errors import BadInput
+from sand.files import page
+
+
+def test_bundle_is_read(tmp_path):
+    (tmp_path / "grainview.js").write_text("let µ = 1;\n", "utf-8")
+    (tmp_path / "grainview.css").write_text("body {}\n")
+    (tmp_path / "missing.txt").write_text("an old reason.\n")  # of a build that failed before a developer's own
+    assert page.read_bundle(tmp_path) == ("let µ = 1;\n", "body {}\n")
+
+
+@pytest.mark.parametrize("there", [(), ("grainview.js",), ("grainview.css",)])
+def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
+    """Half a bundle is none."""
+    for name in there:
+        (tmp_path / name).write_text("x")
+    with pytest.raises(BadInput) as told:
+        page.read_bundle(tmp_path)
+    assert "It was not made when SAND was built." in str(told.value)
+    (tmp_path / "missing.txt").write_text("npm failed: no network.\n")
+    with pytest.raises(BadInput) as told:
+        page.read_bundle(tmp_path)
+    assert len(told.value.problems) == 1 and "\n" not in str(told.value)
+    assert "npm failed: no network." in str(told.value) and "pip" in str(told.value)
+
+
+def test_remedy_fits_the_installation(tmp_path, monkeypatch):
+    """In a clone the sources can be bundled; elsewhere SAND is installed again."""
+    place = tmp_path / "src" / "sand" / "view" / "page"
+    monkeypatch.setattr(page, "PAGE", place)
+    with pytest.raises(BadInput, match="--force-reinstall"):
+        page.read_bundle(place)
+    (tmp_path / "grainview").mkdir()
+    (tmp_path / "grainview" / "package.json").write_text("{}")
+    with pytest.raises(BadInput, match="npm run build"):
+        page.read_bundle(place)
+
+
+def test_both_sides_agree_on_the_place():
+    """The hook writes where `read_bundle` reads."""
+    hook = (Path(__file__).parents[2] / "hatch_build.py").read_text()
+    assert 'PAGE = Path("src", "sand", "view", "page")' in hook
+    assert page.PAGE.parts[-3:] == ("sand", "view", "page")
