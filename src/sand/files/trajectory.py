@@ -198,6 +198,22 @@ class Frames(Sequence[Frame]):
         except Exception as error:  # whatever a broken file makes the reader do
             raise BadInput(f"frame {index} of {self.path} cannot be read ({error})") from error
 
+    def pairs(self, index: int) -> np.ndarray:
+        """Grains in contact (C, 2) in a frame ≥ 0, and nothing else of it; its check sum is not looked at.
+
+        Raises:
+            BadInput: the frame is not whole.
+        """
+        file = self._file.file
+        try:
+            # what is as in the first frame is not written again
+            at = index if file.chunk_exists(index, "bonds/N") else 0
+            count = int(file.read_chunk(at, "bonds/N")[0]) if file.chunk_exists(at, "bonds/N") else 0
+            at = index if file.chunk_exists(index, "bonds/group") else 0
+            return file.read_chunk(at, "bonds/group").reshape(count, 2) if count else np.zeros((0, 2), np.uint32)
+        except Exception as error:  # whatever a broken file makes the reader do
+            raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+
     @property
     def times(self) -> np.ndarray:
         """True time of each frame [s]."""
