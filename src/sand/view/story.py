@@ -159,7 +159,11 @@ class Story:
 
     def frame(self, k: int) -> bytes:
         """The packet of the k-th frame told.  Raises BadInput for one that is not there or not whole."""
-        return frame_packet(k, *self.read(k), self.unit, self.compact)
+        return self.packed(k, *self.read(k))
+
+    def packed(self, k: int, frame: Any, names: np.ndarray) -> bytes:
+        """The packet of what `read` gave."""
+        return frame_packet(k, frame, names, self.unit, self.compact)
 
     def series(self) -> dict[str, Any]:
         """What happened over time, by the ledger; by the frames where there is none."""
