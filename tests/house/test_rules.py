@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "view": {"core", "files", "analysis"},
     "cli": EVERYTHING,
 }
-# A simulation shows itself: `Simulation.view()` and the figure at the end import `view` when called.
+# A simulation shows itself: `view()`, `figure()` and the figure at the end import `view` when called.
 LATE = {("run", "view")}
 
 
