@@ -26,6 +26,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(autouse=True)
+def _no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests open no windows."""
+    monkeypatch.setenv("SAND_NO_BROWSER", "1")
+
+
+@pytest.fixture(autouse=True)
 def _no_physics_warnings() -> Iterator[None]:
     """Small iron grains warn about JKR's validity; tests of that warning look for it themselves."""
     with warnings.catch_warnings():

@@ -29,7 +29,7 @@ MAY_IMPORT = {
     "view": {"core", "files", "analysis"},
     "cli": EVERYTHING,
 }
-# A simulation shows itself: `Simulation.view()` and the figure at the end import `view` when called.
+# A simulation shows itself: `view()`, `figure()` and the figure at the end import `view` when called.
 LATE = {("run", "view")}
 
 
@@ -143,12 +143,26 @@ def test_only_files_opens_files_and_only_cli_prints():
 
 
 def test_no_pickle_no_network():
-    """Neither pickle nor sockets anywhere; NumPy files are read with allow_pickle=False."""
+    """Neither pickle nor sockets anywhere but in the server of `sand view`; NumPy files with allow_pickle=False."""
+    server = HOUSE / "view" / "server.py"
+    network = {"socket", "socketserver", "urllib", "requests", "http", "asyncio", "aiohttp", "ssl"}
     for path in SOURCES:
         names = {name for name, _ in imports(path)}
-        assert not names & {"pickle", "dill", "cloudpickle", "socket", "urllib", "requests", "http"}, path
+        assert not names & {"pickle", "dill", "cloudpickle"}, path
+        assert not names & (network - {"http", "socketserver"} if path == server else network), path
         text = path.read_text()
         assert text.count("np.load(") == text.count("allow_pickle=False")
+
+
+def test_the_server_is_for_this_machine_alone():
+    """The one address that view/server.py binds is 127.0.0.1, a literal: no setting can open it to others."""
+    text = (HOUSE / "view" / "server.py").read_text()
+    tree = ast.parse(text)
+    literals = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    assert "127.0.0.1" in literals
+    assert not {"0.0.0.0", "::", "::1"} & literals
+    assert text.count("__init__((LOOPBACK, port)") == 1
+    assert text.count('LOOPBACK = "127.0.0.1"') == text.count("LOOPBACK =") == 1
 
 
 def test_help_is_light():

@@ -325,9 +325,9 @@ def test_thousand_grains_stay_small(tmp_path):
 
 
 def test_a_real_run_has_its_figure():
-    """A simulation's `view` returns the figure, which notebooks show as a PNG, even before the first step."""
+    """A simulation's `figure` returns the figure, which notebooks show as a PNG, even before the first step."""
     grains = sand.Grains([[0.0, 0.0, 0.0], [2.5e-8, 0.0, 0.0]], "10 nm", sand.SILICA)
-    figure = sand.Simulation(grains, forces=[sand.Contact()]).view()
+    figure = sand.Simulation(grains, forces=[sand.Contact()]).figure()
     assert isinstance(figure, Figure)
     assert figure._repr_png_()[:4] == b"\x89PNG"
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..core.errors import BadInput, FilesFailed
 
-CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS = (
+CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW = (
     "case.toml",
     "trajectory.gsd",
     "ledger.csv",
@@ -23,8 +23,9 @@ CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGH
     "scattering.json",
     "results.csv",
     "flights.csv",
+    "view.html",
 )
-OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS)
+OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW)
 
 
 def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:

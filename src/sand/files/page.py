@@ -1,10 +1,14 @@
-"""The bundle of the page that shows a run: made when SAND is built, so it may be missing where node was."""
+"""The bundle of the page that shows a run, which may be missing where it could not be built; pages written as files."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 from pathlib import Path
+from types import TracebackType
+from typing import Any
 
-from ..core.errors import BadInput
+from ..core.errors import BadInput, FilesFailed
 
 PAGE = Path(__file__).parents[1] / "view" / "page"
 """Where `hatch_build.py` puts the bundle, or `missing.txt` with the reason why there is none."""
@@ -39,3 +43,52 @@ def _remedy(folder: Path) -> str:
     if (clone / "grainview" / "package.json").is_file():
         return f"With node: cd {clone / 'grainview'} && npm ci && npm run build; without: pip install -e {clone}"
     return "Install SAND again with access to the network, with pip's --force-reinstall --no-deps --no-cache-dir"
+
+
+class Written:
+    """A large text file written bit by bit: beside, and renamed when it is whole.
+
+    Args:
+        path: of the file; what is there is replaced, but only when the new one is whole.
+
+    Raises:
+        FilesFailed: it cannot be written; also later.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path, self.size = Path(path), 0
+        self._beside = self.path.with_name(f".{self.path.name}.new")
+        try:
+            self._file: Any = open(self._beside, "wb")  # noqa: SIM115
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> FilesFailed:
+        return FilesFailed(f"cannot write {self.path}: {error.strerror}; what was there is untouched")
+
+    def write(self, text: str | bytes) -> None:
+        """Raises FilesFailed."""
+        part = text.encode() if isinstance(text, str) else text
+        try:
+            self._file.write(part)
+        except OSError as error:
+            raise self._failed(error) from error
+        self.size += len(part)
+
+    def __enter__(self) -> Written:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, _: object, __: TracebackType | None) -> None:
+        try:
+            if kind is None:
+                self._file.flush()
+                os.fsync(self._file.fileno())
+                self._file.close()
+                os.replace(self._beside, self.path)
+        except OSError as error:
+            raise self._failed(error) from error
+        finally:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            with contextlib.suppress(OSError):
+                self._beside.unlink(missing_ok=True)

@@ -198,6 +198,34 @@ class Frames(Sequence[Frame]):
         except Exception as error:  # whatever a broken file makes the reader do
             raise BadInput(f"frame {index} of {self.path} cannot be read ({error})") from error
 
+    def pairs(self, index: int) -> np.ndarray:
+        """Grains in contact (C, 2) in a frame ≥ 0, and nothing else of it; its check sum is not looked at.
+
+        Raises:
+            BadInput: the frame is not whole.
+        """
+        file = self._file.file
+        try:
+            count = self._number(index, "bonds/N")
+            at = index if file.chunk_exists(index, "bonds/group") else 0
+            return file.read_chunk(at, "bonds/group").reshape(count, 2) if count else np.zeros((0, 2), np.uint32)
+        except Exception as error:  # whatever a broken file makes the reader do
+            raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+
+    def head(self, index: int) -> tuple[float, int, int]:
+        """True time [s], step and number of contacts of a frame ≥ 0.  Raises BadInput for one that is not whole."""
+        try:
+            time = float(self._file.file.read_chunk(index, "log/time")[0])
+            return time, self._number(index, "configuration/step"), self._number(index, "bonds/N")
+        except Exception as error:  # whatever a broken file makes the reader do
+            raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+
+    def _number(self, index: int, chunk: str) -> int:
+        """A count of a frame; what is as in the first frame is not written again, nor what is 0 there."""
+        file = self._file.file
+        at = next((k for k in (index, 0) if file.chunk_exists(k, chunk)), None)
+        return 0 if at is None else int(file.read_chunk(at, chunk)[0])
+
     @property
     def times(self) -> np.ndarray:
         """True time of each frame [s]."""

@@ -16,10 +16,11 @@ from ..files.trajectory import Frame, Frames
 from ..setup.frame import from_frame
 from .case import read_case
 from .simulation import Simulation
+from .told import view_folder
 
 
 class Opened:
-    """What `sand.open(DIR)` gives; nothing is read before it is asked for, and nothing is written but by `export`.
+    """What `sand.open(DIR)` gives; nothing is read before it is asked for; only `export` and `view` write.
 
     A run that is still going can be looked at: open it again to see what has come since.
 
@@ -82,6 +83,17 @@ class Opened:
             neighbours=case.neighbours,
             seed=case.run.seed,
         )
+
+    def view(self, path: str | Path | None = None) -> Any:
+        """The grains in motion, as `Simulation.view`.
+
+        Args:
+            path: of the page; view.html in the run's folder by default.
+
+        Raises:
+            BadInput: there is no frame yet, or the trajectory is broken.
+        """
+        return view_folder(self.folder, path, lambda: self.at(-1).figure())
 
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.

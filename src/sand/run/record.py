@@ -115,6 +115,11 @@ class Record:
         self._saved = wall.monotonic()
         self._took = self._saved - begun
 
+    def flush(self) -> None:
+        """Frames written so far can be read.  Raises FilesFailed."""
+        if self._trajectory is not None:
+            self._trajectory.flush()
+
     def rescue(self) -> None:
         """Keep what can be kept after a file could not be written."""
         if self._trajectory is not None:

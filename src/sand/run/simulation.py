@@ -208,7 +208,20 @@ class Simulation:
             self._broken = f"its files could not be written ({error}); go on with sand.resume, or start again"
             raise
 
-    def view(self) -> Any:
+    def view(self, path: str | Path | None = None) -> Any:
+        """The grains in motion: a widget in a notebook with anywidget, else a page, opened if there is a browser.
+
+        Args:
+            path: of the page; view.html in the run's folder by default, or in a temporary one.
+
+        Returns the widget, or the path of the page; the figure, with a warning, where the installation lacks the page.
+        """
+        from .told import view_simulation
+
+        self._start()
+        return view_simulation(self, path)
+
+    def figure(self) -> Any:
         """The figure of the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
         from ..view.figure import run_figure, show
 

@@ -226,7 +226,7 @@ def save(figure: Figure, path: str | Path) -> None:
 
 def show(figure: Figure) -> Figure:
     """Show the figure in a window where there can be one; notebooks display what is returned."""
-    if not _in_notebook():
+    if not in_notebook():
         from matplotlib import pyplot as plt
 
         if plt.get_backend().lower() in _windows():
@@ -236,7 +236,8 @@ def show(figure: Figure) -> Figure:
     return figure
 
 
-def _in_notebook() -> bool:
+def in_notebook() -> bool:
+    """Whether cells of a notebook call."""
     python = sys.modules.get("IPython")
     shell: Any = python.get_ipython() if python is not None else None
     return shell is not None and hasattr(shell, "kernel")

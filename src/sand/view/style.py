@@ -27,6 +27,18 @@ SINGLE = "#B9BDC3"
 """Of grains without a contact."""
 INK, FAINT = "#22262B", "#7A828C"
 """Of text and frames; of notes."""
+ON_DARK = {
+    BLUE: "#5AA9E6",
+    RED: "#F08A4B",
+    GREEN: "#3CC9A0",
+    PURPLE: "#D98CC0",
+    ORANGE: "#F0B94A",
+    SKY: "#8FD0F2",
+    YELLOW: "#E8DA4F",
+    INK: "#E4E8EC",
+    FAINT: "#939CA6",
+}
+"""The same colours where the ground is dark."""
 
 _STYLE = {
     "font.family": "DejaVu Sans",

@@ -1,0 +1,136 @@
+"""`sand view DIR`: a page on which the grains of a run move."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import threading
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..core.errors import BadInput
+from . import options, report
+from .exits import DONE
+from .export import chosen
+
+LARGE = 100e6
+"""Bytes above which a page takes long to open."""
+
+
+@click.command("view", short_help="Look at the grains of a run in the browser.")
+@click.argument("folder", metavar="DIR")
+@click.option("--html", "html", metavar="FILE", help="Write one page with everything in it instead, to keep or send.")
+@click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Every K-th frame only.")
+@click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
+@click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Listen there (default: any free).")
+@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
+@click.option("--overwrite", is_flag=True, help="Replace FILE if it is there.")
+@options.as_json
+@options.quiet
+@options.debug
+def command(
+    folder: str,
+    html: str | None,
+    every: int,
+    frames: str,
+    port: int,
+    no_browser: bool,
+    overwrite: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Look at the grains of the run in DIR, or of a trajectory of SAND, in the browser.
+
+    A run that is still going is followed. The page is for this machine alone; Ctrl-C ends it.
+    """
+    from ..run.told import field_in
+    from ..view.page import chosen_frames, write_page
+    from ..view.story import run_folder, story_of
+
+    target = None if html is None else Path(html)
+    if target is not None:
+        _refuse(target, overwrite)
+    home = run_folder(folder)
+    story = story_of(folder, None if home is None else field_in(home))
+    picked = chosen_frames(chosen(frames), every)
+    if picked != slice(None, None, 1):
+        told = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
+        story.choose(picked, ", ".join(told))
+    if target is None:
+        return _serve(story, folder, port, not no_browser, as_json, quiet)
+    size = write_page(story, target, progress=None if quiet or as_json else _Bar(target))
+    if as_json:
+        report.emit({"file": str(target), "bytes": size})
+    elif not quiet:
+        report.show(f"view {folder}", [("file", str(target)), ("frames", str(len(story))), ("size", _spoken(size))])
+    if size > LARGE:
+        fewer = max(int(every * size / LARGE) + 1, 2)
+        report.note(f"note: {_spoken(size)} take long to open; --every {fewer} would make it about 100 MB")
+    return DONE
+
+
+def _refuse(target: Path, overwrite: bool) -> None:
+    """Raises BadInput for a file that is there, or a folder that is not."""
+    if target.is_dir():
+        raise BadInput(f"{target} is a folder; give --html the name of a file, such as {target / 'view.html'}")
+    if target.exists() and not overwrite:
+        raise BadInput(f"{target} exists; give another --html, or --overwrite")
+    if not target.parent.is_dir():
+        raise BadInput(f"there is no folder {target.parent}; make it first")
+
+
+def _spoken(size: int) -> str:
+    return f"{size / 1e6:.3g} MB"
+
+
+class _Bar:
+    """How far the file is, on stderr, where somebody sees it."""
+
+    def __init__(self, target: Path):
+        self.target = target
+        self._bar: Any = None
+
+    def __call__(self, done: int, count: int) -> None:
+        from tqdm import tqdm
+
+        if self._bar is None:
+            self._bar = tqdm(total=count, desc=self.target.name, unit="frame", disable=None, leave=False)
+        self._bar.update(done - self._bar.n)
+        if done == count:
+            self._bar.close()
+
+
+def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
+    """Until Ctrl-C."""
+    from ..view.browser import open_page
+    from ..view.server import Server
+
+    server = Server(story, port)
+    server.start()
+    try:
+        opened = browser and open_page(server.url)
+        if as_json:
+            report.emit({"url": server.url})
+        else:
+            report.show(f"view {shlex.quote(folder)}", [("address", server.url), ("frames", str(len(story)))])
+        if not quiet and not as_json:
+            if os.environ.get("SSH_CONNECTION"):
+                tunnel = f"ssh -L {server.port}:127.0.0.1:{server.port} …"
+                report.note(f"note: from another machine, first type there: {tunnel}")
+            report.note(f"{'' if opened else 'open the address in a browser; '}Ctrl-C ends it")
+        _wait()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        server.stop()
+    if not quiet and not as_json:
+        report.note("ended")
+    return DONE
+
+
+def _wait() -> None:
+    """Until Ctrl-C."""
+    while not threading.Event().wait(0.5):  # a longer wait cannot be interrupted everywhere
+        pass

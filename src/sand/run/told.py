@@ -1,0 +1,71 @@
+"""A run told to those who look at it: its magnetic field, and what `view()` shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..core.errors import BadInput
+from ..core.units import spoken
+from ..core.vec import norm
+from ..files.folder import CASE, TRAJECTORY, read_toml
+from ..forces.field import Field
+
+if TYPE_CHECKING:
+    from .simulation import Simulation
+
+Told = tuple[str, Callable[[float], Sequence[float]]]
+
+
+def field_of(forces: Iterable[Any]) -> Told | None:
+    """The field among forces in words, and its flux density [T] at a time [s]; None without one."""
+    for force in forces:
+        if isinstance(force, Field) and force.flux_density_size() > 0.0:
+            return _said(force), force.flux_density_at
+    return None
+
+
+def field_in(folder: Path) -> Told | None:
+    """The same of the case in a run's folder; None, too, where there is no case, or one that cannot be read."""
+    try:
+        given = read_toml(folder / CASE).get("forces", {}).get("field")
+        return None if given is None else field_of([Field(**given)])
+    except (BadInput, TypeError, AttributeError):
+        return None
+
+
+def _said(field: Field) -> str:
+    constant = spoken(norm(field.flux_density), "T")
+    if field.shape == "constant":
+        return f"{constant}, constant"
+    if field.shape == "ramp":
+        return f"from {constant} at {spoken(field.start, 's')} to {spoken(norm(field.final), 'T')} at " + spoken(
+            field.end, "s"
+        )
+    swing = f"{spoken(norm(field.amplitude), 'T')}, {field.shape} at {spoken(field.frequency, 'Hz')}"
+    return f"{constant}, constant, and {swing}" if norm(field.flux_density) > 0.0 else swing
+
+
+def view_simulation(simulation: Simulation, path: str | Path | None) -> Any:
+    """What `Simulation.view` gives: of the frames in its folder, or of its state of now where there are none."""
+    from ..view.moment import story_of_now
+    from ..view.show import show_story
+    from ..view.story import story_of
+
+    record, field = simulation.record, field_of(simulation.forces)
+    folder = None if record is None else record.folder
+    if record is not None and (record.folder / TRAJECTORY).exists():
+        record.flush()
+        story = story_of(record.folder, field)
+    else:
+        story = story_of_now(simulation, field)
+    return show_story(story, path, folder, simulation.figure)
+
+
+def view_folder(folder: Path, path: str | Path | None, instead: Callable[[], Any]) -> Any:
+    """What `sand.open(DIR).view` gives; `instead` where the installation lacks the page."""
+    from ..view.show import show_story
+    from ..view.story import story_of
+
+    return show_story(story_of(folder, field_in(folder)), path, folder, instead)

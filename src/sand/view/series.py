@@ -1,0 +1,150 @@
+"""What happened over time, as the page of a run draws it: thinned, SI, colours for light and dark."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
+from ..files.folder import plain
+from .panels import LOSS_COLOURS, OUTSIDE_COLOURS, column, energies, losses, peak
+from .style import BLUE, FAINT, GREEN, INK, ON_DARK, RED, SKY
+
+MOST = 2000
+"""Points of a line at most."""
+LOOKED_AT = 20_000_000
+"""Grains, all frames together, whose clusters are counted where there is no ledger."""
+COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
+
+
+class Columns:
+    """Columns of a ledger by name, as the figure takes them.
+
+    Args:
+        rows: of ledger.csv.
+    """
+
+    def __init__(self, rows: Sequence[Mapping[str, float]]):
+        self.columns = tuple(rows[0]) if rows else ()
+        self._table = {name: np.array([row[name] for row in rows], np.float64) for name in self.columns}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._table[name]
+
+    def __len__(self) -> int:
+        return len(next(iter(self._table.values()), ()))
+
+    def taken(self, chosen: np.ndarray) -> Columns:
+        """Some of the rows."""
+        fewer = Columns(())
+        fewer.columns = self.columns
+        fewer._table = {name: values[chosen] for name, values in self._table.items()}
+        return fewer
+
+
+def thinned(count: int, most: int = MOST) -> np.ndarray:
+    """Numbers of at most so many of `count` rows, evenly spread, first and last among them."""
+    if count <= most:
+        return np.arange(count)
+    return np.rint(np.linspace(0, count - 1, most)).astype(int)
+
+
+def of_ledger(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Plots and events of a ledger; a plot whose columns a ledger lacks is left out."""
+    whole = Columns(rows)
+    books = whole.taken(thinned(len(whole)))
+    plots = []
+    for plot in (_clusters, _energies, _losses, _contacts, _balance):
+        try:
+            plots.append(plot(books))
+        except (KeyError, ValueError):  # a ledger of other columns
+            continue
+    return {"time": _numbers(books["time"], 10), "plots": [p for p in plots if p["lines"]], "events": _events(whole)}
+
+
+def of_frames(frames: Any) -> dict[str, Any]:
+    """The same where there are frames alone: contacts, and clusters of as many frames as take little time."""
+    grains = len(frames[0])
+    chosen = thinned(len(frames), max(min(MOST, LOOKED_AT // max(grains, 1)), 2))
+    table: dict[str, list[float]] = {"mean_cluster_size": [], "largest_cluster": [], "clusters": []}
+    for number in chosen:
+        labels = cluster_labels(grains, frames.pairs(int(number)))
+        table["mean_cluster_size"].append(mean_cluster_size(labels))
+        table["largest_cluster"].append(float(cluster_sizes(labels).max()))
+        table["clusters"].append(float(labels.max() + 1))
+    lines = [_line("contacts", RED, frames.contacts[chosen].astype(float))]
+    plots = [
+        _clusters({name: np.array(values) for name, values in table.items()}),
+        _plot("contacts", "Contacts", lines),
+    ]
+    events: dict[str, list[float]] = {"time": [], "made": [], "broken": []}
+    return {"time": _numbers(frames.times[chosen], 10), "plots": plots, "events": events}
+
+
+def _clusters(books: Any) -> dict[str, Any]:
+    lines = [
+        _line("mean size S", BLUE, books["mean_cluster_size"]),
+        _line("largest", SKY, books["largest_cluster"]),
+        _line("number of clusters", FAINT, books["clusters"]),
+    ]
+    return _plot("clusters", "Clusters", lines, log=True)
+
+
+def _energies(books: Columns) -> dict[str, Any]:
+    drawn = {name: values for name, values in energies(books).items() if peak(values)}
+    outside = [name for name in drawn if name not in COLOURS]
+    colour = COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
+    return _plot("energies", "Energies", [_line(name, colour[name], drawn[name]) for name in drawn], "J")
+
+
+def _losses(books: Columns) -> dict[str, Any]:
+    """Their sizes, as in the figure: what a gas and outside forces take may be negative."""
+    colour = dict(zip(losses(books), LOSS_COLOURS, strict=True))
+    drawn = {name: np.abs(values) for name, values in losses(books).items() if peak(values)}
+    lines = [_line(name, colour[name], np.where(v > 0.0, v, np.nan)) for name, v in drawn.items()]
+    return _plot("losses", "Losses", lines, "J", log=True)
+
+
+def _contacts(books: Columns) -> dict[str, Any]:
+    drawn = (("contacts", "contacts", BLUE), ("made", "made so far", GREEN), ("broken", "broken so far", RED))
+    return _plot("contacts", "Contacts", [_line(label, colour, books[name]) for name, label, colour in drawn])
+
+
+def _balance(books: Columns) -> dict[str, Any]:
+    total = column(books, "total")
+    return _plot("balance", "Balance", [_line("total − start", INK, total - total[0])], "J")
+
+
+def _events(books: Columns) -> dict[str, Any]:
+    """When contacts were made or broken, and how many since the row before."""
+    if not {"made", "broken"} <= set(books.columns):
+        return {"time": [], "made": [], "broken": []}
+
+    def grown(some: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        made, broken = (np.maximum(np.diff(some[name]), 0.0) for name in ("made", "broken"))
+        return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
+
+    rows, made, broken = grown(books)
+    if len(rows) > MOST:
+        books = books.taken(thinned(len(books)))
+        rows, made, broken = grown(books)
+    return {
+        "time": _numbers(books["time"][1:][rows], 10),
+        "made": made[rows].astype(int).tolist(),
+        "broken": broken[rows].astype(int).tolist(),
+    }
+
+
+def _plot(key: str, title: str, lines: list[dict[str, Any]], unit: str = "", log: bool = False) -> dict[str, Any]:
+    return {"id": key, "title": title, "unit": unit, "log": log, "lines": lines}
+
+
+def _line(label: str, colour: str, values: np.ndarray) -> dict[str, Any]:
+    return {"label": label, "light": colour, "dark": ON_DARK[colour], "values": _numbers(values)}
+
+
+def _numbers(values: np.ndarray, digits: int = 7) -> list[float | None]:
+    """As JSON has them, with as many digits as can be seen."""
+    return list(plain([float(f"{value:.{digits}g}") for value in np.asarray(values, float).tolist()]))

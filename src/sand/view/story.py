@@ -1,0 +1,279 @@
+"""What the page of a run is told: manifest, grains, frames, series, dimensions; see grainview/README.md."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..analysis.lineage import Lineage
+from ..core.errors import BadInput
+from ..files import folder as files
+from ..files.following import Following
+from . import dimensions
+from .packets import frame_bytes, frame_packet, grains_packet
+from .palettes import colours, palettes
+from .series import of_frames, of_ledger, thinned
+
+FORMAT = 1
+LOOKED_AT = 12
+"""Frames that ranges are taken from."""
+RANGE = (1.0, 99.9)
+"""Percentiles between which a range goes."""
+STEADY = 1e-9
+"""Directions of a field that differ by less are one."""
+
+FieldTold = tuple[str, Callable[[float], Sequence[float]]]
+"""A magnetic field in words, and its flux density [T] at a time [s]."""
+
+
+class Story:
+    """A run, told to a page; safe to be asked by several threads.
+
+    Args:
+        frames: of a trajectory (`files.following.Following`), or what looks like them.
+        name: of the run.
+        place: its folder, or its file.
+        rows: the ledger so far; None where there is none.
+        summary: how the run ended; None while it has not, empty where nobody knows.
+        field: the magnetic field, if there is one.
+        chosen: which frames are told; all by default.
+        compact: frames in half precision.
+    """
+
+    def __init__(
+        self,
+        frames: Any,
+        name: str,
+        place: str,
+        *,
+        rows: Callable[[], Sequence[Mapping[str, float]] | None],
+        summary: Callable[[], Mapping[str, Any] | None],
+        field: FieldTold | None = None,
+        chosen: slice = slice(None),
+        compact: bool = False,
+    ):
+        self.frames, self.name, self.place, self.compact = frames, name, place, compact
+        self.chosen, self.notes, self._lock = chosen, list[str](), threading.RLock()
+        self._rows, self._summary, self._field = rows, summary, field
+        self._begin()
+
+    def _begin(self) -> None:
+        """Of the first frame: what is the same in all."""
+        first = self.frames[0]
+        self.grains_count, self.materials = len(first), list(first.materials)
+        self.unit = float(first.radius.mean())
+        self.periodic = [length is not None for length in first.box.lengths]
+        self._grains = grains_packet(first, self.unit)
+        self._lineage = Lineage(self.grains_count, self.frames.pairs)
+        self._ranges: tuple[int, dict[str, list[float]]] | None = None
+        self._directions: list[list[float]] = []
+        self._generation = self.frames.generation
+
+    def refresh(self) -> None:
+        """Take in what has come since."""
+        with self._lock:
+            self.frames.refresh()
+            if self.frames.generation != self._generation:
+                self._begin()
+
+    def choose(self, chosen: slice, note: str = "") -> None:
+        """Tell of these frames only; the `note` says why.  Raises BadInput if there are none."""
+        if not range(len(self.frames))[chosen]:
+            raise BadInput(f"{self.place} has {len(self.frames)} frames; none of them was chosen")
+        self.chosen = chosen
+        self.notes += [note] if note else []
+
+    @property
+    def numbers(self) -> range:
+        """Numbers in the file of the frames that are told."""
+        return range(len(self.frames))[self.chosen]
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def manifest(self, since: int = 0) -> dict[str, Any]:
+        """What the page has to know first; times and steps from a frame on."""
+        with self._lock:
+            numbers = np.array(self.numbers, dtype=int)
+            summary = self._summary()
+            # a run that was resumed goes on although it has ended once
+            running = summary is None or summary.get("steps", np.inf) < self.frames.steps[-1]
+            return {
+                "format": FORMAT,
+                "name": self.name,
+                "folder": self.place,
+                "version": __version__,
+                "grains": self.grains_count,
+                "times": self.frames.times[numbers[since:]].tolist(),
+                "steps": self.frames.steps[numbers[since:]].tolist(),
+                "bytes": self.size,
+                "running": bool(running),
+                "outcome": None if running or summary is None else summary.get("outcome_text"),
+                "note": "; ".join(self._noted()) or None,
+                "unit": self.unit,
+                "materials": self.materials,
+                "periodic": self.periodic,
+                "field": self._told_field(numbers),
+                "ranges": self.ranges(),
+                "palettes": palettes(),
+                "colours": colours(),
+                "dimensions": None,
+            }
+
+    def _noted(self) -> list[str]:
+        torn = self.frames.torn
+        left = [f"{torn} frame{'s' if torn > 1 else ''} at the end left out: not whole"] if torn else []
+        return self.notes + left
+
+    @property
+    def size(self) -> int:
+        """Bytes of all frames told, as sent."""
+        contacts = self.frames.contacts[np.array(self.numbers, dtype=int)]
+        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact) + int(
+            contacts.sum() * (frame_bytes(0, 1, self.compact) - frame_bytes(0, 0, self.compact))
+        )
+
+    def grains(self) -> bytes:
+        """The packet of what stays."""
+        return self._grains
+
+    def read(self, k: int) -> tuple[Any, np.ndarray]:
+        """The k-th frame told, and names (N,) of the clusters its grains are in.
+
+        Raises:
+            BadInput: there is none, or it is not whole.
+        """
+        with self._lock:
+            if not 0 <= k < len(self):
+                raise BadInput(f"there are {len(self)} frames, from 0 to {len(self) - 1}; there is no {k}")
+            number = self.numbers[k]
+            frame = self.frames[number]
+            if len(frame) != self.grains_count:
+                raise BadInput(f"frame {number} has {len(frame)} grains; the first has {self.grains_count}")
+            return frame, self._lineage.names(number)
+
+    def frame(self, k: int) -> bytes:
+        """The packet of the k-th frame told.  Raises BadInput for one that is not there or not whole."""
+        return self.packed(k, *self.read(k))
+
+    def packed(self, k: int, frame: Any, names: np.ndarray) -> bytes:
+        """The packet of what `read` gave."""
+        return frame_packet(k, frame, names, self.unit, self.compact)
+
+    def series(self) -> dict[str, Any]:
+        """What happened over time, by the ledger; by the frames where there is none."""
+        with self._lock:
+            rows = self._rows()
+            return of_ledger(rows) if rows else of_frames(self.frames)
+
+    def dimension(self, k: int, grain: int) -> dict[str, Any]:
+        """Fractal dimension of the cluster of a grain: `value` and `error`, or the `reason` why there are none.
+
+        Raises:
+            BadInput: there is no such frame or grain.
+        """
+        if not 0 <= grain < self.grains_count:
+            raise BadInput(f"there are {self.grains_count} grains, from 0 to {self.grains_count - 1}; no {grain}")
+        return dimensions.answer(*self.read(k), grain)
+
+    def ranges(self) -> dict[str, list[float]]:
+        """Smallest and largest speed, spin, kinetic energy and force of a contact, SI, nearly all of them."""
+        with self._lock:
+            count = len(self.frames)
+            if self._ranges is None or count > 1.5 * self._ranges[0]:
+                self._ranges = (count, self._looked_at(count))
+            return self._ranges[1]
+
+    def _looked_at(self, count: int) -> dict[str, list[float]]:
+        seen: dict[str, list[np.ndarray]] = {"speed": [], "spin": [], "kinetic": [], "load": []}
+        for number in thinned(count, LOOKED_AT):
+            try:
+                frame = self.frames[int(number)]
+            except BadInput:
+                continue
+            speed, spin = (np.linalg.norm(np.asarray(v, float), axis=1) for v in (frame.velocity, frame.spin))
+            mass, radius = np.asarray(frame.mass, float), frame.radius
+            seen["speed"].append(speed)
+            seen["spin"].append(spin)
+            seen["kinetic"].append(0.5 * mass * (speed**2 + 0.4 * radius**2 * spin**2))
+            seen["load"].append(np.linalg.norm(frame.force, axis=1))
+        return {name: _range(np.concatenate([*parts, np.zeros(0)])) for name, parts in seen.items()}
+
+    def _told_field(self, numbers: np.ndarray) -> dict[str, Any] | None:
+        if self._field is None:
+            return None
+        text, at = self._field
+        times = self.frames.times
+        self._directions += [_direction(at(float(t))) for t in times[len(self._directions) :]]
+        told = [self._directions[k] for k in numbers.tolist()]
+        steady = np.ptp(np.array(told), axis=0).max() < STEADY
+        return {"text": text, "direction": told[0]} | ({} if steady else {"directions": told})
+
+
+def _direction(vector: Sequence[float]) -> list[float]:
+    size = float(np.linalg.norm(vector))
+    return [float(f"{part / size:.9g}") if size > 0.0 else 0.0 for part in vector]
+
+
+def _range(values: np.ndarray) -> list[float]:
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return [0.0, 0.0]
+    low, high = np.percentile(values, RANGE[0], method="lower"), np.percentile(values, RANGE[1], method="higher")
+    return [float(low), float(high)]
+
+
+def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
+    """The story of a run in a folder, or of a trajectory of SAND by itself.
+
+    Raises:
+        BadInput: there is no run, or no frame yet, or the file is foreign or broken.
+    """
+    place = Path(path)
+    folder = run_folder(place)
+    if folder is None:
+        if not place.is_file():
+            lacks = f"there is no {files.TRAJECTORY} in it" if place.is_dir() else "there is no such folder or file"
+            raise BadInput(f"{path} is neither the folder of a run nor a trajectory: {lacks}")
+        return Story(Following(place), place.stem, str(path), rows=lambda: None, summary=dict, field=field)
+    frames = Following(folder / files.TRAJECTORY)
+    name = folder.resolve().name
+    return Story(frames, name, str(path), rows=_Rows(folder), summary=lambda: _summary(folder), field=field)
+
+
+def run_folder(place: str | Path) -> Path | None:
+    """The folder of the run that a path means: itself, or that of its trajectory.gsd; None for a file by itself."""
+    place = Path(place)
+    if place.is_dir():
+        return place if (place / files.TRAJECTORY).exists() else None
+    return place.parent if place.name == files.TRAJECTORY and (place.parent / files.CASE).exists() else None
+
+
+def _summary(folder: Path) -> Mapping[str, Any] | None:
+    try:
+        return files.read_json(folder / files.SUMMARY)
+    except BadInput:
+        return None
+
+
+class _Rows:
+    """The ledger of a run, read again when it has changed; None while there is none."""
+
+    def __init__(self, folder: Path):
+        self._path = folder / files.LEDGER
+        self._known: tuple[tuple[int, int], list[dict[str, float]] | None] = ((0, 0), None)
+
+    def __call__(self) -> list[dict[str, float]] | None:
+        try:
+            found = self._path.stat()
+            stamp = (found.st_size, found.st_mtime_ns)
+            if stamp != self._known[0]:
+                self._known = (stamp, files.read_ledger(self._path))
+        except (OSError, BadInput):
+            return None
+        return self._known[1]
