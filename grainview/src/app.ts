@@ -25,6 +25,8 @@ import { Views } from "./views";
 
 /** Settings that need no new picture. */
 const QUIET = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "follow", "field", "ortho", "size"]);
+/** Pixels; narrower pages begin without the panel of settings. */
+const NARROW = 720;
 const SYSTEM_DARK = window.matchMedia("(prefers-color-scheme: dark)");
 
 export class App {
@@ -97,6 +99,7 @@ export class App {
     }));
     this.timeline.setFrames(this.manifest.times, this.series.events);
     this.tellRun();
+    if (page.root.clientWidth < NARROW) this.togglePanel();
   }
 
   private wire(): void {

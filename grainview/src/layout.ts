@@ -1,6 +1,7 @@
 // The parts of the page and where they are.
 
-import { button, h } from "./ui/dom";
+import { h } from "./ui/dom";
+import { button } from "./ui/icons";
 
 export interface Layout {
   root: HTMLElement;
@@ -43,10 +44,10 @@ export function headerButtons(press: Record<"centre" | "picture" | "link" | "hel
   return h(
     "nav",
     { "aria-label": "Page" },
-    button("◎", "Centre", press.centre, "z"),
-    button("📷", "Picture or movie", press.picture, "s"),
-    button("🔗", "Copy the address of this view", press.link, "j"),
-    button("?", "Keys and help", press.help, "?"),
-    button("☰", "Settings", press.panel, "`"),
+    button("centre", "Centre", press.centre, "z"),
+    button("camera", "Picture or movie", press.picture, "s"),
+    button("link", "Copy the address of this view", press.link, "j"),
+    button("help", "Keys and help", press.help, "?"),
+    button("panel", "Settings", press.panel, "`"),
   );
 }

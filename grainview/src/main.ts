@@ -10,14 +10,17 @@ import { type Model, WidgetSource } from "./widget";
 
 declare global {
   interface Window {
-    grainview?: App | null; // for tests, and for those who want to script the page
+    sandView?: App | null; // for tests, and for those who want to script the page
   }
 }
 
 const place = document.getElementById("grainview");
 if (place) {
   const source = EmbeddedSource.isThere() ? new EmbeddedSource() : new ServerSource();
-  void show(place, source, true).then((app) => (window.grainview = app));
+  void show(place, source, true).then((app) => {
+    window.sandView = app;
+    place.dataset.ready = app ? "yes" : "no"; // for tests: a policy may forbid them to wait for anything but elements
+  });
 }
 
 function render({ model, el }: { model: Model; el: HTMLElement }): () => void {

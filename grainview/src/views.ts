@@ -26,7 +26,7 @@ export class Views {
     const target = low.map((l, a) => (l + high[a]) / 2 || 0) as Place;
     const reach = this.picture.reachFrom(target);
     const narrow = Math.min(1, this.stage.width / this.stage.height);
-    return { target, from: [0.52, -0.74, 0.43], up: [0, 0, 1], height: (2.05 * reach) / narrow };
+    return { target, from: [0.52, -0.74, 0.43], up: [0, 0, 1], height: (1.85 * reach) / narrow };
   }
 
   reset(): void {

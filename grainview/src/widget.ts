@@ -13,8 +13,9 @@ export interface Model {
 
 interface Answer {
   id: number;
-  error?: string;
-  content?: unknown;
+  error?: string | number; // a sentence, or that of a dimension
+  manifest?: Manifest;
+  series?: Series;
 }
 
 export class WidgetSource implements Source {
@@ -33,23 +34,23 @@ export class WidgetSource implements Source {
     this.model.off("msg:custom", this.listener as never);
   }
 
-  private ask(kind: string, more: object = {}): Promise<[unknown, ArrayBuffer]> {
+  private ask(kind: string, more: object = {}): Promise<[Answer, ArrayBuffer]> {
     const id = this.next++;
     return new Promise((give, fail) => {
       this.waiting.set(id, (answer, data) => {
-        if (answer.error) fail(new Error(answer.error));
-        else give([answer.content, data[0] ? copied(data[0]) : new ArrayBuffer(0)]);
+        if (typeof answer.error === "string") fail(new Error(answer.error));
+        else give([answer, data[0] ? copied(data[0]) : new ArrayBuffer(0)]);
       });
       this.model.send({ id, kind, ...more });
     });
   }
 
   async manifest(since: number): Promise<Manifest> {
-    return (await this.ask("manifest", { since }))[0] as Manifest;
+    return (await this.ask("manifest", { since }))[0].manifest as Manifest;
   }
 
   async series(): Promise<Series> {
-    return (await this.ask("series"))[0] as Series;
+    return (await this.ask("series"))[0].series as Series;
   }
 
   async grains(): Promise<Grains> {
@@ -61,7 +62,7 @@ export class WidgetSource implements Source {
   }
 
   async dimension(k: number, grain: number): Promise<Dimension> {
-    return (await this.ask("dimension", { k, grain }))[0] as Dimension;
+    return (await this.ask("dimension", { k, grain }))[0] as unknown as Dimension;
   }
 }
 

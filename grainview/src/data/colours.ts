@@ -21,7 +21,7 @@ function shaded(colour: Colour3, amount: number): Colour3 {
 /** The colour of a cluster's name; the same for as long as the cluster keeps its name. */
 export function colourOfName(name: number, manifest: Manifest): Colour3 {
   if (Number.isNaN(name)) return rgb(manifest.colours.single);
-  const all = [...manifest.colours.big, ...manifest.colours.small];
+  const all = manifest.colours.big;
   // names of clusters that are born together are neighbours: a golden step sets their colours apart
   const spread = Math.imul(name + 1, 0x9e3779b1) >>> 0;
   return shaded(rgb(all[spread % all.length]), [0, 0.22, -0.18][Math.floor(spread / all.length) % 3]);

@@ -79,14 +79,14 @@ export const QUANTITIES: Quantity[] = [
     values: (_, { grains, manifest }) => grains.radius.map((r) => r * manifest.unit),
   },
   {
-    id: "coordination", label: "contacts of the grain", unit: "", kind: "sequential", whole: true,
+    id: "coordination", label: "contacts", unit: "", kind: "sequential", whole: true,
     values: (frame, { manifest }) => coordination(manifest.grains, frame.pair),
   },
   { id: "speed", label: "speed", unit: "m/s", kind: "sequential", values: (frame) => sizes3(frame.velocity) },
   { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => sizes3(frame.spin) },
   { id: "kinetic", label: "kinetic energy", unit: "J", kind: "sequential", values: kinetic },
   {
-    id: "alignment", label: "moment along that of its cluster (cosine)", unit: "", kind: "diverging",
+    id: "alignment", label: "cosine: moment, its cluster's", unit: "", kind: "diverging",
     available: hasMoments,
     values: (frame) => {
       const sums = clusterMoments(frame);
@@ -94,7 +94,7 @@ export const QUANTITIES: Quantity[] = [
     },
   },
   {
-    id: "field", label: "moment along the field (cosine)", unit: "", kind: "diverging",
+    id: "field", label: "cosine: moment, field", unit: "", kind: "diverging",
     available: (known) => known.manifest.field !== null && hasMoments(known),
     values: (frame, { manifest }) => {
       const b = fieldDirection(manifest, frame.frame) ?? [0, 0, 0];

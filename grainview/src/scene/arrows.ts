@@ -33,9 +33,9 @@ void main() {
   vOnQuad = middle + corner.x * (0.5 * seenSize + wide) * along + corner.y * wide * side;
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   float pixels = size * uPixel / (isOrtho() ? 1.0 : max(-c.z, 1e-6));
-  vFlat = pixels < 14.0 ? 1.0 : 0.0;
+  vFlat = pixels < 16.0 ? 1.0 : 0.0;
   // arrows too small to be seen are left out: this is what keeps crowds fast
-  if (shown < 0.5 || size == 0.0 || pixels < 2.5 || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (shown < 0.5 || size == 0.0 || pixels < 9.0 || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
 `;
 

@@ -28,7 +28,7 @@ void main() {
   vColour = colour.rgb;
   vCover = mat3(modelViewMatrix) * cover;
   vMark = mark;
-  float grown = r * (mark > 0.5 ? 1.3 : 1.0);
+  float grown = r * (mark > 0.5 ? 1.3 : 1.06);
   vec3 across = vec3(1.0, 0.0, 0.0);
   vec3 up = vec3(0.0, 1.0, 0.0);
   if (!isOrtho()) {
@@ -62,7 +62,8 @@ void main() {
   float b = dot(ray, to);
   vec3 beside = to - b * ray;
   float room = vRadius * vRadius - dot(beside, beside);
-  if (room < 0.0) {
+  float cover = clamp(0.5 + room / max(fwidth(room), 1e-12), 0.0, 1.0);
+  if (cover == 0.0 || (vMark > 0.5 && room < 0.0)) {
     // a ring around what is chosen
     float wide = vRadius * 1.22;
     if (vMark < 0.5 || wide * wide < dot(beside, beside)) discard;
@@ -70,11 +71,11 @@ void main() {
     gl_FragDepth = depthOf(origin + b * ray);
     return;
   }
-  vec3 p = origin + (b - sqrt(room)) * ray;
+  vec3 p = origin + (b - sqrt(max(room, 0.0))) * ray;
   vec3 normal = (p - vCentre) / vRadius;
   float open = 1.0 - 0.85 * max(dot(normal, vCover), 0.0);
   open *= 1.0 - 0.35 * length(vCover);
-  outColour = vec4(lit(vColour, normal, -ray, open, -p.z), 1.0);
+  outColour = vec4(lit(vColour, normal, -ray, open, -p.z), vMark > 0.5 ? 1.0 : cover);
   gl_FragDepth = depthOf(p);
 }
 `;

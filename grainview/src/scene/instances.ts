@@ -22,6 +22,7 @@ export class Instances {
     geometry.instanceCount = 0;
     const material = new three.RawShaderMaterial({
       vertexShader, fragmentShader, uniforms, glslVersion: three.GLSL3, side: three.DoubleSide,
+      alphaToCoverage: true, // smooth edges where the canvas is sampled more than once
     });
     this.mesh = new three.Mesh(geometry, material);
     this.mesh.frustumCulled = false;

@@ -45,6 +45,8 @@ export class Stage {
     const name = named ? String(context.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
     this.slow = /swiftshader|llvmpipe|software|basic render/i.test(name);
     this.renderer.setPixelRatio(this.slow ? 1 : Math.min(window.devicePixelRatio, 2));
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(0, -10, 0);
     this.controls = this.newControls();
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => this.redraw());

@@ -22,7 +22,7 @@ export const LIGHT: Theme = { background: "#fbfaf7", ink: "#22262b", tip: "#1618
 export const DARK: Theme = { background: "#10131a", ink: "#e8e6df", tip: "#ffffff", line: "#5b626d", dark: true };
 
 /** Length of arrows in radii of their grain. */
-const ARROW = 3.4;
+const ARROW = 4;
 
 const linear = (hex: string): three.Vector3 => new three.Vector3(...rgb(hex).map((c) => c / 255));
 

@@ -2,11 +2,12 @@
 
 import { LARGEST } from "./capture";
 import { h } from "./dom";
+import { icon } from "./icons";
 
 /** Show content in a window that Esc closes. */
 export function openDialog(root: HTMLElement, title: string, ...content: (Node | string)[]): HTMLDialogElement {
   root.querySelector("dialog")?.remove();
-  const close = h("button", { type: "button", "aria-label": "Close", class: "gv-close" }, "×");
+  const close = h("button", { type: "button", "aria-label": "Close", class: "gv-close" }, icon("close"));
   const dialog = h("dialog", { class: "gv-dialog", "aria-label": title }, close, h("h2", {}, title), ...content);
   close.addEventListener("click", () => dialog.close());
   dialog.addEventListener("close", () => dialog.remove());

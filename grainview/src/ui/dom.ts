@@ -23,9 +23,3 @@ export function svg(tag: string, attributes: Record<string, string | number> = {
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
   return element;
 }
-
-/** A button with a sign on it, and words for those who cannot see it. */
-export function button(sign: string, label: string, press: () => void, key = ""): HTMLButtonElement {
-  const title = key ? `${label} (${key})` : label;
-  return h("button", { type: "button", "aria-label": label, title, click: press }, sign);
-}

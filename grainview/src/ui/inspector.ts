@@ -4,25 +4,30 @@ import { MODES, normalForce, worstMode } from "../data/bonds";
 import { measureCluster, membersOf, nearest } from "../data/clusters";
 import { type Known, QUANTITIES } from "../data/quantities";
 import { type Dimension, type Frame, SINGLE } from "../data/types";
-import { digits, quantity } from "../data/units";
+import { digits, prefixed, quantity } from "../data/units";
 import { h } from "./dom";
+import { icon } from "./icons";
 
 type Row = [name: string, value: string];
 
 const vector = (v: Float32Array, i: number, scale = 1): number[] => [0, 1, 2].map((a) => v[3 * i + a] * scale);
 
-/** A vector: each component in the unit that suits the largest. */
+/** Components of a vector, in the unit that suits its size. */
+function components(v: number[], unit: string, count = 4): string {
+  const [one, name] = prefixed(Math.hypot(...v), unit);
+  return `${v.map((x) => digits(x / one, count)).join(", ")} ${name}`;
+}
+
+/** Size and components of a vector. */
 function told(v: number[], unit: string): string {
-  const size = Math.hypot(...v);
-  const parts = v.map((x) => quantity(x, unit, 3));
-  return `${quantity(size, unit)}  (${parts.join(", ")})`;
+  return `${quantity(Math.hypot(...v), unit)}\n${components(v, unit, 3)}`;
 }
 
 export function grainRows(i: number, frame: Frame, known: Known): Row[] {
   const { manifest, grains } = known;
   const own = QUANTITIES.filter((q) => ["coordination", "kinetic", "alignment", "field"].includes(q.id));
   const rows: Row[] = [
-    ["position", vector(frame.position, i, manifest.unit).map((x) => quantity(x, "m")).join(", ")],
+    ["position", components(vector(frame.position, i, manifest.unit), "m", 5)],
     ["radius", quantity(grains.radius[i] * manifest.unit, "m")],
     ["material", manifest.materials[grains.material[i]] ?? "not known"],
     ["mass", quantity(grains.mass[i], "kg")],
@@ -63,7 +68,7 @@ export function clusterRows(i: number, frame: Frame, known: Known, whole: Float3
     ["grains N", String(one.grains)],
     ["contacts", String(one.contacts)],
     ["mass", quantity(one.mass, "kg")],
-    ["centre", one.centre.map((x) => quantity(x * manifest.unit, "m")).join(", ")],
+    ["centre", components(one.centre.map((x) => x * manifest.unit), "m")],
     ["velocity", told(one.velocity, "m/s")],
     ["radius of gyration", quantity(one.gyration * manifest.unit, "m")],
     ["moment", told(one.moment, "A m²")],
@@ -84,7 +89,7 @@ export function distanceRows(i: number, j: number, frame: Frame, known: Known): 
     ["grains", `${i} and ${j}`],
     ["between centres", quantity(size, "m", 5)],
     [gap < 0 ? "overlap" : "between surfaces", quantity(Math.abs(gap), "m")],
-    ["along x, y, z", d.map((x) => quantity(x * manifest.unit, "m")).join(", ")],
+    ["along x, y, z", components(d.map((x) => x * manifest.unit), "m")],
   ];
 }
 
@@ -100,7 +105,7 @@ export class Inspector {
 
   show(parts: [title: string, rows: Row[]][]): void {
     this.element.hidden = parts.length === 0;
-    const close = h("button", { type: "button", class: "gv-close", "aria-label": "Choose nothing", click: this.clear }, "×");
+    const close = h("button", { type: "button", class: "gv-close", "aria-label": "Choose nothing", click: this.clear }, icon("close"));
     const tables = parts.map(([title, rows]) => {
       const body = rows.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)));
       return h("table", {}, h("caption", {}, title), h("tbody", {}, ...body));

@@ -2,7 +2,8 @@
 
 import type { Series } from "../data/types";
 import { quantity } from "../data/units";
-import { button, h } from "./dom";
+import { h } from "./dom";
+import { button, icon } from "./icons";
 
 /** The last frame not after a time. */
 export function frameAt(times: number[], time: number): number {
@@ -45,19 +46,19 @@ export class TimeLine {
   private times: number[] = [];
 
   constructor(press: Presses) {
-    this.playing = button("▶", "Play", press.play, "space");
+    this.playing = button("play", "Play", press.play, "space");
     this.slider.addEventListener("input", () => press.go(Number(this.slider.value)));
     const track = h("div", { class: "gv-track" }, this.slider, this.ticks);
     this.element = h(
       "div",
       { class: "gv-timeline", role: "group", "aria-label": "Time" },
-      button("⏮", "First frame", () => press.go(0), "Home"),
-      button("‹", "One frame back", () => press.step(-1), "←"),
+      button("first", "First frame", () => press.go(0), "Home"),
+      button("back", "One frame back", () => press.step(-1), "←"),
       this.playing,
-      button("›", "One frame on", () => press.step(1), "→"),
-      button("⏭", "Last frame", () => press.go(Infinity), "End"),
-      button("«", "Event before", () => press.event(-1), "N"),
-      button("»", "Next event", () => press.event(1), "n"),
+      button("on", "One frame on", () => press.step(1), "→"),
+      button("last", "Last frame", () => press.go(Infinity), "End"),
+      button("eventBack", "Event before", () => press.event(-1), "N"),
+      button("eventOn", "Next event", () => press.event(1), "n"),
       track,
       this.told,
     );
@@ -65,7 +66,7 @@ export class TimeLine {
   }
 
   setPlaying(on: boolean): void {
-    this.playing.textContent = on ? "⏸" : "▶";
+    this.playing.replaceChildren(icon(on ? "pause" : "play"));
     this.playing.setAttribute("aria-label", on ? "Pause" : "Play");
   }
 
