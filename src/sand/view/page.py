@@ -93,7 +93,7 @@ def write_page(
                 progress(k + 1, count)
         manifest = story.manifest() | {"running": False, "dimensions": dimensions}
         if measured > 1 and any(dimensions):
-            said = f"fractal dimensions of every {measured}th frame"
+            said = f"fractal dimensions of one frame of {measured}"
             manifest["note"] = "; ".join(filter(None, (manifest["note"], said)))
         file.write(_json("sand-manifest", manifest))
         file.write(_json("sand-series", story.series()))
@@ -126,7 +126,8 @@ def _json(key: str, content: dict[str, Any]) -> str:
 
 def _harmless(script: str) -> str:
     """A script that cannot end its element: what would is inside text there, and is written in another way."""
-    return re.sub("<(?=/script|!--)", r"\\x3c", script, flags=re.IGNORECASE)
+    lines = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, before it takes the hash
+    return re.sub("<(?=/script|!--)", r"\\x3c", lines, flags=re.IGNORECASE)
 
 
 def fitting(story: Story, most: float) -> int:

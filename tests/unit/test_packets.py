@@ -1,0 +1,75 @@
+"""Packets: what the page decodes is what was there."""
+
+import json
+
+import numpy as np
+import pytest
+
+import sand
+from sand.files.trajectory import Frames
+from sand.view.packets import decode, encode, frame_bytes, frame_packet, grains_packet
+
+from .reels import reel
+
+
+@pytest.fixture(scope="module")
+def frame(tmp_path_factory):
+    """One of seven grains and two contacts."""
+    return Frames(reel(tmp_path_factory.mktemp("packets") / "a.gsd", [[(0, 1), (5, 3)]], 7))[0]
+
+
+def test_a_frame_comes_back(frame):
+    """All arrays to single precision, positions and names exactly; each begins at a multiple of 8."""
+    names = np.array([0, 0, 2**32 - 1, 3, 2**32 - 1, 3, 2**32 - 1], np.uint32)
+    packet = frame_packet(4, frame, names, 1e-8)
+    head, arrays = decode(packet)
+    assert (head["frame"], head["step"], head["time"]) == (4, 0, 0.0)
+    assert head["box"] == pytest.approx([100.0] * 3, rel=1e-12, abs=0)
+    assert (arrays["position"] == (frame.position / 1e-8).astype(np.float32)).all()
+    assert (arrays["cluster"] == names).all() and (arrays["pair"] == frame.pair).all()
+    for name in ("velocity", "spin", "moment", "force", "share", "overlap", "formed"):
+        assert arrays[name] == pytest.approx(getattr(frame, name), rel=1e-7, abs=0)
+    begin = 12 + int.from_bytes(packet[8:12], "little")
+    assert begin % 8 == 0 and all(entry["offset"] % 8 == 0 for entry in head["arrays"])
+    assert len(packet) % 8 == 0 and abs(len(packet) - frame_bytes(7, 2)) < 500
+
+
+def test_compact_packets_keep_eleven_bits(frame):
+    """Half precision within 2⁻¹¹ of each number, positions untouched; no warning, nothing infinite."""
+    _, whole = decode(frame_packet(0, frame, np.zeros(7), 1e-8))
+    head, arrays = decode(frame_packet(0, frame, np.zeros(7), 1e-8, compact=True))
+    assert {entry["type"] for entry in head["arrays"]} == {"f4", "f2", "u4"}
+    assert (arrays["position"] == whole["position"]).all()
+    for name in ("velocity", "spin", "moment", "share", "overlap", "formed"):
+        assert arrays[name] == pytest.approx(whole[name], rel=2.0**-11, abs=0)
+
+
+def test_scales_span_nine_decades():
+    """From the largest number down to 1e-9 of it all keep 11 bits, wherever the largest is; zeros and NaN stay."""
+    for peak in (1e-30, 7e-7, 1.0, 65504.0, 3e38, 1e200):
+        values = peak * np.concatenate([np.geomspace(1e-9, 1.0, 1000), [-1.0, 0.0, np.nan]])
+        _, arrays = decode(encode({}, {"force": values}, compact=True))
+        assert arrays["force"][:-1] == pytest.approx(values[:-1], rel=2.0**-11, abs=0)
+        assert np.isnan(arrays["force"][-1])
+    for blank in (np.zeros((0, 3)), np.zeros(4), np.full(2, np.nan)):
+        _, arrays = decode(encode({}, {"force": blank}, compact=True))
+        assert np.array_equal(arrays["force"], blank, equal_nan=True)
+
+
+def test_grains_keep_their_size(frame):
+    """Radius in units, mass, charge and material."""
+    _, arrays = decode(grains_packet(frame, 2e-8))
+    assert arrays["radius"] == pytest.approx(frame.radius / 2e-8, rel=1e-7, abs=0)
+    assert arrays["mass"] == pytest.approx(frame.mass, rel=1e-7, abs=0)
+    assert arrays["charge"] == pytest.approx(1.6e-19, rel=1e-7, abs=0)
+    assert arrays["material"].dtype == np.uint8 and not arrays["material"].any()
+
+
+def test_what_is_no_packet():
+    """A cut one and a foreign one are refused; a header never holds NaN, which is not JSON."""
+    packet = encode({"time": np.nan}, {"a": np.arange(6.0)})
+    assert json.loads(packet[12 : 12 + int.from_bytes(packet[8:12], "little")])["time"] is None
+    with pytest.raises(sand.BadInput, match="cut off in 'a'"):
+        decode(packet[:-8])
+    with pytest.raises(sand.BadInput, match="not a packet"):
+        decode(b"GSDGSDGSD")

@@ -1,0 +1,261 @@
+"""The server of `sand view`: tells those who may know, and nobody else, whatever they send."""
+
+import http.client
+import json
+import socket
+import time
+
+import pytest
+
+from sand.core.errors import BadInput
+from sand.view import server as servers
+from sand.view.packets import decode
+from sand.view.server import Server
+from sand.view.story import story_of
+
+from .reels import reel
+
+BUNDLE = ("console.log(1)\n", "body {}\n")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    """One that tells of three frames."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(servers, "read_bundle", lambda: BUNDLE)
+    path = reel(tmp_path_factory.mktemp("served") / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5)
+    one = Server(story_of(path))
+    one.start()
+    yield one
+    one.stop()
+    patch.undo()
+
+
+def ask(server, address, method="GET", headers=None, token=None):
+    """Status, headers and content of an answer."""
+    line = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    line.putrequest(method, f"/{server.token if token is None else token}/{address}", skip_host=True)
+    for name, value in {"Host": f"127.0.0.1:{server.port}", **(headers or {})}.items():
+        line.putheader(name, value)
+    line.endheaders()
+    reply = line.getresponse()
+    content = reply.read()
+    line.close()
+    return reply.status, reply.headers, content
+
+
+def raw(server, text):
+    """What a socket gets for these bytes."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as line:
+        line.sendall(text)
+        line.shutdown(socket.SHUT_WR)
+        return b"".join(iter(lambda: line.recv(65536), b""))
+
+
+def test_what_it_tells(server):
+    """Page, script, styles, manifest, grains, frames, series, dimensions: each of its kind, and the story's own."""
+    status, headers, page = ask(server, "")
+    assert status == 200 and headers["Content-Type"].startswith("text/html") and b'<div id="grainview">' in page
+    assert (ask(server, "grainview.js")[2].decode(), ask(server, "grainview.css")[2].decode()) == BUNDLE
+    assert ask(server, "grainview.js")[1]["Content-Type"].startswith("text/javascript")
+    assert ask(server, "grainview.css")[1]["Content-Type"].startswith("text/css")
+    manifest = json.loads(ask(server, "manifest")[2])
+    assert manifest["grains"] == 5 and len(manifest["times"]) == 3
+    assert len(json.loads(ask(server, "manifest?since=2")[2])["times"]) == 1
+    assert decode(ask(server, "frame/2")[2])[1]["pair"].tolist() == [[0, 1], [1, 2]]
+    assert len(decode(ask(server, "grains")[2])[1]["radius"]) == 5
+    assert json.loads(ask(server, "series")[2])["plots"]
+    assert "at least 32" in json.loads(ask(server, "dimension/2/0")[2])["reason"]
+
+
+def test_a_head_has_no_body(server):
+    """HEAD answers with the headers of GET and nothing else."""
+    status, headers, content = ask(server, "frame/1", "HEAD")
+    assert (status, content) == (200, b"")
+    assert int(headers["Content-Length"]) == len(ask(server, "frame/1")[2])
+
+
+def test_every_answer_is_closed_to_others(server):
+    """The page may load its own and nothing else, no other page may look in, nothing is kept: of errors, too."""
+    for address in ("", "manifest", "nothing"):
+        headers = ask(server, address)[1]
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy
+        assert "unsafe" not in policy and "*" not in policy and "http" not in policy
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Referrer-Policy"] == "no-referrer"
+        assert headers["Cache-Control"] == "no-store"
+        assert headers["Cross-Origin-Resource-Policy"] == headers["Cross-Origin-Opener-Policy"] == "same-origin"
+        assert headers["Cross-Origin-Embedder-Policy"] == "require-corp"
+        assert "Access-Control-Allow-Origin" not in headers
+        assert "Python" not in headers["Server"]
+
+
+@pytest.mark.parametrize("token", ["", "x", "%2e%2e", "..", "é" * 32])
+def test_a_wrong_token(server, token):
+    """Nobody without the token sees anything, not even whether an address exists."""
+    for address in ("", "manifest", "frame/0", "nowhere"):
+        line = f"GET /{token}/{address} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
+        head, _, content = raw(server, line.encode()).partition(b"\r\n\r\n")
+        assert b" 403 " in head.splitlines()[0] and "token" in json.loads(content)["error"]
+
+
+def test_tokens_are_new_each_time(server):
+    """They are long, and no two servers share one."""
+    other = Server(server.story)
+    other.server_close()
+    assert len(other.token) >= 32 and other.token != server.token
+    assert server.server_address[0] == "127.0.0.1"
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", "0.0.0.0:{port}", ""]
+)
+def test_names_that_are_made_to_point_here(server, host):
+    """A page of another name that resolves to 127.0.0.1 is refused, though it had the token."""
+    status, _, content = ask(server, "manifest", headers={"Host": host.format(port=server.port)})
+    assert status == 403 and json.loads(content)["error"]
+
+
+def test_hosts_that_are_its_own(server):
+    """127.0.0.1 and localhost with the port; not both, not none."""
+    assert ask(server, "manifest", headers={"Host": f"localhost:{server.port}"})[0] == 200
+    path = f"GET /{server.token}/manifest HTTP/1.1\r\n".encode()
+    host = f"Host: 127.0.0.1:{server.port}\r\n".encode()
+    assert b" 200 " in raw(server, path + host + b"Connection: close\r\n\r\n").splitlines()[0]
+    assert b" 403 " in raw(server, path + b"\r\n").splitlines()[0]
+    assert b" 403 " in raw(server, path + host + b"Host: evil.example\r\n\r\n").splitlines()[0]
+
+
+def test_other_sites(server):
+    """A request that another site's page made is refused; its own page's is not."""
+    assert ask(server, "manifest", headers={"Origin": "https://evil.example"})[0] == 403
+    assert ask(server, "manifest", headers={"Origin": "null"})[0] == 403
+    assert ask(server, "manifest", headers={"Origin": f"http://127.0.0.1:{server.port}"})[0] == 200
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "nothing",
+        "../../etc/passwd",
+        "..%2f..%2fetc/passwd",
+        "%2e%2e/a.gsd",
+        "a.gsd",
+        "./grainview.js",
+        "grainview.js/",
+        "grainview.js?x=1",
+        "/etc/passwd",
+        "frame",
+        "frame/",
+        "frame/-1",
+        "frame/3",
+        "frame/99999999999999999999",
+        "frame/1.0",
+        "frame/0x1",
+        "frame/1e0",
+        "frame/+1",
+        "frame/1/2",
+        "frame/%31",
+        "frame/٣",
+        "manifest?since=-1",
+        "manifest?since=x",
+        "manifest?since=1&since=2",
+        "manifest?a=1",
+        "dimension/0",
+        "dimension/0/5",
+        "dimension/3/0",
+        "dimension/0/0/0",
+        "grains?x",
+        "series/",
+        "//manifest",
+        "manifest%00",
+        "?since=1",
+    ],
+)
+def test_what_is_not_there(server, address):
+    """Anything but the few addresses is 404 and a sentence: other files, dots, numbers that are none or too large."""
+    line = f"GET /{server.token}/{address} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
+    head, _, content = raw(server, line.encode()).partition(b"\r\n\r\n")
+    assert b" 404 " in head.splitlines()[0] and json.loads(content)["error"]
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "CONNECT", "FOO"])
+def test_other_methods(server, method):
+    """It only tells."""
+    status, headers, content = ask(server, "manifest", method)
+    assert status == 405 and headers["Allow"] == "GET, HEAD" and json.loads(content)["error"]
+
+
+def test_long_addresses(server):
+    """Above 512 characters, and above what the line may be."""
+    assert ask(server, "frame/" + "0" * 600)[0] == 414
+    assert b" 414 " in raw(server, b"GET /" + b"a" * 70000 + b" HTTP/1.1\r\n\r\n").splitlines()[0]
+
+
+@pytest.mark.parametrize(
+    "text", [b"\r\n\r\n", b"\x16\x03\x01\x02\x00", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"x" * 5000]
+)
+def test_what_is_no_request(server, text):
+    """Nonsense ends the connection and nothing else; nothing is printed."""
+    raw(server, text)
+    assert ask(server, "manifest")[0] == 200
+
+
+def test_a_body_is_not_taken_for_a_request(server):
+    """What follows a GET with a length is not read as the next request."""
+    inside = f"GET /{server.token}/grains HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
+    head = (
+        f"GET /{server.token}/manifest HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\nContent-Length: {len(inside)}\r\n"
+    )
+    assert raw(server, f"{head}\r\n{inside}".encode()).count(b"HTTP/1.1 200") == 1
+
+
+def test_one_slow_client_keeps_nobody_waiting(server, capfd):
+    """While some send nothing, or half a request, others are answered; when they leave, nothing is printed."""
+    slow = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(10)]
+    for line in slow:
+        line.sendall(b"GET /")
+    begun = time.monotonic()
+    assert ask(server, "frame/1")[0] == 200
+    assert time.monotonic() - begun < 5.0
+    for line in slow:
+        line.close()
+    assert ask(server, "frame/1")[0] == 200
+    told = capfd.readouterr()
+    assert told.out == told.err == ""
+
+
+def test_too_many_clients(server, monkeypatch):
+    """Beyond its room clients are turned away, and let in again when others have gone."""
+    slow = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(servers.AT_ONCE)]
+    time.sleep(0.3)
+    with pytest.raises((http.client.HTTPException, ConnectionError)):
+        ask(server, "manifest")
+    for line in slow:
+        line.close()
+    for _ in range(50):
+        time.sleep(0.1)
+        try:
+            assert ask(server, "manifest")[0] == 200
+            return
+        except (http.client.HTTPException, ConnectionError):
+            continue
+    raise AssertionError("nobody is let in again")
+
+
+def test_a_frame_that_cannot_be_read(server, monkeypatch):
+    """A broken frame is a sentence, status 500; what nobody thought of, too."""
+    monkeypatch.setattr(server.story, "frame", lambda k: (_ for _ in ()).throw(BadInput("frame 1 is broken")))
+    status, _, content = ask(server, "frame/1")
+    assert status == 500 and json.loads(content) == {"error": "frame 1 is broken"}
+    monkeypatch.setattr(server.story, "frame", lambda k: 1 / 0)
+    status, _, content = ask(server, "frame/1")
+    assert status == 500 and "ZeroDivisionError" in json.loads(content)["error"]
+
+
+def test_a_port_that_is_taken(server):
+    """One sentence that says what to do."""
+    for port in (server.port, 70000):
+        with pytest.raises(BadInput, match="--port"):
+            Server(server.story, port)

@@ -1,0 +1,278 @@
+"""What the page of a run is told: of a finished one, one that is going, and files that are not what they should be."""
+
+import json
+import shutil
+import threading
+
+import numpy as np
+import pytest
+
+import sand
+from sand.analysis.lineage import SINGLE
+from sand.files.following import Following
+from sand.files.gsd_index import ENTRY, read_index
+from sand.files.trajectory import TrajectoryWriter
+from sand.run.told import field_in, field_of
+from sand.view.dimensions import Dimensions
+from sand.view.packets import decode
+from sand.view.series import MOST, of_ledger, thinned
+from sand.view.story import story_of
+
+from .reels import append, reel
+
+KEYS = [
+    "format",
+    "name",
+    "folder",
+    "version",
+    "grains",
+    "times",
+    "steps",
+    "bytes",
+    "running",
+    "outcome",
+    "note",
+    "unit",
+    "materials",
+    "periodic",
+    "field",
+    "ranges",
+    "palettes",
+    "colours",
+    "dimensions",
+]
+
+
+def test_the_manifest_of_a_run(looked_at):
+    """All keys of the contract, the run's own numbers, nothing that JSON cannot hold."""
+    folder, sim = looked_at
+    told = story_of(folder, field_in(folder)).manifest()
+    assert list(told) == KEYS
+    json.dumps(told, allow_nan=False)
+    assert (told["format"], told["name"], told["grains"], told["materials"]) == (1, "run", 6, ["iron"])
+    assert told["times"] == pytest.approx(sim.ledger["time"], rel=1e-15, abs=0)
+    assert told["steps"] == sim.ledger["step"].tolist()
+    assert told["unit"] == pytest.approx(1e-8, rel=1e-12, abs=0)
+    assert not told["running"] and "reached" in told["outcome"] and told["note"] is None
+    assert told["periodic"] == [False] * 3
+    assert all(np.shape(colours) == (64, 3) for colours in told["palettes"].values())
+    assert {"cividis", "diverging"} <= set(told["palettes"])
+    for low, high in told["ranges"].values():
+        assert 0.0 <= low <= high
+    speed = np.linalg.norm(sim.grains.velocity, axis=1)
+    assert told["ranges"]["speed"][1] >= 0.99 * speed.max()
+    kinetic = sim.ledger["translation"][-1] + sim.ledger["rotation"][-1]
+    assert kinetic / 6 <= 1.01 * told["ranges"]["kinetic"][1] <= 10 * (sim.ledger["translation"] + 1e-15).max()
+
+
+def test_times_are_told_from_a_frame_on(looked_at):
+    """`since` leaves out earlier ones and nothing else, and may be beyond the end."""
+    story = story_of(looked_at[0])
+    whole, late, none = story.manifest(), story.manifest(4), story.manifest(10**8)
+    assert late["times"] == whole["times"][4:] and late["steps"] == whole["steps"][4:]
+    assert none["times"] == [] and {k: v for k, v in late.items() if k not in ("times", "steps")} == {
+        k: v for k, v in whole.items() if k not in ("times", "steps")
+    }
+
+
+def test_frames_of_a_run(looked_at):
+    """A packet holds what the file holds, and names that stay."""
+    folder, sim = looked_at
+    story = story_of(folder / "trajectory.gsd")  # the file means the run it lies in
+    assert story.manifest()["outcome"]
+    head, arrays = decode(story.frame(5))
+    assert head["time"] == sim.time and head["frame"] == 5
+    place = arrays["position"] * story.unit
+    assert place == pytest.approx(sim.grains.position, abs=1e-14)
+    assert arrays["cluster"].tolist() == [0] * 5 + [SINGLE]
+    assert abs(sum(len(story.frame(k)) for k in range(6)) / story.size - 1.0) < 0.25
+    with pytest.raises(sand.BadInput, match="no 6"):
+        story.frame(6)
+
+
+def test_a_field_is_told(looked_at):
+    """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
+    folder, sim = looked_at
+    told = story_of(folder, field_in(folder)).manifest()["field"]
+    assert "rotating" in told["text"] and "1 mT" in told["text"]
+    expected = [np.array(sim.forces[2].flux_density_at(t)) * 1e3 for t in sim.ledger["time"]]
+    assert np.array(told["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
+    steady = story_of(folder, field_of([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
+    assert steady["direction"] == [0.0, 0.6, 0.8] and "directions" not in steady
+    assert field_of([sand.Field(0.0)]) is None and story_of(folder).manifest()["field"] is None
+    texts = {
+        "constant": field_of([sand.Field("2 mT")])[0],
+        "oscillating at 1 MHz": field_of([sand.Field(0.0, "oscillating", amplitude="1 mT", frequency="1 MHz")])[0],
+        "to 2 mT at 1 us": field_of([sand.Field("1 mT", "ramp", final="2 mT", end="1 us")])[0],
+    }
+    assert all(said in text for said, text in texts.items()), texts
+
+
+def test_series_are_the_ledgers(looked_at):
+    """Plots hold the ledger's columns; total − start is worked out before numbers are shortened; counts of events."""
+    folder, sim = looked_at
+    series = story_of(folder).series()
+    plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
+    assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
+    assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
+    assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
+    change = sim.ledger["total"] - sim.ledger["total"][0]
+    assert plots["balance"]["total − start"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
+    assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
+    for plot in series["plots"]:
+        assert all(len(line["values"]) == len(series["time"]) for line in plot["lines"])
+        assert all(line[ground].startswith("#") for line in plot["lines"] for ground in ("light", "dark"))
+
+
+def test_long_and_broken_ledgers(looked_at):
+    """At most 2000 points, the last among them; no event is lost; what is not a number is null."""
+    row = dict(looked_at[1].ledger.rows[-1])
+    rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
+    rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
+    series = of_ledger(rows)
+    assert len(series["time"]) == MOST and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
+    assert sum(series["events"]["made"]) == 15000 and sum(series["events"]["broken"]) == 2500
+    assert len(series["events"]["time"]) < MOST
+    values = {plot["id"]: plot["lines"][0]["values"] for plot in series["plots"]}
+    assert values["balance"][-1] is None and values["energies"][-1] is None
+    json.dumps(series, allow_nan=False)
+    assert thinned(10, 20).tolist() == list(range(10)) and thinned(100, 3).tolist() == [0, 50, 99]
+
+
+def test_without_a_ledger(tmp_path):
+    """A file by itself: clusters and contacts are counted in its frames."""
+    story = story_of(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
+    series = story.series()
+    plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
+    assert plots["contacts"]["contacts"] == [0, 1, 2]
+    assert plots["clusters"]["largest"] == [1, 2, 3] and plots["clusters"]["number of clusters"] == [5, 4, 3]
+    assert plots["clusters"]["mean size S"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
+    told = story.manifest()
+    assert not told["running"] and told["outcome"] is None and told["name"] == "a"
+
+
+def test_a_run_that_goes_on(tmp_path, looked_at):
+    """Frames that come later are found; names, times and the ledger go on; its summary ends it."""
+    shutil.copy(looked_at[0] / "case.toml", tmp_path)
+    writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
+    append(writer, [[(1, 2)]], 4)
+    story = story_of(tmp_path)
+    assert story.manifest()["running"] and len(story) == 1
+    assert not story.frames.refresh()
+    append(writer, [[(1, 2), (0, 1)], [(1, 2), (0, 1)]], 4, first=1)
+    assert len(story) == 1  # not before it looks
+    story.refresh()
+    told = story.manifest(1)
+    assert len(told["times"]) == 2 and told["steps"] == [10, 20]
+    assert decode(story.frame(2))[1]["cluster"].tolist() == [1, 1, 1, SINGLE]
+    (tmp_path / "summary.json").write_text('{"steps": 20, "outcome_text": "done"}')
+    assert story.manifest()["outcome"] == "done"
+    append(writer, [[]], 4, first=3)  # resumed
+    story.refresh()
+    assert story.manifest()["running"]
+    writer.close()
+
+
+def test_a_run_begun_anew_is_another(tmp_path):
+    """Where the file is replaced by one of other grains, nothing of the old one is told."""
+    story = story_of(reel(tmp_path / "a.gsd", [[(0, 1)]] * 3, 4))
+    (tmp_path / "a.gsd").unlink()
+    reel(tmp_path / "a.gsd", [[(2, 3)], [(2, 3)]], 6)
+    story.refresh()
+    assert story.manifest()["grains"] == 6 and len(story) == 2
+    assert decode(story.frame(1))[1]["cluster"].tolist() == [SINGLE, SINGLE, 2, 2, SINGLE, SINGLE]
+
+
+def test_a_torn_end_is_left_out(tmp_path):
+    """A last frame whose data were never written does not keep the others from being seen, and is mentioned."""
+    path = reel(tmp_path / "a.gsd", [[(0, 1)], [(0, 2)], [(1, 2)]], 5)
+    place, entries = read_index(path)
+    with open(path, "r+b") as file:  # positions of the last frame are zeros, as after a power cut
+        late = entries[(entries["frame"] == 2) & (entries["rows"] == 5) & (entries["columns"] == 3)][0]
+        file.seek(int(late["location"]))
+        file.write(bytes(60))
+    story = story_of(path)
+    assert len(story) == 2 and "1 frame at the end left out" in story.manifest()["note"]
+    assert decode(story.frame(1))[1]["pair"].tolist() == [[0, 2]]
+    assert ENTRY.itemsize == 32 and place > 0
+
+
+def test_files_that_are_none(tmp_path):
+    """No run, no frame yet, a foreign file, a broken one: one sentence that says what and where."""
+    import gsd.hoomd
+
+    with pytest.raises(sand.BadInput, match="no such folder"):
+        story_of(tmp_path / "none")
+    with pytest.raises(sand.BadInput, match=r"no trajectory.gsd in it"):
+        story_of(tmp_path)
+    TrajectoryWriter(tmp_path / "trajectory.gsd").close()
+    with pytest.raises(sand.BadInput, match="no frame yet"):
+        story_of(tmp_path)
+    with gsd.hoomd.open(str(tmp_path / "other.gsd"), "w") as file:
+        frame = gsd.hoomd.Frame()
+        frame.particles.N = 3
+        file.append(frame)
+    with pytest.raises(sand.BadInput, match="not written by SAND"):
+        story_of(tmp_path / "other.gsd")
+    (tmp_path / "text.gsd").write_text("no frames here")
+    with pytest.raises(sand.BadInput, match="not a trajectory"):
+        story_of(tmp_path / "text.gsd")
+
+
+def test_other_numbers_of_grains(tmp_path):
+    """A frame with other grains than the first is refused by itself."""
+    writer = TrajectoryWriter(tmp_path / "a.gsd")
+    append(writer, [[]], 4)
+    append(writer, [[]], 5, first=1)
+    writer.close()
+    story = story_of(tmp_path / "a.gsd")
+    story.frame(0)
+    with pytest.raises(sand.BadInput, match="frame 1 has 5 grains"):
+        story.frame(1)
+
+
+def test_several_readers_at_once(tmp_path):
+    """Eight threads that ask for frames in any order all get the right ones."""
+    story = story_of(reel(tmp_path / "a.gsd", [[(k % 5, k % 5 + 1)] for k in range(30)], 9))
+    expected, wrong = [story.frame(k) for k in range(30)], []
+
+    def ask(seed):
+        for k in np.random.default_rng(seed).integers(0, 30, 40).tolist():
+            if story.frame(k) != expected[k]:
+                wrong.append(k)
+
+    threads = [threading.Thread(target=ask, args=(seed,)) for seed in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_dimensions(tmp_path, monkeypatch):
+    """A straight chain has dimension 1; too few grains give a reason; the same grains are not measured again."""
+    from sand.view import dimensions
+
+    chain = [(k, k + 1) for k in range(39)]
+    story = story_of(reel(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))
+    assert story.dimension(0, 5)["value"] == pytest.approx(1.0, abs=0.1)
+    assert "at least 32" in story.dimension(2, 5)["reason"]
+    assert "touches none" in story.dimension(0, 41)["reason"]
+    with pytest.raises(sand.BadInput, match="no 42"):
+        story.dimension(0, 42)
+    calls = []
+    real = dimensions.cluster_dimension
+    monkeypatch.setattr(dimensions, "cluster_dimension", lambda *a: calls.append(a) or real(*a))
+    measure = Dimensions()
+    found = [measure.of(*story.read(k)) for k in range(3)]
+    assert len(calls) == 1 and list(found[0]) == ["0"] and found[0] == found[1] and found[2] == {}
+
+
+def test_following_is_a_sequence(tmp_path):
+    """Slices and negative numbers, and an end."""
+    frames = Following(reel(tmp_path / "a.gsd", [[(0, 1)], [], [(1, 2)]], 3))
+    assert frames.contacts.tolist() == [1, 0, 1] and frames.steps.tolist() == [0, 10, 20]
+    assert [frame.step for frame in frames[1:]] == [10, 20] and frames[-1].step == 20
+    assert [frames.pairs(k).tolist() for k in range(3)] == [[[0, 1]], [], [[1, 2]]]
+    with pytest.raises(IndexError):
+        frames[3]
