@@ -131,11 +131,13 @@ export class App {
 
   /** The first picture; settings are already as the address has them. */
   async begin(): Promise<void> {
+    const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
+    this.picture.setFrame(await this.frames.get(first));
+    this.picture.dress(false);
+    if (!this.state.get("look")) this.views.reset();
     this.applyLook();
     this.setTheme();
-    await this.go(this.state.number("frame"));
-    if (!this.state.get("look")) this.views.reset();
-    this.redress();
+    await this.go(first);
   }
 
   private changed(id: string): void {
@@ -171,7 +173,7 @@ export class App {
   go(frame: number): Promise<void> {
     const last = this.manifest.times.length - 1;
     const k = Math.min(Math.max(Math.round(Math.min(frame, last)), 0), last);
-    if (k === this.state.number("frame") && this.picture.frame?.frame !== k) void this.show();
+    if (k === this.state.number("frame")) void this.show();
     else this.state.set("frame", k);
     return this.showing;
   }

@@ -1,22 +1,21 @@
 // Moments as arrows through the centres of grains: shaft and head ray-cast on one square each.
 
 import { COMMON } from "./glsl";
-import { Instances } from "./instances";
+import { CORNER, Squares } from "./squares";
 import type * as three from "three";
 
 const VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
 uniform float uPixel;   // pixels for a length of one at distance one (or at any, orthographic)
-in vec2 corner;
 in vec3 place;
 in vec3 arrow;          // from tail to tip
 in float shown;
 out vec3 vOnQuad;
 flat out vec3 vTail;
 flat out vec3 vAxis;
-flat out float vFlat;
 
 void main() {
+  vec2 corner = cornerOf(gl_VertexID);
   vec3 c = (modelViewMatrix * vec4(place, 1.0)).xyz;
   vec3 d = mat3(modelViewMatrix) * arrow;
   float size = length(d);
@@ -30,12 +29,18 @@ void main() {
   vec3 along = seenSize > 1e-4 * size ? seen / seenSize : normalize(cross(toEye, vec3(0.3, 1.0, 0.2)));
   vec3 side = cross(toEye, along);
   vec3 middle = c + toEye * 0.5 * size; // what is nearer the eye covers what lies behind
+#ifdef PLAIN
+  // a dart: tail, two barbs, tip
+  int k = gl_VertexID & 3;
+  float at = k == 0 ? -0.5 : k == 2 ? 0.5 : 0.12;
+  vOnQuad = c + at * d + (k == 1 ? 1.0 : k == 3 ? -1.0 : 0.0) * wide * side + toEye * 0.1 * size;
+#else
   vOnQuad = middle + corner.x * (0.5 * seenSize + wide) * along + corner.y * wide * side;
+#endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   float pixels = size * uPixel / (isOrtho() ? 1.0 : max(-c.z, 1e-6));
-  vFlat = pixels < 16.0 ? 1.0 : 0.0;
   // arrows too small to be seen are left out: this is what keeps crowds fast
-  if (shown < 0.5 || size == 0.0 || pixels < 9.0 || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (shown < 0.5 || size == 0.0 || pixels < 5.0 || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
 `;
 
@@ -45,7 +50,6 @@ uniform vec3 uTip;
 in vec3 vOnQuad;
 flat in vec3 vTail;
 flat in vec3 vAxis;
-flat in float vFlat;
 out vec4 outColour;
 
 const float SHAFT = 0.042; // radii and where the head begins, in lengths of the arrow
@@ -93,6 +97,9 @@ float meet(vec3 o, vec3 ray, float size, vec3 axis, out vec3 normal) {
   return best;
 }
 
+#ifdef PLAIN
+void main() { outColour = vec4(uInk, 1.0); }
+#else
 void main() {
   vec3 origin = rayOrigin(vOnQuad);
   vec3 ray = rayDirection(vOnQuad);
@@ -106,15 +113,16 @@ void main() {
   if (t < 0.0) discard;
   vec3 p = start + t * ray;
   vec3 colour = dot(p - vTail, axis) > NECK * size ? uTip : uInk;
-  outColour = vec4(vFlat > 0.5 ? colour : lit(colour, normal, -ray, 1.0, -p.z), 1.0);
+  outColour = vec4(lit(colour, normal, -ray, 1.0, -p.z), 1.0);
   gl_FragDepth = depthOf(p);
 }
+#endif
 `;
 
-export class ArrowsMesh extends Instances {
-  constructor(uniforms: Record<string, three.IUniform>) {
-    super(COMMON + VERTEX, COMMON + FRAGMENT, uniforms, [
+export class ArrowsMesh extends Squares {
+  constructor(uniforms: Record<string, three.IUniform>, smooth: boolean) {
+    super(COMMON + CORNER + VERTEX, COMMON + FRAGMENT, uniforms, [
       ["place", 3, Float32Array], ["arrow", 3, Float32Array], ["shown", 1, Float32Array],
-    ]);
+    ], smooth);
   }
 }

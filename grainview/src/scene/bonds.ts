@@ -1,25 +1,27 @@
 // Contacts as round bars between the centres of two grains: where these have their true size, a collar at the neck.
 
 import { COMMON } from "./glsl";
-import { Instances } from "./instances";
+import { CORNER, Squares } from "./squares";
 import type * as three from "three";
 
 const VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
 uniform float uBar;
-in vec2 corner;
 in vec3 from;
 in vec3 to;
 in vec4 colour;
 out vec3 vOnQuad;
+out float vAcross;
 flat out vec3 vFrom;
 flat out vec3 vAxis;
 flat out vec3 vColour;
 
 void main() {
+  vec2 corner = cornerOf(gl_VertexID);
   vec3 a = (modelViewMatrix * vec4(from, 1.0)).xyz;
   vec3 b = (modelViewMatrix * vec4(to, 1.0)).xyz;
   vFrom = a;
+  vAcross = corner.y;
   vAxis = b - a;
   vColour = colour.rgb;
   vec3 toEye = isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-0.5 * (a + b));
@@ -29,7 +31,11 @@ void main() {
   vec3 front = normalize(cross(side, along));
   // the square lies at the side of the bar that faces the eye, a little longer than it
   vec3 middle = 0.5 * (a + b) + front * uBar;
+#ifdef PLAIN
+  vOnQuad = middle + corner.x * 0.5 * vAxis + corner.y * side * uBar;
+#else
   vOnQuad = middle + corner.x * (0.5 * vAxis + along * uBar) + corner.y * side * uBar * 1.2;
+#endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   if (colour.a < 0.5 || max(a.z, b.z) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
@@ -38,11 +44,17 @@ void main() {
 const FRAGMENT = /* glsl */ `
 uniform float uBar;
 in vec3 vOnQuad;
+in float vAcross;
 flat in vec3 vFrom;
 flat in vec3 vAxis;
 flat in vec3 vColour;
 out vec4 outColour;
 
+#ifdef PLAIN
+void main() {
+  outColour = vec4(plainlyLit(vColour, vec3(0.0, 0.5 * vAcross, 0.8), 1.0, -vOnQuad.z), 1.0);
+}
+#else
 void main() {
   vec3 origin = rayOrigin(vOnQuad);
   vec3 ray = rayDirection(vOnQuad);
@@ -63,12 +75,13 @@ void main() {
   outColour = vec4(lit(vColour, normal, -ray, 1.0, -p.z), 1.0);
   gl_FragDepth = depthOf(p);
 }
+#endif
 `;
 
-export class BondsMesh extends Instances {
-  constructor(uniforms: Record<string, three.IUniform>) {
-    super(COMMON + VERTEX, COMMON + FRAGMENT, { ...uniforms, uBar: { value: 1 } }, [
+export class BondsMesh extends Squares {
+  constructor(uniforms: Record<string, three.IUniform>, smooth: boolean) {
+    super(COMMON + CORNER + VERTEX, COMMON + FRAGMENT, { ...uniforms, uBar: { value: 1 } }, [
       ["from", 3, Float32Array], ["to", 3, Float32Array], ["colour", 4, Uint8Array],
-    ]);
+    ], smooth);
   }
 }

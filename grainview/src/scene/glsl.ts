@@ -21,6 +21,12 @@ float depthOf(vec3 p) {
   return 0.5 * clip.z / clip.w + 0.5;
 }
 
+// what a key light and the sky make of something a few pixels wide
+vec3 plainlyLit(vec3 colour, vec3 normal, float open, float distance) {
+  float light = uAmbient * (0.78 + 0.22 * normal.y) * open + 0.66 * max(dot(normal, vec3(-0.41, 0.6, 0.69)), 0.0) * open;
+  return mix(colour * light, uBackground, uHaze * smoothstep(uDepth.x, uDepth.y, distance));
+}
+
 // a key light over the left shoulder, a fill from the right, the sky
 vec3 lit(vec3 colour, vec3 normal, vec3 toEye, float open, float distance) {
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));

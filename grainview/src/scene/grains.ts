@@ -2,18 +2,19 @@
 
 import * as three from "three";
 import { COMMON } from "./glsl";
-import { Instances } from "./instances";
+import { CORNER, Squares } from "./squares";
 
 const VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
 uniform float uSize;
-in vec2 corner;
+uniform float uPixel; // pixels for a length of one at distance one (or at any, orthographic)
 in vec3 place;
 in float radius;
 in vec4 colour;
 in vec3 cover;
 in float mark;
 out vec3 vOnQuad;
+out vec2 vCorner;
 flat out vec3 vCentre;
 flat out float vRadius;
 flat out vec3 vColour;
@@ -21,6 +22,7 @@ flat out vec3 vCover;
 flat out float vMark;
 
 void main() {
+  vec2 corner = cornerOf(gl_VertexID);
   vec3 c = (modelViewMatrix * vec4(place, 1.0)).xyz;
   float r = radius * uSize;
   vCentre = c;
@@ -28,7 +30,13 @@ void main() {
   vColour = colour.rgb;
   vCover = mat3(modelViewMatrix) * cover;
   vMark = mark;
+  vCorner = corner;
+#ifdef PLAIN
+  float grown = mark > 0.5 ? max(1.5 * r, r + 2.0 / uPixel * (isOrtho() ? 1.0 : -c.z)) : r;
+  vCorner *= grown / r;
+#else
   float grown = r * (mark > 0.5 ? 1.3 : 1.06);
+#endif
   vec3 across = vec3(1.0, 0.0, 0.0);
   vec3 up = vec3(0.0, 1.0, 0.0);
   if (!isOrtho()) {
@@ -48,6 +56,7 @@ void main() {
 const FRAGMENT = /* glsl */ `
 uniform vec3 uInk;
 in vec3 vOnQuad;
+in vec2 vCorner;
 flat in vec3 vCentre;
 flat in float vRadius;
 flat in vec3 vColour;
@@ -55,6 +64,19 @@ flat in vec3 vCover;
 flat in float vMark;
 out vec4 outColour;
 
+#ifdef PLAIN
+void main() {
+  float d = dot(vCorner, vCorner);
+  if (d > 1.0) {
+    if (vMark < 0.5) discard;
+    outColour = vec4(vMark > 1.5 ? vec3(0.9, 0.35, 0.0) : uInk, 1.0);
+    return;
+  }
+  vec3 normal = vec3(vCorner, sqrt(1.0 - d));
+  float open = (1.0 - 0.85 * max(dot(normal, vCover), 0.0)) * (1.0 - 0.35 * length(vCover));
+  outColour = vec4(plainlyLit(vColour, normal, open, -vCentre.z), 1.0);
+}
+#else
 void main() {
   vec3 origin = rayOrigin(vOnQuad);
   vec3 ray = rayDirection(vOnQuad);
@@ -62,7 +84,11 @@ void main() {
   float b = dot(ray, to);
   vec3 beside = to - b * ray;
   float room = vRadius * vRadius - dot(beside, beside);
+#ifdef SMOOTH
   float cover = clamp(0.5 + room / max(fwidth(room), 1e-12), 0.0, 1.0);
+#else
+  float cover = room < 0.0 ? 0.0 : 1.0;
+#endif
   if (cover == 0.0 || (vMark > 0.5 && room < 0.0)) {
     // a ring around what is chosen
     float wide = vRadius * 1.22;
@@ -78,13 +104,14 @@ void main() {
   outColour = vec4(lit(vColour, normal, -ray, open, -p.z), vMark > 0.5 ? 1.0 : cover);
   gl_FragDepth = depthOf(p);
 }
+#endif
 `;
 
-export class GrainsMesh extends Instances {
-  constructor(uniforms: Record<string, three.IUniform>) {
-    super(COMMON + VERTEX, COMMON + FRAGMENT, uniforms, [
+export class GrainsMesh extends Squares {
+  constructor(uniforms: Record<string, three.IUniform>, smooth: boolean) {
+    super(COMMON + CORNER + VERTEX, COMMON + FRAGMENT, uniforms, [
       ["place", 3, Float32Array], ["radius", 1, Float32Array], ["colour", 4, Uint8Array],
       ["cover", 3, Float32Array], ["mark", 1, Float32Array],
-    ]);
+    ], smooth);
   }
 }

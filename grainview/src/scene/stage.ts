@@ -15,6 +15,19 @@ export interface Look {
 
 const ANGLE = (2 * Math.atan(0.25) * 180) / Math.PI; // the eye is two heights of the picture away
 
+const NO_WEBGL =
+  "This browser cannot draw in 3-D: WebGL 2 is missing or switched off. Try another browser, or switch on hardware " +
+  "acceleration in its settings; `sand plot` makes pictures without a browser.";
+
+/** Whether the browser draws without a graphics card. */
+function drawsSlowly(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const named = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = named ? String(context?.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 export class Stage {
   readonly scene = new three.Scene();
   readonly renderer: three.WebGLRenderer;
@@ -33,17 +46,10 @@ export class Stage {
   private disposed = false;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    const context = canvas.getContext("webgl2", { antialias: true, alpha: true, preserveDrawingBuffer: true });
-    if (!context) {
-      throw new NoWebGL(
-        "This browser cannot draw in 3-D: WebGL 2 is missing or switched off. Try another browser, or switch on " +
-          "hardware acceleration in its settings; `sand plot` makes pictures without a browser.",
-      );
-    }
-    this.renderer = new three.WebGLRenderer({ canvas, context, antialias: true, alpha: true });
-    const named = context.getExtension("WEBGL_debug_renderer_info");
-    const name = named ? String(context.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
-    this.slow = /swiftshader|llvmpipe|software|basic render/i.test(name);
+    this.slow = drawsSlowly();
+    const context = canvas.getContext("webgl2", { antialias: !this.slow, alpha: true, preserveDrawingBuffer: true });
+    if (!context) throw new NoWebGL(NO_WEBGL);
+    this.renderer = new three.WebGLRenderer({ canvas, context });
     this.renderer.setPixelRatio(this.slow ? 1 : Math.min(window.devicePixelRatio, 2));
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(0, -10, 0);
@@ -130,7 +136,7 @@ export class Stage {
   redraw(): void {
     if (this.asked) return;
     this.asked = true;
-    requestAnimationFrame(() => this.draw());
+    requestAnimationFrame(() => this.asked && this.draw());
   }
 
   draw(): void {

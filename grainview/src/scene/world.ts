@@ -37,9 +37,9 @@ export class World {
     uSize: { value: 1 },
     uPixel: { value: 1 },
   };
-  readonly grains = new GrainsMesh(this.uniforms);
-  readonly bonds = new BondsMesh(this.uniforms);
-  readonly arrows = new ArrowsMesh(this.uniforms);
+  readonly grains: GrainsMesh;
+  readonly bonds: BondsMesh;
+  readonly arrows: ArrowsMesh;
   readonly box = new Segments(false);
   readonly trails = new Segments(true);
   place: Float32Array = new Float32Array();
@@ -48,8 +48,12 @@ export class World {
   pieces: Bonds | null = null;
   haze = 0.5;
   private bar = 1;
+  private middle = 1; // radius of the middle one of the grains
 
   constructor(readonly stage: Stage) {
+    this.grains = new GrainsMesh(this.uniforms, !stage.slow);
+    this.bonds = new BondsMesh(this.uniforms, !stage.slow);
+    this.arrows = new ArrowsMesh(this.uniforms, !stage.slow);
     const parts = [this.trails.lines, this.box.lines, this.grains.mesh, this.bonds.mesh, this.arrows.mesh];
     stage.scene.add(...parts);
     stage.onDraw = () => this.beforeDraw();
@@ -69,6 +73,7 @@ export class World {
 
   setGrains(place: Float32Array, radius: Float32Array, colour: Uint8Array, cover: Float32Array | null): void {
     const count = radius.length;
+    if (radius !== this.radius) this.middle = Float32Array.from(radius).sort()[count >> 1] ?? 1;
     [this.place, this.radius] = [place, radius];
     const values: Record<string, Float32Array | Uint8Array> = { place, radius, colour };
     values.cover = cover ?? new Float32Array(3 * count);
@@ -134,6 +139,9 @@ export class World {
     uniforms.uDepth.value.set(distance - 0.35 * depth, distance + depth);
     uniforms.uHaze.value = this.haze;
     uniforms.uPixel.value = stage.pixelsPerLength * (stage.isOrthographic ? 1 : distance);
+    // what is a few pixels wide needs no ray for each of them
+    const pixels = this.middle * stage.pixelsPerLength * stage.renderer.getPixelRatio();
+    for (const part of [this.grains, this.bonds, this.arrows]) part.isPlain = pixels < (stage.slow ? 7 : 3);
   }
 
   /** The grain or contact at a pixel of the canvas. */
