@@ -119,6 +119,9 @@ def test_series_are_the_ledgers(looked_at):
     change = sim.ledger["total"] - sim.ledger["total"][0]
     assert plots["balance"]["total − start"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
     assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
+    assert plots["losses"]
+    for name, lost in plots["losses"].items():  # an axis of powers of ten has no place for 0
+        assert [v is None for v in lost] == [v == 0.0 for v in sim.ledger[f"lost_{name}"]]
     for plot in series["plots"]:
         assert all(len(line["values"]) == len(series["time"]) for line in plot["lines"])
         assert all(line[ground].startswith("#") for line in plot["lines"] for ground in ("light", "dark"))

@@ -205,7 +205,7 @@ class Story:
         return {name: _range(np.concatenate([*parts, np.zeros(0)])) for name, parts in seen.items()}
 
     def _told_field(self, numbers: np.ndarray) -> dict[str, Any] | None:
-        if self._field is None:
+        if self._field is None or not numbers.size:
             return None
         text, at = self._field
         times = self.frames.times
