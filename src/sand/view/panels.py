@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
+from ..analysis.books import LOSSES
 from ..core.constants import BOLTZMANN
 from ..core.world import LOST
 from .style import (
@@ -28,7 +29,6 @@ from .style import (
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
-LOSSES = tuple(f"lost_{name}" for name in LOST)
 LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, INK, FAINT)
 OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 
