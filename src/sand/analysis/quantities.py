@@ -96,7 +96,7 @@ GRAINS = (
     Quantity(
         "cluster",
         "1",
-        "cluster, counted from the largest",
+        "cluster",
         "categorical",
         _floats(lambda f: cluster_rank(len(f.radius), f.pair)),
         "",
@@ -105,28 +105,28 @@ GRAINS = (
     Quantity(
         "coordination",
         "1",
-        "number of contacts",
+        "contacts",
         "sequential",
         _floats(lambda f: coordination(len(f.radius), f.pair)),
         "",
     ),
-    Quantity("speed", "m/s", "speed of the centre", "sequential", _floats(lambda f: _size(f.velocity)), ""),
-    Quantity("spin", "rad/s", "angular speed", "sequential", _floats(lambda f: _size(f.spin)), ""),
-    Quantity("alignment", "1", "cosine between moment and its cluster's", "diverging", _alignment, _MOMENTS),
+    Quantity("speed", "m/s", "speed", "sequential", _floats(lambda f: _size(f.velocity)), ""),
+    Quantity("spin", "rad/s", "spin", "sequential", _floats(lambda f: _size(f.spin)), ""),
+    Quantity("alignment", "1", "cosine of moment to that of its cluster", "diverging", _alignment, _MOMENTS),
     Quantity(
         "field_alignment",
         "1",
-        "cosine between moment and outside field",
+        "cosine of moment to field",
         "diverging",
         _field_alignment,
         "no grain has a moment, or there is no outside field",
     ),
-    Quantity("kinetic_energy", "J", "kinetic energy, spin included", "sequential", _kinetic, ""),
+    Quantity("kinetic_energy", "J", "kinetic energy", "sequential", _kinetic, ""),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
 )
 """Of grains (N,)."""
 CONTACTS = (
-    Quantity("load", "N", "normal force, positive if pressed", "diverging", _load, "the file holds no forces"),
+    Quantity("load", "N", "normal force, above 0 if pressed", "diverging", _load, "the file holds no forces"),
     Quantity("mode", "1", "mode at its limit", "categorical", _mode, "the file does not say what contacts bear"),
 )
 """Of contacts (C,)."""

@@ -17,6 +17,10 @@ PATTERN = 4
 """Pixels of a square of this edge look in different directions for what darkens them."""
 LOOKS = 9
 """Places that each pixel looks at."""
+NO_SHADOW = 0.5
+"""Rods that are `lit` no more than this throw no shadow."""
+LARGEST_MAP = 3000
+"""Samples along an edge of what the key lamp sees."""
 MOST_ROWS = 400_000
 """Samples that are coloured in one go."""
 
@@ -33,8 +37,8 @@ class Lamps:
         background: (3,) colour that haze fades to.
     """
 
-    sky: float = 0.52
-    key: float = 0.56
+    sky: float = 0.60
+    key: float = 0.54
     fill: float = 0.12
     glint: float = 0.20
     haze: float = 0.34
@@ -83,9 +87,10 @@ def _coloured(
     half = key + np.array([0.0, 0.0, 1.0], dtype=np.float32)
     glint = np.maximum(normal @ (half / np.linalg.norm(half)), 0.0) ** 48 * lamp
     power = lamps.sky * (0.86 + 0.14 * normal[:, 1]) * dim + lamps.fill * np.maximum(normal @ fill, 0.0) * dim
-    power += lamps.key * (0.45 * soft * dim + 0.55 * facing) * (0.3 + 0.7 * lamp)
+    power += lamps.key * (0.45 * soft * dim * (0.6 + 0.4 * lamp) + 0.55 * facing * lamp)
     lit = canvas.solids.lit[which].astype(np.float32)
     base = canvas.solids.colour[which].astype(np.float32)
+    power *= 0.74 + 0.26 * np.clip(normal[:, 2] / 0.55, 0.0, 1.0)  # a rim parts what has one colour
     power = 1.0 + lit * (power - 1.0)
     colour = base * power[:, None] + (lamps.glint * lit * glint * dim)[:, None]
     extent = canvas.range
@@ -106,7 +111,7 @@ def _shade(canvas: Canvas, finer: int, radius: float) -> tuple[np.ndarray, np.nd
     depth[there] = point[:, 2] / finer
     facing = np.zeros((*there.shape, 3), np.float32)
     facing[there] = normal
-    dim = np.exp(-2.6 * _hidden(depth, facing, radius / finer))
+    dim = np.exp(-2.3 * _hidden(depth, facing, radius / finer))
     lamp = np.ones(there.shape, np.float32)
     lamp[there] = _lamp(canvas.solids, point, normal, finer, radius)
     weight = np.maximum(uniform_filter(there.astype(np.float32), PATTERN), 1e-3)
@@ -155,19 +160,21 @@ def _lamp(solids: Solids, point: np.ndarray, normal: np.ndarray, finer: int, rad
     right = np.cross([0.0, 1.0, 0.0], forward)
     right /= np.linalg.norm(right)
     frame = np.array([right, np.cross(forward, right), forward])
-    scale = min(1.0 / finer, 12.0 / radius)  # a grain need not be finer than that in its shadow
-    shown = solids.lit[len(solids.radius) :] > 0.5
-    turned = [p @ frame.T * scale for p in (solids.centre, solids.start[shown], solids.end[shown])]
-    reach = 2.0 * max(float(np.abs(p[:, :2]).max(initial=0.0)) for p in turned) + 4.0 * radius * scale
-    size = int(min(reach, 4000.0)) + 8
+    shown = solids.lit[len(solids.radius) :] > NO_SHADOW
+    turned = [p @ frame.T for p in (solids.centre, solids.start[shown], solids.end[shown])]
+    reach = 2.0 * (max(float(np.abs(p[:, :2]).max(initial=0.0)) for p in turned) + float(solids.radius.max(initial=0.0)))
+    scale = min(1.0 / finer, LARGEST_MAP / (reach + 1.0))
+    size = int(reach * scale) + 8
     girth = solids.girth[shown] * scale
     blank = np.zeros((0, 3)), np.zeros(0)
-    lamp = Canvas((size, size), Solids(turned[0], solids.radius * scale, turned[1], turned[2], girth, *blank))
-    lifted = (point + normal * (0.06 * radius)) @ (frame.T * scale).astype(np.float32)
+    centre, start, end = (p * scale for p in turned)
+    lamp = Canvas((size, size), Solids(centre, solids.radius * scale, start, end, girth, *blank))
+    grazing = 1.0 - np.clip(normal @ forward.astype(np.float32), 0.0, 1.0)
+    lifted = (point + normal * (0.02 * radius + (1.0 + 2.0 * grazing[:, None]) / scale)) @ (frame.T * scale).astype(np.float32)
     soft = max(0.10 * radius * scale, 0.75)
     seen = np.zeros(len(point), np.float32)
     taps = [(np.sqrt((k + 0.5) / 8), 2.399963 * k) for k in range(8)]
-    z = lifted[:, 2] + 0.05 * radius * scale
+    z = lifted[:, 2] + 0.5
     for away, angle in taps:
         column = (lifted[:, 0] + (size / 2 + soft * away * np.cos(angle))).astype(np.int32)
         row = (lifted[:, 1] + (size / 2 + soft * away * np.sin(angle))).astype(np.int32)

@@ -143,6 +143,19 @@ def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=FAINT)
 
 
+def draw_contacts(axes: Axes, ledger: Any, time: Unit) -> None:
+    """Contacts of the moment, and how many were made and broken since the start."""
+    t = ledger["time"] / time.size
+    style = _marks(t)
+    drawn = {"contacts": ("there are", BLUE), "made": ("made so far", GREEN), "broken": ("broken so far", RED)}
+    for name, (label, colour) in drawn.items():
+        axes.plot(t, ledger[name], color=colour, label=label, linewidth=1.9 if name == "contacts" else 1.2, **style)
+    axes.set_ylim(0.0, max(1.08 * max(float(ledger[name].max()) for name in drawn), 4.0))
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axes.set_ylabel("contacts")
+    legend_above(axes)
+
+
 def draw_balance(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """The total, losses included, minus its start: a flat line if the books balance."""
     t = ledger["time"] / time.size

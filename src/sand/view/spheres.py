@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .light import Lamps, shaded
+from .light import NO_SHADOW, Lamps, shaded
 from .style import INK, rgb
 from .trace import Canvas, Solids
 
@@ -122,5 +122,5 @@ def _arrows(balls: Balls, middle: np.ndarray, w: float, colour: np.ndarray) -> R
         np.concatenate([neck, place + half]),
         np.concatenate([np.hstack([narrow, narrow]), np.hstack([wide, point])]),
         np.tile(colour, (2 * len(which), 1)),
-        np.full(2 * len(which), 0.6),
+        np.full(2 * len(which), NO_SHADOW),
     )

@@ -27,6 +27,8 @@ SINGLE = "#B9BDC3"
 """Of grains without a contact."""
 INK, FAINT = "#22262B", "#7A828C"
 """Of text and frames; of notes."""
+PAPER, NIGHT, CHALK, MIST = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
+"""Grounds, light and dark; of text and of notes on the dark one."""
 
 _STYLE = {
     "font.family": "DejaVu Sans",
