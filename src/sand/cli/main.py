@@ -10,10 +10,10 @@ import click
 
 from .. import __version__
 from ..core.errors import SandError
-from . import analyse, build, cite, collide, export, grow, info, options, report, resume, run, scatter
+from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter
 from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
 
-COMMANDS = (run, resume, build, collide, scatter, grow, analyse, export, info, cite)
+COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, export, info, cite)
 """One module per command; each has a `command`."""
 
 

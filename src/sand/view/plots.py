@@ -15,7 +15,6 @@ from ..analysis.books import Books
 from ..analysis.census import size_distribution
 from ..analysis.clusters import cluster_labels
 from ..analysis.quantities import material_names, measured, quantity
-from ..core.constants import BOLTZMANN
 from ..core.errors import BadInput
 from .colouring import DECADES
 from .figure import DPI, RunFigure
@@ -45,11 +44,12 @@ HISTORY = tuple(_DRAW)
 """Figures over time."""
 
 
-def history_figure(books: Books, name: str, dark: bool = False) -> Figure:
+def history_figure(books: Books, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
     """One figure over time, of those in HISTORY.
 
     Args:
         books: rows of a run's ledger.
+        grains: their number; temperature: kinetic, of the start [K]: energies are in N k_B T, in joules if it is 0.
 
     Raises:
         BadInput: there is no row, or a column is missing.
@@ -57,23 +57,15 @@ def history_figure(books: Books, name: str, dark: bool = False) -> Figure:
     if not books.rows:
         raise BadInput("the ledger has no row yet, so that there is nothing to plot over time")
     try:
-        first = books.rows[0]
-        grains = round(first["clusters"] * _grains_per_cluster(first))
-        warm = 2.0 * first["translation"] / (3.0 * grains * BOLTZMANN)
         with styled():
             figure, axes = _figure(SIZE)
             time = time_unit(books)
-            _DRAW[name](axes, books, time, energy_unit(books, warm if np.isfinite(warm) else 0.0, grains))
+            _DRAW[name](axes, books, time, energy_unit(books, temperature, grains))
             draw_time([axes], time, books)
             _darkened(figure, dark)
     except KeyError as error:
         raise BadInput(f"the ledger has no column {error}: it is of another version of SAND") from None
     return figure
-
-
-def _grains_per_cluster(row: dict[str, float]) -> float:
-    """Where all clusters are alike, as at the start of most runs, S is their size."""
-    return row["mean_cluster_size"] if row["mean_cluster_size"] == row["largest_cluster"] else row["largest_cluster"]
 
 
 def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: bool = False) -> Figure:

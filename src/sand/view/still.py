@@ -98,7 +98,7 @@ def still_picture(
     Raises:
         BadInput: one line for each mistake.
     """
-    towards = _checked(colour, bonds, view, size)
+    towards = check_picture(colour, bonds, view, size)
     outside = None if field is None else np.asarray(field, dtype=np.float64)
     scene = scene_of(frame, frame.pair, frame.box, whole)
     scene, key = _painted(scene, frame, colour, outside, arrows)
@@ -120,8 +120,10 @@ def still_picture(
     return figure
 
 
-def _checked(colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]) -> np.ndarray | None:
-    """The direction to the eye, None for the usual one.  Raises BadInput."""
+def check_picture(
+    colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]
+) -> np.ndarray | None:
+    """The direction to the eye, None for the usual one.  Raises BadInput with a line for each mistake."""
     wrong: list[str] = []
     for name, allowed in ((colour, GRAIN_NAMES), (bonds, CONTACT_NAMES)):
         if name is not None:
