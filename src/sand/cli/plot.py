@@ -49,8 +49,8 @@ def command(
 ) -> int:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
-    WHAT is size, energies, losses, contacts, balance, still; or a QUANTITY of grains, whose histogram is drawn: cluster,
-    radius, coordination, speed, spin, alignment (of moments with that of their cluster), field_alignment,
+    WHAT is size, energies, losses, contacts, balance, still; or a QUANTITY of grains, whose histogram is drawn:
+    cluster, radius, coordination, speed, spin, alignment (of moments with that of their cluster), field_alignment,
     kinetic_energy, material.
     """
     from ..files.folder import make_folder, replace_file
@@ -135,6 +135,7 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
     if any(name not in HISTORY for name in names):
         one = _frame(source, frame)
         field = source.run.flux_density(one.time) if source.run is not None and _has_case(source.path) else None
+
     def draw(name: str) -> Any:
         if history is not None and name in HISTORY:
             return history_figure(history[0], name, *history[1:], dark=how["dark"])

@@ -86,7 +86,7 @@ def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) 
         return key.shades(values / one), Key(what.meaning, ((text, key.shades(np.array([high / one]))[0]),))
     log = low > 0.0 and high > DECADES * low
     key = Key(title, low=low / one, high=high / one, log=log)
-    if len(levels) <= FEW and np.all(levels == np.round(levels)):
+    if what.unit == "1" and len(levels) <= FEW and np.all(levels == np.round(levels)):
         shades = key.shades(levels)
         key = Key(title, tuple((f"{v:g}", shade) for v, shade in zip(levels, shades, strict=True)))
         return shades[np.searchsorted(levels, np.where(np.isfinite(values), values, low))], key

@@ -115,7 +115,7 @@ def _shade(canvas: Canvas, finer: int, radius: float) -> tuple[np.ndarray, np.nd
     lamp = np.ones(there.shape, np.float32)
     lamp[there] = _lamp(canvas.solids, point, normal, finer, radius)
     weight = np.maximum(uniform_filter(there.astype(np.float32), PATTERN), 1e-3)
-    return tuple(uniform_filter(np.where(there, each, 0.0), PATTERN) / weight for each in (dim, lamp))  # type: ignore
+    return tuple(uniform_filter(np.where(there, each, 0.0), PATTERN) / weight for each in (dim, lamp))
 
 
 def _hidden(depth: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
@@ -162,7 +162,9 @@ def _lamp(solids: Solids, point: np.ndarray, normal: np.ndarray, finer: int, rad
     frame = np.array([right, np.cross(forward, right), forward])
     shown = solids.lit[len(solids.radius) :] > NO_SHADOW
     turned = [p @ frame.T for p in (solids.centre, solids.start[shown], solids.end[shown])]
-    reach = 2.0 * (max(float(np.abs(p[:, :2]).max(initial=0.0)) for p in turned) + float(solids.radius.max(initial=0.0)))
+    reach = 2.0 * (
+        max(float(np.abs(p[:, :2]).max(initial=0.0)) for p in turned) + float(solids.radius.max(initial=0.0))
+    )
     scale = min(1.0 / finer, LARGEST_MAP / (reach + 1.0))
     size = int(reach * scale) + 8
     girth = solids.girth[shown] * scale
@@ -170,7 +172,9 @@ def _lamp(solids: Solids, point: np.ndarray, normal: np.ndarray, finer: int, rad
     centre, start, end = (p * scale for p in turned)
     lamp = Canvas((size, size), Solids(centre, solids.radius * scale, start, end, girth, *blank))
     grazing = 1.0 - np.clip(normal @ forward.astype(np.float32), 0.0, 1.0)
-    lifted = (point + normal * (0.02 * radius + (1.0 + 2.0 * grazing[:, None]) / scale)) @ (frame.T * scale).astype(np.float32)
+    lifted = (point + normal * (0.02 * radius + (1.0 + 2.0 * grazing[:, None]) / scale)) @ (frame.T * scale).astype(
+        np.float32
+    )
     soft = max(0.10 * radius * scale, 0.75)
     seen = np.zeros(len(point), np.float32)
     taps = [(np.sqrt((k + 0.5) / 8), 2.399963 * k) for k in range(8)]

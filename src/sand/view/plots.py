@@ -104,7 +104,7 @@ def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
     shown = values / one
     axes.set(xlabel=f"{meaning} ({prefixed})" if prefixed else meaning, ylabel="grains")
     levels = np.unique(shown)
-    if len(levels) <= 40 and np.all(levels == np.round(levels)):
+    if unit == "1" and len(levels) <= 40 and np.all(levels == np.round(levels)):
         _bars(axes, *np.unique(shown, return_counts=True))
         return
     low, high = float(shown.min()), float(shown.max())
@@ -116,7 +116,7 @@ def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
         edges = np.geomspace(low, high, bins + 1)
     else:
         edges = np.linspace(low, high, bins + 1)
-    axes.hist(shown, edges, color=BLUE, edgecolor="white", linewidth=0.4)
+    axes.hist(shown, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
 
 
 def _bars(axes: Axes, places: np.ndarray, numbers: np.ndarray) -> None:

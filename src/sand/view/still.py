@@ -138,7 +138,9 @@ def check_picture(
         try:
             towards = [float(part) for part in view.split(",")]
         except ValueError:
-            wrong.append(f"there is no view '{view}'; {did_you_mean(view, tuple(VIEWS))} Or three numbers: '1,-2,0.5'")
+            wrong.append(
+                f"there is no view '{view}'; {did_you_mean(view, tuple(VIEWS))} (or three numbers: '1,-2,0.5')"
+            )
     if towards is not None:
         numbers = np.asarray(towards, dtype=np.float64)
         if numbers.shape != (3,) or not np.isfinite(numbers).all() or not 0.0 < np.linalg.norm(numbers) < 1e9:
@@ -148,9 +150,7 @@ def check_picture(
     return None if towards is None else np.asarray(towards, dtype=np.float64)
 
 
-def _painted(
-    scene: Scene, frame: Any, name: str, field: np.ndarray | None, arrows: bool
-) -> tuple[Scene, Key | None]:
+def _painted(scene: Scene, frame: Any, name: str, field: np.ndarray | None, arrows: bool) -> tuple[Scene, Key | None]:
     """The scene with grains of the quantity's colours, and the key to them."""
     values = measured(frame, name, field)[scene.number]
     colours, key = coloured(values, quantity(name), frame, scene.label)

@@ -54,12 +54,14 @@ def _bar(figure: Figure, key: Key, top: float, tall: float, grow: float, ink: st
     axes = figure.add_axes((COLUMN, top - tall, 0.013, tall), label="bar")
     norm = (LogNorm if key.log else Normalize)(key.low, key.high)
     bar = figure.colorbar(ScalarMappable(norm, key.map or SEQUENTIAL), cax=axes)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     bar.locator = LogLocator(subs=(1.0, 2.0, 5.0), numticks=8) if key.log else MaxNLocator(6)
     bar.formatter = FuncFormatter(lambda value, _: f"{value:.4g}".replace("-", "−"))
     bar.update_ticks()
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(labelsize=8.0 * grow, colors=ink, width=0.7 * grow, length=3.0 * grow, pad=3.0 * grow, which="both")
+    axes.tick_params(
+        labelsize=8.0 * grow, colors=ink, width=0.7 * grow, length=3.0 * grow, pad=3.0 * grow, which="both"
+    )
     return top - tall
 
 
@@ -76,11 +78,11 @@ def draw_directions(
         if np.hypot(*step) > 0.05:
             axes.plot([0.0, step[0]], [0.0, step[1]], color=faint, linewidth=1.1 * grow)
             far = step * (1.0 + 0.32 / np.hypot(*step))
-            axes.text(*far, name, color=faint, size=8.0 * grow, ha="center", va="center")
+            axes.text(far[0], far[1], name, color=faint, size=8.0 * grow, ha="center", va="center")
     if field is not None and np.linalg.norm(field) > 0.0:
         flat = (rotation @ field)[:2] / np.linalg.norm(field)
         colour = BLUE if ink.startswith("#2") else "#7CC4F5"
         style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6 * grow, "mutation_scale": 9.0 * grow}
         axes.annotate("", tuple(1.15 * flat), tuple(-0.0 * flat), arrowprops={**style, "shrinkA": 0.0, "shrinkB": 0.0})
         far = flat * (1.15 + 0.3 / max(float(np.hypot(*flat)), 0.3))
-        axes.text(*far, "B", color=colour, size=8.5 * grow, ha="center", va="center", weight="bold")
+        axes.text(far[0], far[1], "B", color=colour, size=8.5 * grow, ha="center", va="center", weight="bold")

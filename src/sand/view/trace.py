@@ -1,7 +1,8 @@
 """What each point of a picture shows: balls and rods met by rays, the nearest one wins.
 
 Eye coordinates in samples: x to the right, y up, z towards the eye, the origin in the middle of the picture.  A ray
-through (X, Y, 0) holds the points (X(1 − wz), Y(1 − wz), z); w is one over the distance of the eye, 0 for parallel rays.
+through (X, Y, 0) holds the points (X(1 − wz), Y(1 − wz), z); w is one over the distance of the eye, 0 for parallel
+rays.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Canvas:
         for items, tile in _squares(shape, *_rod_windows(self), solids.start[:, 2]):
             self._put(_near_the_axis(self, items, tile), tile, self._rods, len(solids.radius))
 
-    def _put(self, items: np.ndarray, tile: int, meet, first: int) -> None:  # type: ignore[no-untyped-def]
+    def _put(self, items: np.ndarray, tile: int, meet, first: int) -> None:
         """Squares `items` (K, 3): which shape, lowest column and row."""
         flat, (height, width) = self.nearest.reshape(-1), self.shape
         step, many = np.arange(tile), max(MOST_SAMPLES // tile**2, 1)
@@ -159,8 +160,8 @@ class Canvas:
         return self.nearest > 0
 
 
-def _slanted(m0, m1, m2, m3, m5, dd, first, second):  # type: ignore[no-untyped-def]
-    """Where rays meet the side of a cone, from products of axis, ray and way to the first end; NaN where they do not."""
+def _slanted(m0, m1, m2, m3, m5, dd, first, second):
+    """Where rays meet the side of a cone, from products of axis, ray and way to the first end; NaN: nowhere."""
     narrow = first - second
     h = m0 + narrow * narrow
     k2 = m0 * m0 * dd - m2 * m2 * h
@@ -225,4 +226,7 @@ def _squares(
         which = np.repeat(own, across * along)
         number = np.arange(len(which)) - np.repeat(np.cumsum(across * along) - across * along, across * along)
         wide = np.repeat(across, across * along)
-        yield np.column_stack([which, first[which] + tile * np.column_stack([number % wide, number // wide])]), int(tile)
+        yield (
+            np.column_stack([which, first[which] + tile * np.column_stack([number % wide, number // wide])]),
+            int(tile),
+        )
