@@ -86,7 +86,7 @@ def _coloured(
     soft = np.clip(0.3 + 0.7 * (normal @ key), 0.0, 1.0)  # light creeps round the edge
     half = key + np.array([0.0, 0.0, 1.0], dtype=np.float32)
     glint = np.maximum(normal @ (half / np.linalg.norm(half)), 0.0) ** 48 * lamp
-    power = lamps.sky * (0.86 + 0.14 * normal[:, 1]) * dim + lamps.fill * np.maximum(normal @ fill, 0.0) * dim
+    power = lamps.sky * (0.80 + 0.20 * normal[:, 1]) * dim + lamps.fill * np.maximum(normal @ fill, 0.0) * dim
     power += lamps.key * (0.45 * soft * dim * (0.6 + 0.4 * lamp) + 0.55 * facing * lamp)
     lit = canvas.solids.lit[which].astype(np.float32)
     base = canvas.solids.colour[which].astype(np.float32)

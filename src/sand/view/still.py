@@ -31,8 +31,8 @@ VIEWS: dict[str, tuple[float, float, float] | None] = {
 """Directions to the eye."""
 LEAST_SIZE, MOST_SIZE = 200, 8000
 """Pixels along an edge."""
-DAY_LAMPS = Lamps(haze=0.42)
-NIGHT_LAMPS = Lamps(sky=0.50, key=0.62, glint=0.24, haze=0.55, background=tuple(rgb(NIGHT)))
+DAY_LAMPS = Lamps(haze=0.26)
+NIGHT_LAMPS = Lamps(sky=0.64, key=0.66, glint=0.24, haze=0.45, background=tuple(rgb(NIGHT)))
 COLLAR = 0.52
 """Radius of what marks a contact, in radii of the smaller grain; half its length is 0.4 of that."""
 FEW_GRAINS = 3000
