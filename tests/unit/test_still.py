@@ -224,9 +224,9 @@ def test_a_colour_leads_back_to_its_number():
     picture = still_picture(frame, colour="speed", view="front", size=(500, 300))
     bar = next(axes for axes in picture.axes if axes.get_label() == "bar")
     assert bar.get_ylim() == pytest.approx((2.0, 10.0), rel=1e-6, abs=0.0)
-    from sand.view.colouring import Key
+    from sand.view.colouring import SEQUENTIAL
 
-    expected = Key("", low=2.0, high=10.0).shades(np.arange(2.0, 11.0, 2.0))
+    expected = SEQUENTIAL(np.linspace(0.0, 1.0, 5))[:, :3]
     for k in range(5):
         x, y = at_pixel(picture, frame.position[k])
         assert alike(picture.grains_only[int(y) : int(y) + 2, int(x) : int(x) + 2], expected[k]).all()
