@@ -17,7 +17,7 @@ from sand.run.ledger import Ledger
 from sand.view.figure import LARGEST_FILE, png, run_figure, save, show
 from sand.view.panels import energy_unit, time_unit
 from sand.view.scene import camera, scene_of, side_by_side, view_window
-from sand.view.spheres import FINER, Balls, arrow_covers, draw
+from sand.view.spheres import FINER, Balls, draw
 from sand.view.style import pretty, round_length, with_prefix
 
 
@@ -223,12 +223,19 @@ def test_clusters_can_be_told_apart():
 
 def test_arrows_point_along_moments():
     """An arrow is wider towards its head than at its tail; along the line of sight it is a dot."""
-    x, y = np.meshgrid(np.linspace(-1.2, 1.2, 121), np.linspace(-1.2, 1.2, 121))
-    covered = arrow_covers(x, y, np.array([0.9, 0.0]))
-    assert covered[:, 75].sum() > 2 * covered[:, 45].sum() > 0  # x = ±0.3
-    assert covered[60, 103] and not covered[60, 107] and covered[60, 17] and not covered[60, 13]
-    dot = arrow_covers(x, y, np.zeros(2))
-    assert dot[60, 60] and not dot[np.hypot(x, y) > 0.3].any()
+    bare = Balls(np.zeros((1, 3)), np.ones(1), np.ones((1, 3)), np.zeros((1, 3)))
+
+    def covered(half):
+        with_arrow = Balls(bare.centre, bare.radius, bare.colour, np.array([half]))
+        window = (-1.2, 1.2, -1.2, 1.2)
+        return np.abs(draw(with_arrow, window, 120, 120) - draw(bare, window, 120, 120))[..., :3].max(axis=2) > 0.3
+
+    arrow = covered([0.9, 0.0, 0.0])
+    assert arrow[:, 75].sum() > 2 * arrow[:, 45].sum() > 0  # x = ±0.3
+    assert arrow[60, 102] and not arrow[60, 107] and arrow[60, 17] and not arrow[60, 13]
+    dot = covered([0.0, 0.0, 0.9])
+    x, y = np.meshgrid(np.linspace(-1.19, 1.19, 120), np.linspace(-1.19, 1.19, 120))
+    assert dot[60, 60] and not dot[np.hypot(x, y) > 0.4].any()
 
 
 def test_arrows_are_in_proportion(grown):

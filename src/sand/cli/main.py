@@ -10,10 +10,10 @@ import click
 
 from .. import __version__
 from ..core.errors import SandError
-from . import analyse, build, cite, collide, export, grow, info, options, report, resume, run, scatter, view
+from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
 from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
 
-COMMANDS = (run, resume, build, collide, scatter, grow, analyse, view, export, info, cite)
+COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
 """One module per command; each has a `command`."""
 
 

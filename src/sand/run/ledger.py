@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.books import LOSSES, Books, dissipated_in
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..core.constants import BOLTZMANN
 from ..core.errors import BadInput
 from ..core.grains import Grains
-from ..core.world import BROKEN, CONTACTS, LOST, MADE, MOVED, World
+from ..core.world import BROKEN, CONTACTS, MADE, MOVED, World
 from ..kernels.measure import ENERGIES, measure_energies
 
 MAGNETIC = "magnetic"
 """A column that every ledger has, with dipoles or without."""
-LOSSES = tuple(f"lost_{name}" for name in LOST)
 RUNAWAY = 0.5
 """Change of the total over all energies of the moment and all dissipated, at which a run is stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
@@ -55,16 +55,6 @@ def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, 
     return row
 
 
-def dissipated_in(row: dict[str, float]) -> float:
-    """Energy dissipated up to a row [J], forming included.
-
-    What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took more
-    than it gave.
-    """
-    channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
-    return math.fsum([*(row[name] for name in channels), max(row["lost_gas"], 0.0)])
-
-
 def kinetic_energies(grains: Grains) -> np.ndarray:
     """½mv² + ½Iω² of each grain (N,) [J]."""
     moving = grains.mass * (grains.velocity**2).sum(axis=1)
@@ -78,7 +68,7 @@ def momenta(grains: Grains) -> list[float]:
     return [*p.sum(axis=0).tolist(), *angular.sum(axis=0).tolist()]
 
 
-class Ledger:
+class Ledger(Books):
     """The rows written so far, oldest first.
 
     Args:
@@ -87,8 +77,7 @@ class Ledger:
 
     def __init__(self, forces: Sequence[str] = ()):
         others = [name for name in forces if name != MAGNETIC]
-        self.columns = ("step", "time", *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS)
-        self.rows: list[dict[str, float]] = []
+        super().__init__(("step", "time", *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS))
 
     def add(self, row: dict[str, float]) -> bool:
         """Append a row; False if this step is in the books already."""
@@ -116,28 +105,6 @@ class Ledger:
     def restore(self, rows: Iterable[dict[str, float]]) -> None:
         """Take over the rows of a ledger file."""
         self.rows = list(rows)
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __getitem__(self, column: str) -> np.ndarray:
-        """One column over time."""
-        return np.array([row[column] for row in self.rows])
-
-    def _change(self) -> float:
-        return abs(self.rows[-1]["total"] - self.rows[0]["total"]) if self.rows else 0.0
-
-    @property
-    def dissipated(self) -> float:
-        """Energy dissipated so far [J], forming included, see `dissipated_in`; 0 without a row."""
-        return dissipated_in(self.rows[-1]) if self.rows else 0.0
-
-    @property
-    def drift(self) -> float:
-        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy of any row)."""
-        largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
-        scale = self.dissipated + largest
-        return self._change() / scale if scale > 0.0 else 0.0
 
     def runs_away(self, row: dict[str, float]) -> bool:
         """True if more than half of all energy that this row has, or dissipated, came from nowhere.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ..setup.frame import from_frame
 from .case import read_case
 from .simulation import Simulation
 from .told import view_folder
+
+if TYPE_CHECKING:
+    from ..view.still import Still
 
 
 class Opened:
@@ -94,6 +97,28 @@ class Opened:
             BadInput: there is no frame yet, or the trajectory is broken.
         """
         return view_folder(self.folder, path, lambda: self.at(-1).figure())
+
+    def flux_density(self, time: float) -> np.ndarray | None:
+        """Of all outside magnetic fields of the case at a time [s], (3,) [T]; None without any.  Raises BadInput."""
+        forces = read_case(self.folder / files.CASE).forces.build()
+        fields = [force.flux_density_at(time) for force in forces if hasattr(force, "flux_density_at")]
+        return np.sum(fields, axis=0) if fields else None
+
+    def picture(self, frame: int = -1, **how: Any) -> Still:
+        """A still picture of a frame, with the outside field of the case; it shows itself in a notebook.
+
+        Args:
+            how: see `view.still.still_picture`: colour, bonds, arrows, view, size, dark, transparent, cluster, …
+
+        Raises:
+            BadInput: no such frame, an unknown quantity or view, one line for each mistake.
+        """
+        from ..view.still import still_picture
+
+        one = self.frames[frame]
+        if "field" not in how and (self.folder / files.CASE).exists():
+            how["field"] = self.flux_density(one.time)
+        return still_picture(one, **how)
 
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.

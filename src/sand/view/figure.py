@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image  # comes with matplotlib
 
+from ..analysis.quantities import material_names
 from ..core.box import Box
-from ..core.grains import Grains
 from ..files.folder import replace_file
 from .panels import (
     draw_balance,
@@ -76,7 +76,8 @@ def run_figure(simulation: Simulation) -> Figure:
 
 
 def _draw_headline(figure: Figure, simulation: Simulation) -> None:
-    figure.text(_EDGE, 0.968, headline(simulation), size=10.5, weight="bold", va="center")
+    told = headline(simulation.grains, simulation.box, simulation.time)
+    figure.text(_EDGE, 0.968, told, size=10.5, weight="bold", va="center")
     if not simulation.ledger.rows:
         return
     last = simulation.ledger.rows[-1]
@@ -96,20 +97,19 @@ def _count(number: float) -> str:
     return f"{number:.0f}" if number >= 100.0 else f"{number:.3g}"
 
 
-def headline(simulation: Simulation) -> str:
+def headline(grains: Any, box: Box, time: float) -> str:
     """Who is where, and how old: '100 grains of iron, r = 10 nm, periodic box 1.2 µm, t = 5 µs'."""
-    grains = simulation.grains
     parts = [
         f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {_materials(grains)}",
         f"r = {_span(grains.radius)}",
-        _describe(simulation.box),
-        f"t = {pretty(simulation.time, 's')}",
+        _describe(box),
+        f"t = {pretty(time, 's')}",
     ]
     return ",  ".join(parts)
 
 
-def _materials(grains: Grains) -> str:
-    names = [material.name for material in grains.materials]
+def _materials(grains: Any) -> str:
+    names = material_names(grains)
     return ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
 
 

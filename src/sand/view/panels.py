@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
+from ..analysis.books import LOSSES
 from ..core.constants import BOLTZMANN
 from ..core.world import LOST
 from .style import (
@@ -28,7 +29,6 @@ from .style import (
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
-LOSSES = tuple(f"lost_{name}" for name in LOST)
 LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, INK, FAINT)
 OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 
@@ -141,6 +141,19 @@ def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     tiny = ", ".join(name for name, values in channels.items() if name not in drawn and peak(values))
     note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)
     axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=FAINT)
+
+
+def draw_contacts(axes: Axes, ledger: Any, time: Unit) -> None:
+    """Contacts of the moment, and how many were made and broken since the start."""
+    t = ledger["time"] / time.size
+    style = _marks(t)
+    drawn = {"contacts": ("there are", BLUE), "made": ("made so far", GREEN), "broken": ("broken so far", RED)}
+    for name, (label, colour) in drawn.items():
+        axes.plot(t, ledger[name], color=colour, label=label, linewidth=1.9 if name == "contacts" else 1.2, **style)
+    axes.set_ylim(0.0, max(1.08 * max(float(ledger[name].max()) for name in drawn), 4.0))
+    axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
+    axes.set_ylabel("contacts")
+    legend_above(axes)
 
 
 def draw_balance(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, unwrapped
 from ..core.box import Box
-from ..core.grains import Grains
 from .spheres import Balls, draw
 from .style import BIG, FAINT, INK, SINGLE, SMALL, pretty, rgb, round_length
 
@@ -20,11 +20,17 @@ LARGEST_SHOWN = 3
 """Clusters shown by themselves."""
 
 
-def camera() -> np.ndarray:
-    """(3, 3): rows are the directions right, up and towards the eye in the laboratory frame."""
+def camera(towards: np.ndarray | None = None) -> np.ndarray:
+    """(3, 3): rows are the directions right, up and towards the eye in the laboratory frame.
+
+    Args:
+        towards: (3,) direction to the eye, of any length but 0; from above, y is up.
+    """
     a, e = np.radians(AZIMUTH), np.radians(ELEVATION)
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    eye = eye if towards is None else np.asarray(towards, dtype=np.float64) / np.linalg.norm(towards)
+    across = np.hypot(eye[0], eye[1])
+    right = np.array([-eye[1], eye[0], 0.0]) / across if across > 1e-9 else np.array([1.0, 0.0, 0.0])
     return np.array([right, np.cross(eye, right), eye])
 
 
@@ -39,6 +45,7 @@ class Scene:
         colour: (N, 3).
         arrow: (N, 3) direction of the moment times its share of the largest one's size.
         box: with lengths [m].
+        number: (N,) of each grain in what the scene was made from.
     """
 
     position: np.ndarray
@@ -47,6 +54,7 @@ class Scene:
     colour: np.ndarray
     arrow: np.ndarray
     box: Box
+    number: np.ndarray
 
     def seen(self, rotation: np.ndarray, chosen: slice | np.ndarray = slice(None)) -> Balls:
         """The chosen grains in screen coordinates; rows of `rotation` are right, up, to the eye."""
@@ -68,6 +76,19 @@ class Scene:
                 low[axis], high[axis] = -length / 2, length / 2
         return np.array(list(itertools.product(*zip(low, high, strict=True)))).reshape(2, 2, 2, 3)
 
+    def edges(self) -> list[tuple[np.ndarray, np.ndarray, int, bool]]:
+        """The twelve edges of the box: two ends (3,) [m], axis, and whether they meet in the farthest corner."""
+        corners = self.corners()
+        if corners is None:
+            return []
+        far = np.unravel_index(np.argmin(corners @ camera()[2]), (2, 2, 2))
+        found = []
+        for axis, *others in itertools.product(range(3), (0, 1), (0, 1)):
+            start = [*others[:axis], 0, *others[axis:]]
+            end = [*others[:axis], 1, *others[axis:]]
+            found.append((corners[tuple(start)], corners[tuple(end)], axis, far in (tuple(start), tuple(end))))
+        return found
+
     def largest(self) -> list[int]:
         """Labels of clusters of at least two grains, the largest first."""
         sizes = cluster_sizes(self.label)
@@ -75,23 +96,31 @@ class Scene:
         return [int(k) for k in order if sizes[k] > 1]
 
 
-def scene_of(grains: Grains, pairs: np.ndarray, box: Box) -> Scene:
-    """The scene of grains with contacts `pairs` (C, 2); grains whose place is not a number are left out."""
+def scene_of(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> Scene:
+    """The scene of grains with contacts `pairs` (C, 2); grains whose place is not a number are left out.
+
+    Args:
+        grains: anything with position, radius and moment.
+        whole: clusters are not cut by the faces of the box; otherwise every grain lies inside it.
+    """
     label = cluster_labels(len(grains), pairs)
     place = np.where(np.isfinite(grains.position), grains.position, np.nan)
-    position = unwrapped(box.wrap(place), pairs, box)
-    sizes = cluster_sizes(label)
-    middle = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
-    position = position + (box.wrap(middle) - middle)[label]
+    position = box.wrap(place)
+    if whole:
+        position = unwrapped(position, pairs, box)
+        sizes = cluster_sizes(label)
+        middle = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
+        position = position + (box.wrap(middle) - middle)[label]
     there = np.isfinite(position).all(axis=1)
     numbered = np.unique(label[there], return_inverse=True)[1]
     return Scene(
         position[there],
         grains.radius[there],
         numbered,
-        _colours(numbered),
+        cluster_colours(numbered),
         _arrows(grains.moment[there]),
         box,
+        np.flatnonzero(there),
     )
 
 
@@ -104,7 +133,7 @@ def _arrows(moment: np.ndarray) -> np.ndarray:
     return 0.9 * share * moment / np.where(size > 0.0, size, 1.0)
 
 
-def _colours(label: np.ndarray) -> np.ndarray:
+def cluster_colours(label: np.ndarray) -> np.ndarray:
     """(N, 3): a colour of its own for each of the largest clusters, grey for single grains."""
     sizes = cluster_sizes(label)
     of_cluster = np.tile(rgb(SINGLE), (sizes.size, 1))
@@ -115,12 +144,15 @@ def _colours(label: np.ndarray) -> np.ndarray:
     return of_cluster[label]
 
 
-def view_window(scene: Scene, wide: float, margin: float = 0.02) -> tuple[float, float, float, float]:
+def view_window(
+    scene: Scene, wide: float, margin: float = 0.02, rotation: np.ndarray | None = None
+) -> tuple[float, float, float, float]:
     """Left, right, bottom, top [m] that hold the grains and the box; `wide` is width over height."""
-    left, right, bottom, top = scene.seen(camera()).bounds
+    rotation = camera() if rotation is None else rotation
+    left, right, bottom, top = scene.seen(rotation).bounds
     corners = scene.corners()
     if corners is not None:
-        flat = corners.reshape(-1, 3) @ camera().T
+        flat = corners.reshape(-1, 3) @ rotation.T
         left, right = min(left, flat[:, 0].min()), max(right, flat[:, 0].max())
         bottom, top = min(bottom, flat[:, 1].min()), max(top, flat[:, 1].max())
     return widened((left, right, bottom, top), wide, margin, least=5.0 * float(scene.radius.max()))
@@ -140,9 +172,7 @@ def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     """All grains in their box, with a scale bar and the directions of the axes."""
     window = view_window(scene, pixels[0] / pixels[1])
     _show(axes, scene.seen(camera()), window, pixels)
-    corners = scene.corners()
-    if corners is not None:
-        _draw_box(axes, corners, scene.box)
+    _draw_box(axes, scene)
     _draw_directions(axes)
     draw_scale_bar(axes)
 
@@ -160,28 +190,20 @@ def _show(axes: Axes, balls: Balls, window: tuple[float, float, float, float], p
     axes.set_axis_off()
 
 
-def _draw_box(axes: Axes, corners: np.ndarray, box: Box) -> None:
+def _draw_box(axes: Axes, scene: Scene) -> None:
     """The twelve edges; the three that meet in the farthest corner lie behind the grains."""
-    flat = corners @ camera().T
-    far = np.unravel_index(np.argmin(flat[..., 2]), (2, 2, 2))
-    for axis in range(3):
-        for others in itertools.product((0, 1), repeat=2):
-            start = list(others)
-            start.insert(axis, 0)
-            end = list(start)
-            end[axis] = 1
-            behind = tuple(start) == far or tuple(end) == far
-            line = np.array([flat[tuple(start)], flat[tuple(end)]])
-            axes.plot(
-                line[:, 0],
-                line[:, 1],
-                color=FAINT,
-                linewidth=0.6 if behind else 0.8,
-                alpha=0.55 if behind else 0.75,
-                linestyle="-" if box.lengths[axis] is not None else (0, (1.5, 3)),
-                zorder=1 if behind else 3,
-                gid="box",
-            )
+    for start, end, axis, behind in scene.edges():
+        line = np.array([start, end]) @ camera().T
+        axes.plot(
+            line[:, 0],
+            line[:, 1],
+            color=FAINT,
+            linewidth=0.6 if behind else 0.8,
+            alpha=0.55 if behind else 0.75,
+            linestyle="-" if scene.box.lengths[axis] is not None else (0, (1.5, 3)),
+            zorder=1 if behind else 3,
+            gid="box",
+        )
 
 
 def _draw_directions(axes: Axes) -> None:

@@ -27,6 +27,8 @@ SINGLE = "#B9BDC3"
 """Of grains without a contact."""
 INK, FAINT = "#22262B", "#7A828C"
 """Of text and frames; of notes."""
+PAPER, NIGHT, CHALK, MIST = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
+"""Grounds, light and dark; of text and of notes on the dark one."""
 ON_DARK = {
     BLUE: "#5AA9E6",
     RED: "#F08A4B",
@@ -35,8 +37,8 @@ ON_DARK = {
     ORANGE: "#F0B94A",
     SKY: "#8FD0F2",
     YELLOW: "#E8DA4F",
-    INK: "#E4E8EC",
-    FAINT: "#939CA6",
+    INK: CHALK,
+    FAINT: MIST,
 }
 """The same colours where the ground is dark."""
 

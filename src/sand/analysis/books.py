@@ -1,0 +1,57 @@
+"""The rows of a ledger, of a run that goes on or of one that is read: columns over time, what they add up to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ..core.world import LOST
+
+LOSSES = tuple(f"lost_{name}" for name in LOST)
+
+
+def dissipated_in(row: dict[str, float]) -> float:
+    """Energy dissipated up to a row [J], forming included.
+
+    What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took more
+    than it gave.
+    """
+    channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
+    return math.fsum([*(row[name] for name in channels), max(row["lost_gas"], 0.0)])
+
+
+class Books:
+    """Rows, oldest first, and their columns by name.
+
+    Args:
+        columns: names, in the order of the file.
+        rows: each a number for every column.
+    """
+
+    def __init__(self, columns: Sequence[str], rows: Iterable[dict[str, float]] = ()):
+        self.columns = tuple(columns)
+        self.rows: list[dict[str, float]] = list(rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, column: str) -> np.ndarray:
+        """One column over time."""
+        return np.array([row[column] for row in self.rows])
+
+    def _change(self) -> float:
+        return abs(self.rows[-1]["total"] - self.rows[0]["total"]) if self.rows else 0.0
+
+    @property
+    def dissipated(self) -> float:
+        """Energy dissipated so far [J], forming included, see `dissipated_in`; 0 without a row."""
+        return dissipated_in(self.rows[-1]) if self.rows else 0.0
+
+    @property
+    def drift(self) -> float:
+        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy of any row)."""
+        largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
+        scale = self.dissipated + largest
+        return self._change() / scale if scale > 0.0 else 0.0

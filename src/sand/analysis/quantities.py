@@ -1,0 +1,160 @@
+"""What each grain, and each contact, of a frame can be told by: one table for pictures, histograms and viewers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.errors import BadInput, did_you_mean
+from .clusters import cluster_labels, cluster_sizes
+from .magnetism import aggregate_moments
+from .shape import coordination
+
+MODES = ("within its limits", "stretch", "slide", "roll", "twist")
+"""Of `mode`: which way a contact has reached what it can bear."""
+AT_LIMIT = 0.999
+"""Share of what a contact can bear from which a mode is at its limit; a clamp holds it at 1 but for rounding."""
+
+
+class Quantity(NamedTuple):
+    """One number per grain, or per contact.
+
+    `of(frame, field)` gives them, NaN where there is none; `field` is the flux density of outside [T] (3,) or None.
+    """
+
+    name: str
+    unit: str  # "1" for pure numbers
+    meaning: str
+    kind: str  # "sequential", "diverging" about zero, "categorical": whole numbers
+    of: Callable[[Any, np.ndarray | None], np.ndarray]
+    missing: str  # why there is none, where all are NaN
+
+
+def cluster_rank(count: int, pairs: np.ndarray) -> np.ndarray:
+    """The cluster of each grain (N,), counted from the largest, 0; of equal ones that with the lowest grain first."""
+    labels = cluster_labels(count, pairs)
+    order = np.argsort(-cluster_sizes(labels), kind="stable")
+    return np.argsort(order, kind="stable")[labels]
+
+
+def material_names(frame: Any) -> list[str]:
+    """Names that `material` counts in."""
+    return [str(getattr(one, "name", one)) for one in frame.materials]
+
+
+def _size(vectors: Any) -> np.ndarray:
+    return np.linalg.norm(np.asarray(vectors, dtype=np.float64), axis=1)
+
+
+def _kinetic(frame: Any, _: np.ndarray | None) -> np.ndarray:
+    mass = np.asarray(frame.mass, dtype=np.float64)
+    inertia = 0.4 * mass * np.asarray(frame.radius, dtype=np.float64) ** 2
+    return np.asarray(0.5 * (mass * _size(frame.velocity) ** 2 + inertia * _size(frame.spin) ** 2))
+
+
+def _cosine(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
+    sizes = _size(vectors) * _size(others)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        product = (np.asarray(vectors, float) * others).sum(axis=1) / sizes
+    return np.where(sizes > 0.0, np.clip(product, -1.0, 1.0), np.nan)
+
+
+def _alignment(frame: Any, _: np.ndarray | None) -> np.ndarray:
+    labels = cluster_labels(len(frame.radius), frame.pair)
+    sums, aligned = aggregate_moments(frame.moment, labels)
+    return _cosine(frame.moment, np.where(aligned[:, None] > 1e-9, sums, 0.0)[labels])
+
+
+def _field_alignment(frame: Any, field: np.ndarray | None) -> np.ndarray:
+    direction = np.zeros(3) if field is None else np.asarray(field, dtype=np.float64)
+    return _cosine(frame.moment, np.broadcast_to(direction, np.shape(frame.moment)))
+
+
+def _load(frame: Any, _: np.ndarray | None) -> np.ndarray:
+    i, j = np.asarray(frame.pair, dtype=np.int64).reshape(-1, 2).T
+    normal = frame.box.nearest(frame.position[i] - frame.position[j])  # from the second to the first
+    size = np.maximum(_size(normal), 1e-300)
+    return np.asarray((np.asarray(frame.force, dtype=np.float64) * normal).sum(axis=1) / size)
+
+
+def _mode(frame: Any, _: np.ndarray | None) -> np.ndarray:
+    share = np.abs(np.asarray(frame.share, dtype=np.float64)).reshape(-1, 4)
+    share[:, 0] = np.asarray(frame.share, dtype=np.float64).reshape(-1, 4)[:, 0]  # pressed is no limit
+    worst = np.argmax(np.where(np.isnan(share), -np.inf, share), axis=1) + 1.0
+    reached = np.max(share, axis=1, initial=-np.inf, where=~np.isnan(share)) >= AT_LIMIT
+    return np.where(np.isnan(share).all(axis=1), np.nan, np.where(reached, worst, 0.0))
+
+
+def _floats(of: Callable[[Any], Any]) -> Callable[[Any, np.ndarray | None], np.ndarray]:
+    return lambda frame, _: np.asarray(of(frame), dtype=np.float64)
+
+
+_MOMENTS = "no grain has a moment"
+GRAINS = (
+    Quantity(
+        "cluster",
+        "1",
+        "cluster",
+        "categorical",
+        _floats(lambda f: cluster_rank(len(f.radius), f.pair)),
+        "",
+    ),
+    Quantity("radius", "m", "radius", "sequential", _floats(lambda f: f.radius), ""),
+    Quantity(
+        "coordination",
+        "1",
+        "contacts",
+        "sequential",
+        _floats(lambda f: coordination(len(f.radius), f.pair)),
+        "",
+    ),
+    Quantity("speed", "m/s", "speed", "sequential", _floats(lambda f: _size(f.velocity)), ""),
+    Quantity("spin", "rad/s", "spin", "sequential", _floats(lambda f: _size(f.spin)), ""),
+    Quantity("alignment", "1", "cosine of moment to that of its cluster", "diverging", _alignment, _MOMENTS),
+    Quantity(
+        "field_alignment",
+        "1",
+        "cosine of moment to field",
+        "diverging",
+        _field_alignment,
+        "no grain has a moment, or there is no outside field",
+    ),
+    Quantity("kinetic_energy", "J", "kinetic energy", "sequential", _kinetic, ""),
+    Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
+)
+"""Of grains (N,)."""
+CONTACTS = (
+    Quantity("load", "N", "normal force, above 0 if pressed", "diverging", _load, "the file holds no forces"),
+    Quantity("mode", "1", "mode at its limit", "categorical", _mode, "the file does not say what contacts bear"),
+)
+"""Of contacts (C,)."""
+GRAIN_NAMES = tuple(one.name for one in GRAINS)
+CONTACT_NAMES = tuple(one.name for one in CONTACTS)
+_BY_NAME: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS)}
+
+
+def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
+    """The quantity of that name.  Raises BadInput."""
+    if name not in allowed:
+        raise BadInput(f"there is no quantity '{name}'; {did_you_mean(name, allowed)}")
+    return _BY_NAME[name]
+
+
+def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarray:
+    """The numbers of a quantity in a frame, SI: (N,) of grains or (C,) of contacts, NaN where there is none.
+
+    Args:
+        frame: of a trajectory, or anything that has its attributes.
+        name: see GRAINS and CONTACTS.
+        field: flux density of outside (3,) [T].
+
+    Raises:
+        BadInput: no such quantity, or the frame has no number for it.
+    """
+    found = quantity(name, GRAIN_NAMES + CONTACT_NAMES)
+    values = found.of(frame, field)
+    if values.size and np.isnan(values).all():
+        raise BadInput(f"{name} is not known: {found.missing or 'no number is finite'}")
+    return values

@@ -1,0 +1,232 @@
+"""What each point of a picture shows: balls and rods met by rays, the nearest one wins.
+
+Eye coordinates in samples: x to the right, y up, z towards the eye, the origin in the middle of the picture.  A ray
+through (X, Y, 0) holds the points (X(1 − wz), Y(1 − wz), z); w is one over the distance of the eye, 0 for parallel
+rays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+EDGES = (4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
+"""Samples along an edge of the squares that shapes are cut into."""
+MOST_SAMPLES = 400_000
+"""Looked at in one go: what bounds the memory."""
+NOTHING = -1
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Balls, then rods: cones cut flat at both ends, cylinders among them.  N balls, M rods, all in samples.
+
+    Attributes:
+        centre, radius: (N, 3), (N,) of balls.
+        start, end, girth: (M, 3), (M, 3), (M, 2) of rods: middles of the two ends, and their radii.
+        colour: (N + M, 3), 0 to 1, balls first.
+        lit: (N + M,) how much light and shade change the colour, 0 to 1.
+    """
+
+    centre: np.ndarray
+    radius: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    girth: np.ndarray
+    colour: np.ndarray
+    lit: np.ndarray
+
+    def depths(self) -> tuple[float, float]:
+        """Lowest and highest z of anything."""
+        thick = self.girth.max(axis=1) if len(self.girth) else np.zeros(0)
+        low = [self.centre[:, 2] - self.radius, np.minimum(self.start, self.end)[:, 2] - thick]
+        high = [self.centre[:, 2] + self.radius, np.maximum(self.start, self.end)[:, 2] + thick]
+        return float(np.concatenate(low).min(initial=0.0)), float(np.concatenate(high).max(initial=0.0))
+
+
+class Canvas:
+    """The nearest shape in each sample of a picture, and how deep it lies there.
+
+    Args:
+        shape: rows and columns; the first row is the lowest.
+        solids: what there is to see.
+        w: one over the distance of the eye; 0: parallel rays.
+    """
+
+    def __init__(self, shape: tuple[int, int], solids: Solids, w: float = 0.0):
+        self.shape, self.solids, self.w = shape, solids, w
+        self.far, near = solids.depths()
+        self.range = max(near - self.far, 1.0) * 1.001
+        # depth in the upper half, shape + 1 in the lower: the larger of two numbers is the nearer of two shapes
+        self.nearest = np.zeros(shape, dtype=np.uint64)
+        for items, tile in _squares(shape, *_ball_windows(self), solids.centre[:, 2]):
+            self._put(items, tile, self._balls, 0)
+        for items, tile in _squares(shape, *_rod_windows(self), solids.start[:, 2]):
+            self._put(_near_the_axis(self, items, tile), tile, self._rods, len(solids.radius))
+
+    def _put(self, items: np.ndarray, tile: int, meet, first: int) -> None:
+        """Squares `items` (K, 3): which shape, lowest column and row."""
+        flat, (height, width) = self.nearest.reshape(-1), self.shape
+        step, many = np.arange(tile), max(MOST_SAMPLES // tile**2, 1)
+        for begin in range(0, len(items), many):
+            which, left, low = items[begin : begin + many][::-1].T
+            columns, rows = left[:, None] + step, low[:, None] + step
+            z = meet(
+                which,
+                (columns + 0.5 - width / 2)[:, None, :],
+                (rows + 0.5 - height / 2)[:, :, None],
+            )
+            inside = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[:, None, :]
+            b, r, c = np.nonzero(np.isfinite(z) & inside)
+            share = np.clip((z[b, r, c] - self.far) / self.range, 1e-30, 1.0).astype(np.float32)
+            key = (share.view(np.uint32).astype(np.uint64) << np.uint64(32)) | (which[b] + first + 1).astype(np.uint64)
+            place = rows[b, r] * width + columns[b, c]
+            front = key > flat[place]
+            while front.any():  # of several numbers for one place the last is kept: look again until it is the largest
+                place, key = place[front], key[front]
+                flat[place] = key
+                front = key > flat[place]
+
+    def _balls(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """z where rays first meet balls, not a number where they do not."""
+        cx, cy, cz = self.solids.centre[which].T[:, :, None, None]
+        radius, w = self.solids.radius[which][:, None, None], self.w
+        ox = ((x * (1.0 - w * cz) - cx) / radius).astype(np.float32)
+        oy = ((y * (1.0 - w * cz) - cy) / radius).astype(np.float32)
+        cz, radius = cz.astype(np.float32), radius.astype(np.float32)
+        with np.errstate(invalid="ignore"):
+            if w == 0.0:
+                return cz + radius * np.sqrt(1.0 - ox * ox - oy * oy)
+            dx, dy = (w * x).astype(np.float32), (w * y).astype(np.float32)
+            long, along = 1.0 + dx * dx + dy * dy, ox * dx + oy * dy
+            root = np.sqrt(along * along - long * (ox * ox + oy * oy - 1.0))
+            return cz + radius * ((along + root) / long)
+
+    def _rods(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """z where rays first meet rods, not a number where they do not."""
+        s, w = self.solids, self.w
+        a, axis = s.start[which], (s.end - s.start)[which]
+        first, second = s.girth[which].T[:, :, None, None]
+        top = np.maximum(a[:, 2], a[:, 2] + axis[:, 2]) + s.girth[which].max(axis=1)  # rays begin in front of all
+        bx, by, bz = axis.T[:, :, None, None]
+        m0 = bx * bx + by * by + bz * bz
+        scale = (1.0 - w * top)[:, None, None]
+        ox, oy = x * scale - a[:, 0, None, None], y * scale - a[:, 1, None, None]
+        oz = (top - a[:, 2])[:, None, None]
+        dx, dy = w * x, w * y
+        dd = dx * dx + dy * dy + 1.0
+        m1, m2 = ox * bx + oy * by + oz * bz, dx * bx + dy * by - bz
+        m3, m5 = dx * ox + dy * oy - oz, ox * ox + oy * oy + oz * oz
+        with np.errstate(invalid="ignore", divide="ignore"):
+            t = _slanted(m0, m1, m2, m3, m5, dd, first, second)
+            near = -m1 / m2
+            disc = (m5 + 2.0 * near * m3 + near * near * dd < first**2) & (m1 < 0.0)
+            away = (m0 - m1) / m2
+            lid = (m5 - 2.0 * m1 + m0 + 2.0 * away * (m3 - m2) + away * away * dd < second**2) & (m1 > m0)
+            t = np.where(disc & (near > 0.0), near, np.where(lid & (away > 0.0), away, t))
+        return top[:, None, None] - t
+
+    def surface(self, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Which shape (K,), point (K, 3) and outward unit normal (K, 3) in covered samples."""
+        key = self.nearest[rows, columns]
+        which = (key & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
+        z = (key >> np.uint64(32)).astype(np.uint32).view(np.float32) * self.range + self.far
+        height, width = self.shape
+        near = 1.0 - self.w * z
+        point = np.column_stack([(columns + 0.5 - width / 2) * near, (rows + 0.5 - height / 2) * near, z])
+        normal = np.empty_like(point)
+        ball = which < len(self.solids.radius)
+        normal[ball] = point[ball] - self.solids.centre[which[ball]]
+        normal[~ball] = self._rod_normals(which[~ball] - len(self.solids.radius), point[~ball])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        return which, point.astype(np.float32), normal.astype(np.float32)
+
+    def _rod_normals(self, which: np.ndarray, point: np.ndarray) -> np.ndarray:
+        s = self.solids
+        axis, (first, second) = (s.end - s.start)[which], s.girth[which].T
+        q, m0 = point - s.start[which], (axis * axis).sum(axis=1)
+        along = (q * axis).sum(axis=1) / m0
+        out = q - along[:, None] * axis
+        reach = np.linalg.norm(out, axis=1)
+        slant = ((first - second) / m0 * reach)[:, None] * axis
+        flat = reach < first + (second - first) * along - 0.05
+        ends = np.sign(along - 0.5)[:, None] * axis
+        return np.where(flat[:, None], ends, out + slant)
+
+    def covered(self) -> np.ndarray:
+        """Whether there is anything, for each sample."""
+        return self.nearest > 0
+
+
+def _slanted(m0, m1, m2, m3, m5, dd, first, second):
+    """Where rays meet the side of a cone, from products of axis, ray and way to the first end; NaN: nowhere."""
+    narrow = first - second
+    h = m0 + narrow * narrow
+    k2 = m0 * m0 * dd - m2 * m2 * h
+    k1 = m0 * m0 * m3 - m1 * m2 * h + m0 * first * narrow * m2
+    k0 = m0 * m0 * m5 - m1 * m1 * h + m0 * first * (2.0 * narrow * m1 - m0 * first)
+    t = (-k1 - np.sqrt(k1 * k1 - k2 * k0)) / k2
+    y = m1 + t * m2
+    return np.where((y >= 0.0) & (y <= m0), t, np.nan)
+
+
+def _ball_windows(canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 2) lowest and highest column and row of balls: exact tangents."""
+    s, w = canvas.solids, canvas.w
+    if w == 0.0:
+        return s.centre[:, :2] - s.radius[:, None], s.centre[:, :2] + s.radius[:, None]
+    away = (1.0 / w - s.centre[:, 2])[:, None]
+    middle = np.arctan2(s.centre[:, :2], away)
+    half = np.arcsin(np.clip(s.radius[:, None] / np.hypot(s.centre[:, :2], away), 0.0, 1.0))
+    limit = 0.49 * np.pi
+    return np.tan(np.clip(middle - half, -limit, limit)) / w, np.tan(np.clip(middle + half, -limit, limit)) / w
+
+
+def _rod_windows(canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
+    s, w = canvas.solids, canvas.w
+    ends = []
+    for point, girth in ((s.start, s.girth[:, 0]), (s.end, s.girth[:, 1])):
+        near = np.maximum(1.0 - w * (point[:, 2] + girth), 1e-3)[:, None]
+        flat = point[:, :2] / np.maximum(1.0 - w * point[:, 2], 1e-3)[:, None]
+        wide = girth[:, None] / near * (1.0 + w * np.abs(flat)) + 0.5
+        ends.append((flat - wide, flat + wide))
+    return np.minimum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
+
+
+def _near_the_axis(canvas: Canvas, items: np.ndarray, tile: int) -> np.ndarray:
+    """Those squares that a rod's projection comes near to: a long one crosses few of those in its window."""
+    s, w = canvas.solids, canvas.w
+    which = items[:, 0]
+    a, b = (p[which, :2] / np.maximum(1.0 - w * p[which, 2], 1e-3)[:, None] for p in (s.start, s.end))
+    middle = items[:, 1:] + tile / 2 - np.array(canvas.shape[::-1]) / 2
+    axis = b - a
+    along = np.clip(((middle - a) * axis).sum(axis=1) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(middle - a - along[:, None] * axis, axis=1)
+    top = np.maximum(s.start, s.end)[which, 2] + s.girth[which].max(axis=1)
+    return items[away < 0.75 * tile + 1.5 * s.girth[which].max(axis=1) / np.maximum(1.0 - w * top, 1e-3) + 1.0]
+
+
+def _squares(
+    shape: tuple[int, int], low: np.ndarray, high: np.ndarray, z: np.ndarray
+) -> Iterator[tuple[np.ndarray, int]]:
+    """Windows cut into squares, those of one edge together: (K, 3) shape, lowest column and row; and the edge."""
+    size = np.array(shape[::-1])
+    with np.errstate(invalid="ignore"):
+        first = np.floor(np.clip(low + size / 2 - 0.5, 0, size)).astype(np.int64)
+        last = np.ceil(np.clip(high + size / 2 - 0.5, -1, size - 1)).astype(np.int64)
+    span = last - first + 1
+    there = np.flatnonzero((span > 0).all(axis=1))
+    there = there[np.argsort(-z[there], kind="stable")]  # the nearest first: they hide most
+    edge = np.array(EDGES)[np.minimum(np.searchsorted(EDGES, span[there].max(axis=1)), len(EDGES) - 1)]
+    for tile in np.unique(edge):
+        own = there[edge == tile]
+        across, along = (-(-span[own] // tile)).T
+        which = np.repeat(own, across * along)
+        number = np.arange(len(which)) - np.repeat(np.cumsum(across * along) - across * along, across * along)
+        wide = np.repeat(across, across * along)
+        yield (
+            np.column_stack([which, first[which] + tile * np.column_stack([number % wide, number // wide])]),
+            int(tile),
+        )
