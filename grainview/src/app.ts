@@ -255,8 +255,9 @@ export class App {
   }
 
   help(): void {
-    const words = "Drag to turn, with the right button or two fingers to move, wheel or pinch to go nearer. Click a grain or " +
-      "a contact for its numbers. The address of the page holds the view: share it, or keep it.";
+    const words =
+      "Drag to turn, with the right button or two fingers to move, wheel or pinch to go nearer. Click a grain or a " +
+      "contact for its numbers. The address of the page holds the view: share it, or keep it.";
     openDialog(this.page.root, "Keys and help", words, this.keys.help());
   }
 

@@ -132,13 +132,16 @@ export class Choosing {
     if (state.get("contact")) {
       for (const i of numbersOf(state.get("contact"))) marks.set(i, 1);
       const name = `contact ${state.get("contact").toString().replace("-", "–")}`;
-      parts.push([name, contact < 0 ? [["", "these grains do not touch in this frame"]] : contactRows(contact, frame, known)]);
+      const apart: [string, string][] = [["", "these grains do not touch in this frame"]];
+      parts.push([name, contact < 0 ? apart : contactRows(contact, frame, known)]);
     }
     const grain = state.number("grain");
     if (grain >= 0 && grain < known.manifest.grains) {
       marks.set(grain, 1);
       parts.push([`grain ${grain}`, grainRows(grain, frame, known)]);
-      if (!isSingle(frame, grain)) parts.push(["its cluster", clusterRows(grain, frame, known, whole, this.dimensionOf(grain))]);
+      if (!isSingle(frame, grain)) {
+        parts.push(["its cluster", clusterRows(grain, frame, known, whole, this.dimensionOf(grain))]);
+      }
     }
     const ends = this.ends;
     for (const i of ends) marks.set(i, 2);

@@ -40,7 +40,9 @@ export function sorry(place: HTMLElement, sentence: string): void {
 }
 
 /** Buttons at the right of the header. */
-export function headerButtons(press: Record<"centre" | "picture" | "link" | "help" | "panel", () => void>): HTMLElement {
+export function headerButtons(
+  press: Record<"centre" | "picture" | "link" | "help" | "panel", () => void>,
+): HTMLElement {
   return h(
     "nav",
     { "aria-label": "Page" },

@@ -11,7 +11,7 @@ import { MOST_TRAILS, trailSegments } from "./scene/lines";
 import type { World } from "./scene/world";
 import type { State } from "./state";
 
-/** With more grains, shade from neighbours waits until nothing plays. */
+/** With more grains, shade from neighbours waits until there is time. */
 const MANY = 30_000;
 
 export class Picture {
@@ -19,6 +19,7 @@ export class Picture {
   whole: Float32Array = new Float32Array();
   painted: Painted | null = null;
   bondScale: Scale | null = null;
+  private later = 0;
   private readonly middle: number; // radius of the middle one of the grains
 
   constructor(
@@ -37,7 +38,13 @@ export class Picture {
 
   /** Places at which grains are drawn. */
   get place(): Float32Array {
-    return this.state.get<boolean>("whole") || this.state.get<boolean>("isolate") ? this.whole : this.frame?.position ?? this.whole;
+    const whole = this.state.get<boolean>("whole") || this.state.get<boolean>("isolate");
+    return whole ? this.whole : this.frame?.position ?? this.whole;
+  }
+
+  /** Which grains are shown; null: all. */
+  get shown(): Uint8Array | null {
+    return this.world.shown;
   }
 
   setFrame(frame: Frame): void {
@@ -55,13 +62,24 @@ export class Picture {
     world.shown = this.shownGrains(frame);
     const colour = this.painted.colour;
     if (world.shown) world.shown.forEach((on, i) => on || (colour[4 * i + 3] = 0));
-    const shade = state.number("shade") > 0 && !(playing && known.manifest.grains > MANY);
-    const cover = shade ? coverOf(this.place, 5 * this.middle).map((c) => c * Math.min(1, 2 * state.number("shade"))) : null;
-    world.setGrains(this.place, known.grains.radius, colour, cover);
+    world.setGrains(this.place, known.grains.radius, colour);
+    this.shadeSoon(playing);
     this.dressBonds();
     world.setArrows(state.get<boolean>("arrows") ? frame.moment : null);
-    world.setBox(state.get<boolean>("box") && known.manifest.periodic.some(Boolean) ? frame.box : null);
+    const boxed = state.get<boolean>("box") && !world.shown && known.manifest.periodic.some(Boolean);
+    world.setBox(boxed ? frame.box : null);
     void this.dressTrails();
+  }
+
+  /** Shade from neighbours; in a crowd, once nothing else is to be done: until then that of the frame before stays. */
+  private shadeSoon(playing: boolean): void {
+    window.clearTimeout(this.later);
+    const shade = (): void => {
+      const much = Math.min(1, 2 * this.state.number("shade"));
+      this.world.setCover(much > 0 ? coverOf(this.place, 5 * this.middle).map((c) => c * much) : null);
+    };
+    if (this.known.manifest.grains <= MANY) shade();
+    else if (!playing) this.later = window.setTimeout(shade, 250);
   }
 
   dressBonds(): void {
@@ -105,7 +123,8 @@ export class Picture {
 
   /** Radius about a place within which all there is lies. */
   reachFrom(target: number[]): number {
-    const box = this.frame && this.known.manifest.periodic.some(Boolean) ? this.frame.box : [0, 0, 0];
+    const boxed = this.frame && !this.shown && this.known.manifest.periodic.some(Boolean);
+    const box = boxed && this.frame ? this.frame.box : [0, 0, 0];
     return Math.max(this.world.reachFrom(target), Math.hypot(...box) / 2 + Math.hypot(...target));
   }
 

@@ -36,7 +36,7 @@ export const SETTINGS: Setting[] = [
   { id: "shade", label: "Shade and haze", group: "Show", kind: "range", initial: 0.5, from: 0, to: 1, by: 0.1,
     key: "h", down: "H" },
   { id: "bonds", label: "Contacts", group: "Contacts", kind: "choice", initial: "plain", key: "b",
-    options: [["off", "not shown"], ["plain", "plain"], ["load", "by normal force"], ["mode", "by mode at its limit"]] },
+    options: [["off", "not shown"], ["plain", "plain"], ["load", "by normal force"], ["mode", "by limit reached"]] },
   { id: "bar", label: "Thickness", group: "Contacts", kind: "range", initial: 0.45, from: 0.05, to: 0.8, by: 0.05,
     key: "}", down: "{" },
   { id: "ortho", label: "Orthographic", group: "Camera", kind: "toggle", initial: false, key: "o" },

@@ -14,12 +14,13 @@ export class Views {
     private readonly choosing: Choosing,
   ) {}
 
-  /** All grains and the box, from above a corner. */
+  /** All that is shown and the box, from above a corner. */
   whole(): Look {
-    const { place } = this.picture;
+    const { place, shown } = this.picture;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (let e = 0; e < place.length; e++) {
+      if (shown && !shown[Math.floor(e / 3)]) continue;
       low[e % 3] = Math.min(low[e % 3], place[e]);
       high[e % 3] = Math.max(high[e % 3], place[e]);
     }

@@ -1,4 +1,4 @@
-// Contacts as they are drawn: two halves each, so that one across a face shows at both faces; coloured by what they bear.
+// Contacts as they are drawn: halves where they cross a face, so that they show at both; coloured by what they bear.
 
 import { nearest } from "./clusters";
 import { colourAt, rgb, type Scale } from "./colours";
@@ -33,7 +33,8 @@ export function normalForce(frame: Frame, contact: number, periodic: boolean[]):
 export function worstMode(frame: Frame, contact: number): [number, number] {
   let [mode, most] = [-1, -Infinity];
   for (let m = 0; m < 4; m++) {
-    const share = frame.share[4 * contact + m];
+    // shifts and turns go both ways; of stretching, only that by a pull comes to a limit
+    const share = m ? Math.abs(frame.share[4 * contact + m]) : frame.share[4 * contact];
     if (share > most) [mode, most] = [m, share];
   }
   return [mode, most];
@@ -45,12 +46,14 @@ export type BondPaint = (contact: number) => Colour3;
 export function bondPaint(kind: string, frame: Frame, manifest: Manifest, scale: Scale): BondPaint {
   if (kind === "load") return (c) => colourAt(scale, normalForce(frame, c, manifest.periodic));
   if (kind === "mode") {
+    const colours = [WITHIN, ...MODE_COLOURS].map(rgb);
     return (c) => {
       const [mode, share] = worstMode(frame, c);
-      return rgb(share >= AT_LIMIT ? MODE_COLOURS[mode] : WITHIN);
+      return colours[share >= AT_LIMIT ? mode + 1 : 0];
     };
   }
-  return () => rgb(WITHIN);
+  const plain = rgb(WITHIN);
+  return () => plain;
 }
 
 /** Loads from the largest pull to the largest push, alike on both sides of none. */
@@ -69,44 +72,40 @@ export function bondPieces(
   manifest: Manifest,
   paint: BondPaint,
 ): Bonds {
-  const most = frame.pair.length; // two pieces for each contact at most
-  const bonds = {
-    from: new Float32Array(3 * most),
-    to: new Float32Array(3 * most),
-    colour: new Uint8Array(4 * most),
-    contact: new Uint32Array(most),
-  };
+  const { pair, box } = frame;
+  const most = pair.length; // two pieces for each contact at most
+  const from = new Float32Array(3 * most);
+  const to = new Float32Array(3 * most);
+  const colours = new Uint8Array(4 * most);
+  const contact = new Uint32Array(most);
+  const d = new Float64Array(3);
   let used = 0;
-  const put = (contact: number, at: number, d: number[], share: number, colour: Colour3): void => {
+  const put = (c: number, at: number, share: number, colour: Colour3): void => {
     for (let a = 0; a < 3; a++) {
-      bonds.from[3 * used + a] = place[3 * at + a];
-      bonds.to[3 * used + a] = place[3 * at + a] + share * d[a];
+      from[3 * used + a] = place[3 * at + a];
+      to[3 * used + a] = place[3 * at + a] + share * d[a];
+      colours[4 * used + a] = colour[a];
     }
-    bonds.colour.set([...colour, 255], 4 * used);
-    bonds.contact[used++] = contact;
+    colours[4 * used + 3] = 255;
+    contact[used++] = c;
   };
-  const d = [0, 0, 0];
-  for (let c = 0; 2 * c < frame.pair.length; c++) {
-    const [i, j] = [frame.pair[2 * c], frame.pair[2 * c + 1]];
+  for (let c = 0; 2 * c < pair.length; c++) {
+    const [i, j] = [pair[2 * c], pair[2 * c + 1]];
     if (shown && !(shown[i] && shown[j])) continue;
     let wrapped = false;
     for (let a = 0; a < 3; a++) {
       const straight = place[3 * j + a] - place[3 * i + a];
-      d[a] = nearest(straight, frame.box[a], manifest.periodic[a]);
-      wrapped ||= Math.abs(d[a] - straight) > 0.5 * frame.box[a];
+      d[a] = nearest(straight, box[a], manifest.periodic[a]);
+      wrapped ||= Math.abs(d[a] - straight) > 0.5 * box[a];
     }
     const colour = paint(c);
-    if (!wrapped) {
-      put(c, i, d, 1, colour);
-    } else {
-      put(c, i, d, 0.5, colour);
-      put(c, j, d.map((v) => -v), 0.5, colour);
-    }
+    put(c, i, wrapped ? 0.5 : 1, colour);
+    if (wrapped) put(c, j, -0.5, colour);
   }
   return {
-    from: bonds.from.subarray(0, 3 * used),
-    to: bonds.to.subarray(0, 3 * used),
-    colour: bonds.colour.subarray(0, 4 * used),
-    contact: bonds.contact.subarray(0, used),
+    from: from.subarray(0, 3 * used),
+    to: to.subarray(0, 3 * used),
+    colour: colours.subarray(0, 4 * used),
+    contact: contact.subarray(0, used),
   };
 }

@@ -21,10 +21,12 @@ function shaded(colour: Colour3, amount: number): Colour3 {
 /** The colour of a cluster's name; the same for as long as the cluster keeps its name. */
 export function colourOfName(name: number, manifest: Manifest): Colour3 {
   if (Number.isNaN(name)) return rgb(manifest.colours.single);
-  const all = manifest.colours.big;
+  const { big, small, named } = manifest.colours;
+  const slot = named?.[String(name)];
+  if (slot !== undefined && slot < big.length) return rgb(big[slot]); // those that will be the largest
   // names of clusters that are born together are neighbours: a golden step sets their colours apart
   const spread = Math.imul(name + 1, 0x9e3779b1) >>> 0;
-  return shaded(rgb(all[spread % all.length]), [0, 0.22, -0.18][Math.floor(spread / all.length) % 3]);
+  return shaded(rgb(small[spread % small.length]), [0, 0.25, -0.2][Math.floor(spread / small.length) % 3]);
 }
 
 export function colourOfMaterial(index: number, manifest: Manifest): Colour3 {

@@ -51,7 +51,7 @@ function decodeArray(buffer: ArrayBuffer, begin: number, entry: Entry): Numbers 
 /** The header and the arrays by name; throws an Error that a reader understands. */
 export function decode(buffer: ArrayBuffer): { header: Record<string, unknown>; arrays: Record<string, Numbers> } {
   const magic = new TextDecoder().decode(new Uint8Array(buffer, 0, Math.min(8, buffer.byteLength)));
-  if (magic !== MAGIC) throw new Error("what came is not a frame of SAND: the file may be cut off, or another version's");
+  if (magic !== MAGIC) throw new Error("what came is not of SAND: the file may be cut off, or of another version");
   const length = new DataView(buffer).getUint32(8, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 12, length)));
   const arrays: Record<string, Numbers> = {};

@@ -60,7 +60,7 @@ function kinetic(frame: Frame, { grains, manifest }: Known): Float32Array {
   return out;
 }
 
-const hasMoments = ({ manifest }: Known): boolean => manifest.ranges.moment === undefined || manifest.ranges.moment[1] > 0;
+const hasMoments = ({ manifest }: Known): boolean => !manifest.ranges.moment || manifest.ranges.moment[1] > 0;
 
 export const QUANTITIES: Quantity[] = [
   {
@@ -86,7 +86,7 @@ export const QUANTITIES: Quantity[] = [
   { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => sizes3(frame.spin) },
   { id: "kinetic", label: "kinetic energy", unit: "J", kind: "sequential", values: kinetic },
   {
-    id: "alignment", label: "cosine: moment, its cluster's", unit: "", kind: "diverging",
+    id: "alignment", label: "alignment in cluster", unit: "", kind: "diverging",
     available: hasMoments,
     values: (frame) => {
       const sums = clusterMoments(frame);
@@ -94,7 +94,7 @@ export const QUANTITIES: Quantity[] = [
     },
   },
   {
-    id: "field", label: "cosine: moment, field", unit: "", kind: "diverging",
+    id: "field", label: "alignment with field", unit: "", kind: "diverging",
     available: (known) => known.manifest.field !== null && hasMoments(known),
     values: (frame, { manifest }) => {
       const b = fieldDirection(manifest, frame.frame) ?? [0, 0, 0];

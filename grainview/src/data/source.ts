@@ -38,6 +38,8 @@ export class ServerSource implements Source {
   }
 }
 
+const damaged = (name: string): Error => new Error(`this file is damaged in its part “${name}”; ask for it again`);
+
 /** Reads the blocks that `sand view --html` has put into the page itself. */
 export class EmbeddedSource implements Source {
   private told: Manifest | null = null;
@@ -48,7 +50,7 @@ export class EmbeddedSource implements Source {
 
   private text(name: string): string {
     const block = document.getElementById(`sand-${name}`);
-    if (!block?.textContent) throw new Error(`this file is cut off: its part “${name}” is missing; ask for it again`);
+    if (!block?.textContent) throw new Error(`this file is cut off: “${name}” is missing; ask for it again`);
     return block.textContent;
   }
 
@@ -56,7 +58,7 @@ export class EmbeddedSource implements Source {
     try {
       return JSON.parse(this.text(name));
     } catch (error) {
-      if (error instanceof SyntaxError) throw new Error(`this file is damaged in its part “${name}”; ask for it again`);
+      if (error instanceof SyntaxError) throw damaged(name);
       throw error;
     }
   }
@@ -65,9 +67,10 @@ export class EmbeddedSource implements Source {
     const text = this.text(name);
     try {
       const packed = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
-      return await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+      const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+      return await new Response(plain).arrayBuffer();
     } catch {
-      throw new Error(`this file is damaged in its part “${name}”; ask for it again`);
+      throw damaged(name);
     }
   }
 

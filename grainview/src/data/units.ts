@@ -17,7 +17,7 @@ export function digits(value: number, count = 4): string {
 
 function superscript(value: number, count: number): string {
   const [mantissa, exponent] = value.toExponential(count - 1).split("e");
-  const raised = [...exponent.replace("+", "")].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)])).join("");
+  const raised = exponent.replace("+", "").replace("-", "⁻").replace(/\d/g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)]);
   return `${Number(mantissa)}×10${raised}`;
 }
 

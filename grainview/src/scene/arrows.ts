@@ -1,23 +1,23 @@
 // Moments as arrows through the centres of grains: shaft and head ray-cast on one square each.
 
 import { COMMON } from "./glsl";
-import { CORNER, Squares } from "./squares";
+import { Column, SQUARE, Squares } from "./squares";
 import type * as three from "three";
 
 const VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
+uniform float uLeast;   // pixels, of arrows that are drawn
 uniform float uPixel;   // pixels for a length of one at distance one (or at any, orthographic)
-in vec3 place;
-in vec3 arrow;          // from tail to tip
-in float shown;
+uniform highp sampler2D uPlace;
+uniform highp sampler2D uArrow; // from tail to tip
 out vec3 vOnQuad;
 flat out vec3 vTail;
 flat out vec3 vAxis;
 
 void main() {
   vec2 corner = cornerOf(gl_VertexID);
-  vec3 c = (modelViewMatrix * vec4(place, 1.0)).xyz;
-  vec3 d = mat3(modelViewMatrix) * arrow;
+  vec3 c = (modelViewMatrix * vec4(fetched(uPlace, gl_VertexID).xyz, 1.0)).xyz;
+  vec3 d = mat3(modelViewMatrix) * fetched(uArrow, gl_VertexID).xyz;
   float size = length(d);
   float wide = 0.13 * size;
   vTail = c - 0.5 * d;
@@ -33,14 +33,14 @@ void main() {
   // a dart: tail, two barbs, tip
   int k = gl_VertexID & 3;
   float at = k == 0 ? -0.5 : k == 2 ? 0.5 : 0.12;
-  vOnQuad = c + at * d + (k == 1 ? 1.0 : k == 3 ? -1.0 : 0.0) * wide * side + toEye * 0.1 * size;
+  vOnQuad = c + at * d + (k == 1 ? 0.08 : k == 3 ? -0.08 : 0.0) * size * side + toEye * 0.1 * size;
 #else
   vOnQuad = middle + corner.x * (0.5 * seenSize + wide) * along + corner.y * wide * side;
 #endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   float pixels = size * uPixel / (isOrtho() ? 1.0 : max(-c.z, 1e-6));
   // arrows too small to be seen are left out: this is what keeps crowds fast
-  if (shown < 0.5 || size == 0.0 || pixels < 5.0 || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (size == 0.0 || pixels < uLeast || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
 `;
 
@@ -98,7 +98,10 @@ float meet(vec3 o, vec3 ray, float size, vec3 axis, out vec3 normal) {
 }
 
 #ifdef PLAIN
-void main() { outColour = vec4(uInk, 1.0); }
+void main() {
+  float haze = uHaze * smoothstep(uDepth.x, uDepth.y, -vOnQuad.z);
+  outColour = vec4(mix(uInk, uBackground, haze), 1.0);
+}
 #else
 void main() {
   vec3 origin = rayOrigin(vOnQuad);
@@ -119,10 +122,32 @@ void main() {
 #endif
 `;
 
+/** Length of arrows in radii of their grain. */
+export const ARROW = 4;
+
 export class ArrowsMesh extends Squares {
-  constructor(uniforms: Record<string, three.IUniform>, smooth: boolean) {
-    super(COMMON + CORNER + VERTEX, COMMON + FRAGMENT, uniforms, [
-      ["place", 3, Float32Array], ["arrow", 3, Float32Array], ["shown", 1, Float32Array],
-    ], smooth);
+  private readonly arrow = new Column(Float32Array);
+
+  /** @param place column of the grains' places, which the arrows go through */
+  constructor(uniforms: Record<string, three.IUniform>, place: three.IUniform, smooth: boolean) {
+    const own: Record<string, three.IUniform> = { ...uniforms, uPlace: place };
+    super(COMMON + SQUARE + VERTEX, COMMON + FRAGMENT, own, smooth);
+    own.uArrow = this.arrow.uniform;
+  }
+
+  /** Arrows along the moments (N, 3), each as long as its grain allows. */
+  set(moment: Float32Array, radius: Float32Array, shown: Uint8Array | null): void {
+    const count = radius.length;
+    const arrow = this.arrow.write(count);
+    for (let i = 0; i < count; i++) {
+      const [x, y, z] = [moment[3 * i], moment[3 * i + 1], moment[3 * i + 2]];
+      const top = Math.max(Math.abs(x), Math.abs(y), Math.abs(z)); // squares of moments in SI may be too small
+      const size = top > 0 ? top * Math.sqrt((x / top) ** 2 + (y / top) ** 2 + (z / top) ** 2) : 0;
+      const factor = size > 0 && !(shown && !shown[i]) ? (ARROW * radius[i]) / size : 0;
+      arrow[4 * i] = factor * x;
+      arrow[4 * i + 1] = factor * y;
+      arrow[4 * i + 2] = factor * z;
+    }
+    this.count = count;
   }
 }

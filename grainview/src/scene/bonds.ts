@@ -1,15 +1,16 @@
 // Contacts as round bars between the centres of two grains: where these have their true size, a collar at the neck.
 
+import type { Bonds } from "../data/bonds";
 import { COMMON } from "./glsl";
-import { CORNER, Squares } from "./squares";
+import { Column, SQUARE, Squares } from "./squares";
 import type * as three from "three";
 
 const VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
 uniform float uBar;
-in vec3 from;
-in vec3 to;
-in vec4 colour;
+uniform highp sampler2D uFrom;
+uniform highp sampler2D uTo;
+uniform highp sampler2D uColour;
 out vec3 vOnQuad;
 out float vAcross;
 flat out vec3 vFrom;
@@ -18,8 +19,9 @@ flat out vec3 vColour;
 
 void main() {
   vec2 corner = cornerOf(gl_VertexID);
-  vec3 a = (modelViewMatrix * vec4(from, 1.0)).xyz;
-  vec3 b = (modelViewMatrix * vec4(to, 1.0)).xyz;
+  vec3 a = (modelViewMatrix * vec4(fetched(uFrom, gl_VertexID).xyz, 1.0)).xyz;
+  vec3 b = (modelViewMatrix * vec4(fetched(uTo, gl_VertexID).xyz, 1.0)).xyz;
+  vec4 colour = fetched(uColour, gl_VertexID);
   vFrom = a;
   vAcross = corner.y;
   vAxis = b - a;
@@ -79,9 +81,28 @@ void main() {
 `;
 
 export class BondsMesh extends Squares {
+  private readonly from = new Column(Float32Array);
+  private readonly to = new Column(Float32Array);
+  private readonly colour = new Column(Uint8Array);
+
   constructor(uniforms: Record<string, three.IUniform>, smooth: boolean) {
-    super(COMMON + CORNER + VERTEX, COMMON + FRAGMENT, { ...uniforms, uBar: { value: 1 } }, [
-      ["from", 3, Float32Array], ["to", 3, Float32Array], ["colour", 4, Uint8Array],
-    ], smooth);
+    const own: Record<string, three.IUniform> = { ...uniforms, uBar: { value: 1 } };
+    super(COMMON + SQUARE + VERTEX, COMMON + FRAGMENT, own, smooth);
+    own.uFrom = this.from.uniform;
+    own.uTo = this.to.uniform;
+    own.uColour = this.colour.uniform;
+  }
+
+  set(pieces: Bonds, bar: number): void {
+    const count = pieces.contact.length;
+    this.uniforms.uBar.value = bar;
+    for (const [column, ends] of [[this.from, pieces.from], [this.to, pieces.to]] as const) {
+      const places = column.write(count);
+      for (let k = 0; k < count; k++) {
+        for (let a = 0; a < 3; a++) places[4 * k + a] = ends[3 * k + a];
+      }
+    }
+    this.colour.write(count).set(pieces.colour);
+    this.count = count;
   }
 }

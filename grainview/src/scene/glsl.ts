@@ -23,7 +23,8 @@ float depthOf(vec3 p) {
 
 // what a key light and the sky make of something a few pixels wide
 vec3 plainlyLit(vec3 colour, vec3 normal, float open, float distance) {
-  float light = uAmbient * (0.78 + 0.22 * normal.y) * open + 0.66 * max(dot(normal, vec3(-0.41, 0.6, 0.69)), 0.0) * open;
+  float key = max(dot(normal, vec3(-0.41, 0.6, 0.69)), 0.0);
+  float light = (uAmbient * (0.78 + 0.22 * normal.y) + 0.66 * key) * open;
   return mix(colour * light, uBackground, uHaze * smoothstep(uDepth.x, uDepth.y, distance));
 }
 

@@ -2,17 +2,15 @@
 
 import * as three from "three";
 import { COMMON } from "./glsl";
-import { CORNER, Squares } from "./squares";
+import { Column, SQUARE, Squares } from "./squares";
 
 const VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
 uniform float uSize;
 uniform float uPixel; // pixels for a length of one at distance one (or at any, orthographic)
-in vec3 place;
-in float radius;
-in vec4 colour;
-in vec3 cover;
-in float mark;
+uniform highp sampler2D uPlace;  // and radius
+uniform highp sampler2D uColour; // and whether it is shown
+uniform highp sampler2D uCover;  // from 0 for −1 to 1; and what it is marked as
 out vec3 vOnQuad;
 out vec2 vCorner;
 flat out vec3 vCentre;
@@ -23,12 +21,16 @@ flat out float vMark;
 
 void main() {
   vec2 corner = cornerOf(gl_VertexID);
-  vec3 c = (modelViewMatrix * vec4(place, 1.0)).xyz;
-  float r = radius * uSize;
+  vec4 place = fetched(uPlace, gl_VertexID);
+  vec4 colour = fetched(uColour, gl_VertexID);
+  vec4 cover = fetched(uCover, gl_VertexID);
+  float mark = floor(255.0 * cover.a + 0.5);
+  vec3 c = (modelViewMatrix * vec4(place.xyz, 1.0)).xyz;
+  float r = place.w * uSize;
   vCentre = c;
   vRadius = r;
   vColour = colour.rgb;
-  vCover = mat3(modelViewMatrix) * cover;
+  vCover = mat3(modelViewMatrix) * ((255.0 * cover.rgb - 128.0) / 127.0);
   vMark = mark;
   vCorner = corner;
 #ifdef PLAIN
@@ -73,7 +75,7 @@ void main() {
     return;
   }
   vec3 normal = vec3(vCorner, sqrt(1.0 - d));
-  float open = (1.0 - 0.85 * max(dot(normal, vCover), 0.0)) * (1.0 - 0.35 * length(vCover));
+  float open = (1.0 - 0.8 * max(dot(normal, vCover), 0.0)) * (1.0 - 0.22 * length(vCover));
   outColour = vec4(plainlyLit(vColour, normal, open, -vCentre.z), 1.0);
 }
 #else
@@ -99,8 +101,8 @@ void main() {
   }
   vec3 p = origin + (b - sqrt(max(room, 0.0))) * ray;
   vec3 normal = (p - vCentre) / vRadius;
-  float open = 1.0 - 0.85 * max(dot(normal, vCover), 0.0);
-  open *= 1.0 - 0.35 * length(vCover);
+  float open = 1.0 - 0.8 * max(dot(normal, vCover), 0.0);
+  open *= 1.0 - 0.22 * length(vCover);
   outColour = vec4(lit(vColour, normal, -ray, open, -p.z), vMark > 0.5 ? 1.0 : cover);
   gl_FragDepth = depthOf(p);
 }
@@ -108,10 +110,43 @@ void main() {
 `;
 
 export class GrainsMesh extends Squares {
+  readonly place = new Column(Float32Array);
+  private readonly colour = new Column(Uint8Array);
+  private readonly cover = new Column(Uint8Array);
+
   constructor(uniforms: Record<string, three.IUniform>, smooth: boolean) {
-    super(COMMON + CORNER + VERTEX, COMMON + FRAGMENT, uniforms, [
-      ["place", 3, Float32Array], ["radius", 1, Float32Array], ["colour", 4, Uint8Array],
-      ["cover", 3, Float32Array], ["mark", 1, Float32Array],
-    ], smooth);
+    const own: Record<string, three.IUniform> = { ...uniforms };
+    super(COMMON + SQUARE + VERTEX, COMMON + FRAGMENT, own, smooth);
+    own.uPlace = this.place.uniform;
+    own.uColour = this.colour.uniform;
+    own.uCover = this.cover.uniform;
+  }
+
+  set(place: Float32Array, radius: Float32Array, colour: Uint8Array): void {
+    const count = radius.length;
+    const places = this.place.write(count);
+    for (let i = 0; i < count; i++) {
+      places[4 * i] = place[3 * i];
+      places[4 * i + 1] = place[3 * i + 1];
+      places[4 * i + 2] = place[3 * i + 2];
+      places[4 * i + 3] = radius[i];
+    }
+    this.colour.write(count).set(colour);
+    this.count = count;
+  }
+
+  /** Directions in which grains are covered, below 1; null: nowhere. */
+  setCover(count: number, cover: Float32Array | null): void {
+    const covers = this.cover.write(count);
+    for (let i = 0; i < count; i++) {
+      for (let a = 0; a < 3; a++) covers[4 * i + a] = cover ? 128.5 + 127 * cover[3 * i + a] : 128;
+    }
+  }
+
+  /** Marks of grains: 1 chosen, 2 an end of what is measured; all others none. */
+  mark(count: number, marks: Map<number, number>): void {
+    const covers = this.cover.write(count);
+    for (let i = 0; i < count; i++) covers[4 * i + 3] = 0;
+    for (const [grain, kind] of marks) covers[4 * grain + 3] = kind;
   }
 }

@@ -3,7 +3,11 @@
 import type { Ray } from "three";
 import type { Bonds } from "../data/bonds";
 
-export type Hit = { kind: "grain"; index: number; distance: number } | { kind: "contact"; index: number; distance: number };
+export interface Hit {
+  kind: "grain" | "contact";
+  index: number;
+  distance: number;
+}
 
 /** The first grain along a ray. */
 export function pickGrain(

@@ -3,7 +3,7 @@
 import * as three from "three";
 import type { Bonds } from "../data/bonds";
 import { rgb } from "../data/colours";
-import { ArrowsMesh } from "./arrows";
+import { ARROW, ArrowsMesh } from "./arrows";
 import { BondsMesh } from "./bonds";
 import { GrainsMesh } from "./grains";
 import { boxEdges, Segments } from "./lines";
@@ -21,9 +21,6 @@ export interface Theme {
 export const LIGHT: Theme = { background: "#fbfaf7", ink: "#22262b", tip: "#16181c", line: "#9aa0a6", dark: false };
 export const DARK: Theme = { background: "#10131a", ink: "#e8e6df", tip: "#ffffff", line: "#5b626d", dark: true };
 
-/** Length of arrows in radii of their grain. */
-const ARROW = 4;
-
 const linear = (hex: string): three.Vector3 => new three.Vector3(...rgb(hex).map((c) => c / 255));
 
 export class World {
@@ -36,6 +33,7 @@ export class World {
     uAmbient: { value: 0.5 },
     uSize: { value: 1 },
     uPixel: { value: 1 },
+    uLeast: { value: 14 },
   };
   readonly grains: GrainsMesh;
   readonly bonds: BondsMesh;
@@ -53,7 +51,7 @@ export class World {
   constructor(readonly stage: Stage) {
     this.grains = new GrainsMesh(this.uniforms, !stage.slow);
     this.bonds = new BondsMesh(this.uniforms, !stage.slow);
-    this.arrows = new ArrowsMesh(this.uniforms, !stage.slow);
+    this.arrows = new ArrowsMesh(this.uniforms, this.grains.place.uniform, !stage.slow);
     const parts = [this.trails.lines, this.box.lines, this.grains.mesh, this.bonds.mesh, this.arrows.mesh];
     stage.scene.add(...parts);
     stage.onDraw = () => this.beforeDraw();
@@ -63,7 +61,7 @@ export class World {
     this.uniforms.uBackground.value.copy(linear(theme.background));
     this.uniforms.uInk.value.copy(linear(theme.ink));
     this.uniforms.uTip.value.copy(linear(theme.tip));
-    this.uniforms.uAmbient.value = theme.dark ? 0.44 : 0.56;
+    this.uniforms.uAmbient.value = theme.dark ? 0.52 : 0.68;
     this.box.lines.material.color.setStyle(theme.line, three.LinearSRGBColorSpace);
     this.stage.renderer.outputColorSpace = three.LinearSRGBColorSpace; // colours are meant as they are given
     const colour = new three.Color().setStyle(theme.background, three.LinearSRGBColorSpace);
@@ -71,48 +69,36 @@ export class World {
     this.stage.redraw();
   }
 
-  setGrains(place: Float32Array, radius: Float32Array, colour: Uint8Array, cover: Float32Array | null): void {
-    const count = radius.length;
-    if (radius !== this.radius) this.middle = Float32Array.from(radius).sort()[count >> 1] ?? 1;
+  setGrains(place: Float32Array, radius: Float32Array, colour: Uint8Array): void {
+    if (radius !== this.radius) this.middle = Float32Array.from(radius).sort()[radius.length >> 1] ?? 1;
     [this.place, this.radius] = [place, radius];
-    const values: Record<string, Float32Array | Uint8Array> = { place, radius, colour };
-    values.cover = cover ?? new Float32Array(3 * count);
-    this.grains.set(count, values);
+    this.grains.set(place, radius, colour);
+    this.stage.redraw();
+  }
+
+  /** Directions (N, 3) in which grains are covered by others, as long as they are much; null: all are in the open. */
+  setCover(cover: Float32Array | null): void {
+    this.grains.setCover(this.radius.length, cover);
     this.stage.redraw();
   }
 
   /** Marks of grains: 1 chosen, 2 an end of what is measured. */
   setMarks(marks: Map<number, number>): void {
-    const mark = new Float32Array(this.radius.length);
-    for (const [grain, kind] of marks) mark[grain] = kind;
-    this.grains.set(this.radius.length, { mark });
+    this.grains.mark(this.radius.length, marks);
     this.stage.redraw();
   }
 
   setBonds(pieces: Bonds | null, bar: number): void {
     [this.pieces, this.bar] = [pieces, bar];
     this.bonds.visible = pieces !== null;
-    this.bonds.uniforms.uBar.value = bar;
-    if (pieces) this.bonds.set(pieces.contact.length, { from: pieces.from, to: pieces.to, colour: pieces.colour });
+    if (pieces) this.bonds.set(pieces, bar);
     this.stage.redraw();
   }
 
-  /** Arrows along the moments (N, 3), each as long as its grain allows; null: none. */
+  /** Arrows along the moments (N, 3); null: none. */
   setArrows(moment: Float32Array | null): void {
     this.arrows.visible = moment !== null;
-    if (moment) {
-      const count = this.radius.length;
-      const arrow = new Float32Array(3 * count);
-      const shown = new Float32Array(count);
-      for (let i = 0; i < count; i++) {
-        const size = Math.hypot(moment[3 * i], moment[3 * i + 1], moment[3 * i + 2]);
-        shown[i] = this.shown && !this.shown[i] ? 0 : 1;
-        if (!(size > 0)) continue;
-        const factor = (ARROW * this.radius[i]) / size;
-        for (let a = 0; a < 3; a++) arrow[3 * i + a] = factor * moment[3 * i + a];
-      }
-      this.arrows.set(count, { place: this.place, arrow, shown });
-    }
+    if (moment) this.arrows.set(moment, this.radius, this.shown);
     this.stage.redraw();
   }
 
@@ -122,11 +108,14 @@ export class World {
     this.stage.redraw();
   }
 
-  /** Radius about a place within which all shown grains lie. */
+  /** Radius about a place within which all shown grains lie, arrows included. */
   reachFrom(target: number[]): number {
     let most = 0;
     for (let i = 0; i < this.radius.length; i++) {
-      const [x, y, z] = [0, 1, 2].map((a) => this.place[3 * i + a] - target[a]);
+      if (this.shown && !this.shown[i]) continue;
+      const x = this.place[3 * i] - target[0];
+      const y = this.place[3 * i + 1] - target[1];
+      const z = this.place[3 * i + 2] - target[2];
       most = Math.max(most, Math.sqrt(x * x + y * y + z * z) + ARROW * this.radius[i]);
     }
     return most || 1;

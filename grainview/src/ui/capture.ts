@@ -39,7 +39,9 @@ export async function picture(world: World, wish: Wish): Promise<Blob> {
     stage.draw();
   }
   return new Promise((give, fail) => {
-    canvas.toBlob((blob) => (blob ? give(blob) : fail(new Error("this picture is too large for the browser"))), "image/png");
+    const done = (blob: Blob | null): void =>
+      blob ? give(blob) : fail(new Error("this picture is too large for the browser"));
+    canvas.toBlob(done, "image/png");
   });
 }
 

@@ -6,7 +6,7 @@ import { type Known, QUANTITIES } from "../data/quantities";
 import { type Dimension, type Frame, SINGLE } from "../data/types";
 import { digits, prefixed, quantity } from "../data/units";
 import { h } from "./dom";
-import { icon } from "./icons";
+import { button } from "./icons";
 
 type Row = [name: string, value: string];
 
@@ -58,7 +58,13 @@ export function contactRows(c: number, frame: Frame, known: Known): Row[] {
   return rows;
 }
 
-export function clusterRows(i: number, frame: Frame, known: Known, whole: Float32Array, dimension: Dimension | null): Row[] {
+export function clusterRows(
+  i: number,
+  frame: Frame,
+  known: Known,
+  whole: Float32Array,
+  dimension: Dimension | null,
+): Row[] {
   const { manifest, grains } = known;
   const one = measureCluster(frame, grains, whole, membersOf(frame, i));
   const fractal = dimension === null ? "…" : "value" in dimension
@@ -105,7 +111,8 @@ export class Inspector {
 
   show(parts: [title: string, rows: Row[]][]): void {
     this.element.hidden = parts.length === 0;
-    const close = h("button", { type: "button", class: "gv-close", "aria-label": "Choose nothing", click: this.clear }, icon("close"));
+    const close = button("close", "Choose nothing", this.clear, "Esc");
+    close.classList.add("gv-close");
     const tables = parts.map(([title, rows]) => {
       const body = rows.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)));
       return h("table", {}, h("caption", {}, title), h("tbody", {}, ...body));

@@ -36,7 +36,7 @@ export class Keys {
     for (const setting of this.state.settings) {
       if (setting.key === key) this.state.step(setting.id, 1);
       else if (setting.down === key) this.state.step(setting.id, -1);
-      else if (setting.kind === "choice" && setting.key && setting.key.toUpperCase() === key) this.state.step(setting.id, -1);
+      else if (setting.kind === "choice" && setting.key?.toUpperCase() === key) this.state.step(setting.id, -1);
       else continue;
       return true;
     }
@@ -56,11 +56,11 @@ export class Keys {
 
   /** The table behind “?”. */
   help(): HTMLElement {
+    const told = (key: string): string => key.replace(/\b(Arrow\w+|Escape)\b|^ $/g, (name) => NAMES[name] ?? name);
     const row = (keys: string[], label: string): HTMLElement =>
-      h("tr", {}, h("td", {}, ...keys.map((k) => h("kbd", {}, k.replace(/\b(Arrow\w+|Escape)\b|^ $/g, (n) => NAMES[n] ?? n)))),
-        h("td", {}, label));
+      h("div", {}, h("dt", {}, ...keys.map((k) => h("kbd", {}, told(k)))), h("dd", {}, label));
     const rows = this.actions.map((a) => row(a.keys, a.label));
     for (const s of this.state.settings) if (s.key) rows.push(row(s.down ? [s.key, s.down] : [s.key], s.label));
-    return h("table", { class: "gv-keys" }, h("tbody", {}, ...rows));
+    return h("dl", { class: "gv-keys" }, ...rows);
   }
 }

@@ -62,7 +62,7 @@ export function legend(
   const parts: HTMLElement[] = [];
   if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit));
   else parts.push(quantity.id === "material" ? materials(known) : clusters(painted, known, choose));
-  if (bonds.kind === "load") parts.push(bar(bonds.scale, "contacts: normal force, pull − push +", "N"));
+  if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + pushes", "N"));
   if (bonds.kind === "mode") {
     const rows = MODES.map((mode, m) => swatch(MODE_COLOURS[m], mode));
     rows.push(swatch(WITHIN, "within all limits"));

@@ -58,7 +58,7 @@ export class Overlay {
     const wide = length * pixels;
     const [x, y] = [this.stage.width - 18 - wide, this.stage.height - 18];
     const bar = svg("path", { d: `M${x} ${y - 4}V${y}H${x + wide}V${y - 4}`, class: "gv-bar" });
-    const text = svg("text", { x: x + wide / 2, y: y - 7, class: "gv-bar-name" });
+    const text = svg("text", { x: x + wide, y: y - 7, class: "gv-bar-name" });
     text.textContent = quantity(length, "m", 3) + (this.stage.isOrthographic ? "" : " at the centre");
     return [bar, text];
   }

@@ -2,12 +2,29 @@
 
 import uPlot from "uplot";
 import type { Plot, Series } from "../data/types";
-import { prefixed } from "../data/units";
+import { digits, prefixed } from "../data/units";
 import { h } from "./dom";
 
 /** Zero and less have no place on a logarithmic axis; energies of both signs stay linear. */
 function drawable(plot: Plot): (number | null)[][] {
   return plot.lines.map((line) => (plot.log ? line.values.map((v) => (v !== null && v > 0 ? v : null)) : line.values));
+}
+
+function largest(lines: (number | null)[][]): number {
+  let most = 0;
+  for (const line of lines) for (const v of line) most = Math.max(most, Math.abs(v ?? 0));
+  return most;
+}
+
+/** Numbers at an axis; of a logarithmic one those of powers of ten, at most six of them. */
+function numbers(at: number[], log: boolean): string[] {
+  if (!log) return at.map((v) => digits(v, 3));
+  const power = (v: number): number | null => {
+    const exponent = Math.log10(v);
+    return v > 0 && Math.abs(exponent - Math.round(exponent)) < 1e-6 ? Math.round(exponent) : null;
+  };
+  const step = Math.ceil(at.filter((v) => power(v) !== null).length / 6);
+  return at.map((v) => ((power(v) ?? 0.5) % step === 0 ? digits(v, 3) : ""));
 }
 
 export class LinkedPlot {
@@ -37,8 +54,11 @@ export class LinkedPlot {
     const ink = dark ? "#c9c7c1" : "#4a4f57";
     const grid = { stroke: dark ? "#2a2f3a" : "#e4e2dc", width: 1 };
     const [one, unit] = this.timeUnit();
-    const data = [series.time.map((t) => t / one), ...drawable(plot)] as uPlot.AlignedData;
-    const label = plot.unit ? `${plot.title} (${plot.unit})` : plot.title;
+    const lines = drawable(plot);
+    const [size, name] = plot.log ? [1, plot.unit] : prefixed(largest(lines), plot.unit);
+    const scaled = lines.map((line) => line.map((v) => (v === null ? null : v / size)));
+    const data = [series.time.map((t) => t / one), ...scaled] as uPlot.AlignedData;
+    const label = name ? `${plot.title} (${name})` : plot.title;
     const style = { stroke: ink, grid, ticks: grid, font: "11px system-ui", labelFont: "11px system-ui" };
     this.chart?.destroy();
     this.chart = new uPlot(
@@ -50,11 +70,13 @@ export class LinkedPlot {
         scales: { x: { time: false }, y: { distr: plot.log ? 3 : 1 } },
         axes: [
           { ...style, label: `time (${unit})`, size: 32, labelSize: 16 },
-          { ...style, label, size: 58, labelSize: 18 },
+          { ...style, label, size: 64, labelSize: 18, values: (_: uPlot, at: number[]) => numbers(at, plot.log) },
         ],
         series: [
           {},
-          ...plot.lines.map((l) => ({ label: l.label, stroke: dark ? l.dark : l.light, width: 1.6, points: { show: false } })),
+          ...plot.lines.map((line) => ({
+            label: line.label, stroke: dark ? line.dark : line.light, width: 1.6, points: { show: false },
+          })),
         ],
       },
       data,

@@ -102,7 +102,9 @@ export class TimeLine {
     const { made, broken } = this.eventsOf(frame);
     const happened = [made ? `${made} made` : "", broken ? `${broken} broken` : ""].filter(Boolean).join(", ");
     const time = quantity(this.times[frame], "s");
-    this.told.textContent = `t = ${time}  ·  frame ${frame} of ${this.times.length - 1}${happened ? `  ·  ${happened}` : ""}`;
+    this.told.textContent = [`t = ${time}`, `frame ${frame} of ${this.times.length - 1}`, happened]
+      .filter(Boolean)
+      .join("  ·  ");
     this.told.title = `step ${step}`;
     this.slider.setAttribute("aria-valuetext", `frame ${frame}, ${time}`);
   }
