@@ -24,7 +24,7 @@ import { nearestFrame, TimeLine } from "./ui/timeline";
 import { Views } from "./views";
 
 /** Settings that need no new picture. */
-const QUIET = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "follow", "field", "ortho", "size"]);
+const QUIET = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "field", "ortho", "size"]);
 /** Pixels; narrower pages begin without the panel of settings. */
 const NARROW = 720;
 const SYSTEM_DARK = window.matchMedia("(prefers-color-scheme: dark)");
@@ -230,7 +230,7 @@ export class App {
 
   tellRun(): void {
     const { manifest } = this;
-    const parts = [`${manifest.grains} grains`, `${manifest.times.length} frames`];
+    const parts = [manifest.grains === 1 ? "1 grain" : `${manifest.grains} grains`, manifest.times.length === 1 ? "1 frame" : `${manifest.times.length} frames`];
     if (manifest.running) parts.push("still running");
     else if (manifest.outcome) parts.push(manifest.outcome);
     if (manifest.field) parts.push(manifest.field.text);

@@ -38,7 +38,7 @@ export class Picture {
 
   /** Places at which grains are drawn. */
   get place(): Float32Array {
-    const whole = this.state.get<boolean>("whole") || this.state.get<boolean>("isolate");
+    const whole = ["whole", "isolate", "follow"].some((id) => this.state.get<boolean>(id));
     return whole ? this.whole : this.frame?.position ?? this.whole;
   }
 

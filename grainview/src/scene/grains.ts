@@ -13,6 +13,7 @@ uniform highp sampler2D uColour; // and whether it is shown
 uniform highp sampler2D uCover;  // from 0 for −1 to 1; and what it is marked as
 out vec3 vOnQuad;
 out vec2 vCorner;
+flat out float vEdge; // of the ring around what is chosen, in radii
 flat out vec3 vCentre;
 flat out float vRadius;
 flat out vec3 vColour;
@@ -35,7 +36,8 @@ void main() {
   vCorner = corner;
 #ifdef PLAIN
   float grown = mark > 0.5 ? max(1.5 * r, r + 2.0 / uPixel * (isOrtho() ? 1.0 : -c.z)) : r;
-  vCorner *= grown / r;
+  vEdge = grown / r;
+  vCorner *= vEdge;
 #else
   float grown = r * (mark > 0.5 ? 1.3 : 1.06);
 #endif
@@ -59,6 +61,7 @@ const FRAGMENT = /* glsl */ `
 uniform vec3 uInk;
 in vec3 vOnQuad;
 in vec2 vCorner;
+flat in float vEdge;
 flat in vec3 vCentre;
 flat in float vRadius;
 flat in vec3 vColour;
@@ -70,7 +73,7 @@ out vec4 outColour;
 void main() {
   float d = dot(vCorner, vCorner);
   if (d > 1.0) {
-    if (vMark < 0.5) discard;
+    if (vMark < 0.5 || d > vEdge * vEdge) discard;
     outColour = vec4(vMark > 1.5 ? vec3(0.9, 0.35, 0.0) : uInk, 1.0);
     return;
   }

@@ -74,6 +74,7 @@ export class TimeLine {
   setFrames(times: number[], events: Series["events"]): void {
     this.times = times;
     this.slider.max = String(Math.max(times.length - 1, 0));
+    this.slider.disabled = times.length < 2;
     const byFrame = new Map<number, { frame: number; made: number; broken: number }>();
     events.time.forEach((time, e) => {
       const frame = frameAfter(times, time);
