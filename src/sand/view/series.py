@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..analysis.books import Books
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..files.folder import plain
 from .panels import LOSS_COLOURS, OUTSIDE_COLOURS, column, energies, losses, peak
@@ -19,31 +19,6 @@ LOOKED_AT = 20_000_000
 COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
 
 
-class Columns:
-    """Columns of a ledger by name, as the figure takes them.
-
-    Args:
-        rows: of ledger.csv.
-    """
-
-    def __init__(self, rows: Sequence[Mapping[str, float]]):
-        self.columns = tuple(rows[0]) if rows else ()
-        self._table = {name: np.array([row[name] for row in rows], np.float64) for name in self.columns}
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self._table[name]
-
-    def __len__(self) -> int:
-        return len(next(iter(self._table.values()), ()))
-
-    def taken(self, chosen: np.ndarray) -> Columns:
-        """Some of the rows."""
-        fewer = Columns(())
-        fewer.columns = self.columns
-        fewer._table = {name: values[chosen] for name, values in self._table.items()}
-        return fewer
-
-
 def thinned(count: int, most: int = MOST) -> np.ndarray:
     """Numbers of at most so many of `count` rows, evenly spread, first and last among them."""
     if count <= most:
@@ -51,9 +26,8 @@ def thinned(count: int, most: int = MOST) -> np.ndarray:
     return np.rint(np.linspace(0, count - 1, most)).astype(int)
 
 
-def of_ledger(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+def of_ledger(whole: Books) -> dict[str, Any]:
     """Plots and events of a ledger; a plot whose columns a ledger lacks is left out."""
-    whole = Columns(rows)
     books = whole.taken(thinned(len(whole)))
     plots = []
     for plot in (_clusters, _energies, _losses, _contacts, _balance):
@@ -92,14 +66,14 @@ def _clusters(books: Any) -> dict[str, Any]:
     return _plot("clusters", "Clusters", lines, log=True)
 
 
-def _energies(books: Columns) -> dict[str, Any]:
+def _energies(books: Books) -> dict[str, Any]:
     drawn = {name: values for name, values in energies(books).items() if peak(values)}
     outside = [name for name in drawn if name not in COLOURS]
     colour = COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
     return _plot("energies", "Energies", [_line(name, colour[name], drawn[name]) for name in drawn], "J")
 
 
-def _losses(books: Columns) -> dict[str, Any]:
+def _losses(books: Books) -> dict[str, Any]:
     """Their sizes, as in the figure: what a gas and outside forces take may be negative."""
     colour = dict(zip(losses(books), LOSS_COLOURS, strict=True))
     drawn = {name: np.abs(values) for name, values in losses(books).items() if peak(values)}
@@ -107,22 +81,22 @@ def _losses(books: Columns) -> dict[str, Any]:
     return _plot("losses", "Losses", lines, "J", log=True)
 
 
-def _contacts(books: Columns) -> dict[str, Any]:
+def _contacts(books: Books) -> dict[str, Any]:
     drawn = (("contacts", "contacts", BLUE), ("made", "made so far", GREEN), ("broken", "broken so far", RED))
     return _plot("contacts", "Contacts", [_line(label, colour, books[name]) for name, label, colour in drawn])
 
 
-def _balance(books: Columns) -> dict[str, Any]:
+def _balance(books: Books) -> dict[str, Any]:
     total = column(books, "total")
     return _plot("balance", "Balance", [_line("total − start", INK, total - total[0])], "J")
 
 
-def _events(books: Columns) -> dict[str, Any]:
+def _events(books: Books) -> dict[str, Any]:
     """When contacts were made or broken, and how many since the row before."""
     if not {"made", "broken"} <= set(books.columns):
         return {"time": [], "made": [], "broken": []}
 
-    def grown(some: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def grown(some: Books) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         made, broken = (np.maximum(np.diff(some[name]), 0.0) for name in ("made", "broken"))
         return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
 
