@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.errors import BadInput, did_you_mean
+from ..files.frame import MODES as SHARES
 from .clusters import cluster_labels, cluster_sizes
 from .magnetism import aggregate_moments
 from .shape import coordination
 
-MODES = ("within its limits", "stretch", "slide", "roll", "twist")
+MODES = ("within its limits", *SHARES)
 """Of `mode`: which way a contact has reached what it can bear."""
 AT_LIMIT = 0.999
 """Share of what a contact can bear from which a mode is at its limit; a clamp holds it at 1 but for rounding."""

@@ -9,14 +9,13 @@ import numpy as np
 from ..analysis.books import Books
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..files.folder import plain
-from .panels import LOSS_COLOURS, OUTSIDE_COLOURS, column, energies, losses, peak
-from .style import BLUE, FAINT, GREEN, INK, ON_DARK, RED, SKY
+from .panels import COUNTS, column, energies_drawn, losses_drawn, peak
+from .style import BLUE, FAINT, INK, ON_DARK, SKY
 
 MOST = 2000
 """Points of a line at most."""
 LOOKED_AT = 20_000_000
 """Grains, all frames together, whose clusters are counted where there is no ledger."""
-COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
 
 
 def thinned(count: int, most: int = MOST) -> np.ndarray:
@@ -48,7 +47,7 @@ def of_frames(frames: Any) -> dict[str, Any]:
         table["mean_cluster_size"].append(mean_cluster_size(labels))
         table["largest_cluster"].append(float(cluster_sizes(labels).max()))
         table["clusters"].append(float(labels.max() + 1))
-    lines = [_line("contacts", RED, frames.contacts[chosen].astype(float))]
+    lines = [_line(*COUNTS["contacts"], frames.contacts[chosen].astype(float))]
     plots = [
         _clusters({name: np.array(values) for name, values in table.items()}),
         _plot("contacts", "Contacts", lines),
@@ -67,23 +66,18 @@ def _clusters(books: Any) -> dict[str, Any]:
 
 
 def _energies(books: Books) -> dict[str, Any]:
-    drawn = {name: values for name, values in energies(books).items() if peak(values)}
-    outside = [name for name in drawn if name not in COLOURS]
-    colour = COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
-    return _plot("energies", "Energies", [_line(name, colour[name], drawn[name]) for name in drawn], "J")
+    lines = [_line(name, colour, values) for name, (values, colour) in energies_drawn(books).items()]
+    return _plot("energies", "Energies", lines, "J")
 
 
 def _losses(books: Books) -> dict[str, Any]:
-    """Their sizes, as in the figure: what a gas and outside forces take may be negative."""
-    colour = dict(zip(losses(books), LOSS_COLOURS, strict=True))
-    drawn = {name: np.abs(values) for name, values in losses(books).items() if peak(values)}
-    lines = [_line(name, colour[name], np.where(v > 0.0, v, np.nan)) for name, v in drawn.items()]
+    lines = [_line(name, colour, size) for name, (size, colour) in losses_drawn(books).items() if peak(size)]
     return _plot("losses", "Losses", lines, "J", log=True)
 
 
 def _contacts(books: Books) -> dict[str, Any]:
-    drawn = (("contacts", "contacts", BLUE), ("made", "made so far", GREEN), ("broken", "broken so far", RED))
-    return _plot("contacts", "Contacts", [_line(label, colour, books[name]) for name, label, colour in drawn])
+    lines = [_line(label, colour, books[name]) for name, (label, colour) in COUNTS.items()]
+    return _plot("contacts", "Contacts", lines)
 
 
 def _balance(books: Books) -> dict[str, Any]:
