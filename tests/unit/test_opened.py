@@ -86,6 +86,9 @@ def test_no_run_there(tmp_path):
     for path, said in ((tmp_path / "none", "no folder"), (tmp_path, "not the folder of a run")):
         with pytest.raises(sand.BadInput, match=said):
             sand.open(path)
+    (tmp_path / "case.toml").write_text("")
+    with pytest.raises(sand.BadInput, match="wait until its run has written a frame"):
+        sand.open(tmp_path)
 
 
 def test_an_old_trajectory_without_forces_and_check_sum(run, tmp_path):
@@ -100,3 +103,13 @@ def test_an_old_trajectory_without_forces_and_check_sum(run, tmp_path):
     (old,) = Frames(tmp_path / "old.gsd")
     assert np.isnan(old.force).all()
     assert old.force.shape == (len(old.pair), 3)
+
+
+def test_a_picture_from_a_script(in_a_field):
+    """`sand.open(DIR).picture()` is the still of a frame, with the field of the case."""
+    opened = sand.open(in_a_field)
+    np.testing.assert_allclose(opened.flux_density(0.0), [0.0, 0.0, 1e-3])
+    picture = opened.picture(0, colour="field_alignment", size=(300, 200))
+    assert "B" in [text.get_text() for axes in picture.axes for text in axes.texts]
+    assert picture._repr_png_()[:4] == b"\x89PNG"
+    assert "t = 0 s" in [text.get_text() for text in picture.texts]

@@ -40,6 +40,8 @@ class Opened:
         if not self.folder.is_dir():
             raise BadInput(f"there is no folder {folder}")
         if not (self.folder / files.TRAJECTORY).exists():
+            if (self.folder / files.CASE).exists():
+                raise BadInput(f"{folder} has no {files.TRAJECTORY} yet; wait until its run has written a frame")
             raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")
 
     @cached_property
