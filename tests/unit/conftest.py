@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import sand
+from sand.files import page as page_files
+
+from .pages import SCRIPT
 
 
 @pytest.fixture(scope="session")
@@ -25,3 +28,36 @@ def _run(grains, field, folder):
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(), field], out=folder, frame_every="10 ps")
     sim.run(until="50 ps")
     return sim
+
+
+@pytest.fixture(scope="session")
+def in_a_field(tmp_path_factory):
+    """A short run of eight magnetic grains, two of which touch, in a field."""
+    place = tmp_path_factory.mktemp("plot") / "run"
+    grains = sand.Grains(
+        [[2e-8 * 0.998 * (k % 2), 5e-8 * (k // 2), 0.0] for k in range(8)],
+        "10 nm",
+        sand.SILICA,
+        moment=np.tile([0.0, 0.0, 1e-18], (8, 1)),
+    )
+    grains.arrays.velocity[0] = np.arange(8) * 0.1
+    sim = sand.Simulation(
+        grains,
+        [sand.Contact(), sand.Dipoles(), sand.Field(flux_density="1 mT")],
+        box="400 nm",
+        out=str(place),
+        frame_every="1 ns",
+    )
+    sim.run(until="3 ns")
+    return place
+
+
+@pytest.fixture
+def bundle(tmp_path, monkeypatch):
+    """A small page in place of the real one, whose script holds what would end its element."""
+    home = tmp_path / "bundle"
+    home.mkdir()
+    (home / "grainview.js").write_text(SCRIPT)
+    (home / "grainview.css").write_text("body::after { content: '</style>' }")
+    monkeypatch.setattr(page_files, "PAGE", home)
+    return home

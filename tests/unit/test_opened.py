@@ -10,20 +10,9 @@ from sand.cli.main import main
 from sand.files.trajectory import Frames
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """A finished run with contacts; its folder and simulation."""
-    folder = tmp_path_factory.mktemp("opened") / "run"
-    position = [[(2e-8 - 1e-10) * k, 0, 0] for k in range(5)] + [[0, 2e-7, 0]]
-    grains = sand.Grains(position, 1e-8, sand.IRON, moment="200 A m^2/kg", velocity=np.eye(6, 3) * 0.1)
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], out=folder, frame_every="10 ps")
-    sim.run(until="50 ps")
-    return folder, sim
-
-
-def test_everything_is_there(run):
+def test_everything_is_there(looked_at):
     """Frames one by one, ledger columns, contacts with forces, case and summary."""
-    folder, sim = run
+    folder, sim = looked_at
     opened = sand.open(folder)
     assert len(opened.frames) == len(sim.ledger) == 6
     assert opened.frames[-1].time == sim.time
@@ -39,10 +28,10 @@ def test_everything_is_there(run):
         opened.frames[6]
 
 
-def test_tables_for_others(run):
+def test_tables_for_others(looked_at):
     """xarray: dimensions, coordinates, units; pandas: the ledger."""
     pytest.importorskip("xarray", reason="xarray is in the test extra")
-    folder, sim = run
+    folder, sim = looked_at
     opened = sand.open(folder)
     data = opened.to_xarray()
     assert dict(data.sizes) == {"frame": 6, "grain": 6, "axis": 3}
@@ -53,9 +42,9 @@ def test_tables_for_others(run):
 
 
 @pytest.mark.parametrize(("form", "files"), [("xyz", 1), ("lammps-dump", 1), ("lammps-data", 6), ("vtk", 7)])
-def test_the_export_command(run, tmp_path, capsys, form, files):
+def test_the_export_command(looked_at, tmp_path, capsys, form, files):
     """As many files as promised, not overwritten without leave; slices choose frames."""
-    folder, _ = run
+    folder, _ = looked_at
     stem = str(tmp_path / "out")
     assert main(["export", str(folder), "--to", form, "--out", stem, "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["files"]) == files == len(list(tmp_path.iterdir()))
@@ -73,9 +62,9 @@ def test_the_export_command(run, tmp_path, capsys, form, files):
         (["--to", "pdb"], "pdb"),
     ],
 )
-def test_mistakes(run, capsys, words, said):
+def test_mistakes(looked_at, capsys, words, said):
     """One line, exit 2."""
-    assert main(["export", str(run[0]), *words]) == 2
+    assert main(["export", str(looked_at[0]), *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert said in lines[0]
@@ -86,13 +75,16 @@ def test_no_run_there(tmp_path):
     for path, said in ((tmp_path / "none", "no folder"), (tmp_path, "not the folder of a run")):
         with pytest.raises(sand.BadInput, match=said):
             sand.open(path)
+    (tmp_path / "case.toml").write_text("")
+    with pytest.raises(sand.BadInput, match="wait until its run has written a frame"):
+        sand.open(tmp_path)
 
 
-def test_an_old_trajectory_without_forces_and_check_sum(run, tmp_path):
+def test_an_old_trajectory_without_forces_and_check_sum(looked_at, tmp_path):
     """Files of before are read: forces are NaN."""
     import gsd.hoomd
 
-    with gsd.hoomd.open(str(run[0] / "trajectory.gsd"), "r") as file:
+    with gsd.hoomd.open(str(looked_at[0] / "trajectory.gsd"), "r") as file:
         frame = file[2]
     del frame.log["crc32"], frame.log["bonds/force"]
     with gsd.hoomd.open(str(tmp_path / "old.gsd"), "w") as file:
@@ -100,3 +92,13 @@ def test_an_old_trajectory_without_forces_and_check_sum(run, tmp_path):
     (old,) = Frames(tmp_path / "old.gsd")
     assert np.isnan(old.force).all()
     assert old.force.shape == (len(old.pair), 3)
+
+
+def test_a_picture_from_a_script(in_a_field):
+    """`sand.open(DIR).picture()` is the still of a frame, with the field of the case."""
+    opened = sand.open(in_a_field)
+    np.testing.assert_allclose(opened.flux_density(0.0), [0.0, 0.0, 1e-3])
+    picture = opened.picture(0, colour="field_alignment", size=(300, 200))
+    assert "B" in [text.get_text() for axes in picture.axes for text in axes.texts]
+    assert picture._repr_png_()[:4] == b"\x89PNG"
+    assert "t = 0 s" in [text.get_text() for text in picture.texts]

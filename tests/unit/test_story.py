@@ -9,16 +9,14 @@ import pytest
 
 import sand
 from sand.analysis.lineage import SINGLE
-from sand.files.following import Following
+from sand.analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured
 from sand.files.gsd_index import ENTRY, read_index
 from sand.files.trajectory import TrajectoryWriter
-from sand.run.told import field_in, field_of
-from sand.view.dimensions import Dimensions
+from sand.run.told import field_in
 from sand.view.packets import decode
-from sand.view.series import MOST, of_ledger, thinned
-from sand.view.story import story_of
+from sand.view.story import EXTREMES, PERCENTILES, story_of
 
-from .reels import append, reel
+from .reels import append, contacts_of, reel
 
 KEYS = [
     "format",
@@ -56,13 +54,12 @@ def test_the_manifest_of_a_run(looked_at):
     assert not told["running"] and "reached" in told["outcome"] and told["note"] is None
     assert told["periodic"] == [False] * 3
     assert all(np.shape(colours) == (64, 3) for colours in told["palettes"].values())
-    assert {"cividis", "diverging"} <= set(told["palettes"])
     for low, high in told["ranges"].values():
         assert 0.0 <= low <= high
     speed = np.linalg.norm(sim.grains.velocity, axis=1)
     assert told["ranges"]["speed"][1] >= 0.99 * speed.max()
     kinetic = sim.ledger["translation"][-1] + sim.ledger["rotation"][-1]
-    assert kinetic / 6 <= 1.01 * told["ranges"]["kinetic"][1] <= 10 * (sim.ledger["translation"] + 1e-15).max()
+    assert kinetic / 6 <= 1.01 * told["ranges"]["kinetic_energy"][1] <= 10 * (sim.ledger["translation"] + 1e-15).max()
 
 
 def test_times_are_told_from_a_frame_on(looked_at):
@@ -88,70 +85,6 @@ def test_frames_of_a_run(looked_at):
     assert abs(sum(len(story.frame(k)) for k in range(6)) / story.size - 1.0) < 0.25
     with pytest.raises(sand.BadInput, match="no 6"):
         story.frame(6)
-
-
-def test_a_field_is_told(looked_at):
-    """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
-    folder, sim = looked_at
-    told = story_of(folder, field_in(folder)).manifest()["field"]
-    assert "rotating" in told["text"] and "1 mT" in told["text"]
-    expected = [np.array(sim.forces[2].flux_density_at(t)) * 1e3 for t in sim.ledger["time"]]
-    assert np.array(told["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
-    steady = story_of(folder, field_of([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
-    assert steady["direction"] == [0.0, 0.6, 0.8] and "directions" not in steady
-    assert field_of([sand.Field(0.0)]) is None and story_of(folder).manifest()["field"] is None
-    texts = {
-        "constant": field_of([sand.Field("2 mT")])[0],
-        "oscillating at 1 MHz": field_of([sand.Field(0.0, "oscillating", amplitude="1 mT", frequency="1 MHz")])[0],
-        "to 2 mT at 1 us": field_of([sand.Field("1 mT", "ramp", final="2 mT", end="1 us")])[0],
-    }
-    assert all(said in text for said, text in texts.items()), texts
-
-
-def test_series_are_the_ledgers(looked_at):
-    """Plots hold the ledger's columns; total − start is worked out before numbers are shortened; counts of events."""
-    folder, sim = looked_at
-    series = story_of(folder).series()
-    plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
-    assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
-    assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
-    assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
-    change = sim.ledger["total"] - sim.ledger["total"][0]
-    assert plots["balance"]["total − start"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
-    assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
-    assert plots["losses"]
-    for name, lost in plots["losses"].items():  # an axis of powers of ten has no place for 0
-        assert [v is None for v in lost] == [v == 0.0 for v in sim.ledger[f"lost_{name}"]]
-    for plot in series["plots"]:
-        assert all(len(line["values"]) == len(series["time"]) for line in plot["lines"])
-        assert all(line[ground].startswith("#") for line in plot["lines"] for ground in ("light", "dark"))
-
-
-def test_long_and_broken_ledgers(looked_at):
-    """At most 2000 points, the last among them; no event is lost; what is not a number is null."""
-    row = dict(looked_at[1].ledger.rows[-1])
-    rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
-    rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
-    series = of_ledger(rows)
-    assert len(series["time"]) == MOST and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
-    assert sum(series["events"]["made"]) == 15000 and sum(series["events"]["broken"]) == 2500
-    assert len(series["events"]["time"]) < MOST
-    values = {plot["id"]: plot["lines"][0]["values"] for plot in series["plots"]}
-    assert values["balance"][-1] is None and values["energies"][-1] is None
-    json.dumps(series, allow_nan=False)
-    assert thinned(10, 20).tolist() == list(range(10)) and thinned(100, 3).tolist() == [0, 50, 99]
-
-
-def test_without_a_ledger(tmp_path):
-    """A file by itself: clusters and contacts are counted in its frames."""
-    story = story_of(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
-    series = story.series()
-    plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
-    assert plots["contacts"]["contacts"] == [0, 1, 2]
-    assert plots["clusters"]["largest"] == [1, 2, 3] and plots["clusters"]["number of clusters"] == [5, 4, 3]
-    assert plots["clusters"]["mean size S"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
-    told = story.manifest()
-    assert not told["running"] and told["outcome"] is None and told["name"] == "a"
 
 
 def test_a_run_that_goes_on(tmp_path, looked_at):
@@ -252,30 +185,18 @@ def test_several_readers_at_once(tmp_path):
     assert not wrong
 
 
-def test_dimensions(tmp_path, monkeypatch):
-    """A straight chain has dimension 1; too few grains give a reason; the same grains are not measured again."""
-    from sand.view import dimensions
-
-    chain = [(k, k + 1) for k in range(39)]
-    story = story_of(reel(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))
-    assert story.dimension(0, 5)["value"] == pytest.approx(1.0, abs=0.1)
-    assert "at least 32" in story.dimension(2, 5)["reason"]
-    assert "touches none" in story.dimension(0, 41)["reason"]
-    with pytest.raises(sand.BadInput, match="no 42"):
-        story.dimension(0, 42)
-    calls = []
-    real = dimensions.cluster_dimension
-    monkeypatch.setattr(dimensions, "cluster_dimension", lambda *a: calls.append(a) or real(*a))
-    measure = Dimensions()
-    found = [measure.of(*story.read(k)) for k in range(3)]
-    assert len(calls) == 1 and list(found[0]) == ["0"] and found[0] == found[1] and found[2] == {}
-
-
-def test_following_is_a_sequence(tmp_path):
-    """Slices and negative numbers, and an end."""
-    frames = Following(reel(tmp_path / "a.gsd", [[(0, 1)], [], [(1, 2)]], 3))
-    assert frames.contacts.tolist() == [1, 0, 1] and frames.steps.tolist() == [0, 10, 20]
-    assert [frame.step for frame in frames[1:]] == [10, 20] and frames[-1].step == 20
-    assert [frames.pairs(k).tolist() for k in range(3)] == [[[0, 1]], [], [[1, 2]]]
-    with pytest.raises(IndexError):
-        frames[3]
+def test_ranges_are_those_of_the_quantities(looked_at, tmp_path):
+    """Names are those of the table but for `moment`; extremes are those of all frames; without moments 0 to 0."""
+    folder, _ = looked_at
+    ranges, frames = story_of(folder).ranges(), sand.open(folder).frames
+    assert set(ranges) == {*PERCENTILES, *EXTREMES} and set(ranges) - {"moment"} <= {*GRAIN_NAMES, *CONTACT_NAMES}
+    for name in ("size", "radius", "coordination", "load"):
+        every = np.concatenate([np.abs(measured(frame, name)) for frame in frames])
+        assert ranges[name] == [every.min(), every.max()]
+    assert ranges["size"] == [1.0, 5.0] and ranges["moment"][1] > 0.0
+    writer = TrajectoryWriter(tmp_path / "a.gsd")
+    still = sand.Grains([[0.0, 0.0, 0.0]], "10 nm", sand.SILICA)
+    writer.write(0, 0.0, still, sand.Box.open(), contacts_of([]))
+    writer.close()
+    ranges = story_of(tmp_path / "a.gsd").ranges()
+    assert ranges["moment"] == ranges["load"] == ranges["speed"] == [0.0, 0.0] and ranges["size"] == [1.0, 1.0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..core.world import LOST
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 
 
-def dissipated_in(row: dict[str, float]) -> float:
+def dissipated_in(row: Mapping[str, float]) -> float:
     """Energy dissipated up to a row [J], forming included.
 
     What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took more
@@ -34,8 +34,17 @@ class Books:
         self.columns = tuple(columns)
         self.rows: list[dict[str, float]] = list(rows)
 
+    @classmethod
+    def of(cls, rows: Sequence[dict[str, float]]) -> Books:
+        """Of the rows of a ledger file; no columns where there is no row."""
+        return Books(tuple(rows[0]) if rows else (), rows)
+
     def __len__(self) -> int:
         return len(self.rows)
+
+    def taken(self, numbers: Iterable[int]) -> Books:
+        """Books of some of the rows."""
+        return Books(self.columns, (self.rows[k] for k in numbers))
 
     def __getitem__(self, column: str) -> np.ndarray:
         """One column over time."""

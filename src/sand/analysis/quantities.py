@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.errors import BadInput, did_you_mean
+from ..files.frame import MODES as SHARES
 from .clusters import cluster_labels, cluster_sizes
 from .magnetism import aggregate_moments
 from .shape import coordination
 
-MODES = ("within its limits", "stretch", "slide", "roll", "twist")
+MODES = ("within its limits", *SHARES)
 """Of `mode`: which way a contact has reached what it can bear."""
 AT_LIMIT = 0.999
 """Share of what a contact can bear from which a mode is at its limit; a clamp holds it at 1 but for rounding."""
@@ -61,10 +62,16 @@ def _cosine(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.where(sizes > 0.0, np.clip(product, -1.0, 1.0), np.nan)
 
 
+def _cluster_size(frame: Any) -> np.ndarray:
+    labels = cluster_labels(len(frame.radius), frame.pair)
+    return cluster_sizes(labels)[labels]
+
+
 def _alignment(frame: Any, _: np.ndarray | None) -> np.ndarray:
     labels = cluster_labels(len(frame.radius), frame.pair)
     sums, aligned = aggregate_moments(frame.moment, labels)
-    return _cosine(frame.moment, np.where(aligned[:, None] > 1e-9, sums, 0.0)[labels])
+    known = (aligned > 1e-9) & (cluster_sizes(labels) > 1)  # with itself a single grain is always aligned
+    return _cosine(frame.moment, np.where(known[:, None], sums, 0.0)[labels])
 
 
 def _field_alignment(frame: Any, field: np.ndarray | None) -> np.ndarray:
@@ -91,28 +98,22 @@ def _floats(of: Callable[[Any], Any]) -> Callable[[Any, np.ndarray | None], np.n
     return lambda frame, _: np.asarray(of(frame), dtype=np.float64)
 
 
-_MOMENTS = "no grain has a moment"
 GRAINS = (
-    Quantity(
-        "cluster",
-        "1",
-        "cluster",
-        "categorical",
-        _floats(lambda f: cluster_rank(len(f.radius), f.pair)),
-        "",
-    ),
+    Quantity("cluster", "1", "cluster", "categorical", _floats(lambda f: cluster_rank(len(f.radius), f.pair)), ""),
+    Quantity("size", "1", "grains in its cluster", "sequential", _floats(_cluster_size), ""),
     Quantity("radius", "m", "radius", "sequential", _floats(lambda f: f.radius), ""),
-    Quantity(
-        "coordination",
-        "1",
-        "contacts",
-        "sequential",
-        _floats(lambda f: coordination(len(f.radius), f.pair)),
-        "",
-    ),
+    Quantity("coordination", "1", "contacts", "sequential", _floats(lambda f: coordination(len(f.radius), f.pair)), ""),
     Quantity("speed", "m/s", "speed", "sequential", _floats(lambda f: _size(f.velocity)), ""),
     Quantity("spin", "rad/s", "spin", "sequential", _floats(lambda f: _size(f.spin)), ""),
-    Quantity("alignment", "1", "cosine of moment to that of its cluster", "diverging", _alignment, _MOMENTS),
+    Quantity("kinetic_energy", "J", "kinetic energy", "sequential", _kinetic, ""),
+    Quantity(
+        "alignment",
+        "1",
+        "cosine of moment to that of its cluster",
+        "diverging",
+        _alignment,
+        "no grain that touches another has a moment",
+    ),
     Quantity(
         "field_alignment",
         "1",
@@ -121,7 +122,6 @@ GRAINS = (
         _field_alignment,
         "no grain has a moment, or there is no outside field",
     ),
-    Quantity("kinetic_energy", "J", "kinetic energy", "sequential", _kinetic, ""),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
 )
 """Of grains (N,)."""

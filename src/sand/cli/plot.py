@@ -49,9 +49,9 @@ def command(
 ) -> int:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
-    WHAT is size, energies, losses, contacts, balance, still; or a QUANTITY of grains, whose histogram is drawn:
-    cluster, radius, coordination, speed, spin, alignment (of moments with that of their cluster), field_alignment,
-    kinetic_energy, material.
+    WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, whose
+    histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with that of
+    their cluster), field_alignment, material. As a colour of grains, size is the number of grains in their cluster.
     """
     from ..files.folder import make_folder, replace_file
 
@@ -134,7 +134,7 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
     one, field = None, None
     if any(name not in HISTORY for name in names):
         one = _frame(source, frame)
-        field = source.run.flux_density(one.time) if source.run is not None and _has_case(source.path) else None
+        field = None if source.run is None else source.run.flux_density(one.time)
 
     def draw(name: str) -> Any:
         if history is not None and name in HISTORY:
@@ -146,21 +146,15 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
     return [picture_bytes(draw(name), form, how["transparent"]) for name in names]
 
 
-def _has_case(folder: Path) -> bool:
-    from ..files.folder import CASE
-
-    return (folder / CASE).exists()
-
-
 def _history(source: Source) -> tuple[Any, int, float]:
     """The ledger, the number of grains, and their temperature at the start [K].  Raises BadInput."""
     from ..analysis.books import Books
     from ..files.folder import LEDGER, read_ledger
     from ..forces.dipoles import kinetic_temperature
 
-    rows = read_ledger(source.path / LEDGER)
+    books = Books.of(read_ledger(source.path / LEDGER))
     first = _frame(source, 0)
-    return Books(tuple(rows[0]) if rows else (), rows), len(first), kinetic_temperature(first)
+    return books, len(first), kinetic_temperature(first)
 
 
 def _frame(source: Source, number: int) -> Any:

@@ -5,18 +5,25 @@ from __future__ import annotations
 import os
 import shlex
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..core.errors import BadInput
+from ..files.folder import CASE, SUMMARY, TRAJECTORY
 from . import options, report
 from .exits import DONE
 from .export import chosen
 
 LARGE = 100e6
 """Bytes above which a page takes long to open."""
+WAIT = 60.0
+"""Seconds that the first frame of a run is waited for, which may have to be compiled first."""
+TOLD_EVERY = 15.0
+YOUNG = 5.0
+"""Seconds within which a trajectory gets its first frame."""
 
 
 @click.command("view", short_help="Look at the grains of a run in the browser.")
@@ -43,17 +50,15 @@ def command(
 ) -> int:
     """Look at the grains of the run in DIR, or of a trajectory of SAND, in the browser.
 
-    A run that is still going is followed. The page is for this machine alone; Ctrl-C ends it.
+    A run that is still going is followed; one that is still being compiled is waited for. The page is for this machine
+    alone; Ctrl-C ends it.
     """
-    from ..run.told import field_in
     from ..view.page import chosen_frames, write_page
-    from ..view.story import run_folder, story_of
 
     target = None if html is None else Path(html)
     if target is not None:
         _refuse(target, overwrite)
-    home = run_folder(folder)
-    story = story_of(folder, None if home is None else field_in(home))
+    story = _story(Path(folder), talk=not (quiet or as_json))
     picked = chosen_frames(chosen(frames), every)
     if picked != slice(None, None, 1):
         told = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
@@ -69,6 +74,47 @@ def command(
         fewer = max(int(every * size / LARGE) + 1, 2)
         report.note(f"note: {_spoken(size)} take long to open; --every {fewer} would make it about 100 MB")
     return DONE
+
+
+def _story(place: Path, talk: bool) -> Any:
+    """Of the run in a folder, as soon as it has a frame.  Raises BadInput: there is none, or not within WAIT."""
+    from ..run.told import field_in
+    from ..view.story import run_folder, story_of
+
+    begun = time.monotonic()
+    told = -TOLD_EVERY
+    while True:
+        waited = time.monotonic() - begun
+        try:
+            home = run_folder(place)
+            return story_of(place, None if home is None else field_in(home))
+        except BadInput as error:
+            if not _is_beginning(place, watched=waited > 0.1):
+                raise
+            if waited > WAIT:
+                raise BadInput(
+                    f"{place} has no frame after {WAIT:.0f} s; see whether its run is still going, or has failed"
+                ) from error
+        if talk and waited - told >= TOLD_EVERY:
+            so_far = f" ({waited:.0f} s so far)" if told >= 0.0 else ""
+            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one{so_far}")
+            told = waited
+        time.sleep(0.2)
+
+
+def _is_beginning(place: Path, watched: bool) -> bool:
+    """Whether a run may be about to write its first frame: its folder is empty, or holds a case and no frames.
+
+    Args:
+        watched: it was so a moment ago; its trajectory then may be there, but without a frame.
+    """
+    if not place.is_dir() or (place / SUMMARY).exists():
+        return False
+    try:
+        age = time.time() - (place / TRAJECTORY).stat().st_mtime
+    except OSError:
+        return (place / CASE).exists() or not any(place.iterdir())
+    return watched and age < YOUNG
 
 
 def _refuse(target: Path, overwrite: bool) -> None:

@@ -14,15 +14,16 @@ PAGE = Path(__file__).parents[1] / "view" / "page"
 """Where `hatch_build.py` puts the bundle, or `missing.txt` with the reason why there is none."""
 
 
-def read_bundle(folder: Path = PAGE) -> tuple[str, str]:
+def read_bundle(folder: Path | None = None) -> tuple[str, str]:
     """Script and style sheet of the page, as text.
 
     Args:
-        folder: where they lie.
+        folder: where they lie; PAGE by default.
 
     Raises:
         BadInput: they are not there; says why, and what to do.
     """
+    folder = PAGE if folder is None else folder
     try:
         script, sheet = ((folder / name).read_text("utf-8") for name in ("grainview.js", "grainview.css"))
     except (OSError, UnicodeDecodeError):

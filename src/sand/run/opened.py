@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.books import Books
 from ..analysis.clusters import cluster_labels
 from ..core.errors import BadInput
 from ..files import folder as files
@@ -16,7 +17,7 @@ from ..files.trajectory import Frame, Frames
 from ..setup.frame import from_frame
 from .case import read_case
 from .simulation import Simulation
-from .told import view_folder
+from .told import field_in, view_folder
 
 if TYPE_CHECKING:
     from ..view.still import Still
@@ -39,6 +40,8 @@ class Opened:
         if not self.folder.is_dir():
             raise BadInput(f"there is no folder {folder}")
         if not (self.folder / files.TRAJECTORY).exists():
+            if (self.folder / files.CASE).exists():
+                raise BadInput(f"{folder} has no {files.TRAJECTORY} yet; wait until its run has written a frame")
             raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")
 
     @cached_property
@@ -49,8 +52,8 @@ class Opened:
     @cached_property
     def ledger(self) -> dict[str, np.ndarray]:
         """Columns of the ledger by name (K,), SI.  Raises BadInput."""
-        rows = files.read_ledger(self.folder / files.LEDGER)
-        return {name: np.array([row[name] for row in rows]) for name in (rows[0] if rows else ())}
+        books = Books.of(files.read_ledger(self.folder / files.LEDGER))
+        return {name: books[name] for name in books.columns}
 
     @cached_property
     def case(self) -> dict[str, Any]:
@@ -99,10 +102,9 @@ class Opened:
         return view_folder(self.folder, path, lambda: self.at(-1).figure())
 
     def flux_density(self, time: float) -> np.ndarray | None:
-        """Of all outside magnetic fields of the case at a time [s], (3,) [T]; None without any.  Raises BadInput."""
-        forces = read_case(self.folder / files.CASE).forces.build()
-        fields = [force.flux_density_at(time) for force in forces if hasattr(force, "flux_density_at")]
-        return np.sum(fields, axis=0) if fields else None
+        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `told.field_in`."""
+        field = field_in(self.folder)
+        return None if field is None else np.asarray(field[1](time))
 
     def picture(self, frame: int = -1, **how: Any) -> Still:
         """A still picture of a frame, with the outside field of the case; it shows itself in a notebook.
@@ -116,9 +118,7 @@ class Opened:
         from ..view.still import still_picture
 
         one = self.frames[frame]
-        if "field" not in how and (self.folder / files.CASE).exists():
-            how["field"] = self.flux_density(one.time)
-        return still_picture(one, **how)
+        return still_picture(one, **({"field": self.flux_density(one.time)} | how))
 
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.

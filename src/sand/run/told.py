@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..core.errors import BadInput
 from ..core.units import spoken
 from ..core.vec import norm
@@ -19,11 +21,12 @@ Told = tuple[str, Callable[[float], Sequence[float]]]
 
 
 def field_of(forces: Iterable[Any]) -> Told | None:
-    """The field among forces in words, and its flux density [T] at a time [s]; None without one."""
-    for force in forces:
-        if isinstance(force, Field) and force.flux_density_size() > 0.0:
-            return _said(force), force.flux_density_at
-    return None
+    """Magnetic fields among forces in words, and their flux density together [T] at a time [s]; None without one."""
+    fields = [f for f in forces if hasattr(f, "flux_density_at") and f.flux_density_size() > 0.0]
+    if not fields:
+        return None
+    text = " + ".join(_said(f) if isinstance(f, Field) else f.name for f in fields)
+    return text, lambda time: np.sum([f.flux_density_at(time) for f in fields], axis=0)
 
 
 def field_in(folder: Path) -> Told | None:

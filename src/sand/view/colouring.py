@@ -6,23 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.colors import Colormap
 
 from ..analysis.clusters import cluster_sizes
 from ..analysis.quantities import MODES, Quantity, material_names
+from .palettes import DIVERGING, LIMITS, MATERIALS, SEQUENTIAL, WITHIN
 from .scene import cluster_colours
-from .style import BIG, BLUE, GREEN, ORANGE, PURPLE, RED, SINGLE, SKY, pretty, rgb, with_prefix
+from .style import BIG, SINGLE, pretty, rgb, with_prefix
 
-SEQUENTIAL: Colormap = LinearSegmentedColormap.from_list(
-    "deep to bright", ["#35469C", "#2C7FB8", "#2DB5A3", "#8FD368", "#F6E45A"], 256
-)
-DIVERGING: Colormap = LinearSegmentedColormap.from_list(
-    "cold and warm", ["#08519C", "#5FA2D4", "#E9E8E4", "#EE8F55", "#B33A00"], 256
-)
-KINDS = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
-"""Of materials."""
-LIMITS = (SINGLE, RED, BLUE, GREEN, PURPLE)
-"""Of modes, in the order of analysis.quantities.MODES."""
 FEW = 9
 """Whole numbers up to this many are shown one by one."""
 DECADES = 100.0
@@ -63,10 +54,11 @@ def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) 
         frame: that they are from, for the names of materials.
         label: cluster of each grain that is shown, for the quantity `cluster`.
     """
-    if what.name == "cluster":
+    if what.name == "cluster":  # by rank, not by name as on the page: one picture has no history
         return cluster_colours(label), Key(what.name, _cluster_swatches(label))
     if what.kind == "categorical":
-        names, colours = (MODES, LIMITS) if what.name == "mode" else (material_names(frame), KINDS)
+        kinds = {"mode": (MODES, (WITHIN, *LIMITS)), "material": (material_names(frame), MATERIALS)}
+        names, colours = kinds[what.name]
         table = np.array([rgb(colours[k % len(colours)]) for k in range(len(names))])
         there = np.unique(values[np.isfinite(values)]).astype(int)
         shown = table[np.where(np.isfinite(values), values, 0.0).astype(int)]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.books import Books
 from ..files.frame import Frame, stored_frame
 from .story import FieldTold, Story
 
@@ -43,8 +44,8 @@ def story_of_now(simulation: Simulation, field: FieldTold | None) -> Story:
     """The state of a simulation and what happened until then; later steps are not in it."""
     world = simulation.world
     stored: Any = stored_frame(world.steps, world.time, world.grains, world.box, simulation.contacts)
-    rows = list(simulation.ledger.rows)
+    books = Books(simulation.ledger.columns, simulation.ledger.rows)
     now = Moment(Frame(stored))
-    story = Story(now, "simulation", "in memory", rows=lambda: rows, summary=dict, field=field)
+    story = Story(now, "simulation", "in memory", books=lambda: books, summary=dict, field=field)
     story.notes.append("this simulation keeps no files: its state of now, and what its ledger holds")
     return story

@@ -1,27 +1,46 @@
-"""Palettes of the page: 64 colours each, as even as they look, and safe for the colour-blind."""
+"""Maps from shares to colours, and colours of kinds: one table for pictures and for the page of a run."""
 
 from __future__ import annotations
 
 import matplotlib
 import numpy as np
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 
-from .style import BIG, SINGLE, SMALL
+from .style import BIG, BLUE, GREEN, ORANGE, PURPLE, RED, SINGLE, SKY, SMALL
 
 STEPS = 64
-SEQUENTIAL = ("cividis", "viridis")
-"""Of matplotlib."""
-DIVERGING = ("#12436D", "#2F78B5", "#8DB6DA", "#E6E6E6", "#E8B48A", "#C8702A", "#7A3A0C")
-"""Blue, light grey, orange: as dark on both sides."""
+"""Colours of a map that the page gets."""
+# The places make the lightness L* of CIELAB rise in proportion to the share.
+SEQUENTIAL: Colormap = LinearSegmentedColormap.from_list(
+    "deep", [(0.0, "#35469C"), (0.32, "#2C7FB8"), (0.59, "#2DB5A3"), (0.79, "#8FD368"), (1.0, "#F6E45A")], 256
+)
+"""From deep to bright."""
+DIVERGING: Colormap = LinearSegmentedColormap.from_list(
+    "diverging", ["#08519C", "#5FA2D4", "#E9E8E4", "#E48248", "#983100"], 256
+)
+"""Cold and warm, as dark on both sides."""
+OTHERS = ("cividis", "viridis")
+"""Of matplotlib, for who prefers them."""
+MATERIALS = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
+"""Of materials, in turn."""
+WITHIN, LIMITS = SINGLE, (RED, BLUE, GREEN, PURPLE)
+"""Of contacts within their limits, and at the limit of a mode: stretch, slide, roll, twist."""
 
 
 def palettes() -> dict[str, list[list[int]]]:
-    """64 × (red, green, blue) from 0 to 255, by name."""
-    ways = {name: matplotlib.colormaps[name] for name in SEQUENTIAL}
-    ways["diverging"] = matplotlib.colors.LinearSegmentedColormap.from_list("diverging", DIVERGING)
+    """64 × (red, green, blue) from 0 to 255, by name; the first is the usual one, `diverging` is about zero."""
+    maps = [SEQUENTIAL, *(matplotlib.colormaps[name] for name in OTHERS), DIVERGING]
     places = np.linspace(0.0, 1.0, STEPS)
-    return {name: np.rint(255.0 * way(places)[:, :3]).astype(int).tolist() for name, way in ways.items()}
+    return {each.name: np.rint(255.0 * each(places)[:, :3]).astype(int).tolist() for each in maps}
 
 
 def colours() -> dict[str, list[str] | str]:
-    """Of the largest clusters, of all others in turn, and of single grains."""
-    return {"big": list(BIG), "small": list(SMALL), "single": SINGLE}
+    """Of clusters (the largest, all others in turn, single grains), of modes at their limit, and of materials."""
+    return {
+        "big": list(BIG),
+        "small": list(SMALL),
+        "single": SINGLE,
+        "modes": list(LIMITS),
+        "within": WITHIN,
+        "materials": list(MATERIALS),
+    }

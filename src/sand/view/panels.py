@@ -31,6 +31,9 @@ KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
 LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, INK, FAINT)
 OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
+ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
+COUNTS = {"contacts": ("contacts", BLUE), "made": ("made so far", GREEN), "broken": ("broken so far", RED)}
+"""Of contacts: columns, what they are called, colours."""
 
 DECADES = 6
 """Shown of a quantity that spans many."""
@@ -83,6 +86,24 @@ def losses(ledger: Any) -> dict[str, np.ndarray]:
     return {name: column(ledger, f"lost_{name}") for name in LOST}
 
 
+def energies_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
+    """Energies [J] that ever differ from zero, and their colours."""
+    drawn = {name: values for name, values in energies(ledger).items() if peak(values)}
+    outside = [name for name in drawn if name not in ENERGY_COLOURS]
+    colour = ENERGY_COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
+    return {name: (values, colour[name]) for name, values in drawn.items()}
+
+
+def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
+    """Sizes of all losses [J] for an axis of powers of ten, NaN for 0, and their colours.
+
+    What following stiffnesses, a gas and outside forces take may be negative; its size is drawn.
+    """
+    sizes = {name: np.abs(values) for name, values in losses(ledger).items()}
+    colour = dict(zip(LOST, LOSS_COLOURS, strict=True))
+    return {name: (np.where(size > 0.0, size, np.nan), colour[name]) for name, size in sizes.items()}
+
+
 def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
     """S (Eq. 17), the largest cluster and the number of clusters; all are numbers from 1 to N."""
     t = ledger["time"] / time.size
@@ -101,16 +122,14 @@ def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
 def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """Energies; those that never differ from zero are left out."""
     t = ledger["time"] / time.size
-    drawn = {name: values / unit.size for name, values in energies(ledger).items() if peak(values)}
-    outside = [name for name in drawn if name not in ("kinetic", "contacts", "magnetic")]
-    colour = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
-    colour |= {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
-    longer = {} if len(outside) > 1 else {"contacts": "contacts (elastic, adhesion)"}
+    drawn = {name: (values / unit.size, colour) for name, (values, colour) in energies_drawn(ledger).items()}
+    crowded = len(set(drawn) - set(ENERGY_COLOURS)) > 1
+    longer = {} if crowded else {"contacts": "contacts (elastic, adhesion)"}
     axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
-    for name, values in drawn.items():
-        axes.plot(t, values, color=colour[name], label=longer.get(name, name), **_marks(t))
+    for name, (values, colour) in drawn.items():
+        axes.plot(t, values, color=colour, label=longer.get(name, name), **_marks(t))
     if drawn:
-        _scale(axes, list(drawn.values()))
+        _scale(axes, [values for values, _ in drawn.values()])
         legend_above(axes)
     else:
         _nothing(axes, "no energy at any time")
@@ -120,25 +139,23 @@ def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
 def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     """Losses by channel; channels too small for the frame, or without any loss, are named only."""
     t = ledger["time"] / time.size
-    # what following stiffnesses, a gas and outside forces take may be negative; its size is drawn
-    channels = {name: np.abs(values) / unit.size for name, values in losses(ledger).items()}
+    channels = {name: (size / unit.size, colour) for name, (size, colour) in losses_drawn(ledger).items()}
     axes.set_ylabel(f"lost ({unit.name})")
-    top = max(map(peak, channels.values()))
+    top = max(peak(size) for size, _ in channels.values())
     if top == 0.0:
         _nothing(axes, "nothing lost")
         return
-    drawn = {name: v for name, v in channels.items() if peak(v) > top * 10.0**-DECADES}
-    colour = dict(zip(LOST, LOSS_COLOURS, strict=True))
-    for name, values in drawn.items():
-        axes.plot(t, np.where(values > 0.0, values, np.nan), color=colour[name], label=name, **_marks(t))
-    least = min(float(values[values > 0.0].min()) for values in drawn.values())
+    drawn = {name: v for name, v in channels.items() if peak(v[0]) > top * 10.0**-DECADES}
+    for name, (size, colour) in drawn.items():
+        axes.plot(t, size, color=colour, label=name, **_marks(t))
+    least = min(float(np.nanmin(size)) for size, _ in drawn.values())
     axes.set_yscale("log")
     axes.set_ylim(max(least / 2.0, top * 10.0**-DECADES), top * 2.5)
     _log_ticks(axes)
     legend_above(axes)
     options = ("damping", "stiffness", "gas", "outside")  # off by default: not worth a word
-    none = ", ".join(name for name, values in channels.items() if not peak(values) and name not in options)
-    tiny = ", ".join(name for name, values in channels.items() if name not in drawn and peak(values))
+    none = ", ".join(name for name, (size, _) in channels.items() if not peak(size) and name not in options)
+    tiny = ", ".join(name for name, (size, _) in channels.items() if name not in drawn and peak(size))
     note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)
     axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=FAINT)
 
@@ -147,12 +164,11 @@ def draw_contacts(axes: Axes, ledger: Any, time: Unit) -> None:
     """Contacts of the moment, and how many were made and broken since the start."""
     t = ledger["time"] / time.size
     style = _marks(t)
-    drawn = {"contacts": ("there are", BLUE), "made": ("made so far", GREEN), "broken": ("broken so far", RED)}
-    for name, (label, colour) in drawn.items():
+    for name, (label, colour) in COUNTS.items():
         axes.plot(t, ledger[name], color=colour, label=label, linewidth=1.9 if name == "contacts" else 1.2, **style)
-    axes.set_ylim(0.0, max(1.08 * max(float(ledger[name].max()) for name in drawn), 4.0))
+    axes.set_ylim(0.0, max(1.08 * max(float(ledger[name].max()) for name in COUNTS), 4.0))
     axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axes.set_ylabel("contacts")
+    axes.set_ylabel("number")
     legend_above(axes)
 
 

@@ -216,13 +216,16 @@ def _draw_directions(axes: Axes) -> None:
         axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=FAINT, size=7, ha="center", va="center")
 
 
-def draw_scale_bar(axes: Axes, share: float = 0.25) -> None:
-    """A bar of a round length, at most `share` of the width, in the lower right corner."""
+def draw_scale_bar(axes: Axes, share: float = 0.25, ink: str = INK, margin: float = 0.015, grow: float = 1.0) -> None:
+    """A bar of a round length, at most `share` of the width, in the lower right corner, and its length."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     length = round_length(share * (right - left))
-    x, y = right - 0.015 * (right - left), bottom + 0.02 * (top - bottom)
-    axes.plot([x - length, x], [y, y], color=INK, linewidth=2.0, solid_capstyle="butt", zorder=4, gid="scale")
-    axes.annotate(pretty(length, "m"), (x - length / 2, y), (0, 3), textcoords="offset points", ha="center", size=7.5)
+    x, y = right - margin * (right - left), bottom + 4.0 / 3.0 * margin * (top - bottom)
+    axes.plot([x - length, x], [y, y], color=ink, linewidth=2.0 * grow, solid_capstyle="butt", zorder=4, gid="scale")
+    place, above = (x - length / 2, y), (0, 3 * grow)
+    axes.annotate(
+        pretty(length, "m"), place, above, textcoords="offset points", ha="center", color=ink, size=7.5 * grow
+    )
 
 
 def side_by_side(scene: Scene, count: int) -> tuple[Balls, np.ndarray, list[int]]:

@@ -2,46 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..analysis.books import Books
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..files.folder import plain
-from .panels import LOSS_COLOURS, OUTSIDE_COLOURS, column, energies, losses, peak
-from .style import BLUE, FAINT, GREEN, INK, ON_DARK, RED, SKY
+from .panels import COUNTS, column, energies_drawn, losses_drawn, peak
+from .style import BLUE, FAINT, INK, ON_DARK, SKY
 
 MOST = 2000
 """Points of a line at most."""
 LOOKED_AT = 20_000_000
 """Grains, all frames together, whose clusters are counted where there is no ledger."""
-COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
-
-
-class Columns:
-    """Columns of a ledger by name, as the figure takes them.
-
-    Args:
-        rows: of ledger.csv.
-    """
-
-    def __init__(self, rows: Sequence[Mapping[str, float]]):
-        self.columns = tuple(rows[0]) if rows else ()
-        self._table = {name: np.array([row[name] for row in rows], np.float64) for name in self.columns}
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self._table[name]
-
-    def __len__(self) -> int:
-        return len(next(iter(self._table.values()), ()))
-
-    def taken(self, chosen: np.ndarray) -> Columns:
-        """Some of the rows."""
-        fewer = Columns(())
-        fewer.columns = self.columns
-        fewer._table = {name: values[chosen] for name, values in self._table.items()}
-        return fewer
 
 
 def thinned(count: int, most: int = MOST) -> np.ndarray:
@@ -51,9 +25,8 @@ def thinned(count: int, most: int = MOST) -> np.ndarray:
     return np.rint(np.linspace(0, count - 1, most)).astype(int)
 
 
-def of_ledger(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+def of_ledger(whole: Books) -> dict[str, Any]:
     """Plots and events of a ledger; a plot whose columns a ledger lacks is left out."""
-    whole = Columns(rows)
     books = whole.taken(thinned(len(whole)))
     plots = []
     for plot in (_clusters, _energies, _losses, _contacts, _balance):
@@ -74,7 +47,7 @@ def of_frames(frames: Any) -> dict[str, Any]:
         table["mean_cluster_size"].append(mean_cluster_size(labels))
         table["largest_cluster"].append(float(cluster_sizes(labels).max()))
         table["clusters"].append(float(labels.max() + 1))
-    lines = [_line("contacts", RED, frames.contacts[chosen].astype(float))]
+    lines = [_line(*COUNTS["contacts"], frames.contacts[chosen].astype(float))]
     plots = [
         _clusters({name: np.array(values) for name, values in table.items()}),
         _plot("contacts", "Contacts", lines),
@@ -92,37 +65,32 @@ def _clusters(books: Any) -> dict[str, Any]:
     return _plot("clusters", "Clusters", lines, log=True)
 
 
-def _energies(books: Columns) -> dict[str, Any]:
-    drawn = {name: values for name, values in energies(books).items() if peak(values)}
-    outside = [name for name in drawn if name not in COLOURS]
-    colour = COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
-    return _plot("energies", "Energies", [_line(name, colour[name], drawn[name]) for name in drawn], "J")
+def _energies(books: Books) -> dict[str, Any]:
+    lines = [_line(name, colour, values) for name, (values, colour) in energies_drawn(books).items()]
+    return _plot("energies", "Energies", lines, "J")
 
 
-def _losses(books: Columns) -> dict[str, Any]:
-    """Their sizes, as in the figure: what a gas and outside forces take may be negative."""
-    colour = dict(zip(losses(books), LOSS_COLOURS, strict=True))
-    drawn = {name: np.abs(values) for name, values in losses(books).items() if peak(values)}
-    lines = [_line(name, colour[name], np.where(v > 0.0, v, np.nan)) for name, v in drawn.items()]
+def _losses(books: Books) -> dict[str, Any]:
+    lines = [_line(name, colour, size) for name, (size, colour) in losses_drawn(books).items() if peak(size)]
     return _plot("losses", "Losses", lines, "J", log=True)
 
 
-def _contacts(books: Columns) -> dict[str, Any]:
-    drawn = (("contacts", "contacts", BLUE), ("made", "made so far", GREEN), ("broken", "broken so far", RED))
-    return _plot("contacts", "Contacts", [_line(label, colour, books[name]) for name, label, colour in drawn])
+def _contacts(books: Books) -> dict[str, Any]:
+    lines = [_line(label, colour, books[name]) for name, (label, colour) in COUNTS.items()]
+    return _plot("contacts", "Contacts", lines)
 
 
-def _balance(books: Columns) -> dict[str, Any]:
+def _balance(books: Books) -> dict[str, Any]:
     total = column(books, "total")
     return _plot("balance", "Balance", [_line("total − start", INK, total - total[0])], "J")
 
 
-def _events(books: Columns) -> dict[str, Any]:
+def _events(books: Books) -> dict[str, Any]:
     """When contacts were made or broken, and how many since the row before."""
     if not {"made", "broken"} <= set(books.columns):
         return {"time": [], "made": [], "broken": []}
 
-    def grown(some: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def grown(some: Books) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         made, broken = (np.maximum(np.diff(some[name]), 0.0) for name in ("made", "broken"))
         return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
 

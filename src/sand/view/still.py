@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from PIL import Image
 
 from ..analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, quantity
@@ -17,10 +16,10 @@ from ..core.errors import BadInput, did_you_mean
 from .colouring import Key, coloured
 from .figure import DPI, RunFigure, headline
 from .light import Lamps
-from .scene import Scene, camera, scene_of, view_window
+from .scene import Scene, camera, draw_scale_bar, scene_of, view_window
 from .spheres import Rods, draw
 from .still_key import draw_directions, draw_keys
-from .style import CHALK, FAINT, INK, MIST, NIGHT, PAPER, pretty, rgb, round_length, styled
+from .style import CHALK, FAINT, INK, MIST, NIGHT, PAPER, rgb, styled
 
 VIEWS: dict[str, tuple[float, float, float] | None] = {
     "iso": None,
@@ -249,21 +248,4 @@ def _write(figure: Still, frame: Any, keys: list[Key], field: np.ndarray | None,
     figure.text(0.022, 0.922, ",  ".join(caption[:-1]), size=8.5 * grow, color=faint, va="center")
     draw_keys(figure, keys, grow, ink)
     draw_directions(figure, figure.rotation, field, grow, faint, ink)
-    _scale_bar(axes, figure.window, grow, ink)
-
-
-def _scale_bar(axes: Axes, window: tuple[float, float, float, float], grow: float, ink: str) -> None:
-    """A bar of a round length in the lower right corner, and its length."""
-    left, right, bottom, top = window
-    length = round_length(0.16 * (right - left))
-    x, y = right - 0.03 * (right - left), bottom + 0.04 * (top - bottom)
-    axes.plot([x - length, x], [y, y], color=ink, linewidth=2.6 * grow, solid_capstyle="butt", gid="scale")
-    axes.annotate(
-        pretty(length, "m"),
-        (x - length / 2, y),
-        (0, 4 * grow),
-        textcoords="offset points",
-        ha="center",
-        color=ink,
-        size=9.0 * grow,
-    )
+    draw_scale_bar(axes, 0.16, ink, 0.03, 1.2 * grow)

@@ -8,7 +8,8 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from .colouring import SEQUENTIAL, Key
+from .colouring import Key
+from .palettes import SEQUENTIAL
 from .style import BLUE
 
 COLUMN = 0.865

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..analysis.books import Books
 from ..analysis.lineage import Lineage
+from ..analysis.quantities import measured
 from ..core.errors import BadInput
 from ..files import folder as files
 from ..files.following import Following
@@ -22,8 +24,12 @@ from .series import of_frames, of_ledger, thinned
 FORMAT = 1
 LOOKED_AT = 12
 """Frames that ranges are taken from."""
+PERCENTILES = ("speed", "spin", "kinetic_energy")
+"""Quantities of grains of which few have very large numbers: their ranges leave those out."""
+EXTREMES = ("size", "radius", "coordination", "moment", "load")
+"""Whose ranges hold all; `moment` and `load`: of sizes."""
 RANGE = (1.0, 99.9)
-"""Percentiles between which a range goes."""
+"""Percentiles between which a range of PERCENTILES goes."""
 STEADY = 1e-9
 """Directions of a field that differ by less are one."""
 
@@ -38,7 +44,7 @@ class Story:
         frames: of a trajectory (`files.following.Following`), or what looks like them.
         name: of the run.
         place: its folder, or its file.
-        rows: the ledger so far; None where there is none.
+        books: the ledger so far; None where there is none.
         summary: how the run ended; None while it has not, empty where nobody knows.
         field: the magnetic field, if there is one.
         chosen: which frames are told; all by default.
@@ -51,7 +57,7 @@ class Story:
         name: str,
         place: str,
         *,
-        rows: Callable[[], Sequence[Mapping[str, float]] | None],
+        books: Callable[[], Books | None],
         summary: Callable[[], Mapping[str, Any] | None],
         field: FieldTold | None = None,
         chosen: slice = slice(None),
@@ -59,7 +65,7 @@ class Story:
     ):
         self.frames, self.name, self.place, self.compact = frames, name, place, compact
         self.chosen, self.notes, self._lock = chosen, list[str](), threading.RLock()
-        self._rows, self._summary, self._field = rows, summary, field
+        self._books, self._summary, self._field = books, summary, field
         self._begin()
 
     def _begin(self) -> None:
@@ -168,8 +174,8 @@ class Story:
     def series(self) -> dict[str, Any]:
         """What happened over time, by the ledger; by the frames where there is none."""
         with self._lock:
-            rows = self._rows()
-            return of_ledger(rows) if rows else of_frames(self.frames)
+            books = self._books()
+            return of_ledger(books) if books else of_frames(self.frames)
 
     def dimension(self, k: int, grain: int) -> dict[str, Any]:
         """Fractal dimension of the cluster of a grain: `value` and `error`, or the `reason` why there are none.
@@ -182,7 +188,7 @@ class Story:
         return dimensions.answer(*self.read(k), grain)
 
     def ranges(self) -> dict[str, list[float]]:
-        """Smallest and largest speed, spin, kinetic energy and force of a contact, SI, nearly all of them."""
+        """Least and most of quantities by name, SI: of all numbers in EXTREMES, nearly all in PERCENTILES."""
         with self._lock:
             count = len(self.frames)
             if self._ranges is None or count > 1.5 * self._ranges[0]:
@@ -190,19 +196,15 @@ class Story:
             return self._ranges[1]
 
     def _looked_at(self, count: int) -> dict[str, list[float]]:
-        seen: dict[str, list[np.ndarray]] = {"speed": [], "spin": [], "kinetic": [], "load": []}
+        seen: dict[str, list[np.ndarray]] = {name: [] for name in (*PERCENTILES, *EXTREMES)}
         for number in thinned(count, LOOKED_AT):
             try:
                 frame = self.frames[int(number)]
             except BadInput:
                 continue
-            speed, spin = (np.linalg.norm(np.asarray(v, float), axis=1) for v in (frame.velocity, frame.spin))
-            mass, radius = np.asarray(frame.mass, float), frame.radius
-            seen["speed"].append(speed)
-            seen["spin"].append(spin)
-            seen["kinetic"].append(0.5 * mass * (speed**2 + 0.4 * radius**2 * spin**2))
-            seen["load"].append(np.linalg.norm(frame.force, axis=1))
-        return {name: _range(np.concatenate([*parts, np.zeros(0)])) for name, parts in seen.items()}
+            for name, parts in seen.items():
+                parts.append(_sizes(frame, name))
+        return {name: _range(np.concatenate([*parts, np.zeros(0)]), name) for name, parts in seen.items()}
 
     def _told_field(self, numbers: np.ndarray) -> dict[str, Any] | None:
         if self._field is None or not numbers.size:
@@ -220,11 +222,20 @@ def _direction(vector: Sequence[float]) -> list[float]:
     return [float(f"{part / size:.9g}") if size > 0.0 else 0.0 for part in vector]
 
 
-def _range(values: np.ndarray) -> list[float]:
-    values = values[np.isfinite(values)]
+def _sizes(frame: Any, name: str) -> np.ndarray:
+    """Finite numbers of a quantity in a frame, without their signs."""
+    try:
+        values = np.linalg.norm(frame.moment, axis=1) if name == "moment" else np.abs(measured(frame, name))
+    except BadInput:  # the frame has none
+        return np.zeros(0)
+    return np.asarray(values[np.isfinite(values)], dtype=np.float64)
+
+
+def _range(values: np.ndarray, name: str) -> list[float]:
     if not values.size:
         return [0.0, 0.0]
-    low, high = np.percentile(values, RANGE[0], method="lower"), np.percentile(values, RANGE[1], method="higher")
+    share = RANGE if name in PERCENTILES else (0.0, 100.0)
+    low, high = np.percentile(values, share[0], method="lower"), np.percentile(values, share[1], method="higher")
     return [float(low), float(high)]
 
 
@@ -240,10 +251,10 @@ def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
         if not place.is_file():
             lacks = f"there is no {files.TRAJECTORY} in it" if place.is_dir() else "there is no such folder or file"
             raise BadInput(f"{path} is neither the folder of a run nor a trajectory: {lacks}")
-        return Story(Following(place), place.stem, str(path), rows=lambda: None, summary=dict, field=field)
+        return Story(Following(place), place.stem, str(path), books=lambda: None, summary=dict, field=field)
     frames = Following(folder / files.TRAJECTORY)
     name = folder.resolve().name
-    return Story(frames, name, str(path), rows=_Rows(folder), summary=lambda: _summary(folder), field=field)
+    return Story(frames, name, str(path), books=_Books(folder), summary=lambda: _summary(folder), field=field)
 
 
 def run_folder(place: str | Path) -> Path | None:
@@ -261,19 +272,19 @@ def _summary(folder: Path) -> Mapping[str, Any] | None:
         return None
 
 
-class _Rows:
+class _Books:
     """The ledger of a run, read again when it has changed; None while there is none."""
 
     def __init__(self, folder: Path):
         self._path = folder / files.LEDGER
-        self._known: tuple[tuple[int, int], list[dict[str, float]] | None] = ((0, 0), None)
+        self._known: tuple[tuple[int, int], Books | None] = ((0, 0), None)
 
-    def __call__(self) -> list[dict[str, float]] | None:
+    def __call__(self) -> Books | None:
         try:
             found = self._path.stat()
             stamp = (found.st_size, found.st_mtime_ns)
             if stamp != self._known[0]:
-                self._known = (stamp, files.read_ledger(self._path))
+                self._known = (stamp, Books.of(files.read_ledger(self._path)))
         except (OSError, BadInput):
             return None
         return self._known[1]

@@ -1,0 +1,95 @@
+"""`sand plot`: files made, refusals that leave nothing behind."""
+
+import json
+
+import pytest
+from PIL import Image
+
+from sand.cli.main import main
+from sand.view.plots import HISTORY
+
+
+def test_everything_by_default(in_a_field, tmp_path, capsys):
+    """Five figures over time and a still picture, in DIR/plots, and what was written is told."""
+    assert main(["plot", str(in_a_field), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["files"]
+    assert told == [str(in_a_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]
+    assert Image.open(in_a_field / "plots" / "still.png").size == (1600, 1000)
+    assert main(["plot", str(in_a_field)]) == 2
+    assert capsys.readouterr().err.count("exists; give another --out, or --overwrite") == 1
+    assert main(["plot", str(in_a_field), "--overwrite", "--what", "size"]) == 0
+    assert main(["info", str(in_a_field)]) == 0  # a run's folder is one still
+
+
+def test_chosen_ones_as_other_formats(in_a_field, tmp_path, capsys):
+    """Histograms of quantities, a still of a frame in a size of one's own; PDF and SVG are what they are called."""
+    out = str(tmp_path / "there")
+    words = ["--what", "speed,still", "--size", "300x200", "--frame", "0", "--bonds", "load", "--colour", "size"]
+    for form, start in (("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")):
+        assert main(["plot", str(in_a_field), "--out", out, "--format", form, *words, "--dark", "--transparent"]) == 0
+        for name in ("speed", "still"):
+            assert (tmp_path / "there" / f"{name}.{form}").read_bytes().startswith(start)
+    assert Image.open(tmp_path / "there" / "still.png").size == (300, 200)
+    assert Image.open(tmp_path / "there" / "still.png").getpixel((298, 2))[3] == 0
+
+
+def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
+    """A .gsd has no ledger: a still picture by default, beside it."""
+    alone = tmp_path / "alone.gsd"
+    alone.write_bytes((in_a_field / "trajectory.gsd").read_bytes())
+    assert main(["plot", str(alone), "--size", "300x200"]) == 0
+    assert [p.name for p in (tmp_path / "alone-plots").iterdir()] == ["still.png"]
+    assert main(["plot", str(alone), "--what", "size"]) == 2
+    assert "has no ledger; give a run's folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--what", "sise,still"], "'sise' is none; did you mean 'size'?"),
+        (["--what", ""], "'' is none"),
+        (["--colour", "sped"], "there is no quantity 'sped'; did you mean 'speed'?"),
+        (["--size", "10x10"], "each must be from 200 to 8000 pixels"),
+        (["--size", "wide"], "--size 'wide' must be width x height"),
+        (["--view", "botom"], "there is no view 'botom'"),
+        (["--view", "0,0,0"], "three numbers that are not all 0"),
+        (["--frame", "99"], "has frames 0 to 3, or -1 to -4"),
+        (["--cluster", "9"], "cluster 9: there are 4"),
+        (["--format", "gif"], "is not one of"),
+        (["--out", "/nowhere/at/all"], "cannot be a folder"),
+    ],
+)
+def test_mistakes_are_told_and_nothing_is_written(in_a_field, tmp_path, capsys, words, told):
+    """One line, exit code 2, no folder."""
+    out = [] if "--out" in words else ["--out", str(tmp_path / "there")]
+    assert main(["plot", str(in_a_field), *out, *words]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and told in lines[0]
+    assert not list(tmp_path.iterdir())
+
+
+def test_several_mistakes_have_a_line_each(in_a_field, tmp_path, capsys):
+    """All at once, not one after the other."""
+    assert main(["plot", str(in_a_field), "--what", "sise", "--view", "botom", "--size", "1x1", "--colour", "x"]) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 4
+
+
+def test_what_is_not_there(in_a_field, tmp_path, capsys):
+    """No run, no ledger, a ledger without rows, no frame: told, and nothing is written."""
+    assert main(["plot", str(tmp_path)]) == 2
+    assert "is not the folder of a run" in capsys.readouterr().err
+    (tmp_path / "trajectory.gsd").write_bytes((in_a_field / "trajectory.gsd").read_bytes())
+    assert main(["plot", str(tmp_path), "--what", "size"]) == 2
+    assert "there is no file" in capsys.readouterr().err
+    (tmp_path / "ledger.csv").write_text((in_a_field / "ledger.csv").read_text().split("\n")[0] + "\n")
+    assert main(["plot", str(tmp_path), "--what", "size"]) == 2
+    assert "the ledger has no row yet" in capsys.readouterr().err
+    (tmp_path / "ledger.csv").write_text("step,time\n0,0.0\n")
+    assert main(["plot", str(tmp_path), "--what", "size"]) == 2
+    assert "the ledger has no column" in capsys.readouterr().err
+    assert not (tmp_path / "plots").exists()
+    import gsd.hoomd
+
+    gsd.hoomd.open(str(tmp_path / "trajectory.gsd"), "w").close()
+    assert main(["plot", str(tmp_path), "--what", "still"]) == 2
+    assert "has no frame yet" in capsys.readouterr().err

@@ -1,0 +1,133 @@
+"""`sand view`: files and addresses it gives, runs it waits for, mistakes it refuses."""
+
+import json
+import re
+import threading
+import urllib.request
+
+import pytest
+
+import sand
+from sand.cli import view as view_command
+from sand.cli.main import main
+
+from .pages import blocks
+from .reels import reel
+
+pytestmark = pytest.mark.usefixtures("bundle")
+
+
+def test_the_command_writes_a_file(looked_at, tmp_path, capsys):
+    """Not over what is there, without leave; says how large it is; slices and thinning go in."""
+    target = tmp_path / "out.html"
+    words = ["view", str(looked_at[0]), "--html", str(target)]
+    assert main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told == {"file": str(target), "bytes": target.stat().st_size}
+    assert main(words) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main([*words, "--overwrite", "--every", "2", "--frames", "1:"]) == 0
+    assert "MB" in capsys.readouterr().out
+    manifest, _, packets = blocks(target)
+    assert len(packets) == 3 and manifest["steps"] == [sand.open(looked_at[0]).frames[k].step for k in (1, 3, 5)]
+    assert "one frame of 2" in manifest["note"] and manifest["field"]["directions"]
+
+
+def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
+    """Above 100 MB it says what to do."""
+    monkeypatch.setattr(view_command, "LARGE", 1e3)
+    assert main(["view", str(looked_at[0]), "--html", str(tmp_path / "a.html"), "--quiet"]) == 0
+    told = capsys.readouterr()
+    assert "--every" in told.err and told.out == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["/nowhere/at/all"], "no such folder"),
+        (["RUN", "--html", "/nowhere/at/all.html"], "no folder"),
+        (["RUN", "--html", "/tmp"], "is a folder"),
+        (["RUN", "--frames", "a"], "--frames"),
+        (["RUN", "--frames", "70:"], "none of them was chosen"),
+        (["RUN", "--every", "0"], "--every"),
+        (["RUN", "--port", "70000"], "--port"),
+        ([], "DIR"),
+    ],
+)
+def test_mistakes(looked_at, capsys, words, said):
+    """One line, exit 2."""
+    assert main(["view", *(str(looked_at[0]) if word == "RUN" else word for word in words)]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and said in lines[0]
+
+
+def test_without_the_page(looked_at, bundle, capsys):
+    """An installation that lacks the bundle says so, in one line."""
+    (bundle / "grainview.js").unlink()
+    assert main(["view", str(looked_at[0])]) == 2
+    assert "not part of this installation" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", [[], ["--json"], ["--quiet"]])
+def test_the_command_serves(looked_at, capsys, monkeypatch, form):
+    """It prints the address, answers there while it waits, and Ctrl-C ends it with 0."""
+    got = {}
+
+    def wait():
+        got["out"], got["err"] = capsys.readouterr()
+        (url,) = re.findall(r"http://127\.0\.0\.1:\d+/[\w-]+/", got["out"])
+        with urllib.request.urlopen(url + "manifest", timeout=10) as reply:
+            got["manifest"] = json.load(reply)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(view_command, "_wait", wait)
+    monkeypatch.setenv("SSH_CONNECTION", "a b c d")
+    before = threading.active_count()
+    assert main(["view", str(looked_at[0]), *form]) == 0
+    assert got["manifest"]["grains"] == 6
+    told = got["err"] + capsys.readouterr().err
+    assert ("ssh -L" in told and "ended" in told) if not form else told == ""
+    assert threading.active_count() <= before + 2
+    if form == ["--json"]:
+        assert list(json.loads(got["out"])) == ["url"]
+
+
+def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
+    """An empty folder, as while a run is compiled; then a case, then a trajectory: the page has its frames."""
+    run = tmp_path / "run"
+    run.mkdir()
+
+    def begin():
+        (run / "case.toml").write_bytes((looked_at[0] / "case.toml").read_bytes())
+        reel(run / "trajectory.gsd", [[(0, 1)], []], 3)
+
+    later = threading.Timer(1.0, begin)
+    later.start()
+    assert main(["view", str(run), "--html", str(tmp_path / "a.html")]) == 0
+    later.join()
+    assert len(blocks(tmp_path / "a.html")[2]) == 2
+    assert "waiting up to 60 s" in capsys.readouterr().err
+
+
+def test_a_run_that_never_begins(tmp_path, capsys, monkeypatch):
+    """After the time for waiting: one line that says what to look for; not for a run that has ended."""
+    monkeypatch.setattr(view_command, "WAIT", 0.5)
+    (tmp_path / "case.toml").write_text("")
+    assert main(["view", str(tmp_path), "--quiet"]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and "has no frame after" in lines[0]
+    (tmp_path / "summary.json").write_text("{}")
+    assert main(["view", str(tmp_path)]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and "no trajectory.gsd" in lines[0]
+
+
+def test_waiting_can_be_interrupted(tmp_path, monkeypatch):
+    """Ctrl-C before there is a page: as for all commands."""
+
+    def pressed(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(view_command.time, "sleep", pressed)
+    (tmp_path / "run").mkdir()
+    assert main(["view", str(tmp_path / "run")]) == 130

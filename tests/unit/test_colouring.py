@@ -1,0 +1,35 @@
+"""Colours of grains on a still picture, and the key that takes one back to its number."""
+
+import numpy as np
+import pytest
+
+from sand.view.palettes import SEQUENTIAL
+from sand.view.still import still_picture
+from sand.view.style import BIG, SINGLE, rgb
+
+from .stills import R, alike, at_pixel, frame_of
+
+
+def test_clusters_have_their_colours():
+    """At each grain's centre is the hue of its cluster, the largest first; single grains are grey."""
+    position = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0], [0, 0, 5], [2, 0, 5], [6, 0, 5]]) * R
+    picture = still_picture(frame_of(position, [(0, 1), (1, 2), (3, 4)]), view="front", size=(500, 400))
+    for k, colour in enumerate([BIG[0]] * 3 + [BIG[1]] * 2 + [SINGLE]):
+        x, y = at_pixel(picture, position[k])
+        patch = picture.grains_only[int(y) - 3 : int(y) + 3, int(x) - 3 : int(x) + 3]
+        if colour == SINGLE:
+            assert np.ptp(patch[..., :3], axis=2).max() < 0.08
+        else:
+            assert alike(patch, rgb(colour)).all()
+
+
+def test_a_colour_leads_back_to_its_number():
+    """Speeds are in the order of the colours on the bar, whose ends are the least and the most; of arrows no trace."""
+    frame = frame_of(np.arange(5)[:, None] * [3 * R, 0, 0], velocity=np.arange(1, 6)[:, None] * [0.0, 0.0, 2.0])
+    picture = still_picture(frame, colour="speed", view="front", size=(500, 300))
+    bar = next(axes for axes in picture.axes if axes.get_label() == "bar")
+    assert bar.get_ylim() == pytest.approx((2.0, 10.0), rel=1e-6, abs=0.0)
+    expected = SEQUENTIAL(np.linspace(0.0, 1.0, 5))[:, :3]
+    for k in range(5):
+        x, y = at_pixel(picture, frame.position[k])
+        assert alike(picture.grains_only[int(y) : int(y) + 2, int(x) : int(x) + 2], expected[k]).all()

@@ -1,0 +1,28 @@
+"""Fractal dimensions of single clusters, as the page is told them."""
+
+import pytest
+
+import sand
+from sand.view.dimensions import Dimensions
+from sand.view.story import story_of
+
+from .reels import reel
+
+
+def test_dimensions(tmp_path, monkeypatch):
+    """A straight chain has dimension 1; too few grains give a reason; the same grains are not measured again."""
+    from sand.view import dimensions
+
+    chain = [(k, k + 1) for k in range(39)]
+    story = story_of(reel(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))
+    assert story.dimension(0, 5)["value"] == pytest.approx(1.0, abs=0.1)
+    assert "at least 32" in story.dimension(2, 5)["reason"]
+    assert "touches none" in story.dimension(0, 41)["reason"]
+    with pytest.raises(sand.BadInput, match="no 42"):
+        story.dimension(0, 42)
+    calls = []
+    real = dimensions.cluster_dimension
+    monkeypatch.setattr(dimensions, "cluster_dimension", lambda *a: calls.append(a) or real(*a))
+    measure = Dimensions()
+    found = [measure.of(*story.read(k)) for k in range(3)]
+    assert len(calls) == 1 and list(found[0]) == ["0"] and found[0] == found[1] and found[2] == {}

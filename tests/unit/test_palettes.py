@@ -1,0 +1,43 @@
+"""Maps of colours are even, and the page gets those of the pictures."""
+
+import numpy as np
+import pytest
+
+from sand.analysis.quantities import MODES
+from sand.view.palettes import DIVERGING, LIMITS, MATERIALS, SEQUENTIAL, WITHIN, colours, palettes
+
+
+def lightness(shades):
+    """L* of CIELAB of sRGB colours from 0 to 1 (IEC 61966-2-1, CIE 15)."""
+    linear = np.where(shades <= 0.04045, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
+    y = linear @ [0.2126729, 0.7151522, 0.0721750]
+    return np.where(y > 216 / 24389, 116.0 * np.cbrt(y) - 16.0, 24389 / 27 * y)
+
+
+def test_lightness_rises_evenly():
+    """From deep to bright in a straight line, to 0.5 of 57; the eye tells apart about 1."""
+    light = lightness(SEQUENTIAL(np.linspace(0.0, 1.0, 256))[:, :3])
+    assert (np.diff(light) > 0.0).all()
+    assert light == pytest.approx(np.linspace(light[0], light[-1], 256), rel=0.0, abs=0.5)
+    assert light[-1] - light[0] > 50.0
+
+
+def test_both_sides_of_zero_are_as_dark():
+    """The same lightness at the same distance from the middle, which is the lightest, to 3 of 57."""
+    light = lightness(DIVERGING(np.linspace(0.0, 1.0, 257))[:, :3])
+    assert light == pytest.approx(light[::-1], rel=0.0, abs=3.0)
+    assert (np.diff(light[:128]) > 0.0).all() and light[128] - light[0] > 50.0
+
+
+def test_the_page_has_the_pictures_colours():
+    """Deep is the first, 64 steps from end to end; a colour for each mode, of materials, and of contacts within."""
+    told = palettes()
+    assert list(told) == ["deep", "cividis", "viridis", "diverging"]
+    assert all(np.shape(steps) == (64, 3) for steps in told.values())
+    for name, way in (("deep", SEQUENTIAL), ("diverging", DIVERGING)):
+        ends = np.rint(255 * way(np.array([0.0, 1.0]))[:, :3])
+        assert [told[name][0], told[name][-1]] == ends.tolist()
+    named = colours()
+    assert list(named) == ["big", "small", "single", "modes", "within", "materials"]
+    assert named["modes"] == list(LIMITS) and len(LIMITS) == len(MODES) - 1
+    assert (named["within"], named["materials"]) == (WITHIN, list(MATERIALS))

@@ -1,0 +1,57 @@
+"""What happened over time, as the page is told it: the ledger's numbers, thinned."""
+
+import json
+
+import pytest
+
+from sand.analysis.books import Books
+from sand.view.series import MOST, of_ledger, thinned
+from sand.view.story import story_of
+
+from .reels import reel
+
+
+def test_series_are_the_ledgers(looked_at):
+    """Plots hold the ledger's columns; total − start is worked out before numbers are shortened; counts of events."""
+    folder, sim = looked_at
+    series = story_of(folder).series()
+    plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
+    assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
+    assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
+    assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
+    change = sim.ledger["total"] - sim.ledger["total"][0]
+    assert plots["balance"]["total − start"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
+    assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
+    assert plots["losses"]
+    for name, lost in plots["losses"].items():  # an axis of powers of ten has no place for 0
+        assert [v is None for v in lost] == [v == 0.0 for v in sim.ledger[f"lost_{name}"]]
+    for plot in series["plots"]:
+        assert all(len(line["values"]) == len(series["time"]) for line in plot["lines"])
+        assert all(line[ground].startswith("#") for line in plot["lines"] for ground in ("light", "dark"))
+
+
+def test_long_and_broken_ledgers(looked_at):
+    """At most 2000 points, the last among them; no event is lost; what is not a number is null."""
+    row = dict(looked_at[1].ledger.rows[-1])
+    rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
+    rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
+    series = of_ledger(Books.of(rows))
+    assert len(series["time"]) == MOST and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
+    assert sum(series["events"]["made"]) == 15000 and sum(series["events"]["broken"]) == 2500
+    assert len(series["events"]["time"]) < MOST
+    values = {plot["id"]: plot["lines"][0]["values"] for plot in series["plots"]}
+    assert values["balance"][-1] is None and values["energies"][-1] is None
+    json.dumps(series, allow_nan=False)
+    assert thinned(10, 20).tolist() == list(range(10)) and thinned(100, 3).tolist() == [0, 50, 99]
+
+
+def test_without_a_ledger(tmp_path):
+    """A file by itself: clusters and contacts are counted in its frames."""
+    story = story_of(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
+    series = story.series()
+    plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
+    assert plots["contacts"]["contacts"] == [0, 1, 2]
+    assert plots["clusters"]["largest"] == [1, 2, 3] and plots["clusters"]["number of clusters"] == [5, 4, 3]
+    assert plots["clusters"]["mean size S"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
+    told = story.manifest()
+    assert not told["running"] and told["outcome"] is None and told["name"] == "a"

@@ -1,0 +1,67 @@
+"""The widget of a notebook: what it answers."""
+
+import json
+
+import pytest
+
+import sand
+from sand.view import show
+from sand.view.packets import decode
+from sand.view.story import story_of
+from sand.view.widget import answered, widget
+
+from .pages import SCRIPT
+
+pytestmark = pytest.mark.usefixtures("bundle")
+
+
+def test_messages_of_the_widget(looked_at):
+    """Each kind is answered with what the story tells, echoed so that the page knows what it asked for."""
+    story = story_of(looked_at[0])
+    assert answered(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
+    assert answered(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
+    told, none = answered(story, {"kind": "manifest", "since": 4})
+    assert len(told["manifest"]["times"]) == 2 and none == []
+    assert answered(story, {"kind": "series"})[0]["series"] == json.loads(json.dumps(story.series()))
+    assert "reason" in answered(story, {"kind": "dimension", "k": 5, "grain": 0})[0]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        None,
+        {},
+        {"kind": "file"},
+        {"kind": "frame"},
+        {"kind": "frame", "k": -1},
+        {"kind": "frame", "k": 6},
+        {"kind": "frame", "k": "0"},
+        {"kind": "frame", "k": True},
+        {"kind": "dimension", "k": 0, "grain": 6},
+        {"kind": "manifest", "since": None},
+    ],
+)
+def test_wrong_messages(looked_at, content):
+    """A sentence, whatever comes; nothing is raised in the kernel."""
+    told, buffers = answered(story_of(looked_at[0]), content)
+    assert isinstance(told["error"], str) and buffers == []
+
+
+def test_the_widget(looked_at, monkeypatch):
+    """It holds manifest and series, runs the bundle, and answers through its own channel."""
+    pytest.importorskip("anywidget", reason="anywidget is in the test extra")
+    one = widget(story_of(looked_at[0]))
+    assert one.manifest["grains"] == 6 and one.series["plots"] and SCRIPT in str(one._esm)
+    sent = []
+    monkeypatch.setattr(one, "send", lambda content, buffers=None: sent.append((content, buffers)))
+    one._handle_custom_msg({"kind": "frame", "k": 1}, [])
+    assert sent[0][0] == {"kind": "frame", "k": 1} and decode(sent[0][1][0])[0]["frame"] == 1
+    monkeypatch.setattr(show, "in_notebook", lambda: True)
+    assert type(sand.open(looked_at[0]).view()).__name__ == "GrainWidget"
+
+
+def test_without_anywidget(looked_at, monkeypatch):
+    """It says what to install."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(sand.BadInput, match="pip install anywidget"):
+        widget(story_of(looked_at[0]))
