@@ -230,7 +230,8 @@ export class App {
 
   tellRun(): void {
     const { manifest } = this;
-    const parts = [manifest.grains === 1 ? "1 grain" : `${manifest.grains} grains`, manifest.times.length === 1 ? "1 frame" : `${manifest.times.length} frames`];
+    const counted = (count: number, what: string): string => `${count} ${what}${count === 1 ? "" : "s"}`;
+    const parts = [counted(manifest.grains, "grain"), counted(manifest.times.length, "frame")];
     if (manifest.running) parts.push("still running");
     else if (manifest.outcome) parts.push(manifest.outcome);
     if (manifest.field) parts.push(manifest.field.text);

@@ -20,10 +20,10 @@ async function build(place: HTMLElement, source: Source, ownPage: boolean): Prom
   const known = { manifest, grains };
   const state = new State();
   const there = QUANTITIES.filter((q) => q.available?.(known) ?? true);
-  state.setting("colour").options = there.map((q) => [q.id, q.label]);
+  state.offer("colour", there.map((q) => [q.id, q.label]));
   const palettes = Object.keys(manifest.palettes).filter((p) => p !== "diverging");
-  state.setting("palette").options = palettes.map((p) => [p, p]);
-  state.setting("plot").options = series.plots.map((p) => [p.id, p.title]);
+  state.offer("palette", palettes.map((p) => [p, p]));
+  state.offer("plot", series.plots.map((p) => [p.id, p.title]));
   if (ownPage) state.fromAddress(location.hash);
   const look = state.get<string>("look");
   const stage = new Stage(page.canvas);

@@ -18,7 +18,7 @@ export interface Setting {
 
 export const SETTINGS: Setting[] = [
   { id: "colour", label: "Colour by", group: "Colour", kind: "choice", initial: "cluster", options: [], key: "c" },
-  { id: "palette", label: "Scale of colours", group: "Colour", kind: "choice", initial: "cividis", options: [] },
+  { id: "palette", label: "Scale of colours", group: "Colour", kind: "choice", initial: "", options: [] },
   { id: "log", label: "Logarithmic", group: "Colour", kind: "toggle", initial: false, key: "q" },
   { id: "low", label: "From", group: "Colour", kind: "number", initial: NaN },
   { id: "high", label: "To", group: "Colour", kind: "number", initial: NaN },
@@ -46,7 +46,7 @@ export const SETTINGS: Setting[] = [
     key: "+", down: "-" },
   { id: "loop", label: "Loop", group: "Time", kind: "toggle", initial: false, key: "l" },
   { id: "live", label: "Go along with the run", group: "Time", kind: "toggle", initial: true, key: "a" },
-  { id: "plot", label: "Plot", group: "Time", kind: "choice", initial: "size", options: [], key: "p" },
+  { id: "plot", label: "Plot", group: "Time", kind: "choice", initial: "", options: [], key: "p" },
   { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0 },
   { id: "grain", label: "Chosen grain", group: "", kind: "hidden", initial: -1 },
   { id: "contact", label: "Chosen contact", group: "", kind: "hidden", initial: "" }, // "i-j": its grains
@@ -66,6 +66,14 @@ export class State {
     const found = this.settings.find((s) => s.id === id);
     if (!found) throw new Error(`there is no setting “${id}”`);
     return found;
+  }
+
+  /** What there is to choose from, known only with the data; the first is the one to begin with. */
+  offer(id: string, options: [value: string, label: string][]): void {
+    const setting = this.setting(id);
+    setting.options = options;
+    setting.initial = options[0]?.[0] ?? "";
+    this.values.set(id, setting.initial);
   }
 
   get<T extends Value>(id: string): T {

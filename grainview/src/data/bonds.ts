@@ -4,10 +4,8 @@ import { nearest } from "./clusters";
 import { colourAt, rgb, type Scale } from "./colours";
 import type { Colour3, Frame, Manifest } from "./types";
 
-/** Modes, as the columns of a frame's `share`, and the colours of contacts whose limit they have reached. */
+/** Modes, as the columns of a frame's `share`. */
 export const MODES = ["stretch", "slide", "roll", "twist"] as const;
-export const MODE_COLOURS = ["#D55E00", "#56B4E9", "#0072B2", "#009E73"];
-export const WITHIN = "#9AA0A6";
 
 /** From here on a mode counts as at its limit: what is stored is rounded. */
 export const AT_LIMIT = 0.999;
@@ -46,13 +44,13 @@ export type BondPaint = (contact: number) => Colour3;
 export function bondPaint(kind: string, frame: Frame, manifest: Manifest, scale: Scale): BondPaint {
   if (kind === "load") return (c) => colourAt(scale, normalForce(frame, c, manifest.periodic));
   if (kind === "mode") {
-    const colours = [WITHIN, ...MODE_COLOURS].map(rgb);
+    const colours = [manifest.colours.within, ...manifest.colours.modes].map(rgb);
     return (c) => {
       const [mode, share] = worstMode(frame, c);
       return colours[share >= AT_LIMIT ? mode + 1 : 0];
     };
   }
-  const plain = rgb(WITHIN);
+  const plain = rgb(manifest.colours.within);
   return () => plain;
 }
 

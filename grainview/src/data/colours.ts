@@ -22,7 +22,7 @@ function shaded(colour: Colour3, amount: number): Colour3 {
 export function colourOfName(name: number, manifest: Manifest): Colour3 {
   if (Number.isNaN(name)) return rgb(manifest.colours.single);
   const { big, small, named } = manifest.colours;
-  const slot = named?.[String(name)];
+  const slot = named[String(name)];
   if (slot !== undefined && slot < big.length) return rgb(big[slot]); // those that will be the largest
   // names of clusters that are born together are neighbours: a golden step sets their colours apart
   const spread = Math.imul(name + 1, 0x9e3779b1) >>> 0;
@@ -30,8 +30,8 @@ export function colourOfName(name: number, manifest: Manifest): Colour3 {
 }
 
 export function colourOfMaterial(index: number, manifest: Manifest): Colour3 {
-  const all = [...manifest.colours.big, ...manifest.colours.small];
-  return rgb(all[(index + 1) % all.length]);
+  const all = manifest.colours.materials;
+  return rgb(all[index % all.length]);
 }
 
 export interface Scale {
@@ -68,7 +68,6 @@ export function scaleOf(quantity: Quantity, values: Float32Array, wish: ScaleWis
     return { low: -1, high: 1, log: false, palette: manifest.palettes.diverging };
   }
   let [low, high] = manifest.ranges[quantity.id] ?? extent(values) ?? [0, 1];
-  if (quantity.whole && !manifest.ranges[quantity.id]) low = quantity.id === "coordination" ? 0 : 1;
   if (!Number.isNaN(wish.low)) low = wish.low;
   if (!Number.isNaN(wish.high)) high = wish.high;
   if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-3;

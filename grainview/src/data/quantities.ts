@@ -13,7 +13,6 @@ export interface Quantity {
   label: string;
   unit: string;
   kind: "names" | "sequential" | "diverging";
-  whole?: boolean; // counts: ticks at whole numbers
   available?: (known: Known) => boolean;
   values: (frame: Frame, known: Known) => Float32Array;
 }
@@ -68,7 +67,7 @@ export const QUANTITIES: Quantity[] = [
     values: (frame) => Float32Array.from(frame.cluster, (n) => (n === SINGLE ? NaN : n)),
   },
   {
-    id: "size", label: "size of its cluster", unit: "grains", kind: "sequential", whole: true,
+    id: "size", label: "size of its cluster", unit: "grains", kind: "sequential",
     values: (frame) => {
       const sizes = clusterSizes(frame);
       return Float32Array.from(frame.cluster, (n) => sizes.get(n) ?? 1);
@@ -79,12 +78,12 @@ export const QUANTITIES: Quantity[] = [
     values: (_, { grains, manifest }) => grains.radius.map((r) => r * manifest.unit),
   },
   {
-    id: "coordination", label: "contacts", unit: "", kind: "sequential", whole: true,
+    id: "coordination", label: "contacts", unit: "", kind: "sequential",
     values: (frame, { manifest }) => coordination(manifest.grains, frame.pair),
   },
   { id: "speed", label: "speed", unit: "m/s", kind: "sequential", values: (frame) => sizes3(frame.velocity) },
   { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => sizes3(frame.spin) },
-  { id: "kinetic", label: "kinetic energy", unit: "J", kind: "sequential", values: kinetic },
+  { id: "kinetic_energy", label: "kinetic energy", unit: "J", kind: "sequential", values: kinetic },
   {
     id: "alignment", label: "alignment in cluster", unit: "", kind: "diverging",
     available: hasMoments,
@@ -94,7 +93,7 @@ export const QUANTITIES: Quantity[] = [
     },
   },
   {
-    id: "field", label: "alignment with field", unit: "", kind: "diverging",
+    id: "field_alignment", label: "alignment with field", unit: "", kind: "diverging",
     available: (known) => known.manifest.field !== null && hasMoments(known),
     values: (frame, { manifest }) => {
       const b = fieldDirection(manifest, frame.frame) ?? [0, 0, 0];

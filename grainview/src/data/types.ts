@@ -26,7 +26,15 @@ export interface Manifest {
   field: Field | null;
   ranges: Record<string, [number, number]>;
   palettes: Record<string, Colour3[]>;
-  colours: { big: string[]; small: string[]; single: string; named?: Record<string, number> };
+  colours: {
+    big: string[];
+    small: string[];
+    single: string;
+    modes: string[];
+    within: string;
+    materials: string[];
+    named: Record<string, number>;
+  };
   dimensions: Record<string, [number, number]>[] | null;
 }
 

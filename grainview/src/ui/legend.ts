@@ -1,6 +1,6 @@
 // What the colours mean: a bar with its range and unit, or names.
 
-import { MODE_COLOURS, MODES, WITHIN } from "../data/bonds";
+import { MODES } from "../data/bonds";
 import { colourOfMaterial, colourOfName, css, type Painted, type Scale } from "../data/colours";
 import type { Known, Quantity } from "../data/quantities";
 import { digits, prefixed } from "../data/units";
@@ -64,8 +64,8 @@ export function legend(
   else parts.push(quantity.id === "material" ? materials(known) : clusters(painted, known, choose));
   if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + pushes", "N"));
   if (bonds.kind === "mode") {
-    const rows = MODES.map((mode, m) => swatch(MODE_COLOURS[m], mode));
-    rows.push(swatch(WITHIN, "within all limits"));
+    const rows = MODES.map((mode, m) => swatch(known.manifest.colours.modes[m], mode));
+    rows.push(swatch(known.manifest.colours.within, "within all limits"));
     parts.push(h("div", {}, h("div", { class: "gv-legend-title" }, "contacts at the limit of"), h("ul", {}, ...rows)));
   }
   return parts;

@@ -75,7 +75,10 @@ export class LinkedPlot {
         series: [
           {},
           ...plot.lines.map((line) => ({
-            label: line.label, stroke: dark ? line.dark : line.light, width: 1.6, points: { show: series.time.length < 3 },
+            label: line.label,
+            stroke: dark ? line.dark : line.light,
+            width: 1.6,
+            points: { show: series.time.length < 3 },
           })),
         ],
       },

@@ -11,25 +11,20 @@ import numpy as np
 
 from .. import __version__
 from ..analysis.books import Books
-from ..analysis.lineage import Lineage
-from ..analysis.quantities import measured
+from ..analysis.lineage import SINGLE, Lineage
 from ..core.errors import BadInput
 from ..files import folder as files
 from ..files.following import Following
 from . import dimensions
 from .packets import frame_bytes, frame_packet, grains_packet
 from .palettes import colours, palettes
-from .series import of_frames, of_ledger, thinned
+from .ranges import ranges_of
+from .series import of_frames, of_ledger
+from .style import BIG
 
 FORMAT = 1
-LOOKED_AT = 12
-"""Frames that ranges are taken from."""
-PERCENTILES = ("speed", "spin", "kinetic_energy")
-"""Quantities of grains of which few have very large numbers: their ranges leave those out."""
-EXTREMES = ("size", "radius", "coordination", "moment", "load")
-"""Whose ranges hold all; `moment` and `load`: of sizes."""
-RANGE = (1.0, 99.9)
-"""Percentiles between which a range of PERCENTILES goes."""
+FOLLOWED = 8_000_000
+"""Grains times frames through which clusters are followed before the page opens: about a second."""
 STEADY = 1e-9
 """Directions of a field that differ by less are one."""
 
@@ -76,6 +71,7 @@ class Story:
         self.periodic = [length is not None for length in first.box.lengths]
         self._grains = grains_packet(first, self.unit)
         self._lineage = Lineage(self.grains_count, self.frames.pairs)
+        self._largest: dict[str, int] | None = None
         self._ranges: tuple[int, dict[str, list[float]]] | None = None
         self._directions: list[list[float]] = []
         self._generation = self.frames.generation
@@ -127,9 +123,23 @@ class Story:
                 "field": self._told_field(numbers),
                 "ranges": self.ranges(),
                 "palettes": palettes(),
-                "colours": colours(),
+                "colours": colours() | {"named": self._named()},
                 "dimensions": None,
             }
+
+    def _named(self) -> dict[str, int]:
+        """Places in `big` of the clusters that are the largest in the last frame, by name: they are to be told apart.
+
+        Empty where it would take long to follow clusters so far. Of a run that goes on, as it was when first asked.
+        """
+        if self._largest is None:
+            self._largest = {}
+            if len(self.frames) * self.grains_count <= FOLLOWED:
+                names, counts = np.unique(self._lineage.names(len(self.frames) - 1), return_counts=True)
+                known = names != SINGLE
+                order = np.argsort(-counts[known], kind="stable")[: len(BIG)]
+                self._largest = {str(name): place for place, name in enumerate(names[known][order].tolist())}
+        return self._largest
 
     def _noted(self) -> list[str]:
         torn = self.frames.torn
@@ -192,19 +202,8 @@ class Story:
         with self._lock:
             count = len(self.frames)
             if self._ranges is None or count > 1.5 * self._ranges[0]:
-                self._ranges = (count, self._looked_at(count))
+                self._ranges = (count, ranges_of(self.frames))
             return self._ranges[1]
-
-    def _looked_at(self, count: int) -> dict[str, list[float]]:
-        seen: dict[str, list[np.ndarray]] = {name: [] for name in (*PERCENTILES, *EXTREMES)}
-        for number in thinned(count, LOOKED_AT):
-            try:
-                frame = self.frames[int(number)]
-            except BadInput:
-                continue
-            for name, parts in seen.items():
-                parts.append(_sizes(frame, name))
-        return {name: _range(np.concatenate([*parts, np.zeros(0)]), name) for name, parts in seen.items()}
 
     def _told_field(self, numbers: np.ndarray) -> dict[str, Any] | None:
         if self._field is None or not numbers.size:
@@ -220,23 +219,6 @@ class Story:
 def _direction(vector: Sequence[float]) -> list[float]:
     size = float(np.linalg.norm(vector))
     return [float(f"{part / size:.9g}") if size > 0.0 else 0.0 for part in vector]
-
-
-def _sizes(frame: Any, name: str) -> np.ndarray:
-    """Finite numbers of a quantity in a frame, without their signs."""
-    try:
-        values = np.linalg.norm(frame.moment, axis=1) if name == "moment" else np.abs(measured(frame, name))
-    except BadInput:  # the frame has none
-        return np.zeros(0)
-    return np.asarray(values[np.isfinite(values)], dtype=np.float64)
-
-
-def _range(values: np.ndarray, name: str) -> list[float]:
-    if not values.size:
-        return [0.0, 0.0]
-    share = RANGE if name in PERCENTILES else (0.0, 100.0)
-    low, high = np.percentile(values, share[0], method="lower"), np.percentile(values, share[1], method="higher")
-    return [float(low), float(high)]
 
 
 def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
