@@ -1,8 +1,8 @@
 """Where things are in a picture, worked out from what the camera is said to be and nothing of the page's code.
 
-A look is (target, from, up, height): the eye is in the direction `from` of the target; `height` is how much of the plane
-through the target the picture holds from top to bottom.  In perspective the eye is two heights away (tan of half the
-angle is 1/4), orthographic rays are all along −from.  Lengths are in the page's unit.
+A look is (target, from, up, height): the eye is in the direction `from` of the target; `height` is how much of the
+plane through the target the picture holds from top to bottom.  In perspective the eye is two heights away (tan of half
+the angle is 1/4), orthographic rays are all along −from.  Lengths are in the page's unit.
 """
 
 from __future__ import annotations

@@ -202,7 +202,7 @@ def _joined(radius: np.ndarray) -> np.ndarray:
     across = other[:, None] - one[None]
     room = (SUNK * (radius[FIRST_PART:, None] + radius[None, :FIRST_PART])) ** 2 - (across[..., 1:] ** 2).sum(-1)
     shift = np.max(np.where(room > 0.0, np.sqrt(np.maximum(room, 0.0)) - across[..., 0], -np.inf))
-    return np.vstack([one, other + [shift, 0.0, 0.0]])
+    return np.vstack([one, other + np.array([shift, 0.0, 0.0])])
 
 
 def _free(place: np.ndarray, radius: np.ndarray, i: int, box: Box) -> bool:

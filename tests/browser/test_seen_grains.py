@@ -3,8 +3,8 @@
 Rays, pixels and spheres are worked out in numpy from the camera's ten numbers (`eye.Eye`) and the trajectory; pixels
 within one of an edge are left out, so that outlines agree within a pixel.
 
-Shading multiplies a colour by light and adds white shine (at most 0.16 of full, 41 levels): a pixel of a grain of colour
-c is f c + s.  The residual of that, with whole s and rounded levels, is at most 0.5 + 0.5; 1.5 are allowed.
+Shading multiplies a colour by light and adds white shine (at most 0.16 of full, 41 levels): a pixel of a grain of
+colour c is f c + s.  The residual of that, with whole s and rounded levels, is at most 0.5 + 0.5; 1.5 are allowed.
 """
 
 import numpy as np
@@ -155,8 +155,8 @@ def test_clusters_have_their_own_colours_and_keep_them(page, shows, source):
     """Grains of one cluster of the file have one colour; the largest five have five; colours stay as clusters grow.
 
     In frame 3 the two largest meet: the one of 26 grains keeps its colour, the one of 14 takes it.  A picture looked at
-    along −from has light of 1.01 at the middle of a grain; within the pixel there (0.07 radii) it changes by 0.04 at most,
-    so that the pixel is the colour within NEAR = 0.05 of full light, 12 levels.
+    along −from has light of 1.01 at the middle of a grain; within the pixel there (0.07 radii) it changes by 0.04 at
+    most, so that the pixel is the colour within NEAR = 0.05 of full light, 12 levels.
     """
     view = View(page, shows("hundred"), source, look=LOOKS["hundred"], ortho=1, **BARE)
     kept = {}
