@@ -77,9 +77,10 @@ def test_all_arrows_have_their_heads_in_front(page, shows, ortho, source):
         way = moment / np.where(size > 0.0, size, 1.0)[:, None]
         half = 0.5 * LENGTH * view.radii[:, None] * way
         tip, tail, middle = (eye.pixels(view.places + s * half)[0] for s in (1.0, -1.0, 0.0))
-        long, full = np.linalg.norm(tip - tail, axis=1), LENGTH * view.radii * eye.scale
+        long, depth = np.linalg.norm(tip - tail, axis=1), eye.pixels(view.places)[1]
+        full = LENGTH * view.radii * eye.scale * (1.0 if ortho else 2.0 * eye.height / depth)
         for i in np.flatnonzero((middle > 60).all(1) & (middle < [eye.wide - 60, eye.high - 60]).all(1)):
-            along = (tip[i] - tail[i]) / max(long[i], 1e-9)
+            along = (tip[i] - tail[i]) / long[i] if size[i] > 0.0 else np.array([1.0, 0.0])
             beside = 0.065 * full[i] * np.array([-along[1], along[0]])
             for part, wanted in ((0.25, True), (-0.25, False)):
                 spot = middle[i] + part * (tip[i] - tail[i]) + beside
@@ -93,7 +94,7 @@ def test_all_arrows_have_their_heads_in_front(page, shows, ortho, source):
                 else:
                     tried += part > 0
                     assert dark[y, x] == wanted, (k, i, part)
-        assert tried >= 15 and none >= 5, (tried, none)
+        assert tried >= 10 and none >= 5, (tried, none)
 
 
 def apart_from(spot: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
