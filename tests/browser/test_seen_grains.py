@@ -119,8 +119,7 @@ def view_target(kind: str) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("source", SOURCES)
-@pytest.mark.parametrize("ortho", [0, 1])
-@pytest.mark.parametrize("kind", ["two", "hundred", "ten-thousand"])
+@pytest.mark.parametrize(("kind", "ortho"), [("two", 0), ("hundred", 0), ("hundred", 1), ("ten-thousand", 0)])
 def test_a_click_chooses_the_grain_that_is_there(page, shows, kind, ortho, source):
     """And its numbers are those of the file, to the digits shown (1e-3)."""
     shown, rng = shows(kind), np.random.default_rng(2)
