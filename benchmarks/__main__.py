@@ -21,8 +21,15 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="one JSON object")
     parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
     parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
+    parser.add_argument("--page", action="store_true", help="what the page of a run costs in a browser, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    if options.page:
+        from . import page  # needs Playwright and a Chromium
+
+        told = page.all_rows(options.quick)
+        print(json.dumps({"versions": versions(), "rows": told})) if options.json else page.tell(told)
+        return
     if options.long_range:
         rows, grown = savings((100, 1000) if options.quick else (100, 1000, 10_000)), growth()
         print(json.dumps({"rows": rows, "growth": grown})) if options.json else tell(rows, grown)

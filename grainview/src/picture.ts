@@ -1,5 +1,6 @@
 // From a frame and the settings to what is on the stage: places, colours, contacts, arrows, trails.
 
+import * as three from "three";
 import { bondPaint, bondPieces, loadScale } from "./data/bonds";
 import { wholePositions } from "./data/clusters";
 import { paint, type Painted, type Scale } from "./data/colours";
@@ -7,6 +8,7 @@ import type { Frames } from "./data/frames";
 import { coverOf } from "./data/openness";
 import { type Known, QUANTITIES, type Quantity } from "./data/quantities";
 import { type Frame, SINGLE } from "./data/types";
+import { ARROW } from "./scene/arrows";
 import { MOST_TRAILS, trailSegments } from "./scene/lines";
 import type { World } from "./scene/world";
 import type { State } from "./state";
@@ -121,11 +123,37 @@ export class Picture {
     world.stage.redraw();
   }
 
+  /** Lengths of the box, 0 where it is not drawn. */
+  private get boxed(): number[] {
+    const boxed = this.frame && !this.shown && this.known.manifest.periodic.some(Boolean);
+    return boxed && this.frame ? this.frame.box : [0, 0, 0];
+  }
+
   /** Radius about a place within which all there is lies. */
   reachFrom(target: number[]): number {
-    const boxed = this.frame && !this.shown && this.known.manifest.periodic.some(Boolean);
-    const box = boxed && this.frame ? this.frame.box : [0, 0, 0];
-    return Math.max(this.world.reachFrom(target), Math.hypot(...box) / 2 + Math.hypot(...target));
+    return Math.max(this.world.reachFrom(target), Math.hypot(...this.boxed) / 2 + Math.hypot(...target));
+  }
+
+  /** Height of the picture that holds all there is, its middle a target; of both cameras, whichever needs more. */
+  heightFor(target: number[], from: number[], up: number[], aspect: number): number {
+    const away = new three.Vector3(...from).normalize();
+    const side = new three.Vector3(...up).cross(away).normalize();
+    const upwards = new three.Vector3().crossVectors(away, side);
+    const v = new three.Vector3();
+    let most = 0;
+    const hold = (x: number, y: number, z: number, radius: number): void => {
+      v.set(x - target[0], y - target[1], z - target[2]);
+      const half = Math.max(Math.abs(v.dot(upwards)) + radius, (Math.abs(v.dot(side)) + radius) / aspect);
+      // the eye is two heights away: what is nearer than the target looks larger
+      most = Math.max(most, 2 * half + Math.max(v.dot(away), 0) / 2);
+    };
+    const { place, shown } = this;
+    this.known.grains.radius.forEach((r, i) => {
+      if (!shown || shown[i]) hold(place[3 * i], place[3 * i + 1], place[3 * i + 2], (ARROW / 2) * r);
+    });
+    const [a, b, c] = this.boxed.map((length) => length / 2);
+    if (a) for (const x of [-a, a]) for (const y of [-b, b]) for (const z of [-c, c]) hold(x, y, z, 0);
+    return most || 1;
   }
 
   /** The number of the contact between two grains, told as "i-j"; −1: they do not touch. */

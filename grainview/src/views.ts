@@ -7,6 +7,9 @@ import type { Look, Stage } from "./scene/stage";
 
 type Place = [number, number, number];
 
+/** Height of a picture over that of what is in it. */
+const MARGIN = 1.08;
+
 export class Views {
   constructor(
     private readonly stage: Stage,
@@ -14,8 +17,8 @@ export class Views {
     private readonly choosing: Choosing,
   ) {}
 
-  /** All that is shown and the box, from above a corner. */
-  whole(): Look {
+  /** All that is shown and the box, from above a corner if not told otherwise. */
+  whole(from: Place = [0.52, -0.74, 0.43], up: Place = [0, 0, 1]): Look {
     const { place, shown } = this.picture;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -25,9 +28,7 @@ export class Views {
       high[e % 3] = Math.max(high[e % 3], place[e]);
     }
     const target = low.map((l, a) => (l + high[a]) / 2 || 0) as Place;
-    const reach = this.picture.reachFrom(target);
-    const narrow = Math.min(1, this.stage.width / this.stage.height);
-    return { target, from: [0.52, -0.74, 0.43], up: [0, 0, 1], height: (1.85 * reach) / narrow };
+    return { target, from, up, height: MARGIN * this.picture.heightFor(target, from, up, this.stage.aspect) };
   }
 
   reset(): void {
@@ -38,7 +39,7 @@ export class Views {
   centre(): void {
     const middle = this.choosing.middle();
     if (middle) this.stage.look = { ...this.stage.look, target: middle as Place };
-    else this.stage.look = { ...this.whole(), from: this.stage.look.from, up: this.stage.look.up };
+    else this.stage.look = this.whole(this.stage.look.from, this.stage.look.up);
   }
 
   /** Go around the target: to the right and upwards [rad]. */

@@ -16,6 +16,7 @@ from sand.core.errors import BadInput
 from sand.files.page import read_bundle
 
 from .chromium import FLAGS, find
+from .looking import Shows
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Request
@@ -58,6 +59,14 @@ def bundle() -> tuple[str, str]:
         return read_bundle()
     except BadInput as error:
         lacking(str(error))
+
+
+@pytest.fixture(scope="session")
+def shows(tmp_path_factory: pytest.TempPathFactory, bundle: tuple[str, str]) -> Iterator[Shows]:
+    """Runs to look at, by kind (see `runs.KINDS`): `shows("two")`."""
+    all_of_them = Shows(tmp_path_factory.mktemp("shows"))
+    yield all_of_them
+    all_of_them.close()
 
 
 @pytest.fixture

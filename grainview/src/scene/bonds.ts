@@ -26,17 +26,20 @@ void main() {
   vAcross = corner.y;
   vAxis = b - a;
   vColour = colour.rgb;
-  vec3 toEye = isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-0.5 * (a + b));
+  vec3 middle = 0.5 * (a + b);
+  vec3 toEye = isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-middle);
   vec3 along = normalize(vAxis);
   vec3 side = cross(along, toEye);
   side = dot(side, side) < 1e-6 ? vec3(1.0, 0.0, 0.0) : normalize(side);
-  vec3 front = normalize(cross(side, along));
-  // the square lies at the side of the bar that faces the eye, a little longer than it
-  vec3 middle = 0.5 * (a + b) + front * uBar;
 #ifdef PLAIN
-  vOnQuad = middle + corner.x * 0.5 * vAxis + corner.y * side * uBar;
+  // the square lies at the side of the bar that faces the eye
+  vec3 front = normalize(cross(side, along));
+  vOnQuad = middle + front * uBar + corner.x * 0.5 * vAxis + corner.y * side * uBar;
 #else
-  vOnQuad = middle + corner.x * (0.5 * vAxis + along * uBar) + corner.y * side * uBar * 1.2;
+  // it faces the eye and holds the outline of the bar, ends and all
+  vec3 ahead = cross(toEye, side);
+  float half_ = 0.5 * abs(dot(vAxis, ahead)) + uBar * (0.2 + abs(dot(along, toEye)));
+  vOnQuad = middle + corner.x * half_ * ahead + corner.y * side * uBar * 1.2;
 #endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   if (colour.a < 0.5 || max(a.z, b.z) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -69,11 +72,21 @@ void main() {
   float b = dot(rayAcross, offAcross);
   float c = dot(offAcross, offAcross) - uBar * uBar;
   float room = b * b - a * c;
-  if (room < 0.0 || a < 1e-12) discard;
-  vec3 p = origin + (-b - sqrt(room)) / a * ray;
-  float at = dot(p - vFrom, axis);
-  if (at < 0.0 || at > size) discard;
-  vec3 normal = (p - vFrom - at * axis) / uBar;
+  if (room < 0.0) discard;
+  float steep = dot(ray, axis);
+  float at = a < 1e-12 ? -1.0 : dot(off, axis) + (-b - sqrt(room)) / a * steep;
+  vec3 p, normal;
+  if (at >= 0.0 && at <= size && a >= 1e-12) {
+    p = origin + (-b - sqrt(room)) / a * ray;
+    normal = (p - vFrom - at * axis) / uBar;
+  } else {
+    // the flat end that faces the eye
+    float end = steep > 0.0 ? 0.0 : size;
+    p = origin + (end - dot(off, axis)) / steep * ray;
+    vec3 beside = p - vFrom - end * axis;
+    if (dot(beside, beside) > uBar * uBar) discard;
+    normal = steep > 0.0 ? -axis : axis;
+  }
   outColour = vec4(lit(vColour, normal, -ray, 1.0, -p.z), 1.0);
   gl_FragDepth = depthOf(p);
 }

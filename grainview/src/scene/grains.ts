@@ -53,6 +53,11 @@ void main() {
   }
   vOnQuad = c + (corner.x * across + corner.y * up) * grown;
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
+#ifdef PLAIN
+  // as near as the sphere is, so that bars within it are hidden
+  vec4 front = projectionMatrix * vec4(c + r * (isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-c)), 1.0);
+  gl_Position.z = front.z / front.w * gl_Position.w;
+#endif
   if (colour.a < 0.5 || c.z > -0.2 * r) gl_Position = vec4(2.0, 2.0, 2.0, 1.0); // hidden, or behind the eye
 }
 `;

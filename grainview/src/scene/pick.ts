@@ -60,10 +60,14 @@ export function pickContact(ray: Ray, bonds: Bonds, bar: number): Hit | null {
       C += op * op;
     }
     const room = B * B - A * C;
-    if (room < 0 || A < 1e-12) continue;
-    const t = (-B - Math.sqrt(room)) / A;
+    if (room < 0) continue;
+    let t = A < 1e-12 ? NaN : (-B - Math.sqrt(room)) / A;
     const at = oa + t * da;
-    if (t > 0 && at >= 0 && at <= size && t < nearest) [best, nearest] = [bonds.contact[k], t];
+    if (!(at >= 0 && at <= size)) {
+      t = ((da > 0 ? 0 : size) - oa) / da; // the flat end that faces the eye
+      if (!(A * t * t + 2 * B * t + C <= 0)) continue;
+    }
+    if (t > 0 && t < nearest) [best, nearest] = [bonds.contact[k], t];
   }
   return best < 0 ? null : { kind: "contact", index: best, distance: nearest };
 }

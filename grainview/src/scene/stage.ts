@@ -117,8 +117,12 @@ export class Stage {
     this.redraw();
   }
 
+  get aspect(): number {
+    return this.width / this.height;
+  }
+
   /** Cameras suit the picture's shape and hold all there is. */
-  fit(aspect = this.width / this.height): void {
+  fit(aspect = this.aspect): void {
     this.perspective.aspect = aspect;
     this.orthographic.left = this.orthographic.bottom * aspect;
     this.orthographic.right = this.orthographic.top * aspect;
