@@ -14,7 +14,8 @@ from sand.files.gsd_index import ENTRY, read_index
 from sand.files.trajectory import TrajectoryWriter
 from sand.run.told import field_in
 from sand.view.packets import decode
-from sand.view.story import EXTREMES, PERCENTILES, story_of
+from sand.view.ranges import EXTREMES, PERCENTILES
+from sand.view.story import story_of
 
 from .reels import append, contacts_of, reel
 
@@ -200,3 +201,15 @@ def test_ranges_are_those_of_the_quantities(looked_at, tmp_path):
     writer.close()
     ranges = story_of(tmp_path / "a.gsd").ranges()
     assert ranges["moment"] == ranges["load"] == ranges["speed"] == [0.0, 0.0] and ranges["size"] == [1.0, 1.0]
+
+
+def test_clusters_that_end_as_the_largest_are_named(tmp_path, monkeypatch):
+    """The pair 0–1 grows to 4 grains, the pair 6–7 stays, 4–5 breaks: places by size at the end, by name.
+
+    Where following them would take long, there are none.
+    """
+    bonds = [[(0, 1), (4, 5), (6, 7)], [(0, 1), (1, 2), (2, 3), (6, 7)]]
+    path = reel(tmp_path / "a.gsd", bonds, 9)
+    assert story_of(path).manifest()["colours"]["named"] == {"0": 0, "6": 1}
+    monkeypatch.setattr("sand.view.story.FOLLOWED", 17)
+    assert story_of(path).manifest()["colours"]["named"] == {}

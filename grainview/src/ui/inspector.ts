@@ -25,7 +25,8 @@ function told(v: number[], unit: string): string {
 
 export function grainRows(i: number, frame: Frame, known: Known): Row[] {
   const { manifest, grains } = known;
-  const own = QUANTITIES.filter((q) => ["coordination", "kinetic_energy", "alignment", "field_alignment"].includes(q.id));
+  const names = ["coordination", "kinetic_energy", "alignment", "field_alignment"];
+  const own = QUANTITIES.filter((q) => names.includes(q.id));
   const rows: Row[] = [
     ["position", components(vector(frame.position, i, manifest.unit), "m", 5)],
     ["radius", quantity(grains.radius[i] * manifest.unit, "m")],
