@@ -107,7 +107,8 @@ export class Picture {
     if (!frame || !length || !this.painted) return;
     const first = Math.max(frame.frame - length, 0);
     const numbers = Array.from({ length: frame.frame - first + 1 }, (_, k) => first + k);
-    const earlier = await Promise.all(numbers.map((k) => this.frames.get(k)));
+    const asked = await Promise.allSettled(numbers.map((k) => this.frames.get(k)));
+    const earlier = asked.flatMap((one) => (one.status === "fulfilled" ? [one.value] : [])); // without unreadable ones
     if (this.frame !== frame || state.number("trails") !== length) return; // it is too late for these
     const who: number[] = [];
     const grain = state.number("grain");
@@ -121,10 +122,14 @@ export class Picture {
     world.stage.redraw();
   }
 
+  /** Whether there is a box, of which all is shown. */
+  get boxed(): boolean {
+    return !this.shown && this.known.manifest.periodic.some(Boolean);
+  }
+
   /** Radius about a place within which all there is lies. */
   reachFrom(target: number[]): number {
-    const boxed = this.frame && !this.shown && this.known.manifest.periodic.some(Boolean);
-    const box = boxed && this.frame ? this.frame.box : [0, 0, 0];
+    const box = this.frame && this.boxed ? this.frame.box : [0, 0, 0];
     return Math.max(this.world.reachFrom(target), Math.hypot(...box) / 2 + Math.hypot(...target));
   }
 

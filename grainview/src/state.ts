@@ -14,6 +14,7 @@ export interface Setting {
   by?: number;
   key?: string; // toggles or goes to the next option; with shift to the one before
   down?: string; // ranges: less (key: more)
+  form?: RegExp; // of text
 }
 
 export const SETTINGS: Setting[] = [
@@ -47,11 +48,12 @@ export const SETTINGS: Setting[] = [
   { id: "loop", label: "Loop", group: "Time", kind: "toggle", initial: false, key: "l" },
   { id: "live", label: "Go along with the run", group: "Time", kind: "toggle", initial: true, key: "a" },
   { id: "plot", label: "Plot", group: "Time", kind: "choice", initial: "size", options: [], key: "p" },
-  { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0 },
-  { id: "grain", label: "Chosen grain", group: "", kind: "hidden", initial: -1 },
-  { id: "contact", label: "Chosen contact", group: "", kind: "hidden", initial: "" }, // "i-j": its grains
-  { id: "ends", label: "Measured", group: "", kind: "hidden", initial: "" }, // "i-j"
-  { id: "look", label: "Camera", group: "", kind: "hidden", initial: "" },
+  { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0, from: 0 }, // beyond the last: the last
+  { id: "grain", label: "Chosen grain", group: "", kind: "hidden", initial: -1, from: -1 },
+  // "i-j": its grains; one or two grains; ten numbers
+  { id: "contact", label: "Chosen contact", group: "", kind: "hidden", initial: "", form: /^(\d+-\d+)?$/ },
+  { id: "ends", label: "Measured", group: "", kind: "hidden", initial: "", form: /^(\d+(-\d+)?)?$/ },
+  { id: "look", label: "Camera", group: "", kind: "hidden", initial: "", form: /^([-+.\de]+(,[-+.\de]+){9})?$/ },
 ];
 
 const same = (a: Value, b: Value): boolean => a === b || (Number.isNaN(a) && Number.isNaN(b));
@@ -66,6 +68,12 @@ export class State {
     const found = this.settings.find((s) => s.id === id);
     if (!found) throw new Error(`there is no setting “${id}”`);
     return found;
+  }
+
+  /** What a setting begins with, where that depends on the run. */
+  begin(id: string, value: Value): void {
+    this.setting(id).initial = value;
+    this.values.set(id, value);
   }
 
   get<T extends Value>(id: string): T {
@@ -125,12 +133,16 @@ export class State {
 
 function allowed(setting: Setting, value: Value): Value | undefined {
   if (setting.kind === "choice") return setting.options?.some(([v]) => v === value) ? value : undefined;
-  if (setting.kind === "number") return typeof value === "number" ? value : undefined;
+  if (setting.kind === "number") return typeof value === "number" && Math.abs(value) !== Infinity ? value : undefined;
   if (typeof value !== typeof setting.initial) return undefined;
   if (typeof value === "number") {
     if (Number.isNaN(value)) return undefined;
-    if (setting.kind === "range") return Math.min(Math.max(value, setting.from ?? 0), setting.to ?? 1);
-    return Math.round(value);
+    const { from = -Infinity, to = Infinity, by = 1 } = setting;
+    if (setting.id === "grain" && (value < from || value > to)) return setting.initial; // there is no such grain
+    const inside = Math.min(Math.max(value, from), to);
+    if (setting.kind !== "range") return Math.round(inside);
+    return Number((from + Math.round((inside - from) / by) * by).toFixed(6));
   }
+  if (typeof value === "string" && setting.form && !setting.form.test(value)) return undefined;
   return value;
 }

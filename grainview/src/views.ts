@@ -20,14 +20,16 @@ export class Views {
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (let e = 0; e < place.length; e++) {
-      if (shown && !shown[Math.floor(e / 3)]) continue;
+      if ((shown && !shown[Math.floor(e / 3)]) || !Number.isFinite(place[e])) continue;
       low[e % 3] = Math.min(low[e % 3], place[e]);
       high[e % 3] = Math.max(high[e % 3], place[e]);
     }
     const target = low.map((l, a) => (l + high[a]) / 2 || 0) as Place;
     const reach = this.picture.reachFrom(target);
     const narrow = Math.min(1, this.stage.width / this.stage.height);
-    return { target, from: [0.52, -0.74, 0.43], up: [0, 0, 1], height: (1.85 * reach) / narrow };
+    // a box reaches into all corners of the ball about it, grains hardly do
+    const room = this.picture.boxed ? 2.07 : 1.85;
+    return { target, from: [0.52, -0.74, 0.43], up: [0, 0, 1], height: (room * reach) / narrow };
   }
 
   reset(): void {

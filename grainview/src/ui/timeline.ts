@@ -109,7 +109,7 @@ export class TimeLine {
     this.slider.setAttribute("aria-valuetext", `frame ${frame}, ${time}`);
   }
 
-  private drawTicks(): void {
+  drawTicks(): void {
     const [width, height] = [this.ticks.clientWidth, this.ticks.clientHeight];
     const pen = this.ticks.getContext("2d");
     if (!pen || !width || !height) return;
