@@ -19,7 +19,7 @@ export interface Setting {
 
 export const SETTINGS: Setting[] = [
   { id: "colour", label: "Colour by", group: "Colour", kind: "choice", initial: "cluster", options: [], key: "c" },
-  { id: "palette", label: "Scale of colours", group: "Colour", kind: "choice", initial: "cividis", options: [] },
+  { id: "palette", label: "Colour scale", group: "Colour", kind: "choice", initial: "cividis", options: [] },
   { id: "log", label: "Logarithmic", group: "Colour", kind: "toggle", initial: false, key: "q" },
   { id: "low", label: "From", group: "Colour", kind: "number", initial: NaN },
   { id: "high", label: "To", group: "Colour", kind: "number", initial: NaN },

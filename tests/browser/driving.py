@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 SETTLED = """async () => {
   const app = window.sandView;
   for (let before = null; app && before !== app.showing; ) { before = app.showing; await before; }
+  while (app?.frames.asked.size) await Promise.allSettled([...app.frames.asked.values()]);
   await new Promise((on) => setTimeout(on, 0));
   await new Promise((on) => requestAnimationFrame(() => requestAnimationFrame(on)));
 }"""

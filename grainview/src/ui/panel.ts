@@ -54,7 +54,7 @@ export class Panel {
         state.set(setting.id, text === "" ? NaN : Number(text));
         this.update(setting.id); // what is no number goes away
       };
-      return h("input", { id, type: "text", inputmode: "decimal", placeholder: "auto, or in SI units", change });
+      return h("input", { id, type: "text", inputmode: "decimal", placeholder: "auto (SI)", change });
     }
     const input = (e: Event): void => state.set(setting.id, Number((e.target as HTMLInputElement).value));
     const slider = h("input", { id, type: "range", min: setting.from, max: setting.to, step: setting.by, input });
