@@ -118,7 +118,10 @@ export class App {
     };
     const lost = "The browser has taken the graphics card away from this page; if the picture stays away, reload it.";
     stage.onLost = (away) => (away ? this.tell(lost) : page.note.textContent === lost && this.tell(""));
-    stage.onLook = () => state.set("look", lookText(stage));
+    stage.onLook = () => {
+      stage.reach = this.picture.reachFrom(stage.look.target); // the haze must not depend on where the eye was before
+      state.set("look", lookText(stage));
+    };
     let down: [number, number] | null = null;
     page.canvas.addEventListener("pointerdown", (e) => (down = [e.clientX, e.clientY]));
     page.canvas.addEventListener("pointerup", (e) => {

@@ -48,9 +48,11 @@ def image(png: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))
 
 
-def differ(a: np.ndarray, b: np.ndarray) -> int:
-    """Pixels that are not the same."""
-    return int(np.any(a != b, axis=-1).sum()) if a.shape == b.shape else max(a.size, b.size)
+def differ(a: np.ndarray, b: np.ndarray, by: int = 0) -> int:
+    """Pixels that are not the same, `by` more than so much of 255."""
+    if a.shape != b.shape:
+        return max(a.size, b.size)
+    return int(np.any(np.abs(a.astype(int) - b) > by, axis=-1).sum())
 
 
 class Driven:
@@ -129,7 +131,3 @@ class Driven:
         x, y, _ = self.run("app.stage.screenOf(app.picture.place.slice(3 * told[0], 3 * told[0] + 3))", grain)
         box = self.tab.locator("canvas.gv-canvas").bounding_box()
         return box["x"] + x, box["y"] + y
-
-    def seen_background(self) -> np.ndarray:
-        """The colour in the corner of the canvas."""
-        return self.picture()[0, -1]

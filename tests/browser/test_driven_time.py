@@ -45,7 +45,7 @@ def drag(view: Driven, start: tuple[float, float], by: tuple[float, float], butt
 def empty_place(view: Driven) -> tuple[float, float]:
     """Beside all grains, in the picture."""
     box = view.tab.locator("canvas.gv-canvas").bounding_box()
-    return box["x"] + box["width"] - 20, box["y"] + 20
+    return box["x"] + box["width"] / 3, box["y"] + box["height"] - 8
 
 
 def test_scrubbing_with_the_mouse(view):
@@ -139,11 +139,11 @@ def test_dragging_turns(view):
 def test_dragging_with_the_right_button_moves(view):
     """The picture goes along with the mouse."""
     before, (x, y) = view.look(), view.place_of(0)
-    drag(view, empty_place(view), (-40, 25), "right")
+    drag(view, empty_place(view), (-40, -25), "right")
     after = view.look()
     assert np.allclose(after["from"], before["from"], atol=1e-4)
     assert np.linalg.norm(np.subtract(after["target"], before["target"])) > 0.01 * before["height"]
-    assert np.allclose(np.subtract(view.place_of(0), (x, y)), (-40, 25), atol=8)
+    assert np.allclose(np.subtract(view.place_of(0), (x, y)), (-40, -25), atol=8)
 
 
 def test_the_wheel_goes_nearer(view):
