@@ -117,7 +117,11 @@ export class App {
       this.overlay.draw();
     };
     const lost = "The browser has taken the graphics card away from this page; if the picture stays away, reload it.";
-    stage.onLost = (away) => (away ? this.tell(lost) : page.note.textContent === lost && this.tell(""));
+    stage.onLost = (away) => {
+      if (away) return this.tell(lost);
+      if (page.note.textContent === lost) this.tell("");
+      this.setTheme(); // a new context does not know the background
+    };
     stage.onLook = () => {
       stage.reach = this.picture.reachFrom(stage.look.target); // the haze must not depend on where the eye was before
       state.set("look", lookText(stage));

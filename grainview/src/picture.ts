@@ -129,8 +129,9 @@ export class Picture {
 
   /** Radius about a place within which all there is lies. */
   reachFrom(target: number[]): number {
-    const box = this.frame && this.boxed ? this.frame.box : [0, 0, 0];
-    return Math.max(this.world.reachFrom(target), Math.hypot(...box) / 2 + Math.hypot(...target));
+    const grains = this.world.reachFrom(target);
+    if (!this.frame || !this.boxed) return grains;
+    return Math.max(grains, Math.hypot(...this.frame.box) / 2 + Math.hypot(...target)); // the box is about the origin
   }
 
   /** The number of the contact between two grains, told as "i-j"; −1: they do not touch. */

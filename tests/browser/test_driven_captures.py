@@ -137,6 +137,9 @@ def test_a_movie(untouched, first, last):
           film.muted = true;
           film.src = URL.createObjectURL(new Blob([Uint8Array.from(bytes)], { type: "video/webm" }));
           await new Promise((on, off) => { film.onloadeddata = on; film.onerror = () => off(film.error.message); });
+          const ended = new Promise((on) => (film.onended = on));
+          await film.play();
+          await ended;
           const pen = new OffscreenCanvas(film.videoWidth, film.videoHeight).getContext("2d");
           pen.drawImage(film, 0, 0);
           const seen = pen.getImageData(0, 0, film.videoWidth, film.videoHeight).data;
