@@ -15,6 +15,7 @@ import type { State } from "./state";
 import { actionsOf } from "./actions";
 import { Studio } from "./studio";
 import { openDialog } from "./ui/dialogs";
+import { replaceKeepingFocus } from "./ui/dom";
 import { Inspector } from "./ui/inspector";
 import { type Action, Keys } from "./ui/keys";
 import { legend } from "./ui/legend";
@@ -144,7 +145,7 @@ export class App {
     state.onChange((id) => this.changed(id));
   }
 
-  /** The first picture; settings are already as the address has them. */
+  /** The first picture; settings are as the address has them. */
   async begin(look: string): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
     this.picture.setFrame(await this.frames.get(first));
@@ -250,7 +251,7 @@ export class App {
     const bonds = { kind: state.get<string>("bonds"), scale: picture.bondScale!, count: picture.frame.pair.length / 2 };
     const choose = (grain: number): void => this.choosing.choose(grain);
     if (picture.painted) {
-      this.page.legend.replaceChildren(...legend(picture.quantity, picture.painted, this.known, bonds, choose));
+      replaceKeepingFocus(this.page.legend, legend(picture.quantity, picture.painted, this.known, bonds, choose));
     }
     const scaled = picture.quantity.kind === "sequential";
     for (const id of ["palette", "log", "low", "high"]) this.panel.enable(id, scaled);

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from playwright.sync_api import Locator, Page
 
+SIZE = {"width": 800, "height": 560}
+"""Of the window: software draws a large one slowly."""
 SETTLED = """async () => {
   const app = window.sandView;
   for (let before = null; app && before !== app.showing; ) { before = app.showing; await before; }

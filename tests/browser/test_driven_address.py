@@ -11,11 +11,11 @@ from .driving import Driven, differ, served
 from .small_runs import FRAMES, SmallRun
 
 SHARED = [
-    {"frame": 3, "colour": "speed", "palette": "viridis", "low": 1e-3, "high": 8.5, "log": True, "theme": "dark"},
-    {"frame": 5, "size": 0.45, "arrows": False, "bonds": "mode", "bar": 0.3, "ortho": True, "whole": True, "grain": 2},
+    {"frame": 3, "colour": "speed", "palette": "viridis", "low": 1e-3, "high": 8.5, "log": True, "theme": "dark"}
+    | {"contact": "1-2", "bonds": "load", "size": 0.3, "box": False, "field": False, "speed": 7, "loop": True},
+    {"frame": 5, "size": 0.45, "arrows": False, "bonds": "mode", "bar": 0.3, "ortho": True, "whole": True, "grain": 2}
+    | {"measure": True, "ends": "10-11", "live": False},
     {"frame": 6, "grain": 6, "isolate": True, "follow": True, "trails": 4, "shade": 1, "plot": "losses"},
-    {"contact": "1-2", "bonds": "load", "size": 0.3, "box": False, "field": False, "speed": 7, "loop": True},
-    {"measure": True, "ends": "10-11", "live": False},
 ]
 
 
@@ -112,30 +112,19 @@ def test_a_followed_cluster_stays_where_the_address_has_it(tabs, address):
 
 
 NONSENSE = [
-    "nothing=1&constructor=2&__proto__=3",
-    "frame=NaN&size=NaN&grain=NaN&low=NaN&trails=NaN",
-    "frame=1e300",
+    "nothing=1&constructor=2&__proto__=3&frame=NaN&size=NaN&grain=NaN&low=NaN&trails=NaN&look=1,2,3",
+    "frame=1e300&look=NaN,0,0,0,0,0,0,0,0,0",
     "frame=Infinity&speed=Infinity&size=-Infinity&low=Infinity&high=-Infinity&colour=speed",
-    "frame=-5",
+    "frame=-5&grain=-7",
     "frame=2.4&trails=2.5&speed=7.7",
-    "grain=-7",
-    "grain=999999&follow=1&isolate=1",
-    "contact=3-999999&follow=1",
-    "contact=%3Cscript%3Ealert(1)%3C/script%3E",
-    "ends=1-2-3-4-99999999999999999999",
-    "look=1,2,3",
-    "look=NaN,0,0,0,0,0,0,0,0,0",
-    "look=0,0,0,0,0,0,0,0,1,10",
-    "look=0,0,0,0,0,1,0,0,1,10",
-    "look=0,0,0,1,0,0,0,0,1,1e300",
-    "look=1e300,0,0,1,0,0,0,0,1,10",
-    "look=%3Cimg%20src=x%20onerror=alert(1)%3E",
-    "colour=%3Cscript%3E&palette=nothing&theme=pink&plot=x&bonds=y",
-    "colour=speed&low=5&high=5",
+    "grain=999999&follow=1&isolate=1&look=0,0,0,0,0,0,0,0,1,10",
+    "contact=3-999999&follow=1&look=0,0,0,0,0,1,0,0,1,10",
+    "contact=%3Cscript%3Ealert(1)%3C/script%3E&look=%3Cimg%20src=x%20onerror=alert(1)%3E",
+    "ends=1-2-3-4-99999999999999999999&look=0,0,0,1,0,0,0,0,1,1e300",
+    "colour=%3Cscript%3E&palette=nothing&theme=pink&plot=x&bonds=y&look=1e300,0,0,1,0,0,0,0,1,10",
     "colour=speed&low=9&high=1&log=1",
     "colour=speed&low=-5&high=-1&log=1",
-    "&&==&%%%E0%A4%A",
-    "x" * 5000,
+    "&&==&%%%E0%A4%A&" + "x" * 5000,
 ]
 
 

@@ -231,7 +231,7 @@ def use_everything(view: Driven) -> None:
         for value, _ in view.run(f"app.state.setting({setting!r}).options"):
             view.run("app.state.set(told[0], told[1])", setting, value)
     view.settle()
-    view.press("n", "N", "y", ".", "k", "e", "z", "i", "g", "w", "o", "t", "q", "ArrowRight", "ArrowLeft", "Escape", "r")
+    view.press(*"nNy.kezigwotq", "ArrowRight", "ArrowLeft", "Escape", "r")
 
 
 @pytest.mark.parametrize("name", UNUSUAL)

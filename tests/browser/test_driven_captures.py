@@ -1,4 +1,4 @@
-"""Pictures and movies that the page hands over: of the size asked for, with what is to be seen, and nothing left behind."""
+"""Pictures and movies that the page hands over: of the size asked for, not blank, and nothing is left behind."""
 
 from __future__ import annotations
 
@@ -10,28 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from .conftest import page_of
-from .driving import Driven, differ, image, served
-from .small_runs import SmallRun
-
-
-@pytest.fixture(scope="module")
-def tab(browser, bundle, tmp_path_factory) -> Iterator[Driven]:
-    """One page for all of these tests."""
-    folder = SmallRun(tmp_path_factory.mktemp("runs") / "small").folder
-    with served(folder) as server:
-        pages = page_of(browser)
-        page = next(pages)
-        page.set_viewport_size({"width": 800, "height": 560})
-        yield Driven(page, server.url)
-        next(pages, None)
-
-
-@pytest.fixture
-def view(tab) -> Driven:
-    """The page as at first."""
-    tab.fresh()
-    return tab
+from .driving import Driven, differ, image
 
 
 def saved(view: Driven, kind: str = "png", *, clear: bool = False, **fields: int) -> tuple[str, bytes]:

@@ -3,33 +3,12 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from .conftest import page_of
-from .driving import Driven, differ, image, served
-from .small_runs import FRAMES, GRAINS, MERGED, PARTED, STEP, SmallRun
-
-
-@pytest.fixture(scope="module")
-def tab(browser, bundle, tmp_path_factory) -> Iterator[Driven]:
-    """One page for all of these tests."""
-    folder = SmallRun(tmp_path_factory.mktemp("runs") / "small").folder
-    with served(folder) as server:
-        pages = page_of(browser)
-        page = next(pages)
-        page.set_viewport_size({"width": 900, "height": 620})
-        yield Driven(page, server.url)
-        next(pages, None)
-
-
-@pytest.fixture
-def view(tab) -> Driven:
-    """The page as at first."""
-    tab.fresh()
-    return tab
+from .driving import Driven, differ, image
+from .small_runs import FRAMES, GRAINS, MERGED, PARTED, STEP
 
 
 def drag(view: Driven, start: tuple[float, float], by: tuple[float, float], button: str = "left") -> None:
@@ -83,8 +62,8 @@ def test_ticks_are_where_events_are(view, theme):
 
 def test_the_cursor_of_the_plot_is_the_time(view):
     """In the middle of its line is the place of the frame's time on the axis, at any width of the page."""
-    for width, frames in ((900, (0, 3, FRAMES - 1)), (760, (2,))):
-        view.tab.set_viewport_size({"width": width, "height": 620})
+    for width, frames in ((900, (0, 3, FRAMES - 1)), (800, (2,))):
+        view.tab.set_viewport_size({"width": width, "height": 560})
         view.tab.wait_for_timeout(50)
         for frame in frames:
             view.put(frame=frame)
@@ -210,7 +189,7 @@ def test_a_chosen_grain_is_marked(view):
 
 def test_the_canvas_suits_the_window(view):
     """After a change of size the picture fills its place, and a grain is clicked where it is seen."""
-    for size in ((700, 560), (900, 620)):
+    for size in ((700, 620), (800, 560)):
         view.tab.set_viewport_size({"width": size[0], "height": size[1]})
         view.tab.wait_for_timeout(100)
         view.settle()

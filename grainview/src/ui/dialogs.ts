@@ -10,7 +10,11 @@ export function openDialog(root: HTMLElement, title: string, ...content: (Node |
   const close = h("button", { type: "button", "aria-label": "Close", class: "gv-close" }, icon("close"));
   const dialog = h("dialog", { class: "gv-dialog", "aria-label": title }, close, h("h2", {}, title), ...content);
   close.addEventListener("click", () => dialog.close());
-  dialog.addEventListener("close", () => dialog.remove());
+  const before = document.activeElement as HTMLElement | null;
+  dialog.addEventListener("close", () => {
+    dialog.remove();
+    if (document.activeElement === document.body) before?.focus();
+  });
   dialog.addEventListener("keydown", (event) => event.stopPropagation()); // Esc closes it, and does nothing else
   root.append(dialog);
   dialog.showModal();

@@ -59,6 +59,7 @@ export class Keys {
       const typing = target.matches("input[type=text], select, textarea");
       const sliding = target.matches("input[type=range]") && SLIDES.test(event.key);
       const pushing = target.matches("button, input[type=checkbox]") && (event.key === " " || event.key === "Enter");
+      if (target.ownerDocument.querySelector(".gv dialog[open]")) return; // Esc closes it, the rest has to wait
       if (typing || sliding || pushing || event.defaultPrevented) return;
       if (this.press(pressed(event), event.repeat)) event.preventDefault();
     });

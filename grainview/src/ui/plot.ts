@@ -32,7 +32,7 @@ function numbers(at: number[], log: boolean): string[] {
 }
 
 export class LinkedPlot {
-  readonly element = h("div", { class: "gv-plot" });
+  readonly element = h("div", { class: "gv-plot", role: "img", "aria-label": "Plot" });
   private chart: uPlot | null = null;
   private cursor = 0;
   private shown: { plot: Plot; series: Series; dark: boolean } | null = null;
@@ -47,6 +47,8 @@ export class LinkedPlot {
   /** Draw one of the plots. */
   show(series: Series, plot: Plot, dark: boolean): void {
     this.shown = { series, plot, dark };
+    const lines = plot.lines.map((line) => line.label).join(", ");
+    this.element.setAttribute("aria-label", `${plot.title} over time: ${lines}`);
     this.redraw();
   }
 
@@ -70,6 +72,7 @@ export class LinkedPlot {
         width,
         height,
         legend: { show: true, live: false },
+        hooks: { ready: [() => this.moveTo(this.cursor)] }, // before that it has no size
         cursor: { show: false },
         scales: { x: { time: false }, y: { distr: plot.log ? 3 : 1 } },
         axes: [
@@ -87,7 +90,6 @@ export class LinkedPlot {
       this.element,
     );
     this.element.append(this.line);
-    this.moveTo(this.cursor);
   }
 
   private timeUnit(): [number, string] {

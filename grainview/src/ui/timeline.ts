@@ -51,7 +51,7 @@ export class TimeLine {
     const track = h("div", { class: "gv-track" }, this.slider, this.ticks);
     this.element = h(
       "div",
-      { class: "gv-timeline", role: "group", "aria-label": "Time" },
+      { class: "gv-timeline", role: "group", "aria-label": "Time line" },
       button("first", "First frame", () => press.go(0), "Home"),
       button("back", "One frame back", () => press.step(-1), "←"),
       this.playing,
