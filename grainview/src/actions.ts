@@ -1,5 +1,6 @@
 // What can be done, each with its keys.
 
+import { copyAddress } from "./address";
 import type { App } from "./app";
 import type { Action } from "./ui/keys";
 
@@ -54,7 +55,7 @@ export function actionsOf(app: App): Action[] {
     { id: "picture", label: "Picture or movie", keys: ["s"], run: () => app.studio.ask("png") },
     { id: "movie", label: "Movie", keys: ["v"], run: () => app.studio.ask("webm") },
     { id: "quick", label: "Picture at once", keys: ["S"], run: () => void app.studio.quick() },
-    { id: "link", label: "Copy the address of this view", keys: ["j"], run: () => void app.copyAddress() },
+    { id: "link", label: "Copy the address of this view", keys: ["j"], run: () => void copyAddress(app) },
     { id: "panel", label: "Settings", keys: ["`"], run: () => app.togglePanel() },
   ];
 }

@@ -1,11 +1,12 @@
 // The app: brings source, stage, settings and the parts of the page together.
 
-import { lookText } from "./address";
+import { copyAddress, lookAs, lookText } from "./address";
 import { Choosing } from "./choosing";
 import { Frames } from "./data/frames";
 import { fieldDirection, type Known } from "./data/quantities";
 import type { Manifest, Series, Source } from "./data/types";
 import { headerButtons, type Layout } from "./layout";
+import { tellRun } from "./live";
 import { Picture } from "./picture";
 import { Player } from "./player";
 import type { Stage } from "./scene/stage";
@@ -14,6 +15,7 @@ import type { State } from "./state";
 import { actionsOf } from "./actions";
 import { Studio } from "./studio";
 import { openDialog } from "./ui/dialogs";
+import { replaceKeepingFocus } from "./ui/dom";
 import { Inspector } from "./ui/inspector";
 import { type Action, Keys } from "./ui/keys";
 import { legend } from "./ui/legend";
@@ -44,6 +46,8 @@ export class App {
   readonly keys: Keys;
   readonly views: Views;
   readonly studio: Studio;
+  /** Brings the address up to now. */
+  beforeCopying: () => void = () => undefined;
   private showing: Promise<void> = Promise.resolve();
   private wanted = 0;
 
@@ -54,6 +58,7 @@ export class App {
     readonly known: Known,
     public series: Series,
     readonly page: Layout,
+    ownPage: boolean,
   ) {
     this.frames = new Frames(source);
     this.world = new World(stage);
@@ -72,10 +77,10 @@ export class App {
     this.views = new Views(stage, this.picture, this.choosing);
     this.studio = new Studio(this);
     this.panel = new Panel(state);
-    this.actions = actionsOf(this);
+    this.actions = actionsOf(this).filter((a) => ownPage || a.id !== "link"); // a notebook has its own address
     this.keys = new Keys(state, this.actions);
-    this.place();
-    this.wire();
+    this.place(ownPage);
+    this.wire(ownPage);
   }
 
   get manifest(): Manifest {
@@ -87,22 +92,23 @@ export class App {
     return theme === "dark" || (theme === "auto" && SYSTEM_DARK.matches);
   }
 
-  private place(): void {
+  private place(ownPage: boolean): void {
     const { page } = this;
     page.title.textContent = this.manifest.name;
     page.view.append(this.overlay.element, this.inspector.element);
     page.side.append(this.panel.element);
     page.bottom.append(this.timeline.element, this.plot.element);
     page.header.append(headerButtons({
-      centre: () => this.views.centre(), picture: () => this.studio.ask("png"), link: () => void this.copyAddress(),
+      centre: () => this.views.centre(), picture: () => this.studio.ask("png"),
+      link: ownPage ? () => void copyAddress(this) : null,
       help: () => this.help(), panel: () => this.togglePanel(),
     }));
     this.timeline.setFrames(this.manifest.times, this.series.events);
-    this.tellRun();
+    tellRun(this);
     if (page.root.clientWidth < NARROW) this.togglePanel();
   }
 
-  private wire(): void {
+  private wire(ownPage: boolean): void {
     const { stage, page, state } = this;
     new ResizeObserver(() => stage.resize(page.view.clientWidth, page.view.clientHeight)).observe(page.view);
     stage.resize(page.view.clientWidth, page.view.clientHeight);
@@ -111,7 +117,16 @@ export class App {
       drawWorld();
       this.overlay.draw();
     };
-    stage.onLook = () => state.set("look", lookText(stage));
+    const lost = "The browser has taken the graphics card away from this page; if the picture stays away, reload it.";
+    stage.onLost = (away) => {
+      if (away) return this.tell(lost);
+      if (page.note.textContent === lost) this.tell("");
+      this.setTheme(); // a new context does not know the background
+    };
+    stage.onLook = () => {
+      stage.reach = this.picture.reachFrom(stage.look.target); // the haze must not depend on where the eye was before
+      state.set("look", lookText(stage));
+    };
     let down: [number, number] | null = null;
     page.canvas.addEventListener("pointerdown", (e) => (down = [e.clientX, e.clientY]));
     page.canvas.addEventListener("pointerup", (e) => {
@@ -119,7 +134,8 @@ export class App {
       const box = page.canvas.getBoundingClientRect();
       if (still) this.choosing.clickAt(e.clientX - box.left, e.clientY - box.top);
     });
-    this.keys.listen(page.root);
+    this.keys.listen(ownPage ? document : page.root);
+    page.root.dataset.lmSuppressShortcuts = "true"; // JupyterLab keeps off while the page has the focus
     this.player.onPlaying = (on) => {
       this.timeline.setPlaying(on);
       this.timeline.told.setAttribute("aria-live", on ? "off" : "polite");
@@ -129,15 +145,31 @@ export class App {
     state.onChange((id) => this.changed(id));
   }
 
-  /** The first picture; settings are already as the address has them. */
-  async begin(): Promise<void> {
+  /** The first picture; settings are as the address has them. */
+  async begin(look: string): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
     this.picture.setFrame(await this.frames.get(first));
     this.picture.dress(false);
-    if (!this.state.get("look")) this.views.reset();
     this.applyLook();
     this.setTheme();
     await this.go(first);
+    this.lookFirst(look);
+  }
+
+  /** Where the camera begins: as a text says, or all in sight. */
+  private lookFirst(text: string): void {
+    if (!lookAs(this.stage, text)) this.views.reset();
+    this.choosing.anchor();
+    this.stage.draw();
+  }
+
+  /** What somebody has written into the address. */
+  async takeAddress(text: string): Promise<void> {
+    this.player.stop();
+    this.state.fromAddress(text);
+    const look = this.state.get<string>("look"); // what follows may move the camera
+    await this.go(this.state.number("frame"));
+    this.lookFirst(look);
   }
 
   private changed(id: string): void {
@@ -161,10 +193,11 @@ export class App {
   private setTheme(): void {
     this.page.root.dataset.theme = this.dark ? "dark" : "light";
     this.world.setTheme(this.dark ? DARK : LIGHT);
+    this.timeline.drawTicks();
     this.showPlot();
   }
 
-  private showPlot(): void {
+  showPlot(): void {
     const plot = this.series.plots.find((p) => p.id === this.state.get("plot")) ?? this.series.plots[0];
     if (plot) this.plot.show(this.series, plot, this.dark);
   }
@@ -196,8 +229,12 @@ export class App {
         return undefined;
       },
       (error: Error) => {
+        if (this.wanted !== k) return this.showing;
         this.player.stop();
+        this.timeline.show(k, this.manifest.steps[k]);
+        this.plot.moveTo(this.manifest.times[k]);
         this.tell(error.message);
+        return undefined;
       },
     );
     return this.showing;
@@ -214,7 +251,7 @@ export class App {
     const bonds = { kind: state.get<string>("bonds"), scale: picture.bondScale!, count: picture.frame.pair.length / 2 };
     const choose = (grain: number): void => this.choosing.choose(grain);
     if (picture.painted) {
-      this.page.legend.replaceChildren(...legend(picture.quantity, picture.painted, this.known, bonds, choose));
+      replaceKeepingFocus(this.page.legend, legend(picture.quantity, picture.painted, this.known, bonds, choose));
     }
     const scaled = picture.quantity.kind === "sequential";
     for (const id of ["palette", "log", "low", "high"]) this.panel.enable(id, scaled);
@@ -228,31 +265,10 @@ export class App {
     this.page.note.hidden = !sentence;
   }
 
-  tellRun(): void {
-    const { manifest } = this;
-    const counted = (count: number, what: string): string => `${count} ${what}${count === 1 ? "" : "s"}`;
-    const parts = [counted(manifest.grains, "grain"), counted(manifest.times.length, "frame")];
-    if (manifest.running) parts.push("still running");
-    else if (manifest.outcome) parts.push(manifest.outcome);
-    if (manifest.field) parts.push(manifest.field.text);
-    if (manifest.note) parts.push(manifest.note);
-    this.page.told.textContent = parts.join("  ·  ");
-  }
-
-  /** What has come since, of a run that is going on. */
-  take(more: Manifest, series: Series): void {
-    const { manifest } = this;
-    const atEnd = this.state.number("frame") >= manifest.times.length - 1;
-    manifest.times.push(...more.times);
-    manifest.steps.push(...more.steps);
-    if (manifest.field && more.field?.directions) manifest.field.directions = more.field.directions;
-    Object.assign(manifest, { running: more.running, outcome: more.outcome, note: more.note, bytes: more.bytes });
-    this.series = series;
-    this.timeline.setFrames(manifest.times, series.events);
-    this.showPlot();
-    this.tellRun();
-    if (atEnd && this.state.get<boolean>("live") && !this.player.playing) void this.go(Infinity);
-    else if (this.picture.frame) this.timeline.show(this.picture.frame.frame, this.picture.frame.step);
+  /** A sentence that goes away by itself. */
+  tellBriefly(sentence: string): void {
+    this.tell(sentence);
+    window.setTimeout(() => this.page.note.textContent === sentence && this.tell(""), 2500);
   }
 
   help(): void {
@@ -263,17 +279,8 @@ export class App {
   }
 
   togglePanel(): void {
-    this.page.root.classList.toggle("gv-panel-away");
-  }
-
-  async copyAddress(): Promise<void> {
-    try {
-      await navigator.clipboard.writeText(location.href);
-      this.tell("The address of this view is on the clipboard.");
-    } catch {
-      this.tell("The browser does not let this page copy; take the address from its bar.");
-    }
-    window.setTimeout(() => this.tell(""), 2500);
+    const away = this.page.root.classList.toggle("gv-panel-away");
+    this.page.header.querySelector(".gv-shows-panel")?.setAttribute("aria-expanded", String(!away));
   }
 
   toEvent(direction: 1 | -1): void {

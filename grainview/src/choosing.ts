@@ -31,6 +31,12 @@ export class Choosing {
     return numbersOf(this.state.get("ends")).filter((i) => i < this.known.manifest.grains);
   }
 
+  /** Grains of the chosen contact, if there are such grains. */
+  private get touching(): number[] {
+    const pair = numbersOf(this.state.get("contact"));
+    return pair.every((i) => i < this.known.manifest.grains) ? pair : [];
+  }
+
   /** What a click at a pixel of the canvas does. */
   clickAt(x: number, y: number): void {
     const hit = this.world.pick(x, y);
@@ -102,8 +108,13 @@ export class Choosing {
     const grain = this.state.number("grain");
     if (!frame) return null;
     if (grain >= 0) return measureCluster(frame, this.known.grains, place, membersOf(frame, grain)).centre;
-    const pair = numbersOf(this.state.get("contact"));
+    const pair = this.touching;
     return pair.length === 2 ? [0, 1, 2].map((a) => place[3 * pair[0] + a]) : null;
+  }
+
+  /** What is followed is where it should be on the picture. */
+  anchor(): void {
+    this.centre = this.state.get<boolean>("follow") ? this.middle() : null;
   }
 
   /** The camera goes as far as the followed cluster has gone. */
@@ -129,8 +140,8 @@ export class Choosing {
     const marks = new Map<number, number>();
     const parts: [string, [string, string][]][] = [];
     const contact = this.picture.contactOf(state.get("contact"));
-    if (state.get("contact")) {
-      for (const i of numbersOf(state.get("contact"))) marks.set(i, 1);
+    if (this.touching.length) {
+      for (const i of this.touching) marks.set(i, 1);
       const name = `contact ${state.get("contact").toString().replace("-", "–")}`;
       const apart: [string, string][] = [["", "these grains do not touch in this frame"]];
       parts.push([name, contact < 0 ? apart : contactRows(contact, frame, known)]);

@@ -41,15 +41,19 @@ export function sorry(place: HTMLElement, sentence: string): void {
 
 /** Buttons at the right of the header. */
 export function headerButtons(
-  press: Record<"centre" | "picture" | "link" | "help" | "panel", () => void>,
+  press: Record<"centre" | "picture" | "help" | "panel", () => void> & { link: (() => void) | null },
 ): HTMLElement {
+  const panel = button("panel", "Settings", press.panel, "`");
+  panel.classList.add("gv-shows-panel");
+  panel.setAttribute("aria-controls", "gv-panel");
+  panel.setAttribute("aria-expanded", "true");
   return h(
     "nav",
     { "aria-label": "Page" },
     button("centre", "Centre", press.centre, "z"),
     button("camera", "Picture or movie", press.picture, "s"),
-    button("link", "Copy the address of this view", press.link, "j"),
+    ...(press.link ? [button("link", "Copy the address of this view", press.link, "j")] : []),
     button("help", "Keys and help", press.help, "?"),
-    button("panel", "Settings", press.panel, "`"),
+    panel,
   );
 }

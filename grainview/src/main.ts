@@ -16,7 +16,7 @@ declare global {
 
 const place = document.getElementById("grainview");
 if (place) {
-  const source = EmbeddedSource.isThere() ? new EmbeddedSource() : new ServerSource();
+  const source = EmbeddedSource.isThere() || location.protocol === "file:" ? new EmbeddedSource() : new ServerSource();
   void show(place, source, true).then((app) => {
     window.sandView = app;
     place.dataset.ready = app ? "yes" : "no"; // for tests: a policy may forbid them to wait for anything but elements

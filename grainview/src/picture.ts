@@ -109,7 +109,8 @@ export class Picture {
     if (!frame || !length || !this.painted) return;
     const first = Math.max(frame.frame - length, 0);
     const numbers = Array.from({ length: frame.frame - first + 1 }, (_, k) => first + k);
-    const earlier = await Promise.all(numbers.map((k) => this.frames.get(k)));
+    const asked = await Promise.allSettled(numbers.map((k) => this.frames.get(k)));
+    const earlier = asked.flatMap((one) => (one.status === "fulfilled" ? [one.value] : [])); // without unreadable ones
     if (this.frame !== frame || state.number("trails") !== length) return; // it is too late for these
     const who: number[] = [];
     const grain = state.number("grain");
@@ -145,7 +146,8 @@ export class Picture {
       v.set(x - target[0], y - target[1], z - target[2]);
       const half = Math.max(Math.abs(v.dot(upwards)) + radius, (Math.abs(v.dot(side)) + radius) / aspect);
       // the eye is two heights away: what is nearer than the target looks larger
-      most = Math.max(most, 2 * half + Math.max(v.dot(away), 0) / 2);
+      const height = 2 * half + Math.max(v.dot(away), 0) / 2;
+      if (height > most) most = height; // what is nowhere is held by none
     };
     const { place, shown } = this;
     this.known.grains.radius.forEach((r, i) => {

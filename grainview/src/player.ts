@@ -4,6 +4,7 @@ import type { State } from "./state";
 
 export class Player {
   playing = false;
+  private round = 0; // counts how often playing has begun: an earlier one that still waits must not go on
   onPlaying: (on: boolean) => void = () => undefined;
 
   constructor(
@@ -25,9 +26,10 @@ export class Player {
   async play(): Promise<void> {
     if (this.playing || this.count() < 2) return;
     this.playing = true;
+    const round = ++this.round;
     this.onPlaying(true);
     if (this.state.number("frame") >= this.count() - 1) await this.go(0);
-    while (this.playing) {
+    while (this.playing && this.round === round) {
       const begun = performance.now();
       const next = this.state.number("frame") + 1;
       if (next >= this.count() && !this.state.get<boolean>("loop")) break;
@@ -35,6 +37,6 @@ export class Player {
       const wait = 1000 / this.state.number("speed") - (performance.now() - begun);
       await new Promise((on) => setTimeout(on, Math.max(wait, 0)));
     }
-    this.stop();
+    if (this.round === round) this.stop();
   }
 }

@@ -14,11 +14,12 @@ export interface Setting {
   by?: number;
   key?: string; // toggles or goes to the next option; with shift to the one before
   down?: string; // ranges: less (key: more)
+  form?: RegExp; // of text
 }
 
 export const SETTINGS: Setting[] = [
   { id: "colour", label: "Colour by", group: "Colour", kind: "choice", initial: "cluster", options: [], key: "c" },
-  { id: "palette", label: "Scale of colours", group: "Colour", kind: "choice", initial: "", options: [] },
+  { id: "palette", label: "Colour scale", group: "Colour", kind: "choice", initial: "", options: [] },
   { id: "log", label: "Logarithmic", group: "Colour", kind: "toggle", initial: false, key: "q" },
   { id: "low", label: "From", group: "Colour", kind: "number", initial: NaN },
   { id: "high", label: "To", group: "Colour", kind: "number", initial: NaN },
@@ -47,11 +48,12 @@ export const SETTINGS: Setting[] = [
   { id: "loop", label: "Loop", group: "Time", kind: "toggle", initial: false, key: "l" },
   { id: "live", label: "Go along with the run", group: "Time", kind: "toggle", initial: true, key: "a" },
   { id: "plot", label: "Plot", group: "Time", kind: "choice", initial: "", options: [], key: "p" },
-  { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0 },
-  { id: "grain", label: "Chosen grain", group: "", kind: "hidden", initial: -1 },
-  { id: "contact", label: "Chosen contact", group: "", kind: "hidden", initial: "" }, // "i-j": its grains
-  { id: "ends", label: "Measured", group: "", kind: "hidden", initial: "" }, // "i-j"
-  { id: "look", label: "Camera", group: "", kind: "hidden", initial: "" },
+  { id: "frame", label: "Frame", group: "", kind: "hidden", initial: 0, from: 0 }, // beyond the last: the last
+  { id: "grain", label: "Chosen grain", group: "", kind: "hidden", initial: -1, from: -1 },
+  // "i-j": its grains; one or two grains; ten numbers
+  { id: "contact", label: "Chosen contact", group: "", kind: "hidden", initial: "", form: /^(\d+-\d+)?$/ },
+  { id: "ends", label: "Measured", group: "", kind: "hidden", initial: "", form: /^(\d+(-\d+)?)?$/ },
+  { id: "look", label: "Camera", group: "", kind: "hidden", initial: "", form: /^([-+.\de]+(,[-+.\de]+){9})?$/ },
 ];
 
 const same = (a: Value, b: Value): boolean => a === b || (Number.isNaN(a) && Number.isNaN(b));
@@ -133,12 +135,16 @@ export class State {
 
 function allowed(setting: Setting, value: Value): Value | undefined {
   if (setting.kind === "choice") return setting.options?.some(([v]) => v === value) ? value : undefined;
-  if (setting.kind === "number") return typeof value === "number" ? value : undefined;
+  if (setting.kind === "number") return typeof value === "number" && Math.abs(value) !== Infinity ? value : undefined;
   if (typeof value !== typeof setting.initial) return undefined;
   if (typeof value === "number") {
     if (Number.isNaN(value)) return undefined;
-    if (setting.kind === "range") return Math.min(Math.max(value, setting.from ?? 0), setting.to ?? 1);
-    return Math.round(value);
+    const { from = -Infinity, to = Infinity, by = 1 } = setting;
+    if (setting.id === "grain" && (value < from || value > to)) return setting.initial; // there is no such grain
+    const inside = Math.min(Math.max(value, from), to);
+    if (setting.kind !== "range") return Math.round(inside);
+    return Number((from + Math.round((inside - from) / by) * by).toFixed(6));
   }
+  if (typeof value === "string" && setting.form && !setting.form.test(value)) return undefined;
   return value;
 }

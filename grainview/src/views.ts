@@ -23,7 +23,7 @@ export class Views {
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (let e = 0; e < place.length; e++) {
-      if (shown && !shown[Math.floor(e / 3)]) continue;
+      if ((shown && !shown[Math.floor(e / 3)]) || !Number.isFinite(place[e])) continue;
       low[e % 3] = Math.min(low[e % 3], place[e]);
       high[e % 3] = Math.max(high[e % 3], place[e]);
     }

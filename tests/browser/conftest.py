@@ -16,7 +16,9 @@ from sand.core.errors import BadInput
 from sand.files.page import read_bundle
 
 from .chromium import FLAGS, find
+from .driving import SIZE, Driven, served
 from .looking import Shows
+from .small_runs import SmallRun
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Request
@@ -78,6 +80,26 @@ def page(browser: Browser) -> Iterator[Page]:
     have come; the test sets that list where it provokes errors.
     """
     yield from page_of(browser)
+
+
+@pytest.fixture(scope="module")
+def tab(browser: Browser, bundle: tuple[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
+    """The page of a small run, one for all tests of a module."""
+    folder = SmallRun(tmp_path_factory.mktemp("runs") / "small").folder
+    with served(folder) as server:
+        pages = page_of(browser)
+        page = next(pages)
+        page.set_viewport_size(SIZE)
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        yield Driven(page, server.url)
+        next(pages, None)
+
+
+@pytest.fixture
+def view(tab: Driven) -> Driven:
+    """That page, as at first."""
+    tab.fresh()
+    return tab
 
 
 def page_of(browser: Browser) -> Iterator[Page]:

@@ -45,7 +45,7 @@ export class EmbeddedSource implements Source {
   private told: Manifest | null = null;
 
   static isThere(): boolean {
-    return document.getElementById("sand-manifest") !== null;
+    return document.querySelector('script[id^="sand-"]') !== null;
   }
 
   private text(name: string): string {

@@ -28,6 +28,9 @@ void main() {
   float mark = floor(255.0 * cover.a + 0.5);
   vec3 c = (modelViewMatrix * vec4(place.xyz, 1.0)).xyz;
   float r = place.w * uSize;
+#ifdef PLAIN
+  r = max(r, 0.75 / uPixel * (isOrtho() ? 1.0 : -c.z)); // in wide space a grain is a dot still
+#endif
   vCentre = c;
   vRadius = r;
   vColour = colour.rgb;

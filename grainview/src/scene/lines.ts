@@ -18,6 +18,7 @@ export class Segments {
     const geometry = new three.BufferGeometry();
     geometry.setAttribute("position", new three.BufferAttribute(ends, 3));
     if (colours) geometry.setAttribute("color", new three.BufferAttribute(colours, 4, true));
+    geometry.boundingSphere = new three.Sphere(); // is not looked at, but would be worked out each time
     this.lines.geometry = geometry;
   }
 }
@@ -64,7 +65,7 @@ export function trailSegments(
     const [tail, head] = [255 * ((k - 1) / (places.length - 1)), 255 * (k / (places.length - 1))];
     for (const i of who) {
       let jump = false;
-      for (let a = 0; a < 3; a++) jump ||= Math.abs(now[3 * i + a] - before[3 * i + a]) > 0.5 * box[a];
+      for (let a = 0; a < 3; a++) jump ||= !(Math.abs(now[3 * i + a] - before[3 * i + a]) <= 0.5 * box[a]);
       if (jump) continue;
       ends.set(before.subarray(3 * i, 3 * i + 3), 6 * used);
       ends.set(now.subarray(3 * i, 3 * i + 3), 6 * used + 3);

@@ -42,6 +42,7 @@ export class Stage {
   reach = 10; // radius of all there is, about the target
   onLook: () => void = () => undefined;
   onDraw: () => void = () => undefined;
+  onLost: (lost: boolean) => void = () => undefined;
   private asked = false;
   private disposed = false;
 
@@ -54,8 +55,14 @@ export class Stage {
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(0, -10, 0);
     this.controls = this.newControls();
-    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    canvas.addEventListener("webglcontextrestored", () => this.redraw());
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.onLost(true);
+    });
+    canvas.addEventListener("webglcontextrestored", () => {
+      this.onLost(false);
+      this.redraw();
+    });
   }
 
   private newControls(): OrbitControls {

@@ -116,7 +116,8 @@ export class World {
       const x = this.place[3 * i] - target[0];
       const y = this.place[3 * i + 1] - target[1];
       const z = this.place[3 * i + 2] - target[2];
-      most = Math.max(most, Math.sqrt(x * x + y * y + z * z) + ARROW * this.radius[i]);
+      const away = Math.sqrt(x * x + y * y + z * z) + ARROW * this.radius[i];
+      if (away > most && away < Infinity) most = away; // a grain may have no place
     }
     return most || 1;
   }

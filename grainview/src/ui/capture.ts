@@ -63,6 +63,8 @@ export async function sequence(frames: number[], draw: (frame: number) => Promis
   return new Blob([zipSync(files, { level: 0 }) as Uint8Array<ArrayBuffer>], { type: "application/zip" });
 }
 
+const pause = (long: number): Promise<void> => new Promise((go) => setTimeout(go, long));
+
 const FORMS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
 /** Whether this browser can write a movie. */
@@ -89,8 +91,10 @@ export async function movie(
     const begun = performance.now();
     await show(frame);
     track.requestFrame();
-    await new Promise((go) => setTimeout(go, Math.max(1000 / perSecond - (performance.now() - begun), 0)));
+    await pause(Math.max(1000 / perSecond - (performance.now() - begun), 0));
   }
+  track.requestFrame(); // the last one again: a recorder that stops too soon loses it
+  await pause(300);
   recorder.stop();
   await done;
   track.stop();

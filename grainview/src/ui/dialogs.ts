@@ -10,8 +10,12 @@ export function openDialog(root: HTMLElement, title: string, ...content: (Node |
   const close = h("button", { type: "button", "aria-label": "Close", class: "gv-close" }, icon("close"));
   const dialog = h("dialog", { class: "gv-dialog", "aria-label": title }, close, h("h2", {}, title), ...content);
   close.addEventListener("click", () => dialog.close());
-  dialog.addEventListener("close", () => dialog.remove());
-  dialog.addEventListener("keydown", (event) => event.key !== "Escape" && event.stopPropagation());
+  const before = document.activeElement as HTMLElement | null;
+  dialog.addEventListener("close", () => {
+    dialog.remove();
+    if (document.activeElement === document.body) before?.focus();
+  });
+  dialog.addEventListener("keydown", (event) => event.stopPropagation()); // Esc closes it, and does nothing else
   root.append(dialog);
   dialog.showModal();
   return dialog;
@@ -42,7 +46,7 @@ export function askCapture(
   const kinds: [string, string][] = [["png", "one picture (PNG)"], ["sequence", "pictures of frames (PNG, zip)"]];
   if (webm) kinds.push(["webm", "movie (WebM)"]);
   const kind = h("select", { id: "gv-cap-kind" }, ...kinds.map(([value, label]) => h("option", { value }, label)));
-  kind.value = initial.kind;
+  kind.value = initial.kind === "webm" && !webm ? "sequence" : initial.kind;
   const clear = h("input", { id: "gv-cap-clear", type: "checkbox" });
   clear.checked = initial.transparent;
   const form = h(
@@ -53,7 +57,7 @@ export function askCapture(
     number("gv-cap-height", "Height (pixels)", initial.height, 16, LARGEST),
     number("gv-cap-from", "From frame", initial.from, 0, lastFrame),
     number("gv-cap-to", "To frame", initial.to, 0, lastFrame),
-    h("p", {}, clear, h("label", { for: "gv-cap-clear" }, "transparent background")),
+    h("p", {}, h("label", { for: "gv-cap-clear" }, "Transparent background"), clear),
     h("p", { class: "gv-faint" }, "A movie has the size of the picture on the page, and its background."),
     h("button", { type: "submit", class: "gv-go" }, "Save"),
   );
@@ -68,5 +72,13 @@ export function askCapture(
       kind: kind.value as CaptureWish["kind"],
     }),
   );
+  const suit = (): void => {
+    const input = (id: string): HTMLInputElement => form.querySelector(`#${id}`) as HTMLInputElement;
+    for (const id of ["gv-cap-from", "gv-cap-to"]) input(id).disabled = kind.value === "png";
+    for (const id of ["gv-cap-width", "gv-cap-height", "gv-cap-clear"]) input(id).disabled = kind.value === "webm";
+  };
+  kind.addEventListener("change", suit);
+  suit();
   openDialog(root, "Picture or movie", form);
+  kind.focus();
 }

@@ -23,3 +23,11 @@ export function svg(tag: string, attributes: Record<string, string | number> = {
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
   return element;
 }
+
+/** New content for an element; a button in it that has the focus passes it on to the one in its place. */
+export function replaceKeepingFocus(element: HTMLElement, content: Node[]): void {
+  const buttons = (): HTMLElement[] => [...element.querySelectorAll("button")];
+  const at = buttons().indexOf(document.activeElement as HTMLElement);
+  element.replaceChildren(...content);
+  if (at >= 0) (buttons()[at] ?? buttons().at(-1))?.focus();
+}

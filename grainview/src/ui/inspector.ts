@@ -108,16 +108,20 @@ export function isSingle(frame: Frame, grain: number): boolean {
 export class Inspector {
   readonly element = h("section", { class: "gv-inspector", "aria-label": "What is chosen", hidden: true });
 
-  constructor(private readonly clear: () => void) {}
+  private readonly tables = h("div", {});
+
+  constructor(clear: () => void) {
+    const close = button("close", "Choose nothing", clear, "Esc");
+    close.classList.add("gv-close");
+    this.element.append(close, this.tables); // the button stays, and the focus with it
+  }
 
   show(parts: [title: string, rows: Row[]][]): void {
     this.element.hidden = parts.length === 0;
-    const close = button("close", "Choose nothing", this.clear, "Esc");
-    close.classList.add("gv-close");
     const tables = parts.map(([title, rows]) => {
       const body = rows.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)));
       return h("table", {}, h("caption", {}, title), h("tbody", {}, ...body));
     });
-    this.element.replaceChildren(close, ...tables);
+    this.tables.replaceChildren(...tables);
   }
 }

@@ -33,8 +33,9 @@ export class Overlay {
 
   /** A direction of the world as it is seen: pixels to the right and down, for a length of one. */
   private seen(direction: number[]): [number, number] {
+    const size = Math.hypot(...direction);
     const v = new three.Vector3(...direction).transformDirection(this.stage.camera.matrixWorldInverse);
-    return [v.x, -v.y];
+    return [size * v.x, -size * v.y];
   }
 
   private arm(x: number, y: number, direction: number[], name: string, kind: string): SVGElement[] {
@@ -48,7 +49,7 @@ export class Overlay {
   private triad(): SVGElement[] {
     const [x, y] = [44, this.stage.height - 44];
     const arms = ["x", "y", "z"].flatMap((name, a) => this.arm(x, y, [0, 1, 2].map((b) => Number(a === b)), name, ""));
-    if (this.field) arms.push(...this.arm(x, y, this.field.map((v) => 1.25 * v), "B", "gv-field"));
+    if (this.field) arms.push(...this.arm(x, y, this.field.map((v) => 1.6 * v), "B", "gv-field"));
     return arms;
   }
 

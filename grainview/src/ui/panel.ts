@@ -52,8 +52,9 @@ export class Panel {
       const change = (e: Event): void => {
         const text = (e.target as HTMLInputElement).value.trim();
         state.set(setting.id, text === "" ? NaN : Number(text));
+        this.update(setting.id); // what is no number goes away
       };
-      return h("input", { id, type: "text", inputmode: "decimal", placeholder: "auto", change });
+      return h("input", { id, type: "text", inputmode: "decimal", placeholder: "auto (SI)", change });
     }
     const input = (e: Event): void => state.set(setting.id, Number((e.target as HTMLInputElement).value));
     const slider = h("input", { id, type: "range", min: setting.from, max: setting.to, step: setting.by, input });

@@ -16,19 +16,23 @@ function largest(lines: (number | null)[][]): number {
   return most;
 }
 
-/** Numbers at an axis; of a logarithmic one those of powers of ten, at most six of them. */
+/** Numbers at an axis; of a logarithmic one of powers of ten, at most six, with 2 and 5 where these are few. */
 function numbers(at: number[], log: boolean): string[] {
   if (!log) return at.map((v) => digits(v, 3));
   const power = (v: number): number | null => {
     const exponent = Math.log10(v);
     return v > 0 && Math.abs(exponent - Math.round(exponent)) < 1e-6 ? Math.round(exponent) : null;
   };
+  if (at.filter((v) => power(v) !== null).length < 3) {
+    const round = (v: number): boolean => /^[125]e/.test(Number(v.toPrecision(6)).toExponential());
+    return at.map((v) => (v && round(v) ? digits(v, 3) : "")); // uPlot takes some of them away itself: null
+  }
   const step = Math.ceil(at.filter((v) => power(v) !== null).length / 6);
   return at.map((v) => ((power(v) ?? 0.5) % step === 0 ? digits(v, 3) : ""));
 }
 
 export class LinkedPlot {
-  readonly element = h("div", { class: "gv-plot" });
+  readonly element = h("div", { class: "gv-plot", role: "img", "aria-label": "Plot" });
   private chart: uPlot | null = null;
   private cursor = 0;
   private shown: { plot: Plot; series: Series; dark: boolean } | null = null;
@@ -43,6 +47,8 @@ export class LinkedPlot {
   /** Draw one of the plots. */
   show(series: Series, plot: Plot, dark: boolean): void {
     this.shown = { series, plot, dark };
+    const lines = plot.lines.map((line) => line.label).join(", ");
+    this.element.setAttribute("aria-label", `${plot.title} over time: ${lines}`);
     this.redraw();
   }
 
@@ -66,6 +72,7 @@ export class LinkedPlot {
         width,
         height,
         legend: { show: true, live: false },
+        hooks: { ready: [() => this.moveTo(this.cursor)] }, // before that it has no size
         cursor: { show: false },
         scales: { x: { time: false }, y: { distr: plot.log ? 3 : 1 } },
         axes: [
@@ -86,7 +93,6 @@ export class LinkedPlot {
       this.element,
     );
     this.element.append(this.line);
-    this.moveTo(this.cursor);
   }
 
   private timeUnit(): [number, string] {
@@ -98,12 +104,12 @@ export class LinkedPlot {
   moveTo(time: number): void {
     this.cursor = time;
     if (!this.chart) return;
-    const box = this.chart.over;
+    const [outer, box] = [this.element.getBoundingClientRect(), this.chart.over.getBoundingClientRect()];
     const x = this.chart.valToPos(time / this.timeUnit()[0], "x");
-    this.line.style.left = `${box.offsetLeft + x}px`;
-    this.line.style.top = `${box.offsetTop}px`;
-    this.line.style.height = `${box.clientHeight}px`;
-    this.line.hidden = !(x >= -1 && x <= box.clientWidth + 1);
+    this.line.style.left = `${box.left - outer.left + x}px`;
+    this.line.style.top = `${box.top - outer.top}px`;
+    this.line.style.height = `${box.height}px`;
+    this.line.hidden = !(x >= -1 && x <= box.width + 1);
   }
 
   private drag(event: PointerEvent): void {

@@ -51,7 +51,7 @@ export class TimeLine {
     const track = h("div", { class: "gv-track" }, this.slider, this.ticks);
     this.element = h(
       "div",
-      { class: "gv-timeline", role: "group", "aria-label": "Time" },
+      { class: "gv-timeline", role: "group", "aria-label": "Time line" },
       button("first", "First frame", () => press.go(0), "Home"),
       button("back", "One frame back", () => press.step(-1), "←"),
       this.playing,
@@ -110,7 +110,7 @@ export class TimeLine {
     this.slider.setAttribute("aria-valuetext", `frame ${frame}, ${time}`);
   }
 
-  private drawTicks(): void {
+  drawTicks(): void {
     const [width, height] = [this.ticks.clientWidth, this.ticks.clientHeight];
     const pen = this.ticks.getContext("2d");
     if (!pen || !width || !height) return;

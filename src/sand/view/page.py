@@ -31,6 +31,9 @@ MEASURED = 5e7
 
 NO_SCRIPT = "This page draws moving grains; please allow it to run its script."
 
+NOT_WHOLE = "Reading the frames … If this stays, the file is not whole: ask for it again."
+"""What a file says until its script, which is at its end, has run."""
+
 
 def served(title: str) -> str:
     """The page of the server."""
@@ -45,13 +48,13 @@ def _page(title: str, head: str, body: str) -> str:
     return _top(title, head) + body + _BOTTOM
 
 
-def _top(title: str, head: str) -> str:
+def _top(title: str, head: str, within: str = "") -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="referrer" content="no-referrer">\n'
         f'<link rel="icon" href="data:,">\n<title>{html.escape(title)}</title>\n{head}</head>\n<body>\n'
-        f'<div id="grainview"></div>\n<noscript>{NO_SCRIPT}</noscript>\n'
+        f'<div id="grainview">{within}</div>\n<noscript>{NO_SCRIPT}</noscript>\n'
     )
 
 
@@ -84,7 +87,7 @@ def write_page(
     count, dimensions, measured = len(story), [], _measured(story)
     measure = Dimensions()
     with Written(path) as file:
-        file.write(_top(_title(story), head))
+        file.write(_top(_title(story), head, f"<p>{NOT_WHOLE}</p>"))
         file.write(_block("sand-grains", story.grains()))
         for k in range(count):
             frame, names = story.read(k)

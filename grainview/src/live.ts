@@ -1,0 +1,50 @@
+// A run that is still going: what has come since, and how it stands.
+
+import type { App } from "./app";
+import type { Manifest, Series } from "./data/types";
+
+/** Seconds between questions whether a run has gone on. */
+const EVERY = 1;
+
+/** How the run stands, beside its name. */
+export function tellRun({ manifest, page }: App): void {
+  const counted = (count: number, what: string): string => `${count} ${what}${count === 1 ? "" : "s"}`;
+  const parts = [counted(manifest.grains, "grain"), counted(manifest.times.length, "frame")];
+  if (manifest.running) parts.push("still running");
+  else if (manifest.outcome) parts.push(manifest.outcome);
+  if (manifest.field) parts.push(manifest.field.text);
+  if (manifest.note) parts.push(manifest.note);
+  page.told.textContent = page.told.title = parts.join("  ·  ");
+}
+
+/** What has come since. */
+function take(app: App, more: Manifest, series: Series): void {
+  const { manifest, state, picture } = app;
+  const atEnd = state.number("frame") >= manifest.times.length - 1;
+  manifest.times.push(...more.times);
+  manifest.steps.push(...more.steps);
+  if (manifest.field && more.field?.directions) manifest.field.directions = more.field.directions;
+  Object.assign(manifest, { running: more.running, outcome: more.outcome, note: more.note, bytes: more.bytes });
+  app.series = series;
+  app.timeline.setFrames(manifest.times, series.events);
+  app.showPlot();
+  tellRun(app);
+  if (atEnd && state.get<boolean>("live") && !app.player.playing) void app.go(Infinity);
+  else if (picture.frame) app.timeline.show(picture.frame.frame, picture.frame.step);
+}
+
+/** Ask again and again, while a run goes on. */
+export async function goAlong(app: App): Promise<void> {
+  while (app.manifest.running) {
+    await new Promise((on) => setTimeout(on, 1000 * EVERY));
+    if (!app.page.root.isConnected) return;
+    try {
+      const more = await app.source.manifest(app.manifest.times.length);
+      const news = more.times.length || more.running !== app.manifest.running;
+      if (news) take(app, more, await app.source.series());
+    } catch (error) {
+      app.tell((error as Error).message);
+      return;
+    }
+  }
+}

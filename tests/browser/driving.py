@@ -1,0 +1,135 @@
+"""The page as a test drives it: opened, pressed, clicked, and looked at."""
+
+from __future__ import annotations
+
+import base64
+import io
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sand.view.server import Server
+from sand.view.story import story_of
+
+from .small_runs import FIELD
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Locator, Page
+
+SIZE = {"width": 800, "height": 560}
+"""Of the window: software draws a large one slowly."""
+SETTLED = """async () => {
+  const app = window.sandView;
+  for (let before = null; app && before !== app.showing; ) { before = app.showing; await before; }
+  while (app?.frames.asked.size) await Promise.allSettled([...app.frames.asked.values()]);
+  await new Promise((on) => setTimeout(on, 0));
+  await new Promise((on) => requestAnimationFrame(() => requestAnimationFrame(on)));
+}"""
+CANVAS = """() => document.querySelector("canvas.gv-canvas").toDataURL("image/png")"""
+
+
+@contextmanager
+def served(folder: Path, field: Any = FIELD) -> Iterator[Server]:
+    """The server of a run."""
+    server = Server(story_of(folder, field))
+    server.start()
+    try:
+        yield server
+    finally:
+        server.stop()
+
+
+def image(png: bytes) -> np.ndarray:
+    """(H, W, 4) u1."""
+    from PIL import Image
+
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))
+
+
+def differ(a: np.ndarray, b: np.ndarray, by: int = 0) -> int:
+    """Pixels that are not the same, `by` more than so much of 255."""
+    if a.shape != b.shape:
+        return max(a.size, b.size)
+    return int(np.any(np.abs(a.astype(int) - b) > by, axis=-1).sum())
+
+
+class Driven:
+    """A page of a run in a tab.
+
+    Args:
+        tab: of the browser.
+        address: of the page; None: what the tab shows already.
+    """
+
+    def __init__(self, tab: Page, address: str | None = None):
+        self.tab = tab
+        if address is not None:
+            self.open(address)
+
+    def open(self, address: str, ready: str = "yes") -> None:
+        """Go there, and wait for the first picture (`ready`: "no" for the sentence instead)."""
+        self.tab.goto("about:blank")
+        self.tab.goto(address)
+        self.tab.wait_for_selector(f"#grainview[data-ready={ready}]")
+        self.settle()
+
+    def settle(self) -> None:
+        """Until what was asked for is drawn."""
+        self.tab.evaluate(SETTLED)
+
+    def run(self, script: str, *told: Any) -> Any:
+        """The value of an expression about `app`."""
+        return self.tab.evaluate(f"(told) => {{ const app = window.sandView; return {script}; }}", list(told))
+
+    def get(self, setting: str) -> Any:
+        """A setting's value; None for one that is not a number."""
+        value = self.run(f"app.state.get({setting!r})")
+        return None if value != value else value
+
+    def put(self, **settings: Any) -> None:
+        """Settings, set without a control."""
+        for name, value in settings.items():
+            self.run("app.state.set(told[0], told[1])", name, value)
+        self.settle()
+
+    def fresh(self) -> None:
+        """All settings as at first, the camera too, no dialog, the focus nowhere."""
+        self.run("app.player.stop()")
+        self.tab.evaluate("() => { document.querySelector('dialog')?.close(); document.activeElement?.blur(); }")
+        self.run("app.state.fromAddress('')")
+        self.settle()
+        self.run("app.views.reset()")
+        self.settle()
+
+    def press(self, *keys: str) -> None:
+        """Keys, one after another."""
+        for key in keys:
+            self.tab.keyboard.press(key)
+        self.settle()
+
+    def control(self, setting: str) -> Locator:
+        """The form element of a setting."""
+        return self.tab.locator(f"#gv-{setting}")
+
+    def look(self) -> dict[str, Any]:
+        """Where the camera is."""
+        return self.run("app.stage.look")
+
+    def picture(self) -> np.ndarray:
+        """(H, W, 4), what the canvas shows."""
+        self.settle()
+        return image(base64.b64decode(self.tab.evaluate(CANVAS).split(",")[1]))
+
+    def text(self, selector: str) -> str:
+        """What is to be read there."""
+        return self.tab.locator(selector).inner_text()
+
+    def place_of(self, grain: int) -> tuple[float, float]:
+        """Where a grain is in the window [pixels]."""
+        x, y, _ = self.run("app.stage.screenOf(app.picture.place.slice(3 * told[0], 3 * told[0] + 3))", grain)
+        box = self.tab.locator("canvas.gv-canvas").bounding_box()
+        return box["x"] + x, box["y"] + y

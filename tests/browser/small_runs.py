@@ -1,0 +1,158 @@
+"""Folders of small runs, written as a run writes them but not simulated: nothing is compiled.
+
+Twelve grains in a periodic box: a chain of four that lies across a face, a chain of four that comes and touches it in
+frame 4, a pair that parts in frame 6, and two single grains that move all the time.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from sand.core.box import Box
+from sand.core.material import IRON, SILICA
+from sand.core.world import LOST
+from sand.files.folder import LEDGER, SUMMARY, TRAJECTORY, LedgerFile, write_json
+from sand.files.frame import MODES
+from sand.files.trajectory import TrajectoryWriter
+
+R = 10e-9
+"""Radius of a grain [m]."""
+SIDE = 24.0
+"""Of the box, in radii."""
+FRAMES, GRAINS, MERGED, PARTED = 8, 12, 4, 6
+STEP = 1e-9
+"""Time between frames [s]."""
+FIELD = ("1 mT, constant", lambda time: (0.0, 0.0, 1e-3))
+ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting", "magnetic")
+COLUMNS = (
+    *("step", "time", "clusters", "largest_cluster", "mean_cluster_size", "contacts", "made", "broken"),
+    *ENERGIES,
+    *(f"lost_{name}" for name in LOST),
+    "total",
+)
+
+
+class Grains(SimpleNamespace):
+    """What `TrajectoryWriter` takes for grains."""
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+
+def places(k: int) -> np.ndarray:
+    """(12, 3), in radii, inside the box."""
+    drift = 0.4 * max(k - MERGED, 0)
+    first = [(9.0 + 1.99 * i, -6.0, drift) for i in range(4)]
+    second = [(16.96 + 1.99 * i, 6.0 - 3.0 * min(k, MERGED), drift) for i in range(4)]
+    pair = [(2.0, 8.0, -6.0), (3.99, 8.0, -6.0 + 1.5 * max(k - PARTED + 1, 0))]
+    alone = [(-4.0 + 0.8 * k, 3.0, 7.0), (-6.0, -1.0 + 0.5 * k, -7.0)]
+    at = np.array(first + second + pair + alone)
+    return at - SIDE * np.round(at / SIDE)
+
+
+def pairs(k: int) -> np.ndarray:
+    """(C, 2), grains that touch."""
+    chains = [(i, i + 1) for start in (0, 4) for i in range(start, start + 3)]
+    return np.array(chains + [(3, 4)] * (k >= MERGED) + [(8, 9)] * (k < PARTED))
+
+
+def grains(at: np.ndarray, k: int = 0, *, moments: bool = True) -> Grains:
+    """Grains at places [radii]; numbers differ from grain to grain and from frame to frame."""
+    n = len(at)
+    one = np.arange(n)
+    radius = np.where(one == GRAINS - 1, 1.5, 1.0) * R
+    mass = 4 / 3 * np.pi * radius**3 * np.where(one == GRAINS - 2, SILICA.density, IRON.density)
+    angle = 0.5 * one + 0.3 * k
+    turned = np.column_stack([np.cos(angle), np.sin(angle), 0.3 * np.ones(n)])
+    return Grains(
+        position=at * R,
+        radius=radius,
+        mass=mass,
+        materials=(IRON, SILICA),
+        material=np.where(one == GRAINS - 2, 1, 0),
+        velocity=turned * (1.0 + one)[:, None],
+        spin=turned[:, ::-1] * 1e8 * (1.0 + one % 5)[:, None],
+        charge=np.zeros(n),
+        orientation=np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)),
+        moment=turned * 6e-18 * moments,
+    )
+
+
+def contacts(pair: np.ndarray, k: int = 0) -> dict[str, np.ndarray]:
+    """Columns of a table of contacts."""
+    pair = np.asarray(pair, np.uint32).reshape(-1, 2)
+    count = len(pair)
+    size = np.arange(1, count + 1, dtype=float)
+    table = {name: np.zeros((count, 3)) for name in ("slide_vector", "roll_vector")}
+    shares = {f"{mode}_share": (0.2 * size + 0.1 * m) % 1.05 for m, mode in enumerate(MODES)}
+    return {
+        **table,
+        **shares,
+        "pair": pair,
+        "overlap": 1e-10 * size,
+        "formed": np.full(count, 0.25 * STEP * k),
+        "force": np.column_stack([1e-8 * (size - 3.0), 0.2e-8 * size, np.zeros(count)]),
+        "twist": np.zeros(count),
+    }
+
+
+def row(at: float) -> dict[str, float]:
+    """Of the ledger, at a time counted in frames; a change has happened by the half before the frame that shows it."""
+    merged, parted = at >= MERGED - 0.5, at >= PARTED - 0.5
+    told = dict.fromkeys(COLUMNS, 0.0)
+    told |= {name: 1e-18 * (k + 1) * (1 + 0.1 * at) for k, name in enumerate(ENERGIES)}
+    told |= {f"lost_{name}": 1e-19 * (k + 1) * at for k, name in enumerate(LOST)}
+    clusters = 5 - merged + parted
+    told |= {"step": int(100 * at), "time": at * STEP, "clusters": clusters, "largest_cluster": 8 if merged else 4}
+    told |= {"mean_cluster_size": 12 / clusters, "contacts": 7 + merged - parted}
+    return told | {"made": 7 + int(merged), "broken": int(parted), "total": 1e-17 * (1 + 1e-6 * at)}
+
+
+class SmallRun:
+    """The run in a folder, written as far as is wanted.
+
+    Args:
+        folder: of the run; made.
+        frames: of the eight that are there at first.
+        ended: whether the summary is there.
+        box: periodic by default.
+    """
+
+    def __init__(self, folder: Path, frames: int = FRAMES, *, ended: bool = True, box: Box | None = None):
+        self.folder, self.count = folder, 0
+        self.box = box or Box.periodic(SIDE * R)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.ledger = LedgerFile(folder / LEDGER, COLUMNS)
+        self.writer = TrajectoryWriter(folder / TRAJECTORY)
+        self.go_on(frames)
+        if ended:
+            self.end()
+
+    def go_on(self, frames: int) -> None:
+        """Write so many more frames, and the ledger twice as often."""
+        for k in range(self.count, self.count + frames):
+            for at in (k - 0.5, k) if k else (0,):
+                self.ledger.append(row(at))
+            self.writer.write(100 * k, k * STEP, grains(places(k), k), self.box, contacts(pairs(k), k))
+        self.count += frames
+        self.writer.flush()
+
+    def end(self) -> None:
+        """The run has ended."""
+        self.writer.close()
+        write_json(self.folder / SUMMARY, {"outcome_text": "ended as wished", "steps": 100 * (self.count - 1)})
+
+
+def written(folder: Path, frames: list[tuple[Any, np.ndarray]], box: Box | None = None) -> Path:
+    """A trajectory of these grains and pairs, one of each for every frame, without a ledger."""
+    folder.mkdir(parents=True, exist_ok=True)
+    writer = TrajectoryWriter(folder / TRAJECTORY)
+    for k, (some, pair) in enumerate(frames):
+        writer.write(100 * k, k * STEP, some, box or Box.open(), contacts(pair, k))
+    writer.close()
+    write_json(folder / SUMMARY, {"outcome_text": "ended as wished", "steps": 100 * (len(frames) - 1)})
+    return folder

@@ -1,0 +1,241 @@
+"""Every action by its keys, and by its button where it has one: what it does, not only that nothing breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from .driving import Driven
+from .small_runs import FRAMES, GRAINS, MERGED, PARTED
+
+Check = Callable[[Driven], None]
+
+
+def lands(frame: int) -> Check:
+    """A frame is shown: by the state, in the words beside the time line, by the grains on the canvas."""
+
+    def check(view: Driven) -> None:
+        assert view.get("frame") == frame == view.run("app.picture.frame.frame")
+        assert f"frame {frame} of {FRAMES - 1}" in view.text(".gv-time")
+        assert view.run("app.timeline.slider.valueAsNumber") == frame
+
+    return check
+
+
+def has(**settings: object) -> Check:
+    """Settings have these values."""
+
+    def check(view: Driven) -> None:
+        assert {name: view.get(name) for name in settings} == settings
+
+    return check
+
+
+def captions(*words: str) -> Check:
+    """What the box of numbers tells of."""
+
+    def check(view: Driven) -> None:
+        assert view.tab.locator(".gv-inspector caption").all_inner_texts() == list(words)
+        assert view.tab.locator(".gv-inspector").is_visible() == bool(words)
+
+    return check
+
+
+def along(axis: list[float]) -> Check:
+    def check(view: Driven) -> None:
+        assert np.allclose(view.look()["from"], axis, atol=1e-4)
+
+    return check
+
+
+def moved(part: str, test: Callable[[np.ndarray, np.ndarray, dict], bool]) -> Check:
+    """A part of the camera's place has changed from the first view as `test` says, and nothing else has."""
+
+    def check(view: Driven) -> None:
+        now = view.look()
+        view.press("r")
+        first = view.look()
+        assert test(np.array(now[part]), np.array(first[part]), first)
+        same = {"target", "from", "up", "height"} - {part}
+        assert all(np.allclose(now[name], first[name], atol=1e-4) for name in same)
+
+    return check
+
+
+def across(right: float, upwards: float) -> Check:
+    """The target has moved so far, in heights of the picture."""
+
+    def test(now: np.ndarray, first: np.ndarray, look: dict) -> bool:
+        side = np.cross(look["up"], look["from"])
+        side /= np.linalg.norm(side)
+        up = np.cross(look["from"], side)
+        return np.allclose((now - first) / look["height"] @ np.array([side, up]).T, [right, upwards], atol=1e-3)
+
+    return moved("target", test)
+
+
+def turned(sideways: int, upwards: int) -> Check:
+    """The eye has gone around the target by a 24th of π."""
+
+    def test(now: np.ndarray, first: np.ndarray, look: dict) -> bool:
+        angle = np.arctan2(now[1], now[0]) - np.arctan2(first[1], first[0])
+        rise = np.arcsin(now[2]) - np.arcsin(first[2])
+        return np.allclose([angle, rise], [sideways * np.pi / 24, upwards * np.pi / 24], atol=2e-3)
+
+    return moved("from", test)
+
+
+def dialog(title: str) -> Check:
+    """A window of this name is open, and Esc closes it and does nothing else."""
+
+    def check(view: Driven) -> None:
+        assert view.tab.get_by_role("dialog", name=title).is_visible()
+        chosen = view.get("grain")
+        view.press("Escape")
+        assert view.tab.locator("dialog").count() == 0
+        assert view.get("grain") == chosen
+
+    return check
+
+
+def kind_asked(kind: str) -> Check:
+    def check(view: Driven) -> None:
+        assert view.tab.locator("#gv-cap-kind").input_value() == kind
+        dialog("Picture or movie")(view)
+
+    return check
+
+
+def playing(view: Driven) -> None:
+    """The same key pauses it."""
+    assert view.run("app.player.playing")
+    assert view.tab.get_by_role("button", name="Pause").is_visible()
+    view.press("Space")
+    assert not view.run("app.player.playing")
+    assert view.tab.get_by_role("button", name="Play").is_visible()
+
+
+def centred(view: Driven) -> None:
+    assert np.allclose(view.look()["target"], view.run("app.choosing.middle()"), atol=1e-4)
+
+
+def as_at_first(view: Driven) -> None:
+    assert np.allclose(view.look()["from"], np.array([0.52, -0.74, 0.43]) / np.linalg.norm([0.52, -0.74, 0.43]))
+    assert view.look()["height"] == pytest.approx(view.run("app.views.whole().height"))
+
+
+def copied(view: Driven) -> None:
+    """The address on the clipboard is that of this view, at once."""
+    text = view.tab.evaluate("() => navigator.clipboard.readText()")
+    assert text.startswith("http://127.0.0.1:") and "frame=2" in text
+    assert "clipboard" in view.text(".gv-note")
+
+
+def panel_away(view: Driven) -> None:
+    assert not view.tab.locator(".gv-panel").is_visible()
+    view.press("`")
+    assert view.tab.locator(".gv-panel").is_visible()
+
+
+# settings before; what must be so after each of its keys
+ACTIONS: dict[str, tuple[dict, Check]] = {
+    "help": ({"grain": 3}, dialog("Keys and help")),
+    "play": ({"speed": 30, "loop": True}, playing),
+    "on": ({"frame": 2}, lands(3)),
+    "back": ({"frame": 2}, lands(1)),
+    "far-on": ({"frame": 2}, lands(FRAMES - 1)),
+    "far-back": ({"frame": 5}, lands(0)),
+    "first": ({"frame": 5}, lands(0)),
+    "last": ({"frame": 2}, lands(FRAMES - 1)),
+    "next-event": ({"frame": MERGED}, lands(PARTED)),
+    "last-event": ({"frame": PARTED}, lands(MERGED)),
+    "next-grain": ({"grain": GRAINS - 1}, captions("grain 0", "its cluster")),
+    "last-grain": ({"grain": 0}, captions(f"grain {GRAINS - 1}")),
+    "next-contact": ({"contact": "0-1"}, captions("contact 1–2")),
+    "last-contact": ({"contact": "1-2"}, captions("contact 0–1")),
+    "largest": ({"frame": MERGED}, has(grain=0)),
+    "end": ({"grain": 10, "ends": "3"}, captions("grain 10", "distance")),
+    "clear": ({"grain": 3, "isolate": True, "follow": True, "ends": "1-2"}, captions()),
+    "centre": ({"grain": 5}, centred),
+    "reset": ({"look": "1,2,3,1,0,0,0,0,1,5"}, as_at_first),
+    "along-x": ({}, along([1, 0, 0])),
+    "along-y": ({}, along([0, -1, 0])),
+    "along-z": ({}, along([0, 0, 1])),
+    "left": ({}, turned(-1, 0)),
+    "right": ({}, turned(1, 0)),
+    "up": ({}, turned(0, 1)),
+    "down": ({}, turned(0, -1)),
+    "pan-left": ({}, across(-0.08, 0.0)),
+    "pan-right": ({}, across(0.08, 0.0)),
+    "pan-up": ({}, across(0.0, 0.08)),
+    "pan-down": ({}, across(0.0, -0.08)),
+    "nearer": ({}, moved("height", lambda now, first, _: bool(np.isclose(1.2 * now, first)))),
+    "farther": ({}, moved("height", lambda now, first, _: bool(np.isclose(now, 1.2 * first)))),
+    "picture": ({}, kind_asked("png")),
+    "movie": ({}, kind_asked("webm")),
+    "link": ({"frame": 2}, copied),
+    "panel": ({}, panel_away),
+}
+ELSEWHERE = {"quick"}  # test_driven_captures
+BUTTONS = {
+    "help": "Keys and help",
+    "play": "Play",
+    "on": "One frame on",
+    "back": "One frame back",
+    "first": "First frame",
+    "last": "Last frame",
+    "next-event": "Next event",
+    "last-event": "Event before",
+    "clear": "Choose nothing",
+    "centre": "Centre",
+    "picture": "Picture or movie",
+    "link": "Copy the address of this view",
+    "panel": "Settings",
+}
+
+
+def test_no_action_is_left_out(view):
+    """A new one without a test fails here."""
+    assert set(view.run("app.actions.map((a) => a.id)")) == set(ACTIONS) | ELSEWHERE
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_an_action_by_each_of_its_keys(view, action):
+    """With nothing in focus, as when the page has just been opened."""
+    setup, check = ACTIONS[action]
+    for key in view.run(f"app.actions.find((a) => a.id === {action!r}).keys"):
+        view.fresh()
+        view.put(**setup)
+        view.press({" ": "Space", "Ctrl+": "Control+"}.get(key, key.replace("Ctrl", "Control")))
+        check(view)
+
+
+@pytest.mark.parametrize("action", BUTTONS)
+def test_an_action_by_its_button(view, action):
+    """The button is named, and does the same as the key."""
+    setup, check = ACTIONS[action]
+    view.put(**setup)
+    view.tab.get_by_role("button", name=BUTTONS[action], exact=True).click()
+    view.settle()
+    check(view)
+
+
+def test_help_lists_all_keys(view):
+    """Every action and every setting with a key, and the keys."""
+    view.press("?")
+    words = view.text("dialog .gv-keys")
+    for label in view.run("[...app.actions, ...app.state.settings.filter((s) => s.key)].map((one) => one.label)"):
+        assert label in words, label
+    keys = set(view.tab.locator("dialog kbd").all_inner_texts())
+    named = {" ": "space", "Escape": "Esc"}
+    arrows = {"ArrowLeft": "←", "ArrowRight": "→", "ArrowUp": "↑", "ArrowDown": "↓"}
+    for key in view.run(
+        "[...app.actions.flatMap((a) => a.keys), ...app.state.settings.flatMap((s) => [s.key, s.down])].filter(Boolean)"
+    ):
+        for name, sign in arrows.items():
+            key = key.replace(name, sign)
+        assert named.get(key, key) in keys, key
+    assert view.tab.evaluate("() => document.activeElement.closest('dialog') !== null")
+    view.press("Escape")

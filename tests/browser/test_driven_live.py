@@ -1,0 +1,79 @@
+"""A run that is still going: the page goes along with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from .driving import Driven, served
+from .small_runs import MERGED, PARTED, SmallRun
+
+
+@pytest.fixture
+def run(tmp_path, bundle) -> SmallRun:
+    """Three frames of eight are written."""
+    return SmallRun(tmp_path / "going", 3, ended=False)
+
+
+@pytest.fixture
+def view(page, run) -> Iterator[Driven]:
+    page.set_viewport_size({"width": 800, "height": 560})
+    with served(run.folder) as server:
+        yield Driven(page, server.url)
+
+
+def until(view: Driven, words: str) -> None:
+    """The line beside the name says so."""
+    view.tab.locator(".gv-told", has_text=words).wait_for()
+    view.settle()
+
+
+def test_the_page_goes_along(view, run):
+    """From the last frame to the new last; from another it stays; ticks and plot grow; the end is told."""
+    assert "3 frames · still running" in " ".join(view.text(".gv-told").split())
+    view.press("End")
+    run.go_on(2)
+    until(view, "5 frames")
+    assert view.get("frame") == 4 == view.run("app.picture.frame.frame")
+    assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(4.0)
+    assert [mark["frame"] for mark in view.run("app.timeline.marks")] == [MERGED]
+    line, over = (view.tab.locator(f".gv-plot {part}").bounding_box() for part in (".gv-cursor", ".u-over"))
+    assert line["x"] == pytest.approx(over["x"] + view.run("app.plot.chart.valToPos(4, 'x')"), abs=1.5)
+    view.press("ArrowLeft")
+    run.go_on(2)
+    until(view, "7 frames")
+    assert view.get("frame") == 3 == view.run("app.picture.frame.frame")
+    assert "frame 3 of 6" in view.text(".gv-time")
+    assert view.run("app.timeline.slider.max") == "6"
+    view.press("n", "n")
+    assert view.get("frame") == PARTED
+    view.control("live").click()
+    run.go_on(1)
+    run.end()
+    until(view, "ended as wished")
+    assert view.get("frame") == PARTED
+    assert "8 frames" in view.text(".gv-told") and "still running" not in view.text(".gv-told")
+    asked = []
+    view.tab.on("request", lambda request: asked.append(request.url))
+    view.tab.wait_for_timeout(1300)
+    assert not asked
+
+
+def test_playing_goes_on_into_new_frames(view, run):
+    """What comes while it plays is played, too."""
+    view.put(speed=2)
+    view.press("Space")
+    run.go_on(5)
+    until(view, "8 frames")
+    view.put(speed=60)
+    view.tab.wait_for_selector("button[aria-label=Play]")
+    assert view.get("frame") == 7
+
+
+def test_a_run_that_is_followed_from_an_address(view, run):
+    """A frame that is not there yet is the last one; nothing is lost."""
+    view.open(view.tab.url.split("#")[0] + "#frame=7")
+    assert view.run("app.picture.frame.frame") == 2 == view.get("frame")
+    view.press("ArrowLeft")
+    assert view.get("frame") == 1

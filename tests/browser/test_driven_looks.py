@@ -1,0 +1,127 @@
+"""What settings mean for the picture, the legend and the panel, one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from .driving import differ
+from .small_runs import GRAINS, SIDE
+from .test_driven_settings import colours, legend, shown
+
+
+def test_one_cluster_alone(view):
+    """Only its four grains are drawn, whole, and the contacts between them."""
+    view.put(grain=1, isolate=True)
+    assert shown(view) == [1] * 4 + [0] * (GRAINS - 4)
+    x = np.array(view.run("[0, 1, 2, 3].map((i) => app.picture.place[3 * i])"))
+    unit = view.run("app.manifest.unit") / 10e-9
+    assert np.allclose(np.diff(x) * unit, 1.99, atol=1e-4)
+    chosen = view.run("[...new Set(app.world.pieces.contact)].sort()")
+    assert [view.run("[...app.picture.frame.pair.slice(2 * told[0], 2 * told[0] + 2)]", c) for c in chosen] == [
+        [0, 1],
+        [1, 2],
+        [2, 3],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("off", []), ("plain", []), ("load", ["normal force"]), ("mode", ["stretch", "slide", "roll", "twist"])],
+)
+def test_kinds_of_contacts(view, kind, words):
+    """Each is drawn in another way; the legend says how."""
+    view.put(bonds=kind, size=0.4)
+    now = view.picture()
+    assert all(word in legend(view) for word in words)
+    assert view.run("app.world.bonds.mesh.visible") == (kind != "off")
+    for other in {"off", "plain", "load", "mode"} - {kind}:
+        view.put(bonds=other)
+        assert differ(now, view.picture()) > 10, other
+
+
+def test_every_colouring_has_its_legend(view):
+    """Each of those offered gives grains other colours than one before, and is named."""
+    names = view.run("app.state.setting('colour').options")
+    assert {"cluster", "speed", "material", "alignment", "field"} <= {name for name, _ in names}
+    pictures = []
+    for name, label in names:
+        view.control("colour").select_option(name)
+        view.settle()
+        first = legend(view).split("\n")[0]
+        assert first.startswith("clusters" if name == "cluster" else label), name
+        pictures.append(str(colours(view)))
+    assert len(set(pictures)) == len(names)
+
+
+def test_numbers_of_the_legend(view):
+    """They are the ends of the range, in the unit that is named; From and To are in SI."""
+    view.put(colour="spin")
+    view.control("low").fill("1e8")
+    view.control("low").press("Enter")
+    view.control("high").fill("4e8")
+    view.control("high").press("Enter")
+    view.settle()
+    assert "spin (Mrad/s)" in legend(view)
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["100", "250", "400"]
+    view.control("log").click()
+    view.settle()
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["100", "200", "400"]
+
+
+def test_no_number_is_taken_back(view):
+    """Words in a field of numbers go away; nothing changes."""
+    view.put(colour="speed")
+    before = colours(view)
+    view.control("low").fill("much")
+    view.control("low").press("Enter")
+    assert view.control("low").input_value() == ""
+    assert view.get("low") is None and colours(view) == before
+
+
+def test_letters_in_a_field_are_not_keys(view):
+    """Typing m in From leaves the arrows."""
+    view.put(colour="speed")
+    view.control("low").focus()
+    view.press("m", "b", "2")
+    assert view.get("arrows") and view.get("bonds") == "plain"
+    assert view.control("low").input_value() == "mb2"
+
+
+def test_sliders_are_moved_by_arrow_keys(view):
+    """When one has the focus, arrows and Home are its own."""
+    view.put(frame=3)
+    view.control("size").focus()
+    view.press("ArrowLeft")
+    assert (view.get("size"), view.get("frame")) == (0.95, 3)
+    view.press("Home")
+    assert (view.get("size"), view.get("frame")) == (0.1, 3)
+    view.press("m")
+    assert not view.get("arrows")
+
+
+def test_shift_goes_back(view):
+    """Through a list of choices, one by one."""
+    view.press("b")
+    assert view.get("bonds") == "load"
+    view.press("B", "B")
+    assert view.get("bonds") == "off"
+
+
+def test_meaningless_controls_are_grey(view):
+    """A scale of colours means nothing for names."""
+    assert view.control("palette").is_disabled() and view.control("low").is_disabled()
+    view.put(colour="speed")
+    assert view.control("palette").is_enabled() and view.control("low").is_enabled()
+
+
+def test_trails_end_where_grains_are(view):
+    """Segments join the places of one frame to those of the next, and none crosses the box."""
+    view.put(frame=3, trails=2)
+    view.tab.wait_for_timeout(100)
+    ends = np.array(view.run("[...app.world.trails.lines.geometry.attributes.position.array]")).reshape(-1, 2, 3)
+    unit = view.run("app.manifest.unit") / 10e-9
+    assert len(ends) == 2 * GRAINS
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() * unit < SIDE / 2
+    place = np.array(view.run("[...app.picture.frame.position]")).reshape(-1, 3)
+    assert np.allclose(ends[GRAINS:, 1], place, atol=1e-5)
