@@ -43,7 +43,7 @@ def test_kinds_of_contacts(view, kind, words):
 def test_every_colouring_has_its_legend(view):
     """Each of those offered gives grains other colours than one before, and is named."""
     names = view.run("app.state.setting('colour').options")
-    assert {"cluster", "speed", "material", "alignment", "field"} <= {name for name, _ in names}
+    assert {"cluster", "speed", "material", "alignment", "field_alignment"} <= {name for name, _ in names}
     pictures = []
     for name, label in names:
         view.control("colour").select_option(name)

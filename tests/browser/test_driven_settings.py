@@ -112,7 +112,7 @@ EFFECTS: dict[str, tuple[dict, Callable[[Driven], object], bool]] = {
     "isolate": ({"grain": 5}, shown, True),
     "trails": ({"frame": 5}, seen("[app.world.trails.lines.visible, app.state.get('trails')]"), True),
     "shade": ({}, seen("app.world.uniforms.uHaze.value"), True),
-    "bonds": ({}, bonds, True),
+    "bonds": ({"size": 0.5}, bonds, True),
     "bar": ({"size": 0.5}, seen("app.world.bar"), True),
     "ortho": ({}, seen("app.stage.camera.isOrthographicCamera ?? false"), True),
     "follow": ({"grain": 5}, followed, False),
