@@ -74,6 +74,13 @@ def test_a_transparent_picture(view, theme):
     assert (np.abs(solid.astype(int) - picture)[picture[..., 3] == 255].max(axis=-1) <= 3).mean() > 0.98
 
 
+def test_the_page_is_not_transparent_afterwards(untouched):
+    """Only the picture was."""
+    assert image(saved(untouched, clear=True, width=64, height=64)[1])[0, 0, 3] == 0
+    untouched.tab.wait_for_timeout(50)
+    assert untouched.picture()[0, -1].tolist() == [251, 250, 247, 255]
+
+
 def test_a_picture_at_once(untouched):
     """By one key: twice as large as on the page."""
     with untouched.tab.expect_download() as coming:
