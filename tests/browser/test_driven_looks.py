@@ -12,8 +12,13 @@ from .test_driven_settings import colours, legend, shown
 
 def test_one_cluster_alone(view):
     """Only its four grains are drawn, whole, and the contacts between them."""
-    view.put(grain=1, isolate=True)
+    view.put(grain=1, isolate=True, arrows=False)
     assert shown(view) == [1] * 4 + [0] * (GRAINS - 4)
+    corner = view.tab.locator("canvas.gv-canvas").bounding_box()
+    alone = view.picture()
+    for grain, drawn in ((10, False), (8, False), (1, True)):
+        column, line = (round(v) for v in np.subtract(view.place_of(grain), (corner["x"], corner["y"])))
+        assert (alone[line, column].tolist() != alone[0, -1].tolist()) == drawn, grain
     x = np.array(view.run("[0, 1, 2, 3].map((i) => app.picture.place[3 * i])"))
     unit = view.run("app.manifest.unit") / 10e-9
     assert np.allclose(np.diff(x) * unit, 1.99, atol=1e-4)

@@ -78,3 +78,10 @@ def test_numbers_of_a_cluster_go_with_the_frame(view):
     view.press("n")
     lands(MERGED)(view)
     assert "grains N\t8" in view.text(".gv-inspector")
+
+
+def test_the_address_that_is_copied_is_that_of_now(view):
+    """The bar of the browser lags behind by a quarter of a second."""
+    view.run("app.state.set('frame', 5), app.keys.press('j')")
+    view.tab.wait_for_timeout(100)
+    assert "frame=5" in view.tab.evaluate("() => navigator.clipboard.readText()")
