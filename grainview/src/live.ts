@@ -33,8 +33,12 @@ function take(app: App, more: Manifest, series: Series): void {
   else if (picture.frame) app.timeline.show(picture.frame.frame, picture.frame.step);
 }
 
+/** Questions without an answer, one after another, after which none is asked any more. */
+const GIVEN_UP = 5;
+
 /** Ask again and again, while a run goes on. */
 export async function goAlong(app: App): Promise<void> {
+  let failed = 0;
   while (app.manifest.running) {
     await new Promise((on) => setTimeout(on, 1000 * EVERY));
     if (!app.page.root.isConnected) return;
@@ -42,9 +46,11 @@ export async function goAlong(app: App): Promise<void> {
       const more = await app.source.manifest(app.manifest.times.length);
       const news = more.times.length || more.running !== app.manifest.running;
       if (news) take(app, more, await app.source.series());
+      if (failed) app.tell("");
+      failed = 0;
     } catch (error) {
       app.tell((error as Error).message);
-      return;
+      if (++failed === GIVEN_UP) return;
     }
   }
 }
