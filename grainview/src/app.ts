@@ -179,7 +179,7 @@ export class App {
     if (id === "plot") this.showPlot();
     if (id === "follow") this.choosing.follow();
     const aims = (id === "follow" || id === "isolate") && this.state.get<boolean>(id);
-    if (aims && this.state.number("grain") < 0) this.tellBriefly("Choose a grain of a cluster first: click it, or press y.");
+    if (aims && this.state.number("grain") < 0) this.tellBriefly("Choose a grain first: click it, or press y.");
     if (!QUIET.has(id)) this.redress();
   }
 
