@@ -35,7 +35,10 @@ export function actionsOf(app: App): Action[] {
     { id: "last-contact", label: "Choose the contact before", keys: ["K"], run: () => app.choosing.stepContact(-1) },
     { id: "largest", label: "Choose the largest cluster", keys: ["y"], run: () => app.choosing.chooseLargest() },
     { id: "end", label: "Measure from the chosen grain", keys: ["e"], run: () => app.choosing.measureFromChosen() },
-    { id: "clear", label: "Choose nothing", keys: ["Escape"], run: () => app.choosing.clear() },
+    {
+      id: "clear", label: "Choose nothing; stop saving", keys: ["Escape"],
+      run: () => void (app.studio.stop() || app.choosing.clear()),
+    },
     { id: "centre", label: "Centre on what is chosen, or on all", keys: ["z"], run: () => app.views.centre() },
     { id: "reset", label: "Camera as at first", keys: ["r", "0"], run: () => app.views.reset() },
     ...ALONG.map(([name, from, up], k) => ({

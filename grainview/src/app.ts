@@ -65,8 +65,10 @@ export class App {
     this.picture = new Picture(this.world, state, this.frames, known);
     this.overlay = new Overlay(stage, known.manifest.unit);
     this.inspector = new Inspector(() => this.choosing.clear());
-    this.choosing = new Choosing(state, this.picture, this.world, this.inspector, this.overlay, known, source);
     this.player = new Player(state, () => this.manifest.times.length, (k) => this.go(k));
+    const { picture, world, inspector, overlay } = this;
+    const isPlaying = (): boolean => this.player.playing;
+    this.choosing = new Choosing(state, picture, world, inspector, overlay, known, source, isPlaying);
     this.plot = new LinkedPlot((time) => void this.go(nearestFrame(this.manifest.times, time)));
     this.timeline = new TimeLine({
       play: () => this.player.toggle(),
@@ -148,7 +150,7 @@ export class App {
   /** The first picture; settings are as the address has them. */
   async begin(look: string): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
-    this.picture.setFrame(await this.frames.get(first));
+    this.picture.setFrame(await this.frames.nearest(first, this.manifest.times.length));
     this.picture.dress(false);
     this.applyLook();
     this.setTheme();
@@ -178,6 +180,7 @@ export class App {
     if (["ortho", "size", "shade", "field"].includes(id)) this.applyLook();
     if (id === "plot") this.showPlot();
     if (id === "follow") this.choosing.follow();
+    if (id === "grain" && this.state.get<boolean>("follow")) this.choosing.turnTo();
     const aims = (id === "follow" || id === "isolate") && this.state.get<boolean>(id);
     if (aims && this.state.number("grain") < 0) this.tellBriefly("Choose a grain first: click it, or press y.");
     if (!QUIET.has(id)) this.redress();

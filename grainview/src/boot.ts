@@ -2,10 +2,10 @@
 
 import { linkAddress } from "./address";
 import { App } from "./app";
-import { QUANTITIES } from "./data/quantities";
 import type { Source } from "./data/types";
+import { setDigits } from "./data/units";
 import { layout, sorry } from "./layout";
-import { goAlong } from "./live";
+import { goAlong, offerChoices } from "./live";
 import { Stage } from "./scene/stage";
 import { State } from "./state";
 
@@ -17,11 +17,10 @@ async function build(place: HTMLElement, source: Source, ownPage: boolean): Prom
   const page = layout(place);
   const known = { manifest, grains };
   const state = new State();
-  const there = QUANTITIES.filter((q) => q.available?.(known) ?? true);
-  state.offer("colour", there.map((q) => [q.id, q.label]));
+  setDigits(manifest.digits);
   const palettes = Object.keys(manifest.palettes).filter((p) => p !== "diverging");
   state.offer("palette", palettes.map((p) => [p, p]));
-  state.offer("plot", series.plots.map((p) => [p.id, p.title]));
+  offerChoices(state, known, series);
   state.setting("grain").to = manifest.grains - 1;
   if (ownPage) state.fromAddress(location.hash);
   const stage = new Stage(page.canvas);

@@ -24,6 +24,7 @@ export class Choosing {
     private readonly overlay: Overlay,
     private readonly known: Known,
     private readonly source: Source,
+    private readonly isPlaying: () => boolean,
   ) {}
 
   /** Grains being measured, those that there are. */
@@ -47,8 +48,7 @@ export class Choosing {
     }
     if (hit?.kind === "contact" && this.picture.frame) {
       const [i, j] = this.picture.frame.pair.subarray(2 * hit.index, 2 * hit.index + 2);
-      state.set("grain", -1);
-      state.set("contact", `${i}-${j}`);
+      this.chooseContact(i, j);
     } else {
       state.set("contact", "");
       this.choose(hit ? hit.index : -1);
@@ -78,8 +78,13 @@ export class Choosing {
     if (!pair?.length) return;
     const now = this.picture.contactOf(this.state.get("contact"));
     const next = now < 0 ? 0 : (now + by + pair.length / 2) % (pair.length / 2);
-    this.state.set("grain", -1);
-    this.state.set("contact", `${pair[2 * next]}-${pair[2 * next + 1]}`);
+    this.chooseContact(pair[2 * next], pair[2 * next + 1]);
+  }
+
+  /** The contact of two grains; a cluster that stands alone goes on to do so, or gives its place to theirs. */
+  private chooseContact(i: number, j: number): void {
+    this.state.set("grain", this.state.get<boolean>("isolate") ? i : -1);
+    this.state.set("contact", `${i}-${j}`);
   }
 
   /** A grain of the largest cluster. */
@@ -109,12 +114,20 @@ export class Choosing {
     if (!frame) return null;
     if (grain >= 0) return measureCluster(frame, this.known.grains, place, membersOf(frame, grain)).centre;
     const pair = this.touching;
-    return pair.length === 2 ? [0, 1, 2].map((a) => place[3 * pair[0] + a]) : null;
+    if (pair.length !== 2) return null;
+    const [from, to] = this.line(pair[0], pair[1], place);
+    return from.map((x, a) => (x + to[a]) / 2);
   }
 
   /** What is followed is where it should be on the picture. */
   anchor(): void {
     this.centre = this.state.get<boolean>("follow") ? this.middle() : null;
+  }
+
+  /** Another cluster is followed from now on: the camera goes to it. */
+  turnTo(): void {
+    this.centre = null;
+    this.follow();
   }
 
   /** The camera goes as far as the followed cluster has gone. */
@@ -179,6 +192,7 @@ export class Choosing {
   private dimensionOf(grain: number): Dimension | null {
     const frame = this.picture.frame?.frame ?? 0;
     if (this.dimension?.frame === frame && this.dimension.grain === grain) return this.dimension.told;
+    if (this.isPlaying()) return null; // there is no time for it before the next frame
     const asked = { frame, grain, told: null as Dimension | null };
     this.dimension = asked;
     this.source

@@ -1,10 +1,20 @@
 // A run that is still going: what has come since, and how it stands.
 
 import type { App } from "./app";
+import { type Known, QUANTITIES } from "./data/quantities";
 import type { Manifest, Series } from "./data/types";
+import type { State } from "./state";
 
 /** Seconds between questions whether a run has gone on. */
 const EVERY = 1;
+
+/** What can be chosen with these data, which become more while a run goes on; names of the settings. */
+export function offerChoices(state: State, known: Known, series: Series): string[] {
+  const there = QUANTITIES.filter((q) => q.available?.(known) ?? true);
+  state.offer("colour", there.map((q) => [q.id, q.label]));
+  state.offer("plot", series.plots.map((p) => [p.id, p.title]));
+  return ["colour", "plot"];
+}
 
 /** How the run stands, beside its name. */
 export function tellRun({ manifest, page }: App): void {
@@ -24,13 +34,17 @@ function take(app: App, more: Manifest, series: Series): void {
   manifest.times.push(...more.times);
   manifest.steps.push(...more.steps);
   if (manifest.field && more.field?.directions) manifest.field.directions = more.field.directions;
-  Object.assign(manifest, { running: more.running, outcome: more.outcome, note: more.note, bytes: more.bytes });
+  const { running, outcome, note, bytes, ranges } = more;
+  Object.assign(manifest, { running, outcome, note, bytes, ranges });
   app.series = series;
+  for (const id of offerChoices(state, app.known, series)) app.panel.refill(id);
   app.timeline.setFrames(manifest.times, series.events);
   app.showPlot();
   tellRun(app);
-  if (atEnd && state.get<boolean>("live") && !app.player.playing) void app.go(Infinity);
+  const goesAlong = atEnd && state.get<boolean>("live") && !app.player.playing && !app.studio.busy;
+  if (goesAlong) void app.go(Infinity);
   else if (picture.frame) app.timeline.show(picture.frame.frame, picture.frame.step);
+  if (!goesAlong && !app.player.playing) app.redress(); // scales may have changed
 }
 
 /** Questions without an answer, one after another, after which none is asked any more. */
@@ -44,6 +58,10 @@ export async function goAlong(app: App): Promise<void> {
     if (!app.page.root.isConnected) return;
     try {
       const more = await app.source.manifest(app.manifest.times.length);
+      if (more.generation !== app.manifest.generation) {
+        app.tell("This run was begun anew: load the page again to see it.");
+        return;
+      }
       const news = more.times.length || more.running !== app.manifest.running;
       if (news) take(app, more, await app.source.series());
       if (failed) app.tell("");

@@ -21,6 +21,7 @@ export class Picture {
   whole: Float32Array = new Float32Array();
   painted: Painted | null = null;
   bondScale: Scale | null = null;
+  patient = false; // frames are saved: each shall be complete, however long it takes
   private later = 0;
   private readonly middle: number; // radius of the middle one of the grains
 
@@ -80,7 +81,7 @@ export class Picture {
       const much = Math.min(1, 2 * this.state.number("shade"));
       this.world.setCover(much > 0 ? coverOf(this.place, 5 * this.middle).map((c) => c * much) : null);
     };
-    if (this.known.manifest.grains <= MANY) shade();
+    if (this.known.manifest.grains <= MANY || this.patient) shade();
     else if (!playing) this.later = window.setTimeout(shade, 250);
   }
 
@@ -119,7 +120,8 @@ export class Picture {
       if (grain < 0 || i === grain || (name !== SINGLE && frame.cluster[i] === name)) who.push(i);
     }
     const box = frame.box.map((l, a) => (known.manifest.periodic[a] ? l : Infinity));
-    const { ends, colours } = trailSegments(earlier.map((f) => f.position), who, this.painted.colour, box);
+    const shift = this.place.map((x, e) => x - frame.position[e]); // by boxes, where clusters are kept whole
+    const { ends, colours } = trailSegments(earlier.map((f) => f.position), who, this.painted.colour, box, shift);
     world.trails.set(ends, colours);
     world.stage.redraw();
   }

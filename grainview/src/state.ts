@@ -70,10 +70,11 @@ export class State {
     return found;
   }
 
-  /** What there is to choose from, known only with the data; the first is the one to begin with. */
+  /** What there is to choose from, known only with the data; the first is the one to begin with, and stays so. */
   offer(id: string, options: [value: string, label: string][]): void {
     const setting = this.setting(id);
     setting.options = options;
+    if (options.some(([value]) => value === setting.initial)) return;
     setting.initial = options[0]?.[0] ?? "";
     this.values.set(id, setting.initial);
   }

@@ -5,6 +5,8 @@ import { canRecord, download, movie, picture, sequence } from "./ui/capture";
 import { askCapture, type CaptureWish } from "./ui/dialogs";
 
 export class Studio {
+  /** Frames are being saved: nothing else shall move the page. */
+  busy = false;
   private last: Partial<CaptureWish> = {};
 
   constructor(private readonly app: App) {}
@@ -25,6 +27,13 @@ export class Studio {
     return this.make({ kind: "png", width: 2 * width, height: 2 * height, transparent: false, from: 0, to: 0 });
   }
 
+  /** No more frames are saved; false if none were. */
+  stop(): boolean {
+    const was = this.busy;
+    this.busy = false;
+    return was;
+  }
+
   /** Make it and hand it to the browser as a download. */
   async make(wish: CaptureWish): Promise<void> {
     const { app } = this;
@@ -32,12 +41,12 @@ export class Studio {
     const name = app.manifest.name.replace(/[^\w.-]+/g, "-") || "grains";
     try {
       if (wish.kind === "png") {
-        const k = String(app.state.number("frame")).padStart(6, "0");
+        const k = String(app.picture.frame?.frame ?? 0).padStart(6, "0");
         download(await this.still(wish), `${name}-${k}.png`);
+        app.tell("");
       } else {
-        await this.many(wish, name);
+        app.tell(await this.many(wish, name));
       }
-      app.tell("");
     } catch (error) {
       app.tell(`This could not be saved: ${(error as Error).message}`);
     }
@@ -47,24 +56,36 @@ export class Studio {
     return picture(this.app.world, { ...wish, dark: this.app.dark });
   }
 
-  private async many(wish: CaptureWish, name: string): Promise<void> {
+  /** Many frames, one after another; what is to be said of it in the end. */
+  private async many(wish: CaptureWish, name: string): Promise<string> {
     const { app } = this;
     const before = app.state.number("frame");
     const frames = Array.from({ length: wish.to - wish.from + 1 }, (_, k) => wish.from + k);
+    const missing: number[] = [];
     app.player.stop();
-    const show = async (k: number): Promise<void> => {
+    const show = async (k: number): Promise<boolean> => {
+      if (!this.busy) return false;
       await app.go(k);
-      app.tell(`saving: frame ${k} of ${wish.to}`);
+      if (app.picture.frame?.frame !== k) missing.push(k);
+      app.tell(`saving: frame ${k} of ${wish.to}; Esc stops it`);
+      return app.picture.frame?.frame === k;
     };
-    if (wish.kind === "sequence") {
-      const draw = async (k: number): Promise<Blob> => {
-        await show(k);
-        return this.still(wish);
-      };
-      download(await sequence(frames, draw), `${name}-frames.zip`);
-    } else {
-      download(await movie(app.page.canvas, frames, app.state.number("speed"), show), `${name}.webm`);
+    this.busy = true;
+    app.picture.patient = true;
+    try {
+      if (wish.kind === "sequence") {
+        const draw = async (k: number): Promise<Blob | null> => ((await show(k)) ? this.still(wish) : null);
+        const zip = await sequence(frames, draw);
+        if (this.busy) download(zip, `${name}-frames.zip`);
+      } else {
+        const film = await movie(app.page.canvas, frames, app.state.number("speed"), show);
+        if (this.busy) download(film, `${name}.webm`);
+      }
+      if (!this.busy) return "Stopped: nothing was saved.";
+      return missing.length ? `Left out, because they could not be read: frames ${missing.join(", ")}.` : "";
+    } finally {
+      this.busy = app.picture.patient = false;
+      await app.go(before);
     }
-    await app.go(before);
   }
 }

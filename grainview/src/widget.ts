@@ -5,7 +5,6 @@ import type { Dimension, Frame, Grains, Manifest, Series, Source } from "./data/
 
 /** What anywidget gives of its model. */
 export interface Model {
-  get(name: string): unknown;
   send(content: unknown): void;
   on(name: string, listener: (...told: never[]) => void): void;
   off(name: string, listener: (...told: never[]) => void): void;

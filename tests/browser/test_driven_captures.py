@@ -99,6 +99,25 @@ def test_a_sequence_of_pictures(untouched):
         pictures = [image(files.read(one)) for one in files.namelist()]
     assert all(one.shape == (150, 200, 4) for one in pictures)
     assert all(differ(a, b) > 20 for k, a in enumerate(pictures) for b in pictures[:k])
+    for k in (2, 5):
+        untouched.put(frame=k)
+        _, alone = saved(untouched, width=200, height=150)
+        assert differ(image(alone), pictures[k - 2]) == 0
+    untouched.put(frame=3)
+
+
+def test_saving_is_stopped(untouched):
+    """Esc ends a long sequence: nothing is saved, and the page says so."""
+    downloads = []
+    untouched.tab.on("download", downloads.append)
+    untouched.run("void app.studio.make({ kind: 'sequence', width: 900, height: 600, from: 0, to: 7 })")
+    untouched.press("Escape")
+    note = untouched.tab.locator(".gv-note", has_text="Stopped")
+    note.wait_for()
+    untouched.settle()
+    assert not downloads and not untouched.run("app.studio.busy")
+    untouched.put(grain=2)
+    untouched.run("app.tell('')")
 
 
 def test_frames_given_the_wrong_way_round(untouched):

@@ -77,3 +77,27 @@ def test_a_run_that_is_followed_from_an_address(view, run):
     assert view.run("app.picture.frame.frame") == 2 == view.get("frame")
     view.press("ArrowLeft")
     assert view.get("frame") == 1
+
+
+def test_scales_and_plots_grow_with_the_run(tmp_path, page, bundle):
+    """A run that is looked at from its first frame: what there is to lose, and how large clusters are, comes later."""
+    page.set_viewport_size({"width": 800, "height": 560})
+    run = SmallRun(tmp_path / "young", 1, ended=False)
+    with served(run.folder) as server:
+        view = Driven(page, server.url)
+        view.put(colour="size")
+        assert "losses" not in dict(view.run("app.state.setting('plot').options"))
+        run.go_on(MERGED)
+        until(view, "5 frames")
+        assert view.run("app.picture.painted.scale.high") == 8
+        assert view.control("plot").locator("option[value=losses]").count() == 1
+        view.control("plot").select_option("losses")
+        assert view.get("plot") == "losses"
+
+
+def test_a_run_begun_anew(view, run):
+    """The page says so, and asks no more: what it has is of the run before."""
+    (run.folder / "trajectory.gsd").unlink()
+    SmallRun(run.folder, 2, ended=False)
+    view.tab.locator(".gv-note", has_text="begun anew").wait_for()
+    assert view.run("app.picture.frame.frame") == 0

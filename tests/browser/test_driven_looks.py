@@ -120,13 +120,53 @@ def test_meaningless_controls_are_grey(view):
     assert view.control("palette").is_enabled() and view.control("low").is_enabled()
 
 
-def test_trails_end_where_grains_are(view):
-    """Segments join the places of one frame to those of the next, and none crosses the box."""
-    view.put(frame=3, trails=2)
+@pytest.mark.parametrize("whole", [False, True])
+def test_trails_end_where_grains_are(view, whole):
+    """Segments join the places of one frame to those of the next, none crosses the box; whole clusters have theirs."""
+    view.put(frame=3, trails=2, whole=whole)
     view.tab.wait_for_timeout(100)
     ends = np.array(view.run("[...app.world.trails.lines.geometry.attributes.position.array]")).reshape(-1, 2, 3)
     unit = view.run("app.manifest.unit") / 10e-9
     assert len(ends) == 2 * GRAINS
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() * unit < SIDE / 2
-    place = np.array(view.run("[...app.picture.frame.position]")).reshape(-1, 3)
+    place = np.array(view.run("[...app.picture.place]")).reshape(-1, 3)
     assert np.allclose(ends[GRAINS:, 1], place, atol=1e-5)
+
+
+def test_parallel_rays_see_what_is_near(view):
+    """Near by, what lies in front of the camera is not cut away: the same view, set anew, is the same picture."""
+    view.put(ortho=True, shade=0)
+    view.run("app.views.zoom(1 / 1.2)")
+    view.tab.mouse.move(*view.place_of(9))
+    for _ in range(6):
+        view.tab.mouse.wheel(0, -400)
+    before = view.picture()
+    view.run("app.stage.look = app.stage.look")
+    assert differ(before, view.picture(), 8) < 20
+
+
+def test_a_contact_of_a_cluster_that_stands_alone(view):
+    """Choosing it leaves the cluster alone."""
+    view.put(grain=1, isolate=True)
+    shown = view.run("[...app.world.shown]")
+    view.press("k")
+    assert view.get("contact") and view.get("isolate")
+    assert view.run("[...app.world.shown]") == shown
+
+
+def test_the_middle_of_a_contact(view):
+    """Centre puts it into the middle of the picture."""
+    view.put(contact="8-9")
+    view.press("z")
+    at = np.array([view.place_of(8), view.place_of(9)])
+    box = view.tab.locator("canvas.gv-canvas").bounding_box()
+    middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
+    assert at.mean(axis=0) == pytest.approx(middle, abs=1.5)
+
+
+def test_another_cluster_is_followed(view):
+    """Choosing it turns the camera to it at once; the next frame does not make the camera jump."""
+    view.put(frame=1, grain=10, follow=True)
+    view.put(grain=11)
+    target, place = view.look()["target"], view.run("[...app.picture.place.slice(33, 36)]")
+    assert np.allclose(target, place, atol=1e-4)

@@ -67,7 +67,8 @@ export function scaleOf(quantity: Quantity, values: Float32Array, wish: ScaleWis
   if (quantity.kind === "diverging") {
     return { low: -1, high: 1, log: false, palette: manifest.palettes.diverging };
   }
-  let [low, high] = manifest.ranges[quantity.id] ?? extent(values) ?? [0, 1];
+  const range = manifest.ranges[quantity.id];
+  let [low, high] = (range && range[1] > range[0] ? range : extent(values)) ?? [0, 1];
   if (!Number.isNaN(wish.low)) low = wish.low;
   if (!Number.isNaN(wish.high)) high = wish.high;
   if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-3;

@@ -12,11 +12,6 @@ export class Frames {
 
   constructor(private readonly source: Source) {}
 
-  /** A frame that is here already. */
-  peek(k: number): Frame | undefined {
-    return this.ready.get(k);
-  }
-
   get(k: number): Promise<Frame> {
     const here = this.ready.get(k);
     if (here) {
@@ -30,6 +25,20 @@ export class Frames {
       this.asked.set(k, coming);
     }
     return coming;
+  }
+
+  /** The frame, or the nearest of those that can be read; fails as the frame itself if none of some can be. */
+  async nearest(k: number, count: number): Promise<Frame> {
+    let first: unknown;
+    for (const step of [0, -1, 1, -2, 2, -3, 3, -k, count - 1 - k]) {
+      if (k + step < 0 || k + step >= count) continue;
+      try {
+        return await this.get(k + step);
+      } catch (error) {
+        first ??= error;
+      }
+    }
+    throw first;
   }
 
   /** Begin to fetch, without waiting and without complaint. */

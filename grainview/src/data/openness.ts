@@ -72,9 +72,3 @@ export function coverOf(place: Float32Array, reach: number): Float32Array {
   }
   return cover;
 }
-
-/** How many there are within reach of each grain, 0 to 1: what is deep inside gets less light from all sides. */
-export function crowdOf(place: Float32Array, reach: number): Float32Array {
-  const cells = cellsOf(place, reach);
-  return Float32Array.from(cells.of, (cell) => Math.min((cells.all[4 * cell + 3] - 1) / (4 * CROWD), 1));
-}

@@ -23,15 +23,22 @@ function sizes3(vectors: Float32Array): Float32Array {
   return out;
 }
 
-/** Total moments of named clusters. */
+/** A sum of moments shorter than this share of the sum of their sizes is none. */
+const NONE = 1e-9;
+
+/** Total moments of named clusters; of those that have none, zeros. */
 function clusterMoments(frame: Frame): Map<number, [number, number, number]> {
   const sums = new Map<number, [number, number, number]>();
+  const sizes = new Map<number, number>();
   frame.cluster.forEach((name, i) => {
     if (name === SINGLE) return;
     const sum = sums.get(name) ?? [0, 0, 0];
     for (let a = 0; a < 3; a++) sum[a] += frame.moment[3 * i + a];
     sums.set(name, sum);
+    const size = Math.hypot(frame.moment[3 * i], frame.moment[3 * i + 1], frame.moment[3 * i + 2]);
+    sizes.set(name, (sizes.get(name) ?? 0) + size);
   });
+  for (const [name, sum] of sums) if (Math.hypot(...sum) <= NONE * (sizes.get(name) ?? 0)) sum.fill(0);
   return sums;
 }
 

@@ -65,6 +65,9 @@ export class EmbeddedSource implements Source {
 
   private async packet(name: string): Promise<ArrayBuffer> {
     const text = this.text(name);
+    if (typeof DecompressionStream === "undefined") {
+      throw new Error("This browser is too old for this page: it cannot unpack it (DecompressionStream is missing).");
+    }
     try {
       const packed = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
       const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));

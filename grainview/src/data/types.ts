@@ -10,8 +10,9 @@ export interface Field {
 
 export interface Manifest {
   format: number;
+  generation: number; // another one: the run was begun anew
+  digits: number; // that numbers of grains and contacts are known to
   name: string;
-  folder: string;
   version: string;
   grains: number;
   times: number[];

@@ -40,7 +40,7 @@ void main() {
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   float pixels = size * uPixel / (isOrtho() ? 1.0 : max(-c.z, 1e-6));
   // arrows too small to be seen are left out: this is what keeps crowds fast
-  if (size == 0.0 || pixels < uLeast || c.z > -size) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (size == 0.0 || pixels < uLeast || (!isOrtho() && c.z > -size)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
 `;
 

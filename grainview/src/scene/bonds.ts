@@ -42,7 +42,7 @@ void main() {
   vOnQuad = middle + corner.x * half_ * ahead + corner.y * side * uBar * 1.2;
 #endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
-  if (colour.a < 0.5 || max(a.z, b.z) > 0.0) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  if (colour.a < 0.5 || (!isOrtho() && max(a.z, b.z) > 0.0)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
 `;
 

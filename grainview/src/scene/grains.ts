@@ -61,7 +61,8 @@ void main() {
   vec4 front = projectionMatrix * vec4(c + r * (isOrtho() ? vec3(0.0, 0.0, 1.0) : normalize(-c)), 1.0);
   gl_Position.z = front.z / front.w * gl_Position.w;
 #endif
-  if (colour.a < 0.5 || c.z > -0.2 * r) gl_Position = vec4(2.0, 2.0, 2.0, 1.0); // hidden, or behind the eye
+  bool behind = !isOrtho() && c.z > -0.2 * r; // the eye
+  if (colour.a < 0.5 || behind) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }
 `;
 

@@ -48,13 +48,15 @@ export const MOST_TRAILS = 3000;
 
 /**
  * Ways of grains through frames, the oldest first, fading: segments and their colours.  A grain that left the box on
- * one side and came in on the other is not followed through it.
+ * one side and came in on the other is not followed through it.  `shift` (N, 3) is from places in the box to those at
+ * which grains are drawn.
  */
 export function trailSegments(
   places: Float32Array[],
   who: number[],
   colour: Uint8Array,
   box: number[],
+  shift: Float32Array,
 ): { ends: Float32Array; colours: Uint8Array } {
   const most = Math.max(places.length - 1, 0) * who.length;
   const ends = new Float32Array(6 * most);
@@ -67,8 +69,10 @@ export function trailSegments(
       let jump = false;
       for (let a = 0; a < 3; a++) jump ||= !(Math.abs(now[3 * i + a] - before[3 * i + a]) <= 0.5 * box[a]);
       if (jump) continue;
-      ends.set(before.subarray(3 * i, 3 * i + 3), 6 * used);
-      ends.set(now.subarray(3 * i, 3 * i + 3), 6 * used + 3);
+      for (let a = 0; a < 3; a++) {
+        ends[6 * used + a] = before[3 * i + a] + shift[3 * i + a];
+        ends[6 * used + 3 + a] = now[3 * i + a] + shift[3 * i + a];
+      }
       const rgb = colour.subarray(4 * i, 4 * i + 3);
       colours.set([...rgb, 0.8 * tail], 8 * used);
       colours.set([...rgb, 0.8 * head], 8 * used + 4);

@@ -171,6 +171,8 @@ export class Stage {
     this.camera.updateMatrixWorld();
     const caster = new three.Raycaster();
     caster.setFromCamera(new three.Vector2((2 * x) / this.width - 1, 1 - (2 * y) / this.height), this.camera);
+    // with parallel rays there is no eye: what lies in front of it is seen, too
+    if (this.isOrthographic) caster.ray.origin.addScaledVector(caster.ray.direction, -this.orthographic.far);
     return caster.ray;
   }
 

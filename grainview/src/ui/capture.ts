@@ -53,12 +53,13 @@ export function download(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 30_000);
 }
 
-/** Pictures of many frames as one zip: frame-000000.png and so on. */
-export async function sequence(frames: number[], draw: (frame: number) => Promise<Blob>): Promise<Blob> {
+/** Pictures of many frames as one zip: frame-000000.png and so on; those of which there are none are left out. */
+export async function sequence(frames: number[], draw: (frame: number) => Promise<Blob | null>): Promise<Blob> {
   const files: Record<string, Uint8Array> = {};
   for (const frame of frames) {
-    const content = await (await draw(frame)).arrayBuffer();
-    files[`frame-${String(frame).padStart(6, "0")}.png`] = new Uint8Array(content);
+    const one = await draw(frame);
+    if (!one) continue;
+    files[`frame-${String(frame).padStart(6, "0")}.png`] = new Uint8Array(await one.arrayBuffer());
   }
   return new Blob([zipSync(files, { level: 0 }) as Uint8Array<ArrayBuffer>], { type: "application/zip" });
 }
@@ -77,7 +78,7 @@ export async function movie(
   canvas: HTMLCanvasElement,
   frames: number[],
   perSecond: number,
-  show: (frame: number) => Promise<void>,
+  show: (frame: number) => Promise<boolean>,
 ): Promise<Blob> {
   const stream = canvas.captureStream(0);
   const track = stream.getVideoTracks()[0] as CanvasCaptureMediaStreamTrack;
@@ -89,7 +90,7 @@ export async function movie(
   recorder.start();
   for (const frame of frames) {
     const begun = performance.now();
-    await show(frame);
+    if (!(await show(frame))) continue;
     track.requestFrame();
     await pause(Math.max(1000 / perSecond - (performance.now() - begun), 0));
   }

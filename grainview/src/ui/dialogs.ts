@@ -58,7 +58,7 @@ export function askCapture(
     number("gv-cap-from", "From frame", initial.from, 0, lastFrame),
     number("gv-cap-to", "To frame", initial.to, 0, lastFrame),
     h("p", {}, h("label", { for: "gv-cap-clear" }, "Transparent background"), clear),
-    h("p", { class: "gv-faint" }, "A movie has the size of the picture on the page, and its background."),
+    h("p", { class: "gv-faint" }, "Without legend and scale bar. A movie is as large as the picture on the page."),
     h("button", { type: "submit", class: "gv-go" }, "Save"),
   );
   const value = (id: string): number => Number((form.querySelector(`#${id}`) as HTMLInputElement).value);

@@ -13,7 +13,7 @@ type Row = [name: string, value: string];
 const vector = (v: Float32Array, i: number, scale = 1): number[] => [0, 1, 2].map((a) => v[3 * i + a] * scale);
 
 /** Components of a vector, in the unit that suits its size. */
-function components(v: number[], unit: string, count = 4): string {
+function components(v: number[], unit: string, count?: number): string {
   const [one, name] = prefixed(Math.hypot(...v), unit);
   return `${v.map((x) => digits(x / one, count)).join(", ")} ${name}`;
 }

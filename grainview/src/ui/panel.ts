@@ -62,6 +62,15 @@ export class Panel {
     return slider;
   }
 
+  /** There is more, or less, to choose from. */
+  refill(id: string): void {
+    const select = this.rows.get(id)?.querySelector("select");
+    const options = this.state.setting(id).options ?? [];
+    if (!select || select.options.length === options.length) return;
+    select.replaceChildren(...options.map(([value, label]) => h("option", { value }, label)));
+    this.update(id);
+  }
+
   /** Show a setting's value of now. */
   update(id: string): void {
     const row = this.rows.get(id);

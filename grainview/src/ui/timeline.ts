@@ -77,6 +77,7 @@ export class TimeLine {
     this.slider.disabled = times.length < 2;
     const byFrame = new Map<number, { frame: number; made: number; broken: number }>();
     events.time.forEach((time, e) => {
+      if (time < times[0]) return; // before the first frame that is told
       const frame = frameAfter(times, time);
       const mark = byFrame.get(frame) ?? { frame, made: 0, broken: 0 };
       mark.made += events.made[e];
