@@ -49,6 +49,8 @@ def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
         (["RUN", "--html", "/tmp"], "is a folder"),
         (["RUN", "--frames", "a"], "--frames"),
         (["RUN", "--frames", "70:"], "none of them was chosen"),
+        (["RUN", "--frames", "::-1"], "in order"),
+        (["RUN", "--frames", "::0"], "in order"),
         (["RUN", "--every", "0"], "--every"),
         (["RUN", "--port", "70000"], "--port"),
         ([], "DIR"),

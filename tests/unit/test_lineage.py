@@ -8,6 +8,7 @@ import pytest
 from sand.analysis import lineage
 from sand.analysis.clusters import cluster_labels
 from sand.analysis.lineage import SINGLE, Lineage, named
+from sand.core.errors import BadInput
 
 
 def names_of(before, count, pairs):
@@ -90,6 +91,21 @@ def test_as_the_rule_says(seed):
     walk = Lineage(count, frames.__getitem__)
     for k in [17, 3, 59, 0, 58, *rng.integers(0, 60, 20)]:
         assert (walk.names(int(k)) == expected[int(k)]).all()
+
+
+def test_frames_that_cannot_be_read_leave_names_as_they_were():
+    """One that raises, and one of grains that are none; in whichever order names are asked for."""
+    bonds = {0: [(0, 1)], 2: [(0, 1), (2, 9)], 3: [(0, 1), (1, 2)]}
+
+    def pairs(number):
+        if number not in bonds:
+            raise BadInput("damaged")
+        return np.array(bonds[number])
+
+    for order in ((0, 1, 2, 3), (3, 2, 1, 0)):
+        walk = Lineage(4, pairs)
+        names = {k: walk.names(k).tolist() for k in order}
+        assert names[0] == names[1] == names[2] == [0, 0, SINGLE, SINGLE] and names[3] == [0, 0, 0, SINGLE]
 
 
 def test_memory_is_bounded(monkeypatch):

@@ -127,6 +127,15 @@ def test_hosts_that_are_its_own(server):
     assert b" 403 " in raw(server, path + host + b"Host: evil.example\r\n\r\n").splitlines()[0]
 
 
+def test_the_usual_port_is_not_named(server, monkeypatch):
+    """At port 80 browsers send the bare name, as Host and in Origin; at any other it stays refused."""
+    assert servers.own_names(80) == {"127.0.0.1", "localhost", "127.0.0.1:80", "localhost:80"}
+    assert servers.own_names(8080) == {"127.0.0.1:8080", "localhost:8080"}
+    monkeypatch.setattr(server, "names", servers.own_names(80))
+    assert ask(server, "manifest", headers={"Host": "localhost", "Origin": "http://localhost"})[0] == 200
+    assert ask(server, "manifest", headers={"Host": "evil.example"})[0] == 403
+
+
 def test_other_sites(server):
     """A request that another site's page made is refused; its own page's is not."""
     assert ask(server, "manifest", headers={"Origin": "https://evil.example"})[0] == 403

@@ -1,8 +1,10 @@
 """What the page of a run is told: of a finished one, one that is going, and files that are not what they should be."""
 
 import json
+import os
 import shutil
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -22,8 +24,8 @@ from .reels import append, contacts_of, reel
 KEYS = [
     "format",
     "name",
-    "folder",
     "version",
+    "generation",
     "grains",
     "times",
     "steps",
@@ -31,6 +33,7 @@ KEYS = [
     "running",
     "outcome",
     "note",
+    "digits",
     "unit",
     "materials",
     "periodic",
@@ -53,7 +56,8 @@ def test_the_manifest_of_a_run(looked_at):
     assert told["steps"] == sim.ledger["step"].tolist()
     assert told["unit"] == pytest.approx(1e-8, rel=1e-12, abs=0)
     assert not told["running"] and "reached" in told["outcome"] and told["note"] is None
-    assert told["periodic"] == [False] * 3
+    assert told["periodic"] == [False] * 3 and (told["generation"], told["digits"]) == (0, 4)
+    assert str(folder.parent) not in json.dumps(told)
     assert all(np.shape(colours) == (64, 3) for colours in told["palettes"].values())
     for low, high in told["ranges"].values():
         assert 0.0 <= low <= high
@@ -103,6 +107,8 @@ def test_a_run_that_goes_on(tmp_path, looked_at):
     assert len(told["times"]) == 2 and told["steps"] == [10, 20]
     assert decode(story.frame(2))[1]["cluster"].tolist() == [1, 1, 1, SINGLE]
     (tmp_path / "summary.json").write_text('{"steps": 20, "outcome_text": "done"}')
+    assert story.manifest()["running"]  # not before it looks
+    story.refresh()
     assert story.manifest()["outcome"] == "done"
     append(writer, [[]], 4, first=3)  # resumed
     story.refresh()
@@ -116,8 +122,103 @@ def test_a_run_begun_anew_is_another(tmp_path):
     (tmp_path / "a.gsd").unlink()
     reel(tmp_path / "a.gsd", [[(2, 3)], [(2, 3)]], 6)
     story.refresh()
-    assert story.manifest()["grains"] == 6 and len(story) == 2
+    assert story.manifest()["grains"] == 6 and len(story) == 2 and story.manifest()["generation"] == 1
     assert decode(story.frame(1))[1]["cluster"].tolist() == [SINGLE, SINGLE, 2, 2, SINGLE, SINGLE]
+
+
+def test_a_run_begun_anew_without_a_frame(tmp_path):
+    """Until the new file has a frame the old story stays, though it is looked at again and again."""
+    path = tmp_path / "a.gsd"
+    story = story_of(reel(path, [[(0, 1)]] * 3, 4))
+    path.unlink()
+    writer = TrajectoryWriter(path)
+    for _ in range(2):
+        story.refresh()
+        told = story.manifest()
+        assert (told["generation"], told["grains"], len(told["times"])) == (0, 4, 3)
+        story.frame(2)
+    append(writer, [[(2, 3)]], 6)
+    story.refresh()
+    told = story.manifest()
+    assert (told["generation"], told["grains"], len(told["times"])) == (1, 6, 1)
+    writer.close()
+
+
+def test_a_run_that_ends_while_it_is_looked_at(tmp_path):
+    """Its last frames and its end come between two looks at its files: it is not over before they are told."""
+    (tmp_path / "case.toml").write_text("")
+    writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
+    append(writer, [[]], 4)
+    story = story_of(tmp_path)
+    look = story.frames.refresh
+
+    def late():
+        found = look()
+        append(writer, [[], []], 4, first=1)
+        (tmp_path / "summary.json").write_text('{"steps": 20, "outcome_text": "done"}')
+        story.frames.refresh = look
+        return found
+
+    story.frames.refresh = late
+    story.refresh()
+    assert story.manifest()["running"]
+    story.refresh()
+    assert not story.manifest()["running"] and len(story) == 3
+    writer.close()
+
+
+def test_a_run_that_was_killed(tmp_path):
+    """Without an end and for hours without a frame: what may have happened, and what to do."""
+    (tmp_path / "case.toml").write_text("")
+    path = reel(tmp_path / "trajectory.gsd", [[]], 4)
+    story = story_of(tmp_path)
+    assert story.manifest()["note"] is None
+    for age, spoken in ((7200, "2 h"), (86400 * 3, "3 days")):
+        os.utime(path, (time.time() - age,) * 2)
+        note = f"no frame for {spoken}: it may have been killed; sand resume goes on"
+        assert story.manifest()["note"] == note and story.manifest()["running"]
+    (tmp_path / "summary.json").write_text('{"steps": 0}')
+    story.refresh()
+    assert story.manifest()["note"] is None
+
+
+def test_the_last_frames_stay_the_same_ones(tmp_path):
+    """Counted from the end when they are chosen, not again when more have come."""
+    path = tmp_path / "a.gsd"
+    writer = TrajectoryWriter(path)
+    append(writer, [[]] * 6, 4)
+    story = story_of(path)
+    story.choose(slice(-2, None))
+    append(writer, [[]] * 2, 4, first=6)
+    story.refresh()
+    assert story.manifest()["steps"] == [40, 50, 60, 70] and decode(story.frame(0))[0]["step"] == 40
+    story.choose(slice(-100, -3, 2))
+    append(writer, [[]], 4, first=8)
+    story.refresh()
+    assert story.manifest()["steps"] == [0, 20, 40]
+    writer.close()
+
+
+def test_a_damaged_frame_spoils_no_other(tmp_path):
+    """Contacts of grains that are none: that frame is an error; manifest, series and the names of others are not."""
+    frames = [[(0, 1)], [(0, 1), (1, 2)], [(0, 1), (1, 2), (2, 3)]]
+    for damaged in (0, 1):
+        path = reel(tmp_path / f"{damaged}.gsd", frames, 5)
+        entries = read_index(path)[1]
+        chunk = entries[(entries["frame"] == damaged) & (entries["rows"] == damaged + 1) & (entries["columns"] == 2)]
+        with open(path, "r+b") as file:
+            file.seek(int(chunk[0]["location"]))
+            file.write(b"\xff" * 4)
+        story = story_of(path)
+        told = story.manifest()
+        assert len(told["times"]) == 3 and told["colours"]["named"] == {"0": 0}
+        with pytest.raises(sand.BadInput, match="check sum"):
+            story.frame(damaged)
+        with pytest.raises(sand.BadInput, match="contact of grain"):
+            story.frames.pairs(damaged)
+        assert decode(story.frame(2))[1]["cluster"].tolist() == [0, 0, 0, 0, SINGLE]
+        lines = story.series()["plots"][0]["lines"]
+        assert lines[1]["values"][damaged] is None and lines[1]["values"][2] == 4.0
 
 
 def test_a_torn_end_is_left_out(tmp_path):

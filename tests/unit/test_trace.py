@@ -32,8 +32,8 @@ def test_the_nearer_of_two_balls_wins_everywhere(w):
     with np.errstate(invalid="ignore"):
         clear = met & ~(np.abs(depth[0] - depth[1]) < 0.01)
     r, c = np.nonzero(clear)
-    assert clear.sum() > 5000 and (canvas.covered() == met).mean() > 0.9995
-    r, c = np.nonzero(clear & canvas.covered())
+    assert clear.sum() > 5000 and ((canvas.nearest > 0) == met).mean() > 0.9995
+    r, c = np.nonzero(clear & (canvas.nearest > 0))
     which, point, normal = canvas.surface(r, c)
     np.testing.assert_array_equal(which, depth.argmax(axis=0)[r, c])
     np.testing.assert_allclose(point[:, 2], depth.max(axis=0)[r, c], atol=0.01)
@@ -53,7 +53,7 @@ def test_rods_are_met_where_they_are(w):
     girth = np.array([[14.0, 0.0], [6.0, 6.0]])
     balls = np.zeros((0, 3)), np.zeros(0)
     canvas = Canvas((140, 180), Solids(*balls, start, end, girth, np.eye(3)[:2], np.ones(2)), w)
-    which, point, normal = canvas.surface(*np.nonzero(canvas.covered()))
+    which, point, normal = canvas.surface(*np.nonzero(canvas.nearest))
     for k in range(2):
         q, axis = point[which == k] - start[k], end[k] - start[k]
         along = q @ axis / (axis @ axis)

@@ -47,11 +47,19 @@ def test_wrong_messages(looked_at, content):
     assert isinstance(told["error"], str) and buffers == []
 
 
+def test_what_nobody_thought_of(looked_at, monkeypatch):
+    """An error of any kind is answered with a sentence, so that the page does not wait for ever."""
+    story = story_of(looked_at[0])
+    monkeypatch.setattr(story, "frame", lambda k: 1 / 0)
+    told, buffers = answered(story, {"kind": "frame", "k": 1, "id": 3})
+    assert told["id"] == 3 and "ZeroDivisionError" in told["error"] and buffers == []
+
+
 def test_the_widget(looked_at, monkeypatch):
-    """It holds manifest and series, runs the bundle, and answers through its own channel."""
+    """It holds nothing that would be saved with the notebook, runs the bundle, and answers through its own channel."""
     pytest.importorskip("anywidget", reason="anywidget is in the test extra")
     one = widget(story_of(looked_at[0]))
-    assert one.manifest["grains"] == 6 and one.series["plots"] and SCRIPT in str(one._esm)
+    assert not {"manifest", "series"} & set(one.get_state()) and SCRIPT in str(one._esm)
     sent = []
     monkeypatch.setattr(one, "send", lambda content, buffers=None: sent.append((content, buffers)))
     one._handle_custom_msg({"kind": "frame", "k": 1}, [])

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..core.errors import BadInput
 from .clusters import cluster_labels
 
 SINGLE = 0xFFFFFFFF
@@ -72,7 +73,8 @@ class Lineage:
 
     Args:
         count: number of grains N.
-        pairs: contacts (C, 2) of a frame by its number.
+        pairs: contacts (C, 2) of a frame by its number; BadInput for one that cannot be read, which leaves names as
+            they were before it, as one of other grains does.
 
     Names of a frame depend on the frames before it alone, not on what was asked for before: they are kept of every m-th
     frame, and m doubles when that takes more than CHECKPOINTS bytes.
@@ -89,14 +91,22 @@ class Lineage:
         """Names (N,) uint32 of the clusters in a frame ≥ 0, SINGLE for single grains."""
         start, pairs, names = self._nearest(frame)
         for number in range(start + 1, frame + 1):
-            now = self._pairs(number)
-            if pairs is None or not np.array_equal(now, pairs):
+            now = self._readable(number)
+            if now is not None and (pairs is None or not np.array_equal(now, pairs)):
                 names = named(names, cluster_labels(self.count, now))
-            pairs = now
+            pairs = pairs if now is None else now
             self._keep(number, names)
         if pairs is not None:
             self._at = (frame, pairs, names)
         return names
+
+    def _readable(self, number: int) -> np.ndarray | None:
+        """Contacts of a frame; None if they cannot be had."""
+        try:
+            pairs = self._pairs(number)
+        except BadInput:
+            return None
+        return pairs if pairs.size == 0 or int(pairs.max()) < self.count else None
 
     def _nearest(self, frame: int) -> tuple[int, np.ndarray | None, np.ndarray]:
         """The last frame up to this one whose names are known, its contacts if they are, and its names."""

@@ -11,7 +11,6 @@ from ..core.errors import BadInput, did_you_mean
 from . import options, report
 from .exits import DONE
 
-HISTORY = ("size", "energies", "losses", "contacts", "balance")
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
 FOLDER = "plots"
@@ -73,6 +72,7 @@ def _asked(
 ) -> tuple[Path, list[str]]:
     """The folder to write to and what to draw; `how` made ready for the picture.  Raises BadInput for all mistakes."""
     from ..analysis.quantities import GRAIN_NAMES
+    from ..view.plots import HISTORY
     from ..view.still import check_picture
 
     wrong: list[str] = []
@@ -127,7 +127,7 @@ def _source(path: Path) -> Source:
 
 def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """All files, in memory, so that none is written unless all can be drawn.  Raises BadInput."""
-    from ..view.plots import grains_figure, history_figure, picture_bytes
+    from ..view.plots import HISTORY, grains_figure, history_figure, picture_bytes
     from ..view.still import still_picture
 
     history = _history(source) if any(name in HISTORY for name in names) else None

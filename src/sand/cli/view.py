@@ -58,8 +58,8 @@ def command(
     target = None if html is None else Path(html)
     if target is not None:
         _refuse(target, overwrite)
-    story = _story(Path(folder), talk=not (quiet or as_json))
     picked = chosen_frames(chosen(frames), every)
+    story = _story(Path(folder), talk=not (quiet or as_json))
     if picked != slice(None, None, 1):
         told = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
         story.choose(picked, ", ".join(told))
@@ -79,7 +79,8 @@ def command(
 def _story(place: Path, talk: bool) -> Any:
     """Of the run in a folder, as soon as it has a frame.  Raises BadInput: there is none, or not within WAIT."""
     from ..run.told import field_in
-    from ..view.story import run_folder, story_of
+    from ..view.run_files import run_folder
+    from ..view.story import story_of
 
     begun = time.monotonic()
     told = -TOLD_EVERY

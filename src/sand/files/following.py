@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import overload
@@ -63,7 +64,8 @@ class Following(Sequence[Frame]):
     def refresh(self) -> bool:
         """Look for new frames, at no cost if the file is as it was; True if there are any, or others.
 
-        A file that is just being written to, and cannot be read, is left for the next time.
+        A file that is just being written to, and cannot be read, is left for the next time; so is one that has been
+        begun anew and has no frame yet.
         """
         with self.lock:
             stamp = self._stamp()
@@ -74,15 +76,29 @@ class Following(Sequence[Frame]):
             except BadInput:
                 return False
             old, before = self._frames, (len(self), self.generation)
-            self._frames, self._seen = frames, stamp
-            with contextlib.suppress(OSError, RuntimeError):
-                old.close()
-            last = len(self) - 1
-            if last >= 0 and not self._goes_on(last):
+            known = self.times, self.steps, self.contacts, self.torn
+            self._frames = frames
+            if len(self) and not self._goes_on(len(self) - 1):
                 self.generation += 1
                 self.times, self.steps, self.contacts = self.times[:0], self.steps[:0], self.contacts[:0]
             self._read_on()
+            if before[0] and not len(self):  # begun anew, without a frame so far: the old ones stay until there is one
+                self._frames, self.generation = old, before[1]
+                self.times, self.steps, self.contacts, self.torn = known
+                frames.close()
+                return False
+            self._seen = stamp
+            with contextlib.suppress(OSError, RuntimeError):
+                old.close()
             return before != (len(self), self.generation)
+
+    @property
+    def age(self) -> float:
+        """Seconds since the file was last written to; 0 if it has gone."""
+        try:
+            return max(time.time() - self.path.stat().st_mtime, 0.0)
+        except OSError:
+            return 0.0
 
     def _goes_on(self, last: int) -> bool:
         """True if the last frame known is still the one that the file has in its place."""

@@ -202,13 +202,16 @@ class Frames(Sequence[Frame]):
         """Grains in contact (C, 2) in a frame ≥ 0, and nothing else of it; its check sum is not looked at.
 
         Raises:
-            BadInput: the frame is not whole.
+            BadInput: the frame is not whole, or names grains that it does not have.
         """
         file = self._file.file
         try:
             count = self._number(index, "bonds/N")
             at = index if file.chunk_exists(index, "bonds/group") else 0
-            return file.read_chunk(at, "bonds/group").reshape(count, 2) if count else np.zeros((0, 2), np.uint32)
+            pair = file.read_chunk(at, "bonds/group").reshape(count, 2) if count else np.zeros((0, 2), np.uint32)
+            if pair.size and int(pair.max()) >= (grains := self._number(index, "particles/N")):
+                raise ValueError(f"a contact of grain {pair.max()}, of {grains} grains")
+            return pair
         except Exception as error:  # whatever a broken file makes the reader do
             raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
 

@@ -140,7 +140,9 @@ def fitting(story: Story, most: float) -> int:
 
 
 def chosen_frames(frames: slice, every: int) -> slice:
-    """Every so many of a slice.  Raises BadInput for less than 1."""
+    """Every so many of a slice.  Raises BadInput for less than 1, and for a slice that goes backwards."""
     if every < 1:
         raise BadInput(f"every = {every} must be a whole number of at least 1")
+    if frames.step is not None and frames.step < 1:
+        raise BadInput(f"frames in steps of {frames.step}: the page tells them in order; give a step of at least 1")
     return slice(frames.start, frames.stop, (frames.step or 1) * every)

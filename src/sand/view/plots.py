@@ -108,8 +108,9 @@ def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
         _bars(axes, *np.unique(shown, return_counts=True))
         return
     low, high = float(shown.min()), float(shown.max())
-    if high - low < 1e-6 * abs(high):
-        low, high = low - 0.5 * abs(low), high + 0.5 * abs(high)
+    if high - low <= 1e-6 * abs(high):  # also where all are 0
+        half = 0.5 * abs(low) or 0.5
+        low, high = low - half, high + half
     bins = int(np.clip(np.sqrt(len(shown)) * 1.5, 5, 60))
     if low > 0.0 and high > DECADES * low:
         axes.set_xscale("log")

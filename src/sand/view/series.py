@@ -8,6 +8,7 @@ import numpy as np
 
 from ..analysis.books import Books
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
+from ..core.errors import BadInput
 from ..files.folder import plain
 from .panels import COUNTS, column, energies_drawn, losses_drawn, peak
 from .style import BLUE, FAINT, INK, ON_DARK, SKY
@@ -37,13 +38,20 @@ def of_ledger(whole: Books) -> dict[str, Any]:
     return {"time": _numbers(books["time"], 10), "plots": [p for p in plots if p["lines"]], "events": _events(whole)}
 
 
-def of_frames(frames: Any) -> dict[str, Any]:
-    """The same where there are frames alone: contacts, and clusters of as many frames as take little time."""
-    grains = len(frames[0])
+def of_frames(frames: Any, grains: int) -> dict[str, Any]:
+    """The same where there are frames of so many grains alone: contacts, and clusters of as many as take little time.
+
+    Frames that cannot be read have no clusters.
+    """
     chosen = thinned(len(frames), max(min(MOST, LOOKED_AT // max(grains, 1)), 2))
     table: dict[str, list[float]] = {"mean_cluster_size": [], "largest_cluster": [], "clusters": []}
     for number in chosen:
-        labels = cluster_labels(grains, frames.pairs(int(number)))
+        try:
+            labels = cluster_labels(grains, frames.pairs(int(number)))
+        except (BadInput, ValueError):  # not whole, or of other grains
+            for values in table.values():
+                values.append(np.nan)
+            continue
         table["mean_cluster_size"].append(mean_cluster_size(labels))
         table["largest_cluster"].append(float(cluster_sizes(labels).max()))
         table["clusters"].append(float(labels.max() + 1))

@@ -29,6 +29,8 @@ LONGEST = 512
 """Characters of an address."""
 PATIENCE = 30.0
 """Seconds that a client may be silent for."""
+USUAL_PORT = 80
+"""Of http: addresses and hosts do not name it."""
 AT_ONCE = 64
 """Connections."""
 HEADERS = {
@@ -50,6 +52,12 @@ class Refused(Exception):
     def __init__(self, status: int, why: str):
         super().__init__(why)
         self.status = status
+
+
+def own_names(port: int) -> set[str]:
+    """Hosts that the server answers to; browsers leave out the port that is the usual one."""
+    bare = (LOOPBACK, "localhost")
+    return {f"{name}:{port}" for name in bare} | (set(bare) if port == USUAL_PORT else set())
 
 
 class Server(ThreadingHTTPServer):
@@ -83,7 +91,7 @@ class Server(ThreadingHTTPServer):
             why = getattr(error, "strerror", None) or error
             raise BadInput(f"cannot listen at port {port} ({why}); give another --port, or leave it out") from None
         self.port = int(self.server_address[1])
-        self.names = {f"{name}:{self.port}" for name in (LOOPBACK, "localhost")}
+        self.names = own_names(self.port)
 
     def server_bind(self) -> None:
         """Without asking anybody for this machine's name."""

@@ -19,6 +19,7 @@ from . import dimensions
 from .packets import frame_bytes, frame_packet, grains_packet
 from .palettes import colours, palettes
 from .ranges import ranges_of
+from .run_files import RunBooks, killed_note, run_folder, summary_of
 from .series import of_frames, of_ledger
 from .style import BIG
 
@@ -59,13 +60,15 @@ class Story:
         compact: bool = False,
     ):
         self.frames, self.name, self.place, self.compact = frames, name, place, compact
-        self.chosen, self.notes, self._lock = chosen, list[str](), threading.RLock()
+        self.notes, self._lock = list[str](), threading.RLock()
         self._books, self._summary, self._field = books, summary, field
+        self._asked = chosen
         self._begin()
+        self.refresh()
 
     def _begin(self) -> None:
-        """Of the first frame: what is the same in all."""
-        first = self.frames[0]
+        """Of the first frame that is whole: what is the same in all."""
+        first = self._first()
         self.grains_count, self.materials = len(first), list(first.materials)
         self.unit = float(first.radius.mean())
         self.periodic = [length is not None for length in first.box.lengths]
@@ -76,18 +79,33 @@ class Story:
         self._directions: list[list[float]] = []
         self._generation = self.frames.generation
 
+        self.chosen = _settled(self._asked, len(self.frames))
+
+    def _first(self) -> Any:
+        """Raises BadInput if no frame is whole."""
+        for number in range(len(self.frames) - 1):
+            try:
+                return self.frames[number]
+            except BadInput:
+                continue
+        return self.frames[len(self.frames) - 1]
+
     def refresh(self) -> None:
         """Take in what has come since."""
         with self._lock:
+            self._ended = self._summary()  # before the frames: those that came before the end are all told with it
             self.frames.refresh()
             if self.frames.generation != self._generation:
                 self._begin()
 
     def choose(self, chosen: slice, note: str = "") -> None:
-        """Tell of these frames only; the `note` says why.  Raises BadInput if there are none."""
+        """Tell of these frames only; the `note` says why.  Raises BadInput if there are none.
+
+        Numbers that count from the end count from that of now, so that the k-th frame told stays the same one.
+        """
         if not range(len(self.frames))[chosen]:
             raise BadInput(f"{self.place} has {len(self.frames)} frames; none of them was chosen")
-        self.chosen = chosen
+        self._asked, self.chosen = chosen, _settled(chosen, len(self.frames))
         self.notes += [note] if note else []
 
     @property
@@ -102,14 +120,14 @@ class Story:
         """What the page has to know first; times and steps from a frame on."""
         with self._lock:
             numbers = np.array(self.numbers, dtype=int)
-            summary = self._summary()
+            summary = self._ended
             # a run that was resumed goes on although it has ended once
             running = summary is None or summary.get("steps", np.inf) < self.frames.steps[-1]
             return {
                 "format": FORMAT,
                 "name": self.name,
-                "folder": self.place,
                 "version": __version__,
+                "generation": self._generation,
                 "grains": self.grains_count,
                 "times": self.frames.times[numbers[since:]].tolist(),
                 "steps": self.frames.steps[numbers[since:]].tolist(),
@@ -117,6 +135,7 @@ class Story:
                 "running": bool(running),
                 "outcome": None if running or summary is None else summary.get("outcome_text"),
                 "note": "; ".join(self._noted()) or None,
+                "digits": 3 if self.compact else 4,
                 "unit": self.unit,
                 "materials": self.materials,
                 "periodic": self.periodic,
@@ -144,7 +163,8 @@ class Story:
     def _noted(self) -> list[str]:
         torn = self.frames.torn
         left = [f"{torn} frame{'s' if torn > 1 else ''} at the end left out: not whole"] if torn else []
-        return self.notes + left
+        silent = killed_note(self.frames.age) if self._ended is None else ""
+        return [*self.notes, *left, *([silent] if silent else [])]
 
     @property
     def size(self) -> int:
@@ -185,7 +205,7 @@ class Story:
         """What happened over time, by the ledger; by the frames where there is none."""
         with self._lock:
             books = self._books()
-            return of_ledger(books) if books else of_frames(self.frames)
+            return of_ledger(books) if books else of_frames(self.frames, self.grains_count)
 
     def dimension(self, k: int, grain: int) -> dict[str, Any]:
         """Fractal dimension of the cluster of a grain: `value` and `error`, or the `reason` why there are none.
@@ -216,6 +236,16 @@ class Story:
         return {"text": text, "direction": told[0]} | ({} if steady else {"directions": told})
 
 
+def _settled(chosen: slice, count: int) -> slice:
+    """The same slice of so many frames, with no number that counts from the end."""
+    start, stop = chosen.start, chosen.stop
+    if start is not None and start < 0:
+        start = max(start + count, 0)
+    if stop is not None and stop < 0:
+        stop = max(stop + count, 0)
+    return slice(start, stop, chosen.step)
+
+
 def _direction(vector: Sequence[float]) -> list[float]:
     size = float(np.linalg.norm(vector))
     return [float(f"{part / size:.9g}") if size > 0.0 else 0.0 for part in vector]
@@ -236,37 +266,4 @@ def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
         return Story(Following(place), place.stem, str(path), books=lambda: None, summary=dict, field=field)
     frames = Following(folder / files.TRAJECTORY)
     name = folder.resolve().name
-    return Story(frames, name, str(path), books=_Books(folder), summary=lambda: _summary(folder), field=field)
-
-
-def run_folder(place: str | Path) -> Path | None:
-    """The folder of the run that a path means: itself, or that of its trajectory.gsd; None for a file by itself."""
-    place = Path(place)
-    if place.is_dir():
-        return place if (place / files.TRAJECTORY).exists() else None
-    return place.parent if place.name == files.TRAJECTORY and (place.parent / files.CASE).exists() else None
-
-
-def _summary(folder: Path) -> Mapping[str, Any] | None:
-    try:
-        return files.read_json(folder / files.SUMMARY)
-    except BadInput:
-        return None
-
-
-class _Books:
-    """The ledger of a run, read again when it has changed; None while there is none."""
-
-    def __init__(self, folder: Path):
-        self._path = folder / files.LEDGER
-        self._known: tuple[tuple[int, int], Books | None] = ((0, 0), None)
-
-    def __call__(self) -> Books | None:
-        try:
-            found = self._path.stat()
-            stamp = (found.st_size, found.st_mtime_ns)
-            if stamp != self._known[0]:
-                self._known = (stamp, Books.of(files.read_ledger(self._path)))
-        except (OSError, BadInput):
-            return None
-        return self._known[1]
+    return Story(frames, name, str(path), books=RunBooks(folder), summary=lambda: summary_of(folder), field=field)

@@ -155,10 +155,6 @@ class Canvas:
         ends = np.sign(along - 0.5)[:, None] * axis
         return np.where(flat[:, None], ends, out + slant)
 
-    def covered(self) -> np.ndarray:
-        """Whether there is anything, for each sample."""
-        return self.nearest > 0
-
 
 def _slanted(m0, m1, m2, m3, m5, dd, first, second):
     """Where rays meet the side of a cone, from products of axis, ray and way to the first end; NaN: nowhere."""

@@ -30,7 +30,6 @@ def widget(story: Story) -> Any:
 def _kind(script: str, styles: str) -> Any:
     """The class, made when it is first wanted: anywidget is imported nowhere else."""
     import anywidget
-    import traitlets
 
     class GrainWidget(anywidget.AnyWidget):
         """Grains of a run that move.
@@ -43,11 +42,9 @@ def _kind(script: str, styles: str) -> Any:
         """
 
         _esm, _css = script, styles
-        manifest = traitlets.Dict().tag(sync=True)
-        series = traitlets.Dict().tag(sync=True)
 
         def __init__(self, story: Story):
-            super().__init__(manifest=plain(story.manifest()), series=plain(story.series()))
+            super().__init__()
             self._story = story
             self.on_msg(self._asked)
 
@@ -78,6 +75,8 @@ def answered(story: Story, content: Any) -> tuple[dict[str, Any], list[bytes]]:
         raise BadInput(f"kind = {kind!r}; allowed: manifest, series, grains, frame, dimension")
     except BadInput as error:
         return echo | {"error": str(error)}, []
+    except Exception as error:  # the page waits for an answer, whatever it is
+        return echo | {"error": f"internal error ({type(error).__name__}: {error})"}, []
 
 
 def _number(asked: dict[str, Any], key: str) -> int:

@@ -1,0 +1,57 @@
+"""What a story reads besides frames: which folder is meant, how its run ended, its ledger."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..analysis.books import Books
+from ..core.errors import BadInput
+from ..files import folder as files
+
+STALE = 3600.0
+"""Seconds without a frame after which a run that has not ended may be one that was killed."""
+
+
+def killed_note(age: float) -> str:
+    """What to say of a run without an end whose last frame is so old [s]; nothing while it may be going."""
+    if age < STALE:
+        return ""
+    hours = age / 3600.0
+    spoken = f"{hours:.0f} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
+    return f"no frame for {spoken}: it may have been killed; sand resume goes on"
+
+
+def run_folder(place: str | Path) -> Path | None:
+    """The folder of the run that a path means: itself, or that of its trajectory.gsd; None for a file by itself."""
+    place = Path(place)
+    if place.is_dir():
+        return place if (place / files.TRAJECTORY).exists() else None
+    return place.parent if place.name == files.TRAJECTORY and (place.parent / files.CASE).exists() else None
+
+
+def summary_of(folder: Path) -> Mapping[str, Any] | None:
+    """How a run ended; None while it has not."""
+    try:
+        return files.read_json(folder / files.SUMMARY)
+    except BadInput:
+        return None
+
+
+class RunBooks:
+    """The ledger of a run, read again when it has changed; None while there is none."""
+
+    def __init__(self, folder: Path):
+        self._path = folder / files.LEDGER
+        self._known: tuple[tuple[int, int], Books | None] = ((0, 0), None)
+
+    def __call__(self) -> Books | None:
+        try:
+            found = self._path.stat()
+            stamp = (found.st_size, found.st_mtime_ns)
+            if stamp != self._known[0]:
+                self._known = (stamp, Books.of(files.read_ledger(self._path)))
+        except (OSError, BadInput):
+            return None
+        return self._known[1]
