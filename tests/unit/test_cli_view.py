@@ -10,6 +10,7 @@ import pytest
 import sand
 from sand.cli import view as view_command
 from sand.cli.main import main
+from sand.view import browser
 
 from .pages import blocks
 from .reels import reel
@@ -84,9 +85,11 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
 
     monkeypatch.setattr(view_command, "_wait", wait)
     monkeypatch.setenv("SSH_CONNECTION", "a b c d")
+    ended = []
+    monkeypatch.setattr(browser, "forget_pages", lambda: ended.append(True))
     before = threading.active_count()
     assert main(["view", str(looked_at[0]), *form]) == 0
-    assert got["manifest"]["grains"] == 6
+    assert got["manifest"]["grains"] == 6 and ended
     told = got["err"] + capsys.readouterr().err
     assert ("ssh -L" in told and "ended" in told) if not form else told == ""
     assert threading.active_count() <= before + 2

@@ -1,5 +1,8 @@
 """`view()` of a simulation and of an opened run, and browsers that are opened or not."""
 
+import os
+import stat
+
 import numpy as np
 import pytest
 
@@ -84,3 +87,26 @@ def test_no_browser_is_opened_without_leave(monkeypatch):
     assert not browser.open_page("a")
     monkeypatch.delenv("DISPLAY")
     assert not browser.has_window()
+
+
+def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
+    """The browser gets a page that only this user can read and that leads to the server; it goes at the end."""
+    import tempfile
+    import webbrowser
+
+    calls = []
+    monkeypatch.setattr(webbrowser, "open", lambda url: calls.append(url) or True)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(browser, "has_window", lambda: True)
+    address = "http://127.0.0.1:5000/a-token/"
+    assert browser.open_page(address)
+    (page,) = tmp_path.glob("*.html")
+    assert calls == [page.as_uri()] and "a-token" not in calls[0]
+    text = page.read_text()
+    assert f'content="0; url={address}"' in text and f'href="{address}" rel="noreferrer"' in text
+    if os.name == "posix":
+        assert stat.S_IMODE(page.stat().st_mode) == 0o600
+    browser.forget_pages()
+    assert not page.exists()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))  # nowhere to write: the address is typed by hand
+    assert not browser.open_page(address) and len(calls) == 1

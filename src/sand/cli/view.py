@@ -151,7 +151,7 @@ class _Bar:
 
 def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
     """Until Ctrl-C."""
-    from ..view.browser import open_page
+    from ..view.browser import forget_pages, open_page
     from ..view.server import Server
 
     server = Server(story, port)
@@ -172,6 +172,7 @@ def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, qui
         pass
     finally:
         server.stop()
+        forget_pages()
     if not quiet and not as_json:
         report.note("ended")
     return DONE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import tempfile
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -44,6 +45,21 @@ def _remedy(folder: Path) -> str:
     if (clone / "grainview" / "package.json").is_file():
         return f"With node: cd {clone / 'grainview'} && npm ci && npm run build; without: pip install -e {clone}"
     return "Install SAND again with access to the network, with pip's --force-reinstall --no-deps --no-cache-dir"
+
+
+def private_page(text: str) -> Path:
+    """A new temporary page that nobody but this user can read; whoever asks for it removes it.
+
+    Raises:
+        FilesFailed: it cannot be written.
+    """
+    try:
+        handle, name = tempfile.mkstemp(prefix="sand-", suffix=".html")  # of mode 0600
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise FilesFailed(f"cannot write a temporary page: {error.strerror}") from error
+    return Path(name)
 
 
 class Written:
