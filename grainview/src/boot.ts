@@ -3,7 +3,6 @@
 import { linkAddress } from "./address";
 import { App } from "./app";
 import type { Source } from "./data/types";
-import { setDigits } from "./data/units";
 import { layout, sorry } from "./layout";
 import { goAlong, offerChoices } from "./live";
 import { Stage } from "./scene/stage";
@@ -17,12 +16,13 @@ async function build(place: HTMLElement, source: Source, ownPage: boolean): Prom
   const page = layout(place);
   const known = { manifest, grains };
   const state = new State();
-  setDigits(manifest.digits);
   const palettes = Object.keys(manifest.palettes).filter((p) => p !== "diverging");
   state.offer("palette", palettes.map((p) => [p, p]));
   offerChoices(state, known, series);
   state.setting("grain").to = manifest.grains - 1;
-  if (ownPage) state.fromAddress(location.hash);
+  // of a run that is still going, the newest frame is what one wants to see
+  if (manifest.running) state.set("frame", manifest.times.length - 1);
+  if (ownPage && location.hash.length > 1) state.fromAddress(location.hash);
   const stage = new Stage(page.canvas);
   const app = new App(source, state, stage, known, series, page, ownPage);
   await app.begin(state.get<string>("look"));

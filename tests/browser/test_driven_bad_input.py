@@ -113,13 +113,20 @@ def test_a_file_that_lost_its_manifest(view, file, tmp_path):
         ("series", "[", ["damaged", "series"]),
         ("grains", "!!!!", ["damaged", "grains"]),
         ("grains", base64.b64encode(b"no gzip at all").decode(), ["damaged", "grains"]),
-        ("frame-0", "H4sI", ["damaged", "frame-0"]),
-        ("frame-0", "", ["cut off", "frame-0"]),
     ],
 )
 def test_damaged_blocks(view, file, tmp_path, name, content, words):
     opened(view, with_block(file, name, content), tmp_path, "no")
     is_refused(view, *words)
+
+
+@pytest.mark.parametrize(("content", "word"), [("H4sI", "damaged"), ("", "cut off")])
+def test_the_first_frame_is_damaged(view, file, tmp_path, content, word):
+    """The next one is shown, and the sentence stays."""
+    opened(view, with_block(file, "frame-0", content), tmp_path)
+    note = view.tab.locator(".gv-note")
+    assert word in note.inner_text() and "frame-0" in note.inner_text()
+    assert view.run("app.picture.frame.frame") == 1
 
 
 def edited(file: str, **keys: object) -> str:

@@ -109,7 +109,7 @@ def test_a_sequence_of_pictures(untouched):
 def test_saving_is_stopped(untouched):
     """Esc ends a long sequence: nothing is saved, and the page says so."""
     downloads = []
-    untouched.tab.on("download", downloads.append)
+    untouched.tab.on("download", lambda one: downloads.append(one))
     untouched.run("void app.studio.make({ kind: 'sequence', width: 900, height: 600, from: 0, to: 7 })")
     untouched.press("Escape")
     note = untouched.tab.locator(".gv-note", has_text="Stopped")

@@ -100,4 +100,4 @@ def test_a_run_begun_anew(view, run):
     (run.folder / "trajectory.gsd").unlink()
     SmallRun(run.folder, 2, ended=False)
     view.tab.locator(".gv-note", has_text="begun anew").wait_for()
-    assert view.run("app.picture.frame.frame") == 0
+    assert view.run("app.picture.frame.frame") == 2

@@ -13,7 +13,7 @@ import sand
 from sand.core.errors import FilesFailed
 from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.files.folder import LedgerFile, make_folder, read_ledger, read_toml, replace_file, write_json, write_toml
-from sand.files.trajectory import read_frames
+from sand.files.trajectory import TrajectoryWriter, read_frames
 
 from ..physics.setups import struck_chain
 
@@ -136,6 +136,13 @@ def test_foreign_files_are_named(tmp_path):
     path.write_bytes(b"not a trajectory" * 100)
     with pytest.raises(sand.BadInput, match="not a trajectory"):
         read_frames(path)
+    TrajectoryWriter(path).close()
+    whole = path.read_bytes()
+    for size in (0, 3, 50, len(whole) // 3):
+        path.write_bytes(whole[:size])
+        with pytest.raises(sand.BadInput, match=r"cut off.*sand resume") as told:
+            read_frames(path)
+        assert str(told.value).count(str(path)) == 1
 
 
 @pytest.mark.parametrize("version", range(1, VERSION + 1))

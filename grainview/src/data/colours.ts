@@ -71,6 +71,7 @@ export function scaleOf(quantity: Quantity, values: Float32Array, wish: ScaleWis
   let [low, high] = (range && range[1] > range[0] ? range : extent(values)) ?? [0, 1];
   if (!Number.isNaN(wish.low)) low = wish.low;
   if (!Number.isNaN(wish.high)) high = wish.high;
+  if (low > high) [low, high] = [high, low];
   if (!(high > low)) high = low + (Math.abs(low) || 1) * 1e-3;
   const log = wish.log && high > 0;
   if (log && !(low > 0)) low = high * 1e-4;

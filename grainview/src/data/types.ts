@@ -11,7 +11,6 @@ export interface Field {
 export interface Manifest {
   format: number;
   generation: number; // another one: the run was begun anew
-  digits: number; // that numbers of grains and contacts are known to
   name: string;
   version: string;
   grains: number;

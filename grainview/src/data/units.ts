@@ -5,15 +5,8 @@ const PREFIXES = ["y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T
 /** Units that take a prefix; others, as A m², get a power of ten. */
 const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "rad/s", "kg", "C"]);
 
-let usual = 4;
-
-/** So many digits are told where nothing else is said: as many as the data hold. */
-export function setDigits(count: number): void {
-  usual = count;
-}
-
 /** A number with at most `digits` digits: 0.001234, 1.234e-7, −12.3. */
-export function digits(value: number, count = usual): string {
+export function digits(value: number, count = 4): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "not known" : value > 0 ? "∞" : "−∞";
   if (value === 0) return "0";
   const size = Math.abs(value);
@@ -36,7 +29,7 @@ export function prefixed(size: number, unit: string): [number, string] {
 }
 
 /** A quantity with its unit: 1.2e-6 m → "1.2 µm". */
-export function quantity(value: number, unit: string, count = usual): string {
+export function quantity(value: number, unit: string, count = 4): string {
   if (!Number.isFinite(value)) return digits(value);
   const [one, name] = prefixed(Math.abs(value), unit);
   return `${digits(value / one, count)}${name ? ` ${name}` : ""}`;

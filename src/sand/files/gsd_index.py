@@ -27,6 +27,8 @@ SPARE = 65536
 """Bytes that GSD may want besides data and index."""
 CHUNKS = 40
 """More than a frame of ours has."""
+MAGIC = np.uint64(0x65DF65DF65DF65DF).tobytes()
+"""What every GSD file begins with."""
 WIDTHS = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1] + [10**9] * 244, np.float64)
 """Bytes of a number by its type there; impossible for types that are none."""
 
@@ -39,12 +41,15 @@ def read_index(path: Path) -> tuple[int, np.ndarray]:
     """
     size = path.stat().st_size
     with open(path, "rb") as file:
-        head = np.frombuffer(file.read(16 * 8), np.uint64)
-        if head.size < 5:
-            raise BadInput(f"{path} is not a trajectory of SAND (it is cut off)")
-        place, count = int(head[1]), int(head[2])
+        begin = file.read(16 * 8)
+        if begin[:8] != MAGIC[: len(begin)]:
+            raise BadInput(f"{path} is not a trajectory of SAND (it is no GSD file)")
+        place, count = (int(number) for number in np.frombuffer(begin.ljust(16 * 8, b"\0"), np.uint64)[1:3])
         if not 0 < place <= place + count * ENTRY.itemsize <= size:
-            raise BadInput(f"{path} is not a trajectory of SAND (its index lies outside the file)")
+            raise BadInput(
+                f"{path} is a trajectory that was cut off, its index is missing: copy it again, or go on with "
+                "'sand resume', which begins a new one"
+            )
         file.seek(place)
         entries = np.frombuffer(file.read(count * ENTRY.itemsize), ENTRY)
     return place, entries[entries["location"] != 0]

@@ -165,6 +165,8 @@ class Frames(Sequence[Frame]):
         try:
             refuse_impossible_sizes(self.path)
             self._file = gsd.hoomd.open(str(path), "r")
+        except BadInput:
+            raise
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             raise BadInput(f"{path} is not a trajectory of SAND ({error})") from error
 

@@ -50,5 +50,6 @@ def show_story(story: Story, path: str | Path | None, folder: Path | None, inste
     if (every := fitting(story, LARGEST)) > 1:
         story.choose(slice(None, None, every), f"one frame of {every}, because all of them would take too much room")
     write_page(story, page)
-    open_page(page.resolve().as_uri())
+    if not open_page(page.resolve().as_uri()):
+        warnings.warn(f"wrote {page}: open it in a browser; none could be opened from here", stacklevel=4)
     return page

@@ -135,7 +135,6 @@ class Story:
                 "running": bool(running),
                 "outcome": None if running or summary is None else summary.get("outcome_text"),
                 "note": "; ".join(self._noted()) or None,
-                "digits": 3 if self.compact else 4,
                 "unit": self.unit,
                 "materials": self.materials,
                 "periodic": self.periodic,
