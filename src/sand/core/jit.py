@@ -41,12 +41,96 @@ def _promise_no_aliases() -> dict[str, Any]:
 
 _NO_ALIASES = _promise_no_aliases()
 
-# nobody calls these from Python once compiled: without their wrappers the first compile is shorter
-_INNER: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-formula = register_jitable(**_INNER, forceinline=True)
-rare = register_jitable(**_INNER)
-loop = register_jitable(**_INNER, **_NO_ALIASES, forceinline=True)
+def _leave_work_to_the_kernel() -> dict[str, Any]:
+    """The option that keeps inner functions as they were lowered; none where numba's inside has changed.
+
+    Numba optimises every function and makes machine code of it before it is pasted into its caller, where all of
+    that is done again.  Only kernels are ever run, and they get everything that they call as it was lowered.
+    """
+    try:
+        from numba.core.codegen import JITCodeLibrary
+        from numba.core.compiler import Compiler
+    except ImportError:
+        return {}
+
+    class Lowered(JITCodeLibrary):
+        """Functions for kernels to be linked with, neither optimised nor turned into machine code."""
+
+        def _optimize_final_module(self) -> None:
+            pass
+
+        def _finalize_final_module(self) -> None:
+            self._finalize_dynamic_globals()
+            self._finalized = True
+
+        def get_pointer_to_function(self, name: str) -> int:
+            """None."""
+            self._ensure_finalized()
+            return 0
+
+        @property
+        def codegen(self) -> Any:
+            """Where environments are told to."""
+            return self
+
+        def set_env(self, name: str, env: Any) -> None:
+            """Nothing of ours reads an environment, and there is no machine code that could."""
+
+    class InnerCompiler(Compiler):
+        """Numba's own compiler, but for where the result is kept."""
+
+        def define_pipelines(self) -> Any:
+            """As always."""
+            self.state.library = Lowered(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+            self.state.library.enable_object_caching()
+            return super().define_pipelines()
+
+    return {"pipeline_class": InnerCompiler}
+
+
+# nobody calls these from Python once compiled: without their wrappers the first compile is shorter
+_INNER: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True} | _leave_work_to_the_kernel()
+
+
+def _once_for_each_type(function: Callable) -> None:
+    """Let numba compile a registered function once for each set of argument types.
+
+    It would do so once more for every set of options among its callers, which changes nothing in ours, and spend
+    much of its time on comparing them.
+    """
+    try:
+        from numba.core.typing.templates import builtin_registry
+
+        template = next(t for f, t in reversed(builtin_registry.globals) if f is function).templates[0]
+        build = template._build_impl
+    except (ImportError, AttributeError, StopIteration, IndexError):
+        return
+    known: dict[Any, Any] = {}
+
+    def implementation(self: Any, args: Any, kws: Any) -> Any:
+        key = tuple(a._code for a in args), tuple(kws.items())
+        if key not in known:
+            known[key] = build(self, key, args, kws)
+        return known[key]
+
+    template._get_impl = implementation
+
+
+def _registered(**options: Any) -> Callable[[Callable], Callable]:
+    """A decorator for functions that kernels may call and that stay ordinary Python."""
+
+    def register(function: Callable) -> Callable:
+        register_jitable(**options)(function)
+        _once_for_each_type(function)
+        return function
+
+    return register
+
+
+formula = _registered(**_INNER, forceinline=True)
+rare = _registered(**_INNER)
+loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
 
 
 def _digest() -> str:
