@@ -18,11 +18,12 @@ CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", 
 
 # --- places in World.count (int64) -----------------------------------------------------------------
 _NAMES = (
-    "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected needed"
+    "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums "
+    "looked grown rejected needed soon"
 )
 COUNT = tuple(_NAMES.split())
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
-LOOKED, GROWN, REJECTED, NEEDED = range(12, 16)
+LOOKED, GROWN, REJECTED, NEEDED, SOON = range(12, 17)
 
 # --- places in World.lost (float64): energy that left the grains, per channel [J] -----------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
@@ -58,6 +59,8 @@ class NearPairs(NamedTuple):
     step: np.ndarray  # (P,) the step their contact needs [s]
     length: np.ndarray  # (P,) δ_c of their contact [m]
     anchor: np.ndarray  # (3, N) positions when the list was made [m]
+    soon: np.ndarray  # (P,) uint32: the pairs that may touch next, the first count[SOON]
+    mark: np.ndarray  # (3, N) positions when they were picked [m]
 
 
 class FarArrays(NamedTuple):
@@ -96,6 +99,8 @@ class StageArrays(NamedTuple):
 
 KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
+PICKED = ("soon", "mark")
+"""Of the near pairs, what it leaves out: it is picked anew."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 
@@ -129,9 +134,9 @@ def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
 def near_pairs(grains: int, capacity: int) -> NearPairs:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
     p = max(int(capacity), 16)
-    return NearPairs(
-        np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p), np.zeros(p), np.full((3, grains), np.inf)
-    )
+    nowhere = np.full((3, grains), np.inf)
+    pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p, np.uint32)
+    return NearPairs(pair, touching, np.zeros(p), np.zeros(p), nowhere, soon, nowhere.copy())
 
 
 def stage_arrays(grains: int) -> StageArrays:
@@ -185,7 +190,7 @@ class World:
 
     def grow_pairs(self) -> None:
         """Twice the room for near pairs."""
-        self.near = _grown(self.near, ("anchor",))
+        self.near = _grown(self.near, ("anchor", "mark"))
 
     def grow_rows(self) -> None:
         """Twice the room for neighbours within the reach of long-range forces; what is there is not kept."""
@@ -198,6 +203,8 @@ class World:
         out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
         for group, per_grain in (("contacts", ("start",)), ("near", ("anchor",))):
             for name, array in getattr(self, group)._asdict().items():
+                if name in PICKED:
+                    continue
                 n = used[group] * (2 if name == "side" else 1)
                 out[f"{group}/{name}"] = array if name in per_grain else array[..., :n]
         return out | {f"far/{name}": getattr(self.far, name) for name in KEPT_FAR}
@@ -218,6 +225,8 @@ class World:
             _take(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "near"):
             for name, array in getattr(self, group)._asdict().items():
+                if name in PICKED:
+                    continue
                 given = saved.get(f"{group}/{name}")
                 n = array.shape[-1] if given is None else given.shape[-1]
                 _take(array[..., :n], saved, f"{group}/{name}")

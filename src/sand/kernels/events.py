@@ -16,6 +16,7 @@ from ..core.world import (
     PAIRS,
     ROLLING,
     SLIDING,
+    SOON,
     STIFFNESS,
     TIME,
     TWISTING,
@@ -218,9 +219,10 @@ def drop_broken(contacts, count):
 
 @loop
 def new_touches(grains, near, count, span):
-    """How many listed pairs have come to touch (D ≤ r1 + r2)."""
+    """How many pairs have come to touch (D ≤ r1 + r2), out of those that may."""
     found = 0
-    for p in range(count[PAIRS]):
+    for k in range(count[SOON]):
+        p = near.soon[k]
         i, j = near.pair[0, p], near.pair[1, p]
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         reach = grains.radius[i] + grains.radius[j]

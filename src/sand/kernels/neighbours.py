@@ -7,7 +7,7 @@ import numpy as np
 from ..core.box import nearest_image
 from ..core.jit import loop, rare
 from ..core.vec import dot, load, put, sub
-from ..core.world import PAIRS, REBUILT
+from ..core.world import PAIRS, REBUILT, SOON
 from ..physics.contact import Pairing, bond_between
 from .cells import FULL
 
@@ -88,8 +88,27 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, listed)
 
 
 @rare
+def list_soon(grains, near, count, span, gap):
+    """Pick the pairs that are apart by less than `gap` [m] out of the near ones: only they can touch for a while.
+
+    A grain that is less than half the gap from where it is now cannot bring another pair to touch.
+    """
+    found = 0
+    for p in range(count[PAIRS]):
+        i, j = near.pair[0, p], near.pair[1, p]
+        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+        limit = grains.radius[i] + grains.radius[j] + gap
+        near.soon[found] = p
+        found += 1 if (near.touching[p] == 0) & (dot(apart, apart) < limit * limit) else 0
+    count[SOON] = found
+    for i in range(grains.mass.size):
+        put(near.mark, i, load(grains.position, i))
+
+
+@rare
 def forget_touch(near, count, i, j):
-    """Mark the pair (i, j) of the list as no longer in contact."""
+    """Mark the pair (i, j) of the list as no longer in contact; it may touch again soon."""
+    near.mark[0, 0] = math.inf
     for p in range(count[PAIRS]):
         a, b = near.pair[0, p], near.pair[1, p]
         if (a == i and b == j) or (a == j and b == i):

@@ -4,7 +4,8 @@ import math
 from typing import NamedTuple
 
 from ..core.box import nearest_image
-from ..core.jit import formula, loop
+from ..core.jit import formula, loop, rare
+from ..core.least import rank, ranked
 from ..core.vec import dot, load, sub
 from ..core.world import (
     CALM,
@@ -77,63 +78,99 @@ def load_step(force, torque, mass, inertia, control):
 
 
 @loop
-def calm_steps(grains, far, start, count, control):
-    """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
-
-    GRAIN1 becomes the grain that wants the step. `start` (N + 1,) tells who has contacts
-    (core.world.ContactArrays).
+def grain_step(grains, far, start, control, i):
+    """Longest step [s] that grain i by itself allows, and longest cycle of the far loads.
 
     Bound grains ring: their step is that of contacts, and only how they fly and spin is looked at.  Free grains
     limit the cycle as they limit the step, but for the part of the list's reach they fly.  Their loads are those of
     the long-range forces, whose energy is at stake: a uniform load, as gravity's, costs Verlet nothing.
     """
-    wanted = cycle = control.longest
-    slowest = -1
+    v, w = load(grains.velocity, i), load(grains.spin, i)
+    speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
+    spin = SPIN_ANGLE / turning if turning > 0.0 else math.inf
+    inertia = grains.inertia[i]
+    swing = field_step(load(grains.moment, i), load(grains.field, i), control.outer_field, inertia)
+    own = load_step(load(far.force, i), load(far.torque, i), grains.mass[i], inertia, control)
+    bound = start[i + 1] != start[i]
+    own = math.inf if bound else own
+    cycle = min(min(spin, swing), own)
+    flight = REACH_PART * control.reach / speed if speed > 0.0 else math.inf
+    return min(cycle, flight), math.inf if bound else cycle
+
+
+@loop
+def calm_steps(grains, far, start, count, control):
+    """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
+
+    GRAIN1 becomes a grain that is not finite. `start` (N + 1,) tells who has contacts (core.world.ContactArrays).
+    """
+    step = cycle = rank(control.longest)
+    lost = 0.0
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
-        if not (speed < math.inf and turning < math.inf):
-            count[GRAIN1] = i
-            return 0.0, 0.0
-        mine = SPIN_ANGLE / turning if turning > 0.0 else math.inf
-        moment, inertia = load(grains.moment, i), grains.inertia[i]
-        mine = min(mine, field_step(moment, load(grains.field, i), control.outer_field, inertia))
-        if start[i + 1] == start[i]:
-            force, torque = load(far.force, i), load(far.torque, i)
-            mine = min(mine, load_step(force, torque, grains.mass[i], inertia, control))
-            cycle = min(cycle, mine)
-        if speed > 0.0:
-            mine = min(mine, REACH_PART * control.reach / speed)
-        if mine < wanted:
-            wanted, slowest = mine, i
-    count[GRAIN1], count[GRAIN2] = slowest, -1
-    return wanted, cycle
+        lost += 0.0 if (dot(v, v) < math.inf) & (dot(w, w) < math.inf) else 1.0
+        own_step, own_cycle = grain_step(grains, far, start, control, i)
+        step, cycle = min(step, rank(own_step)), min(cycle, rank(own_cycle))
+    if lost > 0.0:
+        count[GRAIN1] = first_not_finite(grains)
+        return 0.0, 0.0
+    return ranked(step), ranked(cycle)
+
+
+@rare
+def first_not_finite(grains):
+    """The first grain whose velocity or spin is not finite."""
+    for i in range(grains.mass.size):
+        v, w = load(grains.velocity, i), load(grains.spin, i)
+        if not (dot(v, v) < math.inf and dot(w, w) < math.inf):
+            return i
+    return -1
+
+
+@loop
+def pair_step(grains, near, span, control, p):
+    """The longest step [s] that pair p allows, about to touch or in contact."""
+    i, j = near.pair[0, p], near.pair[1, p]
+    moving = sub(load(grains.velocity, i), load(grains.velocity, j))
+    apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+    distance = math.sqrt(dot(apart, apart))
+    closing = -dot(moving, apart) / distance
+    touching = near.touching[p] == 1
+    # in contact only what loads the neck counts: a pair may spin as fast as it likes
+    speed = abs(closing) if touching else math.sqrt(dot(moving, moving))
+    need, length = near.step[p], near.length[p]
+    fast = (length > 0.0) & (speed * need > control.impact * length)
+    need = control.impact * length / speed if fast else need
+    gap = distance - grains.radius[i] - grains.radius[j]
+    free = max(need, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
+    # slow pairs in contact are served by the step of the contacts
+    bound = need if fast else math.inf
+    return bound if touching else free
 
 
 @loop
 def closing_step(grains, near, count, span, control, wanted):
     """The longest step [s], at most `wanted`, that pairs about to touch or in contact allow."""
+    least = rank(wanted)
     for p in range(count[PAIRS]):
-        i, j = near.pair[0, p], near.pair[1, p]
-        moving = sub(load(grains.velocity, i), load(grains.velocity, j))
-        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        distance = math.sqrt(dot(apart, apart))
-        closing = -dot(moving, apart) / distance
-        need = near.step[p]
-        # in contact only what loads the neck counts: a pair may spin as fast as it likes
-        speed = abs(closing) if near.touching[p] == 1 else math.sqrt(dot(moving, moving))
-        fast = near.length[p] > 0.0 and speed * need > control.impact * near.length[p]
-        if fast:
-            need = control.impact * near.length[p] / speed
-        # slow pairs in contact are served by the step of the contacts
-        ours = need if fast else math.inf
-        if near.touching[p] == 0:
-            gap = distance - grains.radius[i] - grains.radius[j]
-            ours = max(need, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
-        if ours < wanted:
-            wanted = ours
-            count[GRAIN1], count[GRAIN2] = i, j
-    return wanted
+        least = min(least, rank(pair_step(grains, near, span, control, p)))
+    return ranked(least)
+
+
+@rare
+def name_culprits(grains, far, start, near, count, span, control):
+    """Let GRAIN1 and GRAIN2 be the pair, or GRAIN1 the grain, that wants the shortest step."""
+    shortest = math.inf
+    for i in range(grains.mass.size):
+        own, _ = grain_step(grains, far, start, control, i)
+        if own < shortest:
+            shortest = own
+            count[GRAIN1], count[GRAIN2] = i, -1
+    for p in range(count[PAIRS]):
+        own = pair_step(grains, near, span, control, p)
+        if own < shortest:
+            shortest = own
+            count[GRAIN1], count[GRAIN2] = near.pair[0, p], near.pair[1, p]
 
 
 @loop

@@ -14,13 +14,15 @@ from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_co
 from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
 from ..kernels.motion import drift
-from ..kernels.neighbours import make_near_list
+from ..kernels.neighbours import list_soon, make_near_list
 from ..kernels.outside import outside_energy, outside_loads, outside_wrap
-from .control import CHECK_EVERY, choose_step
+from .control import CHECK_EVERY, choose_step, name_culprits
 from .rules import Stop
 
 LONGEST_TURN = 0.5
 """Largest turn in one step [rad] for which `rotation.turn` is sound."""
+SOON_PART = 0.05
+"""Displacement, in the reach of the list of near pairs, after which those that may touch soon are picked out anew."""
 OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """A box without walls, for moves that are wrapped later."""
 
@@ -59,6 +61,7 @@ def possible_step(grains, contacts, near, far, clock, count, rules):
     if clock[LEFT] > 0.0:  # inside a cycle: whole steps that fill it
         dt = clock[LEFT] / math.ceil(clock[LEFT] / dt - 1e-6)
     if clock[TIME] + dt == clock[TIME]:
+        name_culprits(grains, far, contacts.start, near, count, rules.span, rules.control)
         return 0.0, Stop.NO_STEP
     stop, stray = _moves_too_far(grains, rules.control.reach, dt)
     if stop != Stop.STEPS_DONE:
@@ -84,6 +87,8 @@ def update_lists(grains, contacts, near, far, count, rules):
         made = make_near_list(grains, contacts, near, far, count, span, reach, rules.contact, search.listed)
         if made == FULL:
             return Stop.PAIRS_FULL, stale
+    if rules.contact.on and (stale or list_is_stale(grains, near.mark, span, SOON_PART * reach)):
+        list_soon(grains, near, count, span, 2.0 * SOON_PART * reach)
     return Stop.STEPS_DONE, stale
 
 
