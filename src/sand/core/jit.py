@@ -1,8 +1,9 @@
-"""The door to the compiler: the only module that names numba (CUDA apart).
+"""The door to the compiler: with `atomics`, the only module that names numba (CUDA apart).
 
 `formula`  scalar physics on floats and 3-tuples.  It stays an ordinary Python function.
 `rare`     like `formula`, but not pasted into the caller: for code that seldom runs.
 `loop`     a loop over arrays that is pasted into a larger loop.  No array may be passed twice.
+`shared`   a loop that stays a function of its own, so that all who call it get the same bits.  No array twice.
 `kernel`   a compiled entry point, called from Python.  No array may be passed twice.
 """
 
@@ -20,7 +21,7 @@ import numba
 from numba.core import event
 from numba.extending import register_jitable
 
-__all__ = ["cache_folder", "compiling", "formula", "kernel", "loop", "rare"]
+__all__ = ["CAN_SHARE", "cache_folder", "compiling", "formula", "kernel", "loop", "rare", "shared"]
 
 # As fast as fastmath=True, but NaN and infinity stay what they are, so that guards can see them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -42,17 +43,16 @@ def _promise_no_aliases() -> dict[str, Any]:
 _NO_ALIASES = _promise_no_aliases()
 
 
-def _leave_work_to_the_kernel() -> dict[str, Any]:
-    """The option that keeps inner functions as they were lowered; none where numba's inside has changed.
+def _leave_work_to_the_kernel() -> dict[bool, dict[str, Any]]:
+    """The option that keeps inner functions as they were lowered, apart or not; none where numba's inside has changed.
 
-    Numba optimises every function and makes machine code of it before it is pasted into its caller, where all of
-    that is done again.  Only kernels are ever run, and they get everything that they call as it was lowered.
+    Numba makes machine code of every function before it pastes it into a caller, where all of that is done again.
     """
     try:
         from numba.core.codegen import JITCodeLibrary
         from numba.core.compiler import Compiler
     except ImportError:
-        return {}
+        return {False: {}, True: {}}
 
     class Lowered(JITCodeLibrary):
         """Functions for kernels to be linked with, neither optimised nor turned into machine code."""
@@ -69,28 +69,48 @@ def _leave_work_to_the_kernel() -> dict[str, Any]:
             self._ensure_finalized()
             return 0
 
-        @property
-        def codegen(self) -> Any:
-            """Where environments are told to."""
-            return self
+        codegen = property(lambda self: self)
 
         def set_env(self, name: str, env: Any) -> None:
             """Nothing of ours reads an environment, and there is no machine code that could."""
 
+    class Apart(Lowered):
+        """The same for a function that must not be pasted into its callers."""
+
+        def add_llvm_module(self, ll_module: Any) -> None:
+            """Mark what is in it, before others are linked to it."""
+            for function in ll_module.functions:
+                if not function.is_declaration:
+                    function.add_function_attribute("noinline")
+            super().add_llvm_module(ll_module)
+
     class InnerCompiler(Compiler):
         """Numba's own compiler, but for where the result is kept."""
 
+        kept = Lowered
+
         def define_pipelines(self) -> Any:
             """As always."""
-            self.state.library = Lowered(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-            self.state.library.enable_object_caching()
+            library = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+            library.enable_object_caching()
+            self.state.library = library
             return super().define_pipelines()
 
-    return {"pipeline_class": InnerCompiler}
+    class ApartCompiler(InnerCompiler):
+        """The same for such functions."""
+
+        kept = Apart
+
+    return {False: {"pipeline_class": InnerCompiler}, True: {"pipeline_class": ApartCompiler}}
 
 
 # nobody calls these from Python once compiled: without their wrappers the first compile is shorter
-_INNER: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True} | _leave_work_to_the_kernel()
+_LOWERED = _leave_work_to_the_kernel()
+_BARE: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_INNER = _BARE | _LOWERED[False]
+
+CAN_SHARE = bool(_LOWERED[True])
+"""Can `shared` loops be kept apart, so that all threads get the same bits from them?"""
 
 
 def _once_for_each_type(function: Callable) -> None:
@@ -128,9 +148,12 @@ def _registered(**options: Any) -> Callable[[Callable], Callable]:
     return register
 
 
-formula = _registered(**_INNER, forceinline=True)
-rare = _registered(**_INNER)
+# options that are not given are those of the caller: all are given
+_ALIASES = dict.fromkeys(_NO_ALIASES, False)
+formula = _registered(**_INNER, **_ALIASES, forceinline=True)
+rare = _registered(**_INNER, **_ALIASES, forceinline=False)
 loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
+shared = _registered(**_BARE, **_LOWERED[True], **_NO_ALIASES, forceinline=False)
 
 
 def _digest() -> str:
@@ -164,18 +187,19 @@ def cache_folder() -> Path:
 _FOLDER = cache_folder()
 
 
-def kernel(function: Callable, *, keep: bool = True) -> Callable:
+def kernel(function: Callable, *, keep: bool = True, alone: bool = False) -> Callable:
     """Compile `function` on its first call and keep the result in our own cache folder.
 
     numba's global cache folder is put back at once: a user's own kernels go where the user wants.
 
     Args:
         keep: False for code that reaches formulas from outside SAND, whose edits our digest does not see.
+        alone: True for code that other Python threads may run beside.
     """
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        return numba.njit(cache=keep, no_cfunc_wrapper=True, **_COMMON, **_NO_ALIASES)(function)
+        return numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **_COMMON, **_NO_ALIASES)(function)
     finally:
         numba.config.CACHE_DIR = before
 

@@ -87,6 +87,7 @@ class FarArrays(NamedTuple):
     past_position: np.ndarray  # (3, N) at the last summation, or the one before [m]
     past_moment: np.ndarray  # (3, N) [A m²]
     path: np.ndarray  # (3, N) displacement since the last summation, summed over time [m s]
+    share: np.ndarray  # (2B, 3, N) forces and flux densities of each block of all pairs, where threads share the sum
 
 
 class StageArrays(NamedTuple):
@@ -101,14 +102,21 @@ KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_posi
 """The far arrays that a checkpoint holds; the others follow from them."""
 PICKED = ("soon", "mark")
 """Of the near pairs, what it leaves out: it is picked anew."""
+ALL_BLOCKS = 8
+"""Blocks of the sum over all pairs that threads may share."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 
 
-def far_arrays(grains: int, capacity: int) -> FarArrays:
-    """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list."""
+def far_arrays(grains: int, capacity: int, *, share: bool = False) -> FarArrays:
+    """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list.
+
+    Args:
+        share: True for blocks of the sum over all pairs.
+    """
     vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
+    vectors["share"] = np.zeros((2 * ALL_BLOCKS if share else 0, 3, grains))
     sizes = {"order": grains, "start": grains + 1, "mate": max(int(capacity), 16), "home": grains}
     sizes["cell"] = CELLS_PER_GRAIN * grains + 28
     return FarArrays(**(vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}))
@@ -216,7 +224,9 @@ class World:
             BadInput: a missing array, or one of another shape.
         """
         for name in ("clock", "count", "lost"):
-            _take(getattr(self, name), saved, name)
+            # checkpoints of earlier versions lack the last counters, which begin at 0
+            n = saved[name].size if name == "count" and name in saved else None
+            _take(getattr(self, name)[:n], saved, name)
         while self.contacts.pair.shape[1] < self.count[CONTACTS]:
             self.grow_contacts()
         while self.near.pair.shape[1] < self.count[PAIRS]:

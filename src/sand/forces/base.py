@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from ..core.box import Box
 from ..core.grains import Grains
-from ..kernels.far import NO_FAR_FORCE, FarSums, far_together
+from ..kernels.sums import NO_FAR_FORCE, FarSums, far_together
 from ..physics.surroundings import nothing, together
 from .cutoff import Choice
 

@@ -11,7 +11,7 @@ from ..core.box import Box
 from ..core.constants import COULOMB, GRAVITATION
 from ..core.grains import Grains
 from ..kernels.central import ALL, LISTED, CentralRules
-from ..kernels.far import FarSums
+from ..kernels.sums import FarSums
 from .cutoff import WithCutoff, cutoff_for
 
 

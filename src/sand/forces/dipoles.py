@@ -13,7 +13,7 @@ from ..core.constants import BOLTZMANN, MAGNETIC
 from ..core.grains import Grains
 from ..core.units import spoken
 from ..kernels.dipoles import BARE, CUT, LISTED, DipoleRules
-from ..kernels.far import FarSums
+from ..kernels.sums import FarSums
 from ..physics.dipole import capture_radius, contact_energy
 from .cutoff import ROOM, Choice, WithCutoff, cutoff_for
 

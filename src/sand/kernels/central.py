@@ -6,7 +6,7 @@ from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.vec import accrue, axpy, load, put, scale, sub
 from ..physics.central import central_field, central_potential, central_rate
-from .far import FarSums
+from .sums import FarSums
 
 
 class CentralRules(NamedTuple):

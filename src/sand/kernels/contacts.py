@@ -64,10 +64,11 @@ def twist_gain(grains, contacts, c, pose, dt):
 
 
 @loop
-def contact_pass(grains, contacts, count, span, law, dt):
-    """Twist, loads and flag of every contact; returns how many passed a limit.  Vectorises."""
+def contact_pass(grains, contacts, first, last, span, law, dt):
+    """Twist, loads and flag of the contacts first…last − 1 (uint64); True if any passed a limit.  Vectorises."""
     flagged = 0.0
-    for c in range(count[CONTACTS]):
+    for k in range(last - first):
+        c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         bond = bond_at(contacts.bond, c)
         r1, r2 = grains.radius[i], grains.radius[j]
@@ -107,9 +108,10 @@ def write_loads(grains, contacts, span, law, c):
 
 
 @loop
-def gather(grains, contacts):
-    """Set force and torque of each grain to the sum over its contacts, in a fixed order."""
-    for g in range(grains.mass.size):
+def gather(grains, contacts, first, last):
+    """Set force and torque of the grains first…last − 1 (uint64) to the sum over their contacts, in a fixed order."""
+    for k in range(last - first):
+        g = first + k
         force = torque = (0.0, 0.0, 0.0)
         for s in range(contacts.start[g], contacts.start[g + 1]):
             c = contacts.side[s] >> 1

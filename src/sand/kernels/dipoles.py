@@ -4,14 +4,22 @@ All pairs go by action and reaction (Newton's third law); listed ones stand in b
 row is a sum of its own that vectorises.
 """
 
+import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.vec import accrue, add, cross, load, put, sub
+from ..core.world import ALL_BLOCKS
 from ..physics.dipole import pair_load, pair_load_cut
 from ..physics.dipole_rates import pair_rates
-from .far import FarSums
+from .sums import FarSums, Parts
+
+ROWS_AT_ONCE = 256
+"""Rows of the list in a block that one thread takes."""
 
 
 class DipoleRules(NamedTuple):
@@ -29,50 +37,14 @@ def clear_field(grains):
 
 
 @loop
-def add_torques(grains, far):
+def add_torques(grains, far, span, rules):
     """μ×B of the flux density summed before."""
     for i in range(grains.mass.size):
         accrue(far.torque, i, cross(load(grains.moment, i), load(grains.field, i)))
 
 
 @loop
-def bare_loads(grains, far, span, rules):
-    """All pairs of an open box."""
-    clear_field(grains)
-    for i in range(grains.mass.size):
-        here, mine = load(grains.position, i), load(grains.moment, i)
-        push = field = (0.0, 0.0, 0.0)
-        for j in range(i):
-            apart = sub(here, load(grains.position, j))
-            f, b1, b2, _ = pair_load(apart, mine, load(grains.moment, j), rules.k)
-            push, field = add(push, f), add(field, b1)
-            accrue(far.force, j, (-f[0], -f[1], -f[2]))
-            accrue(grains.field, j, b2)
-        accrue(far.force, i, push)
-        accrue(grains.field, i, field)
-    add_torques(grains, far)
-
-
-@loop
-def cut_loads(grains, far, span, rules):
-    """The same with nearest images and a cut-off."""
-    clear_field(grains)
-    for i in range(grains.mass.size):
-        here, mine = load(grains.position, i), load(grains.moment, i)
-        push = field = (0.0, 0.0, 0.0)
-        for j in range(i):
-            apart = nearest_image(sub(here, load(grains.position, j)), span)
-            f, b1, b2, _ = pair_load_cut(apart, mine, load(grains.moment, j), rules.k, rules.cutoff)
-            push, field = add(push, f), add(field, b1)
-            accrue(far.force, j, (-f[0], -f[1], -f[2]))
-            accrue(grains.field, j, b2)
-        accrue(far.force, i, push)
-        accrue(grains.field, i, field)
-    add_torques(grains, far)
-
-
-@loop
-def pack_moments(grains, far):
+def pack_moments(grains, far, span, rules):
     """Positions and moments in the order of the list, so that neighbours lie close in memory."""
     for s in range(grains.mass.size):
         i = far.order[s]
@@ -81,21 +53,41 @@ def pack_moments(grains, far):
 
 
 @loop
-def listed_loads(grains, far, span, rules):
-    """Listed pairs with nearest images and a cut-off."""
-    pack_moments(grains, far)
-    for s in range(grains.mass.size):
+def listed_rows(grains, far, span, rules, first, last):
+    """Listed pairs of the places first…last − 1 (uint64), with nearest images and a cut-off."""
+    for k in range(last - first):
+        s = first + k
         here, mine = load(far.here, s), load(far.source, s)
         push = field = (0.0, 0.0, 0.0)
-        for m in range(far.start[s], far.start[s + 1]):
+        for m in range(far.start[s], far.start[s + np.uint64(1)]):
             t = far.mate[m]
-            apart = nearest_image(sub(here, load(far.here, t)), span)
-            f, b, _, _ = pair_load_cut(apart, mine, load(far.source, t), rules.k, rules.cutoff)
+            f, b, _, _ = cut_pair(here, load(far.here, t), span, mine, load(far.source, t), rules)
             push, field = add(push, f), add(field, b)
         i = far.order[s]
         accrue(far.force, i, push)
         put(grains.field, i, field)
-    add_torques(grains, far)
+
+
+@loop
+def listed_loads(grains, far, span, rules):
+    """All listed pairs."""
+    pack_moments(grains, far, span, rules)
+    listed_rows(grains, far, span, rules, np.uint64(0), np.uint64(grains.mass.size))
+    add_torques(grains, far, span, rules)
+
+
+@loop
+def listed_block(grains, far, span, rules, b):
+    """Some rows of the list."""
+    first = b * ROWS_AT_ONCE
+    last = min(first + ROWS_AT_ONCE, grains.mass.size)
+    listed_rows(grains, far, span, rules, np.uint64(first), np.uint64(last))
+
+
+@loop
+def listed_blocks(grains):
+    """How many blocks of rows there are."""
+    return (grains.mass.size + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
 
 
 @loop
@@ -160,6 +152,81 @@ def loads_of_pair(grains, span, rules, i, j):
     return force, cross(mine, b1), cross(other, b2)
 
 
-BARE = FarSums(bare_loads, cut_rates, energy_shares, loads_of_pair)
-CUT = FarSums(cut_loads, cut_rates, energy_shares, loads_of_pair)
-LISTED = FarSums(listed_loads, listed_rates, energy_shares, loads_of_pair)
+@loop
+def bare_pair(here, there, span, mine, other, rules):
+    """Loads of a pair in an open box without a cut-off."""
+    return pair_load(sub(here, there), mine, other, rules.k)
+
+
+@loop
+def cut_pair(here, there, span, mine, other, rules):
+    """The same with nearest images and a cut-off."""
+    return pair_load_cut(nearest_image(sub(here, there), span), mine, other, rules.k, rules.cutoff)
+
+
+@loop
+def corner(grains, b):
+    """The first row of block b of the triangle of all pairs: blocks have equal areas."""
+    return np.uint64(grains.mass.size * math.sqrt(b / ALL_BLOCKS))
+
+
+def all_pairs(pair_loads: Callable) -> FarSums:
+    """The sums over all pairs, each pair once (Newton's third law)."""
+
+    @loop
+    def add_rows(grains, force, field, span, rules, first, last):
+        for k in range(last - first):
+            i = first + k
+            here, mine = load(grains.position, i), load(grains.moment, i)
+            push = own = (0.0, 0.0, 0.0)
+            for j in range(i):
+                f, b1, b2, _ = pair_loads(here, load(grains.position, j), span, mine, load(grains.moment, j), rules)
+                push, own = add(push, f), add(own, b1)
+                accrue(force, j, (-f[0], -f[1], -f[2]))
+                accrue(field, j, b2)
+            accrue(force, i, push)
+            accrue(field, i, own)
+
+    @loop
+    def loads(grains, far, span, rules):
+        clear_field(grains)
+        add_rows(grains, far.force, grains.field, span, rules, np.uint64(0), np.uint64(grains.mass.size))
+        add_torques(grains, far, span, rules)
+
+    @loop
+    def begin(grains, far, span, rules):
+        clear_field(grains)
+
+    @loop
+    def block(grains, far, span, rules, b):
+        force, field = far.share[2 * b], far.share[2 * b + 1]
+        for i in range(corner(grains, b + 1)):
+            put(force, i, (0.0, 0.0, 0.0))
+            put(field, i, (0.0, 0.0, 0.0))
+        add_rows(grains, force, field, span, rules, corner(grains, b), corner(grains, b + 1))
+
+    @loop
+    def end(grains, far, span, rules):
+        for b in range(ALL_BLOCKS):
+            force, field = far.share[2 * b], far.share[2 * b + 1]
+            for i in range(corner(grains, b + 1)):
+                accrue(far.force, i, load(force, i))
+                accrue(grains.field, i, load(field, i))
+        add_torques(grains, far, span, rules)
+
+    @loop
+    def blocks(grains):
+        return ALL_BLOCKS
+
+    return FarSums(loads, cut_rates, energy_shares, loads_of_pair, Parts(begin, block, end, blocks))
+
+
+BARE = all_pairs(bare_pair)
+CUT = all_pairs(cut_pair)
+LISTED = FarSums(
+    listed_loads,
+    listed_rates,
+    energy_shares,
+    loads_of_pair,
+    Parts(pack_moments, listed_block, add_torques, listed_blocks),
+)

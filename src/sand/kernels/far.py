@@ -1,12 +1,11 @@
-"""Long-range forces together: one sum of loads, of rates and of energies, and what multiple time steps need."""
+"""What becomes of the summed long-range loads, and what multiple time steps need."""
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
 
 from ..core.box import nearest_image
-from ..core.jit import kernel, loop
-from ..core.vec import accrue, add, axpy, cross, dot, load, put, scale, sub
+from ..core.jit import loop
+from ..core.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..core.world import CONTACTS
 
 HELD_CHANGE = 0.5
@@ -15,68 +14,6 @@ HELD_CHANGE = 0.5
 A chain of 20 at rest and one that rings were tried in cycles of 70 steps with 0.2, 0.5 and 1 (no held part): 0.2 lets
 the energy of the ringing one drift, 1 makes the impulses shake the calm one; see docs/physics/long-range.md.
 """
-
-
-class FarSums(NamedTuple):
-    """The loops of one long-range force; each gets (grains, far, span, its numbers)."""
-
-    loads: Callable  # adds to far.force and far.torque
-    rates: Callable  # adds to far.force_rate and far.torque_rate
-    energies: Callable  # adds half the energy of each pair to each grain's entry of a fifth argument, (N,)
-    pair: Callable  # (grains, span, numbers, i, j): force on i, torques on i and on j, of one pair
-
-
-@loop
-def _no_sum(grains, far, span, numbers):
-    pass
-
-
-@loop
-def _no_energies(grains, far, span, numbers, shares):
-    pass
-
-
-@loop
-def _no_pair(grains, span, numbers, i, j):
-    return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-
-
-NO_FAR_FORCE = FarSums(_no_sum, _no_sum, _no_energies, _no_pair)
-
-
-@functools.cache
-def far_together(first: FarSums, rest: FarSums) -> FarSums:
-    """The sums of two; `numbers` is the pair of theirs.  Energies are asked for one by one (`shares_for`)."""
-    first_loads, rest_loads, first_rates, rest_rates = first.loads, rest.loads, first.rates, rest.rates
-    first_pair, rest_pair = first.pair, rest.pair
-
-    @loop
-    def loads(grains, far, span, numbers):
-        first_loads(grains, far, span, numbers[0])
-        rest_loads(grains, far, span, numbers[1])
-
-    @loop
-    def rates(grains, far, span, numbers):
-        first_rates(grains, far, span, numbers[0])
-        rest_rates(grains, far, span, numbers[1])
-
-    @loop
-    def pair(grains, span, numbers, i, j):
-        force1, here1, there1 = first_pair(grains, span, numbers[0], i, j)
-        force2, here2, there2 = rest_pair(grains, span, numbers[1], i, j)
-        return add(force1, force2), add(here1, here2), add(there1, there2)
-
-    return FarSums(loads, rates, _no_energies, pair)
-
-
-@functools.cache
-def shares_for(energies: Callable) -> Callable:
-    """The compiled sum of each grain's part of the energy [J] of one long-range force."""
-
-    def fill_shares(grains, far, span, numbers, shares):
-        energies(grains, far, span, numbers, shares)
-
-    return kernel(fill_shares)
 
 
 @loop

@@ -12,15 +12,17 @@ import numpy as np
 from ..core.world import CONTACT_STEP, FAR_SUMS, GRAIN1, GRAIN2, GROWN, LOOKED, MADE, MOVED, STAGE, STEPS, World
 from ..forces.base import FarForce, GrainForce
 from ..kernels.cells import FULL, remake_far_list
-from ..kernels.far import shares_for
 from ..kernels.outside import outside_shares_for
 from ..kernels.seeds import seed_contacts
+from ..kernels.sums import shares_for
 from ..stepping.adaptive import Adaptive
 from ..stepping.advance import driver_for
 from ..stepping.control import GROW_EVERY
+from ..stepping.crew import crew_for, new_crew
 from ..stepping.flight import flight_driver_for
 from ..stepping.rules import Plan, Rules, Stop
 from ..stepping.verlet import Verlet
+from .hands import Hands
 
 
 @dataclass
@@ -46,9 +48,12 @@ class Engine:
     stepping: Verlet | Adaptive
     _plan: Plan
     _advance: Callable = field(init=False)
+    _hands: Hands | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self._advance = flight_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
+        if self._plan.crew:
+            self._hands = Hands(crew_for(self._plan)[1])
 
     def advance(self, until: float, most_steps: float) -> Stop:
         """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
@@ -57,7 +62,8 @@ class Engine:
         while True:
             stages = (w.stages,) if self._plan.adaptive else ()
             arrays = (w.grains.arrays, w.contacts, w.near, w.far, *stages, w.clock, w.count, w.lost)
-            stop = Stop(self._advance(*arrays, self.rules, float(until), int(last)))
+            rules = self._rules_with_crew()
+            stop = Stop(self._advance(*arrays, rules, float(until), int(last)))
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
@@ -66,6 +72,14 @@ class Engine:
                 w.grow_rows()
             else:
                 return stop
+
+    def _rules_with_crew(self) -> Rules:
+        """The rules for one call of the driver, with a crew at work if there is one."""
+        if self._hands is None:
+            return self.rules
+        w, rules = self.world, self.rules._replace(crew=new_crew())
+        self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
+        return rules
 
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
         """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""

@@ -16,15 +16,16 @@ from ..core.world import World, contact_arrays, far_arrays, near_pairs, stage_ar
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact
 from ..forces.gas import Gas
-from ..kernels.far import FarSums
 from ..kernels.gas import VACUUM
 from ..kernels.outside import is_ours
+from ..kernels.sums import FarSums
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
 from ..setup.frame import Bonds
 from ..setup.soundness import most_overlap
 from ..stepping.adaptive import Adaptive
 from ..stepping.control import IMPACT_PART, Control
+from ..stepping.crew import is_large
 from ..stepping.neighbours import Found, Neighbours
 from ..stepping.rules import Books, ContactRules, Plan, Rules, Stirring
 from ..stepping.verlet import Verlet
@@ -103,8 +104,8 @@ def build_engine(
         control,
         stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
     )
-    plan = _plan(given, composed, sums, verlet, isinstance(stepping, Adaptive))
-    world = _world(grains, box, found, plan.adaptive)
+    plan = _plan(grains, given, composed, sums, verlet, isinstance(stepping, Adaptive))
+    world = _world(grains, box, found, plan, share=plan.crew and (not found.search.listed or None in cutoffs))
     engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
     held = _seed(engine, given.contact, contacts)
     if given.contact is not None and fresh:
@@ -136,7 +137,7 @@ def _seed(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> se
     return held
 
 
-def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
+def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
     """What the driver is compiled from."""
     # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
     way = verlet.far if given.distant and given.contact and verlet.most_steps > 1 else "every step"
@@ -148,11 +149,12 @@ def _plan(given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adapti
         foretell=way.startswith("taylor"),
         gas=bool(given.gas),
         adaptive=adaptive,
+        crew=is_large(len(grains)),
         keep=all(is_ours(f.formula) for f in given.outside),
     )
 
 
-def _world(grains: Grains, box: Box, found: Found, staged: bool) -> World:
+def _world(grains: Grains, box: Box, found: Found, plan: Plan, *, share: bool) -> World:
     """The grains in their box, with room for contacts and pairs, and for stages if there are any."""
     count = len(grains)
     world = World(
@@ -160,8 +162,8 @@ def _world(grains: Grains, box: Box, found: Found, staged: bool) -> World:
         box,
         contact_arrays(count, SPREAD * count, len(Bond._fields)),
         near_pairs(count, SPREAD * count),
-        far_arrays(count, SPREAD * count if found.search.listed else 0),
-        stages=stage_arrays(count if staged else 0),
+        far_arrays(count, SPREAD * count if found.search.listed else 0, share=share),
+        stages=stage_arrays(count if plan.adaptive else 0),
     )
     world.grains.arrays.position[...] = box.wrap(grains.position).T
     return world

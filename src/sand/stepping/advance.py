@@ -12,7 +12,6 @@ from collections.abc import Callable
 
 from ..core.jit import kernel, loop
 from ..core.world import CONTACTS, CYCLE, FAR_SUMS, LEFT, STAGE, STEP, STEPS, TIME
-from ..kernels.contacts import gather
 from ..kernels.events import new_touches
 from ..kernels.far import (
     add_far_loads,
@@ -27,6 +26,8 @@ from ..kernels.far import (
 )
 from ..kernels.motion import kick
 from .control import cycle_steps
+from .crew import dismiss, nobody_to_dismiss
+from .large import large_loops
 from .parts import (
     bury_broken,
     no_gas,
@@ -114,17 +115,17 @@ _NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
 def loads_loop(plan: Plan) -> Callable:
     """The loop that sums forces and torques at the end of a step: the far ones if `due`, else what stands for them."""
     add_outside, _ = outside_loops(plan.outside)
-    far_loads = plan.far.loads
+    _, gather_all, far_loads = large_loops(plan)
     between = add_foretold_loads if plan.foretell else add_held_loads if plan.impulse else _nothing_between
     add_bonded = bonded_loops(plan.far.pair)[0] if plan.split else _no_bonded
 
     @loop
     def sum_loads(grains, contacts, far, clock, count, rules, due, elapsed):
-        gather(grains, contacts)
+        gather_all(grains, contacts, far, count, rules)
         add_outside(grains, clock[TIME] + clock[STEP], rules.outside)
         if due:
             clear_far_loads(far)
-            far_loads(grains, far, rules.span, rules.far)
+            far_loads(grains, contacts, far, count, rules)
             count[FAR_SUMS] += 1
         add_bonded(grains, contacts, count, far, rules.span, rules.far, due)
         if due:
@@ -143,6 +144,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
     """
     _, drift_booked = outside_loops(plan.outside)
     sum_loads = loads_loop(plan)
+    pass_contacts, _, _ = large_loops(plan)
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
     change_sides = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
     begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
@@ -188,7 +190,8 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
         fresh = new_touches(grains, near, count, rules.span)
         if count[CONTACTS] + fresh > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
-        parted = update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh)
+        flagged = pass_contacts(grains, contacts, far, clock, count, rules)
+        parted = update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh, flagged)
         dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
         due = clock[LEFT] == 0.0 or parted or fresh > 0
         sum_loads(grains, contacts, far, clock, count, rules, due, elapsed)
@@ -216,8 +219,10 @@ def driver_for(plan: Plan) -> Callable:
     A world starts at STAGE 1 with a step of 0 s (what that counts and books is not part of a run).
     """
     first_half, second_half = halves_for(plan)
+    leave = dismiss if plan.crew else nobody_to_dismiss
 
-    def advance(grains, contacts, near, far, clock, count, lost, rules, until, last):
+    @loop
+    def steps_until(grains, contacts, near, far, clock, count, lost, rules, until, last):
         """Steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""
         while True:
             if count[STAGE] == 0:
@@ -233,4 +238,9 @@ def driver_for(plan: Plan) -> Callable:
             if stop != Stop.STEPS_DONE:
                 return stop
 
-    return kernel(advance, keep=plan.keep)
+    def advance(grains, contacts, near, far, clock, count, lost, rules, until, last):
+        stop = steps_until(grains, contacts, near, far, clock, count, lost, rules, until, last)
+        leave(rules)
+        return stop
+
+    return kernel(advance, keep=plan.keep, alone=plan.crew)

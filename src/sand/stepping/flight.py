@@ -32,6 +32,7 @@ from ..kernels.cells import FULL, list_is_stale, make_far_list
 from ..kernels.outside import outside_energy, outside_wrap
 from .advance import halves_for
 from .control import GROW_EVERY, calm_steps
+from .crew import dismiss, nobody_to_dismiss
 from .parts import no_gas, stir_gas
 from .rules import Plan, Stop
 from .runge_kutta import GROW, error_of, loads_at_stage, next_factor, normalise_all, place_stage, trial_for, work_of
@@ -163,8 +164,10 @@ def flight_driver_for(plan: Plan) -> Callable:
     """The compiled `advance` of an adaptive run; as `advance.driver_for`, with the stages besides."""
     first_half, second_half = halves_for(plan)
     fly = flight_for(plan)
+    leave = dismiss if plan.crew else nobody_to_dismiss
 
-    def advance(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
+    @loop
+    def steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
         """Steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
         while True:
             stop = Stop.STEPS_DONE
@@ -183,4 +186,9 @@ def flight_driver_for(plan: Plan) -> Callable:
             if stop != Stop.STEPS_DONE:
                 return stop
 
-    return kernel(advance, keep=plan.keep)
+    def advance(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
+        stop = steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last)
+        leave(rules)
+        return stop
+
+    return kernel(advance, keep=plan.keep, alone=plan.crew)

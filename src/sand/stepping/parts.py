@@ -9,7 +9,7 @@ from ..core.jit import loop
 from ..core.vec import dot, load, sub
 from ..core.world import CONTACTS, CYCLE, GAS, GRAIN1, GRAIN2, KICKED, LEFT, OUTSIDE, STEP, STEPS, TIME
 from ..kernels.cells import FULL, list_is_stale, make_far_list
-from ..kernels.contacts import contact_pass, contact_step, sort_sides
+from ..kernels.contacts import contact_step, sort_sides
 from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, settle_flagged
 from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
@@ -93,10 +93,9 @@ def update_lists(grains, contacts, near, far, count, rules):
 
 
 @loop
-def update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh):
-    """Loads of all contacts; those beyond a limit break or move, `fresh` new ones form.  True if any broke."""
+def update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh, flagged):
+    """Contacts beyond a limit break or move, `fresh` new ones form.  True if any broke."""
     span, law, dt = rules.span, rules.contact, clock[STEP]
-    flagged = contact_pass(grains, contacts, count, span, law, dt)
     if law.follow:
         book_stiffness(grains, contacts, count, lost, span, dt)
     parted = flagged and settle_flagged(grains, contacts, near, count, lost, span, law, dt)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import Any, NamedTuple
 
-from ..kernels.far import NO_FAR_FORCE, FarSums
+from ..kernels.sums import NO_FAR_FORCE, FarSums
 from ..physics.surroundings import nothing
 
 
@@ -33,6 +33,7 @@ class Plan(NamedTuple):
     foretell: bool = False  # far loads by Taylor series inside a cycle
     gas: bool = False  # drag and Brownian kicks
     adaptive: bool = False  # Runge–Kutta steps while nothing touches
+    crew: bool = False  # large loops in blocks, for threads to share
     keep: bool = True  # the compiled code on disk, if all of it is ours
 
 
@@ -82,3 +83,4 @@ class Rules(NamedTuple):
     gas: Any
     control: Any
     precision: Any = ()  # adaptive.Precision, where there are Runge–Kutta steps
+    crew: Any = ()  # crew.Crew, where the plan has one

@@ -1,0 +1,135 @@
+"""A crew: threads that take parts of a step's large loops; who takes which changes no bit of the result.
+
+A loop is cut into blocks, by the size of the problem alone.  Whoever is free takes the next block from the board,
+the driver's own thread like all others, and each block is done by the same compiled function.  A helper that comes
+late, or that the system puts aside, only does less.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.atomics import fetch_add, give_way, read, write
+from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
+from ..core.world import CONTACTS
+from ..kernels.contacts import contact_pass, gather
+from .rules import Plan
+
+WORD, DONE, INSIDE, FLAGGED = 0, 8, 16, 24
+"""Places on the board, a line of the cache apart: the work at hand, its finished blocks, helpers at work, flags."""
+PLACES = 32
+PATIENCE = 4000
+"""Looks at the board before a waiting thread lets others run on its core."""
+CONTACTS_AT_ONCE = 512
+GRAINS_AT_ONCE = 2048
+"""Contacts and grains in a block: some 10 µs of work, and whole vectors."""
+_BITS = 24
+_MASK = (1 << _BITS) - 1
+
+
+CREW_FROM = 1000
+"""Fewest grains for which large loops are cut into blocks; below, a block is less work than to share it."""
+
+
+def is_large(grains: int) -> bool:
+    """True if a simulation of so many grains is for a crew, be it of one thread."""
+    return CAN_SHARE and grains >= CREW_FROM
+
+
+PASS, GATHER, FAR, LEAVE = range(1, 5)
+"""What a word on the board asks for: contacts, their loads at grains, long-range loads, the end."""
+
+
+class Crew(NamedTuple):
+    """What the threads share besides the world."""
+
+    board: Any  # (32,) int64; made anew for every call of the driver
+    step: Any  # (1,) float64: length of the step at hand [s]
+
+
+def new_crew() -> Crew:
+    """A board without work."""
+    return Crew(np.zeros(PLACES, np.int64), np.zeros(1))
+
+
+@loop
+def blocks_of(number, at_once):
+    """How many blocks of `at_once` there are in `number`."""
+    return (number + at_once - 1) // at_once
+
+
+@functools.cache
+def crew_for(plan: Plan) -> tuple[Callable, Callable]:
+    """The function that shares a task among all threads, and the kernel that a helper runs meanwhile."""
+    far_block = plan.far.parts.block
+
+    @shared
+    def do_block(task, b, grains, contacts, far, count, rules):
+        if task == PASS:
+            first = b * CONTACTS_AT_ONCE
+            last = min(first + CONTACTS_AT_ONCE, count[CONTACTS])
+            step = rules.crew.step[0]
+            if contact_pass(grains, contacts, np.uint64(first), np.uint64(last), rules.span, rules.contact, step):
+                write(rules.crew.board, FLAGGED, 1)
+        elif task == GATHER:
+            first = b * GRAINS_AT_ONCE
+            last = min(first + GRAINS_AT_ONCE, grains.mass.size)
+            gather(grains, contacts, np.uint64(first), np.uint64(last))
+        elif task == FAR:
+            far_block(grains, far, rules.span, rules.far, b)
+
+    @shared
+    def share(task, blocks, grains, contacts, far, count, rules):
+        board = rules.crew.board
+        write(board, DONE, 0)
+        write(board, WORD, (task << 2 * _BITS) | (blocks << _BITS))
+        while True:
+            b = fetch_add(board, WORD, 1) & _MASK
+            if b >= blocks:
+                break
+            do_block(task, b, grains, contacts, far, count, rules)
+            fetch_add(board, DONE, 1)
+        looks = 0
+        while read(board, DONE) < blocks:
+            looks += 1
+            if looks > PATIENCE:
+                give_way()
+
+    def help_along(grains, contacts, far, count, rules):
+        """Take blocks until the board says LEAVE."""
+        board = rules.crew.board
+        fetch_add(board, INSIDE, 1)
+        looks = 0
+        word = read(board, WORD)
+        while word >> 2 * _BITS != LEAVE:
+            looks += 1
+            if word & _MASK < (word >> _BITS) & _MASK:
+                # what is at hand may have changed since the look: what was taken is what this says
+                word = fetch_add(board, WORD, 1)
+                task, blocks, b = word >> 2 * _BITS, (word >> _BITS) & _MASK, word & _MASK
+                if task != LEAVE and b < blocks:
+                    do_block(task, b, grains, contacts, far, count, rules)
+                    fetch_add(board, DONE, 1)
+                looks = 0
+            elif looks > PATIENCE:
+                give_way()
+            word = read(board, WORD)
+        fetch_add(board, INSIDE, -1)
+
+    return share, kernel(help_along, keep=plan.keep, alone=True)
+
+
+@loop
+def nobody_to_dismiss(rules):
+    """Where there is no crew."""
+
+
+@rare
+def dismiss(rules):
+    """Send the helpers away, and wait until the last has left: then the arrays are the driver's alone."""
+    board = rules.crew.board
+    write(board, WORD, LEAVE << 2 * _BITS)
+    while read(board, INSIDE) > 0:
+        give_way()

@@ -1,0 +1,66 @@
+"""The large loops of a step, by one thread or by a crew."""
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+
+from ..core.atomics import read, write
+from ..core.jit import loop
+from ..core.world import CONTACTS, STEP
+from ..kernels.contacts import contact_pass, gather
+from .crew import CONTACTS_AT_ONCE, FAR, FLAGGED, GATHER, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
+from .rules import Plan
+
+
+@loop
+def _pass_alone(grains, contacts, far, clock, count, rules):
+    last = np.uint64(count[CONTACTS])
+    return contact_pass(grains, contacts, np.uint64(0), last, rules.span, rules.contact, clock[STEP])
+
+
+@loop
+def _gather_alone(grains, contacts, far, count, rules):
+    gather(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
+
+
+@functools.cache
+def large_loops(plan: Plan) -> tuple[Callable, Callable, Callable]:
+    """Pass over all contacts (True if any passed a limit), gathering of their loads, sum of the long-range loads."""
+    return _by_a_crew(plan) if plan.crew else _alone(plan)
+
+
+def _alone(plan: Plan) -> tuple[Callable, Callable, Callable]:
+    sum_far = plan.far.loads
+
+    @loop
+    def far_alone(grains, contacts, far, count, rules):
+        sum_far(grains, far, rules.span, rules.far)
+
+    return _pass_alone, _gather_alone, far_alone
+
+
+def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable]:
+    share, _ = crew_for(plan)
+    begin, _, end, far_blocks = plan.far.parts
+
+    @loop
+    def pass_together(grains, contacts, far, clock, count, rules):
+        rules.crew.step[0] = clock[STEP]
+        write(rules.crew.board, FLAGGED, 0)
+        blocks = blocks_of(count[CONTACTS], CONTACTS_AT_ONCE)
+        share(PASS, blocks, grains, contacts, far, count, rules)
+        return read(rules.crew.board, FLAGGED) > 0
+
+    @loop
+    def gather_together(grains, contacts, far, count, rules):
+        blocks = blocks_of(grains.mass.size, GRAINS_AT_ONCE)
+        share(GATHER, blocks, grains, contacts, far, count, rules)
+
+    @loop
+    def far_together(grains, contacts, far, count, rules):
+        begin(grains, far, rules.span, rules.far)
+        share(FAR, far_blocks(grains), grains, contacts, far, count, rules)
+        end(grains, far, rules.span, rules.far)
+
+    return pass_together, gather_together, far_together
