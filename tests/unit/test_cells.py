@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 import sand
 from sand.core.box import Box
 from sand.core.jit import kernel
-from sand.core.world import LISTED, MADE, REBUILT, far_arrays
+from sand.core.world import LISTED, MADE, PAIRS, REBUILT, far_arrays
 from sand.kernels import cells
 from sand.kernels.dipoles import CUT
 from sand.kernels.far import clear_far_loads
+from sand.kernels.neighbours import bond_of
 from sand.stepping.neighbours import Neighbours
 
 cut_loads = CUT.loads
@@ -68,6 +69,67 @@ def test_grains_on_the_walls_and_in_one_place():
     np.fill_diagonal(close, False)
     assert (rows(position, box, 0.3333) == close).all()
     assert rows(np.zeros((5, 3)), Box.open(), 1.0).sum() == 20
+
+
+BOXES = [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.3), (None, 0.7, None), (0.5, 0.5, 4.0), (4.0, 0.5, 0.5)]
+
+
+@pytest.mark.parametrize("lengths", BOXES)
+@pytest.mark.parametrize("reach", [0.02, 0.1, 0.166])
+def test_many_grains_in_thin_cells(lengths, reach):
+    """Thousands of grains, half of them in clumps, so that cells along x are thin: a search tree finds the same."""
+    rng = np.random.default_rng(7)
+    sides = np.array([length or 1.0 for length in lengths])
+    spread, clumps = (rng.random((1500, 3)) - 0.5) * sides, (rng.random((20, 3)) - 0.5) * sides
+    box = Box(lengths)
+    position = box.wrap(np.concatenate([spread, clumps[rng.integers(20, size=1500)] + rng.normal(0, 0.02, (1500, 3))]))
+    theirs = np.zeros((3000, 3000), int)
+    i, j = box.close_pairs(position, reach).T
+    theirs[i, j] = theirs[j, i] = 1
+    assert (rows(position, box, reach) == theirs).all()
+
+
+@pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.0)])
+@pytest.mark.parametrize("cells_across", [3, 4, 11])
+def test_both_grains_have_a_pair_or_neither(lengths, cells_across):
+    """Pairs that rounding puts now within reach, now beyond: the matrix is symmetric, and nothing stands in it twice.
+
+    A lattice as wide as the reach, moved to places that are no round numbers; its neighbours in x, y and z are ε apart
+    from the reach, on either side of it, also across the walls, and so close to the borders of cells.
+    """
+    box, reach = Box(lengths), 1.0 / cells_across
+    edge = (np.arange(cells_across) + 0.5) / cells_across - 0.5
+    doubtful = 0
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        lattice = np.stack(np.meshgrid(edge, edge, edge), -1).reshape(-1, 3) + rng.uniform(-0.3, 0.3, 3) / cells_across
+        crowd = lattice + rng.choice([-1e-16, 0.0, 1e-16], lattice.shape)
+        found = rows(rng.permutation(crowd), box, reach)
+        assert (found == found.T).all()
+        assert found.max() <= 1
+        doubtful += found.sum() not in (0, found.size)
+    assert doubtful > 5
+
+
+def test_grains_outside_a_periodic_box_are_where_their_images_are():
+    """Moved by whole lengths of the box: the same rows, as no pair is as near the reach as rounding moves it."""
+    rng = np.random.default_rng(3)
+    box, position = Box((1.0, None, 1.0)), rng.random((200, 3)) - 0.5
+    moved = position + rng.integers(-3, 4, (200, 3)) * [1.0, 0.0, 1.0]
+    assert (rows(moved, box, 0.21) == rows(position, box, 0.21)).all()
+
+
+@pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf, 1e300])
+def test_a_grain_that_is_nowhere_is_listed_nowhere(lengths, odd):
+    """A coordinate that is no number, or none to reckon with, harms nothing: its grain has no neighbours."""
+    position = np.random.default_rng(2).random((90, 3)) - 0.5
+    for axis in range(3):
+        spoilt = position.copy()
+        spoilt[40, axis] = odd
+        found = rows(spoilt, Box(lengths), 0.3)
+        assert found.max() <= 1
+        assert found[40].sum() == found[:, 40].sum() == 0 or np.isfinite(odd)
 
 
 def test_three_cells_are_needed():
@@ -149,6 +211,23 @@ def test_a_listed_run_is_the_run_of_all_pairs():
         ends.append(sim.grains.position.copy())
     assert np.abs(ends[1] - ends[0]).max() < 1e-9 * 1e-8
     assert np.abs(ends[2] - ends[0]).max() < 1e-9 * 1e-8
+
+
+def test_near_pairs_have_the_step_of_their_own_contact():
+    """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair are those of its bond, 1e-14."""
+    rng = np.random.default_rng(4)
+    block = sand.setup.lattice(5, radius="10 nm", material=sand.IRON)
+    radius = rng.choice([1e-8, 9e-9, 5e-9], 125)
+    mixed = sand.Grains(1.03 * block.position, radius, [sand.IRON if k % 3 else sand.SILICA for k in range(125)])
+    sim = sand.Simulation(mixed, [sand.Contact()])
+    sim.run(steps=1)
+    near, law, a = sim.world.near, sim._engine.rules.contact, sim.grains.arrays
+    pairs = sim.world.count[PAIRS]
+    assert pairs > 30
+    for p, (i, j) in enumerate(near.pair[:, :pairs].T):
+        bond = bond_of(a, law.pairings, i, j)
+        assert near.step[p] == pytest.approx(2 * np.pi / np.sqrt(bond.fastest) / law.per_period, rel=1e-14)
+        assert near.length[p] == pytest.approx(bond.break_overlap, rel=1e-14)
 
 
 def test_ringing_does_not_make_lists():

@@ -3,6 +3,8 @@
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..core.box import nearest_image
 from ..core.jit import kernel, loop, rare
 from ..core.vec import dot, load, put, sub
@@ -10,6 +12,12 @@ from ..core.world import CELLS_PER_GRAIN, LISTED
 
 FULL = -1
 """Answer of the makers of lists when the arrays are too short."""
+FINEST = 16
+"""Most cells along x in the width of one along y or z: more would shorten the stretches of a row by little."""
+SLACK = 1e-6
+"""Part of the square of the reach by which a stretch is longer than it need be, so that rounding cuts no pair off."""
+ROUNDING = 1e-6
+"""The same in cells: coordinates are counted in them, up to some 10⁹."""
 
 
 class Search(NamedTuple):
@@ -21,11 +29,14 @@ class Search(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Cells along each axis: their number, where the first begins [m], and how many there are in a metre."""
+    """Cells along each axis; along x they are thinner: a row of them is one stretch of places, however many it has."""
 
-    counts: Any  # (x, y, z)
-    low: Any
-    per_length: Any
+    counts: Any  # how many, (x, y, z)
+    low: Any  # where the first begins [m]
+    per_length: Any  # how many there are in a metre, 0 where all grains are in one plane
+    fine: Any  # so many together along x are at least as wide as the reach
+    width_y: Any  # [m]
+    width_z: Any
 
 
 @loop
@@ -55,7 +66,8 @@ def axis_of_grid(low, high, length, reach):
 def grid_for(anchor, span, reach):
     """Cells at least `reach` wide, at most CELLS_PER_GRAIN per grain and never fewer than 27 in all.
 
-    Open axes are cut where the outermost grains are.  On periodic axes the box must be three cells wide.
+    Open axes are cut where the outermost grains are.  On periodic axes the box must be three cells wide.  Along x
+    each is cut once more, into FINEST or until there is a cell for each grain.
     """
     low, high = load(anchor, 0), load(anchor, 0)
     for i in range(anchor.shape[1]):
@@ -68,7 +80,9 @@ def grid_for(anchor, span, reach):
         ny, ly, py = axis_of_grid(low[1], high[1], span.y, y)
         nz, lz, pz = axis_of_grid(low[2], high[2], span.z, z)
         if nx * ny * nz <= CELLS_PER_GRAIN * anchor.shape[1] + 27 or max(nx, ny, nz) <= 3:
-            return Grid((nx, ny, nz), (lx, ly, lz), (px, py, pz))
+            fine = max(1, min(anchor.shape[1] // (nx * ny * nz), FINEST))
+            wide_y, wide_z = 1.0 / py if py > 0.0 else 0.0, 1.0 / pz if pz > 0.0 else 0.0
+            return Grid((nx * fine, ny, nz), (lx, ly, lz), (px * fine, py, pz), fine, wide_y, wide_z)
         # the axis with most cells takes larger ones
         if nx >= ny and nx >= nz:
             x *= 1.25
@@ -79,24 +93,31 @@ def grid_for(anchor, span, reach):
 
 
 @loop
-def place_on_axis(x, low, per_length, number):
-    """The cell of a coordinate; what lies outside (or is not a number) counts to the cell at the end."""
-    return max(0, min(math.floor((x - low) * per_length), number - 1))
+def in_cells(grid, x):
+    """A place [m] counted in cells along each axis."""
+    return (
+        (x[0] - grid.low[0]) * grid.per_length[0],
+        (x[1] - grid.low[1]) * grid.per_length[1],
+        (x[2] - grid.low[2]) * grid.per_length[2],
+    )
 
 
 @loop
-def sort_into_cells(far, grid):
-    """Fill `home`, `cell` and `order`: grains by cell, in each cell by number."""
+def cell_at(x, number):
+    """The cell of a coordinate; what lies outside (or is not a number) counts to the cell at the end."""
+    return max(0, min(math.floor(x), number - 1))
+
+
+@loop
+def sort_into_cells(far, span, grid):
+    """Fill `home`, `cell`, `order` and `here`: grains by cell, in each cell by number."""
     nx, ny, nz = grid.counts
     total = nx * ny * nz
     for c in range(total + 1):
         far.cell[c] = 0
     for i in range(far.anchor.shape[1]):
-        x = load(far.anchor, i)
-        cx = place_on_axis(x[0], grid.low[0], grid.per_length[0], nx)
-        cy = place_on_axis(x[1], grid.low[1], grid.per_length[1], ny)
-        cz = place_on_axis(x[2], grid.low[2], grid.per_length[2], nz)
-        home = (cz * ny + cy) * nx + cx
+        x = in_cells(grid, nearest_image(load(far.anchor, i), span))
+        home = (cell_at(x[2], nz) * ny + cell_at(x[1], ny)) * nx + cell_at(x[0], nx)
         far.home[i] = home
         far.cell[home + 1] += 1
     for c in range(total):
@@ -104,7 +125,9 @@ def sort_into_cells(far, grid):
     # each `cell[c]` serves as the place of its next grain, and is put back afterwards
     for i in range(far.anchor.shape[1]):
         home = far.home[i]
-        far.order[far.cell[home]] = i
+        s = far.cell[home]
+        far.order[s] = i
+        put(far.here, s, nearest_image(load(far.anchor, i), span))
         far.cell[home] += 1
     for k in range(total):
         c = total - k
@@ -124,37 +147,82 @@ def neighbour_on_axis(c, step, number, periodic):
 
 
 @loop
-def list_cell(far, span, limit, s, first, last, found):
-    """Append the grains at places first…last − 1 that are close to the one at place s; FULL if there is no room."""
-    here = load(far.anchor, far.order[s])
-    for t in range(first, last):
-        apart = nearest_image(sub(here, load(far.anchor, far.order[t])), span)
-        if t != s and dot(apart, apart) < limit:
-            if found == far.mate.size:
-                return FULL
-            far.mate[found] = t
-            found += 1
+def gap_on_axis(x, c, step, width):
+    """How far [m] a coordinate, counted in cells, is from the cell `step` further; never too much by rounding."""
+    gap = c + 1.0 - x if step > 0 else x - c
+    return max(0.0, gap - ROUNDING) * width if step != 0 else 0.0
+
+
+@loop
+def list_stretch(far, span, limit, s, first, last, found):
+    """Append those of the places first…last − 1 that are close to place s; FULL if there is no room for all.
+
+    Distances first, in a loop that vectorises; then each place is written down, and kept if it is close: no branch
+    has to be guessed.  The distance is odd in its two grains to the last bit, so that both have the pair or neither.
+    """
+    here, length = load(far.here, s), last - first
+    if found + np.int64(length) > far.mate.size:
+        return FULL
+    for k in range(length):
+        apart = nearest_image(sub(here, load(far.here, first + k)), span)
+        far.source[0, k] = dot(apart, apart)
+    if first <= s < last:
+        far.source[0, s - first] = math.inf
+    end = np.uint64(found)
+    for k in range(length):
+        far.mate[end] = first + k
+        end += np.uint64(far.source[0, k] < limit)
+    return np.int64(end)
+
+
+@loop
+def list_row(far, grid, span, limit, s, x, row, left, found):
+    """Append the neighbours of place s in the row of cells from `row` on; FULL if there is no room.
+
+    Those within ±√left [m] along x are looked at.  Beyond a periodic wall they are a stretch of their own.
+    """
+    nx = grid.counts[0]
+    wide, home = math.sqrt(left) * grid.per_length[0] + ROUNDING, cell_at(x, nx)
+    # never more cells than hold the reach: in a box of three, one more would be met from both sides;
+    # never fewer than one, should a coordinate be no number
+    low = min(max(math.floor(x - wide), home - grid.fine), home)
+    high = max(min(math.floor(x + wide), home + grid.fine), home)
+    first, last = max(low, 0), min(high, nx - 1) + 1
+    for _ in range(2):
+        begin, end = np.uint64(far.cell[row + first]), np.uint64(far.cell[row + last])
+        found = list_stretch(far, span, limit, np.uint64(s), begin, end, found)
+        if found == FULL or not (span.x > 0.0 and (low < 0 or high >= nx)):
+            break
+        first, last = (low + nx, nx) if low < 0 else (0, high - nx + 1)
     return found
 
 
 @rare
 def rows_from_anchors(far, span, reach):
-    """Order, rows and mates from the anchors alone; the number of entries, or FULL."""
+    """Order, rows and mates from the anchors alone; the number of entries, or FULL.
+
+    `here` and the first row of `source` serve meanwhile: anchors by place, and distances.  A row of `mate` needs
+    nothing of the rows before it but the place where it begins: blocks of places can be listed apart, each with
+    room for distances of its own, and be put together in their order.
+    """
     grid = grid_for(far.anchor, span, reach)
-    sort_into_cells(far, grid)
+    sort_into_cells(far, span, grid)
     nx, ny, nz = grid.counts
+    widest = (1.0 + SLACK) * reach * reach
     found = 0
     far.start[0] = 0
     for s in range(far.anchor.shape[1]):
-        home = int(far.home[far.order[s]])
-        cx, cy, cz = home % nx, home // nx % ny, home // (nx * ny)
-        for step in range(27):
-            tx = neighbour_on_axis(cx, step % 3 - 1, nx, span.x > 0.0)
-            ty = neighbour_on_axis(cy, step // 3 % 3 - 1, ny, span.y > 0.0)
-            tz = neighbour_on_axis(cz, step // 9 - 1, nz, span.z > 0.0)
-            if tx >= 0 and ty >= 0 and tz >= 0:
-                there = (tz * ny + ty) * nx + tx
-                found = list_cell(far, span, reach * reach, s, far.cell[there], far.cell[there + 1], found)
+        x = in_cells(grid, load(far.here, s))
+        cy, cz = cell_at(x[1], ny), cell_at(x[2], nz)
+        for step in range(9):
+            dy, dz = step % 3 - 1, step // 3 - 1
+            ty = neighbour_on_axis(cy, dy, ny, span.y > 0.0)
+            tz = neighbour_on_axis(cz, dz, nz, span.z > 0.0)
+            gap_y, gap_z = gap_on_axis(x[1], cy, dy, grid.width_y), gap_on_axis(x[2], cz, dz, grid.width_z)
+            left = widest - gap_y * gap_y - gap_z * gap_z
+            if ty >= 0 and tz >= 0 and left > 0.0:
+                row = (tz * ny + ty) * nx
+                found = list_row(far, grid, span, reach * reach, s, x[0], row, left, found)
                 if found == FULL:
                     return FULL
         far.start[s + 1] = found

@@ -1,6 +1,7 @@
 """The list of pairs that may touch soon."""
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,22 +47,40 @@ def in_contact(contacts, i, j):
     return False
 
 
+class Kind(NamedTuple):
+    """What the constants of a pair's contact depend on, and what the list keeps of them."""
+
+    grains: Any  # material, radius [m] and mass [kg] of each
+    step: Any  # the step that a contact needs [s]
+    length: Any  # δ at which it breaks [m]
+
+
+NO_GRAIN = (np.uint32(0), -1.0, -1.0)
+NO_KIND = Kind((NO_GRAIN, NO_GRAIN), 0.0, 0.0)
+
+
 @loop
-def list_if_near(grains, contacts, near, span, reach, law, i, j, found):
-    """Append the pair i > j if its gap is below `reach` [m]; the number of pairs then, or FULL."""
+def make_of(grains, i):
+    """All that the bonds of grain i depend on."""
+    return grains.material[i], grains.radius[i], grains.mass[i]
+
+
+@loop
+def kind_of(grains, law, i, j, last):
+    """The kind of a pair: the `last` one if it is the same, as its powers cost more than all else."""
+    a, b = make_of(grains, i), make_of(grains, j)
+    if (a, b) == last.grains:
+        return last
+    bond = bond_of(grains, law.pairings, i, j)
+    return Kind((a, b), 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period, bond.break_overlap)
+
+
+@loop
+def are_near(grains, span, reach, i, j):
+    """True if the gap of two grains is below `reach` [m]."""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     limit = grains.radius[i] + grains.radius[j] + reach
-    if not dot(apart, apart) < limit * limit:
-        return found
-    if found == near.pair.shape[1]:
-        return FULL
-    near.pair[0, found] = i
-    near.pair[1, found] = j
-    near.touching[found] = 1 if in_contact(contacts, i, j) else 0
-    bond = bond_of(grains, law.pairings, i, j)
-    near.step[found] = 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period
-    near.length[found] = bond.break_overlap
-    return found + 1
+    return dot(apart, apart) < limit * limit
 
 
 @rare
@@ -70,16 +89,20 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, listed)
 
     FULL if there is no room.
     """
-    found = 0
+    found, kind = 0, NO_KIND
     for k in range(grains.mass.size if law.on else 0):
         first, last = (far.start[k], far.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
         i = far.order[k] if listed else np.uint32(k)
         for m in range(first, last):
             j = far.order[far.mate[m]] if listed else np.uint32(m)
-            if j < i:
-                found = list_if_near(grains, contacts, near, span, reach, law, i, j, found)
-                if found == FULL:
+            if j < i and are_near(grains, span, reach, i, j):
+                if found == near.pair.shape[1]:
                     return FULL
+                kind = kind_of(grains, law, i, j, kind)
+                near.pair[0, found], near.pair[1, found] = i, j
+                near.touching[found] = 1 if in_contact(contacts, i, j) else 0
+                near.step[found], near.length[found] = kind.step, kind.length
+                found += 1
     for i in range(grains.mass.size):
         put(near.anchor, i, load(grains.position, i))
     count[PAIRS] = found
