@@ -82,7 +82,7 @@ export class Studio {
         if (this.busy) download(film, `${name}.webm`);
       }
       if (!this.busy) return "Stopped: nothing was saved.";
-      return missing.length ? `Left out, because they could not be read: frames ${missing.join(", ")}.` : "";
+      return missing.length ? `Left out, because they could not be shown: frames ${missing.join(", ")}.` : "";
     } finally {
       this.busy = app.picture.patient = false;
       await app.go(before);
