@@ -60,18 +60,21 @@ def test_every_colouring_has_its_legend(view):
 
 
 def test_numbers_of_the_legend(view):
-    """They are the ends of the range, in the unit that is named; From and To are in SI."""
+    """They are the ends of the range, in the unit that is named; From and To are in SI; angles take no prefix."""
     view.put(colour="spin")
     view.control("low").fill("1e8")
     view.control("low").press("Enter")
     view.control("high").fill("4e8")
     view.control("high").press("Enter")
     view.settle()
-    assert "spin (Mrad/s)" in legend(view)
-    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["100", "250", "400"]
+    assert "spin (rad/s)" in legend(view)
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["1×10⁸", "2.5×10⁸", "4×10⁸"]
     view.control("log").click()
     view.settle()
-    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["100", "200", "400"]
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["1×10⁸", "2×10⁸", "4×10⁸"]
+    view.put(colour="speed", low=1e3, high=4e3, log=False)
+    assert "speed (km/s)" in legend(view)
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["1", "2.5", "4"]
 
 
 def test_no_number_is_taken_back(view):

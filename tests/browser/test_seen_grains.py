@@ -58,6 +58,7 @@ def check_row(view: View, tables: dict, grain: int) -> None:
         # components have three digits: half of the last one of the largest is 5e-3 of it at most
         agree(row[name], vector, 5e-3) if vector.any() else None
         size(row[name], float(np.linalg.norm(vector)))
+    assert row["spin"].split("\n")[0].split(" ")[1:] == ["rad/s"], "angles take no prefix"
     assert int(row["contacts"]) == (frame.pair == grain).sum()
     v, w = np.linalg.norm(frame.velocity[grain]), np.linalg.norm(frame.spin[grain])
     energy = 0.5 * frame.mass[grain] * (float(v) ** 2 + 0.4 * frame.radius[grain] ** 2 * float(w) ** 2)

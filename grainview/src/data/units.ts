@@ -2,8 +2,8 @@
 
 const PREFIXES = ["y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"];
 
-/** Units that take a prefix; others, as A m², get a power of ten. */
-const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "rad/s", "kg", "C"]);
+/** Units that take a prefix; others, as A m², get a power of ten. So do rad/s: nobody says Grad/s. */
+const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "kg", "C"]);
 
 /** A number with at most `count` digits: 0.001234, 1.234×10⁻⁷, −12.3; null is what JSON has for NaN. */
 export function digits(value: number | null, count = 4): string {
