@@ -183,7 +183,10 @@ export class App {
     if (id === "grain" && this.state.get<boolean>("follow")) this.choosing.turnTo();
     const aims = (id === "follow" || id === "isolate") && this.state.get<boolean>(id);
     if (aims && this.state.number("grain") < 0) this.tellBriefly("Choose a grain first: click it, or press y.");
-    if (!QUIET.has(id)) this.redress();
+    if (QUIET.has(id)) return;
+    const before = this.picture.shown;
+    this.redress();
+    if (id === "isolate" || id === "grain") this.views.turnToAlone(before);
   }
 
   private applyLook(): void {
