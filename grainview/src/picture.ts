@@ -5,6 +5,7 @@ import { bondPaint, bondPieces, loadScale } from "./data/bonds";
 import { maskOf, wholePositions } from "./data/clusters";
 import { paint, type Painted, type Scale } from "./data/colours";
 import type { Frames } from "./data/frames";
+import { type KeyPart, keyOf } from "./data/key";
 import { coverOf } from "./data/openness";
 import { type Known, QUANTITIES, type Quantity } from "./data/quantities";
 import { type Frame, SINGLE } from "./data/types";
@@ -48,6 +49,12 @@ export class Picture {
   /** Which grains are shown; null: all. */
   get shown(): Uint8Array | null {
     return this.world.shown;
+  }
+
+  /** What its colours mean. */
+  get key(): KeyPart[] {
+    const { painted, bondScale: scale } = this;
+    return painted && scale ? keyOf(this.quantity, painted, this.known, { kind: this.state.get("bonds"), scale }) : [];
   }
 
   setFrame(frame: Frame): void {
