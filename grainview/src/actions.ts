@@ -40,7 +40,7 @@ export function actionsOf(app: App): Action[] {
       run: () => void (app.studio.stop() || app.choosing.clear()),
     },
     { id: "centre", label: "Centre on what is chosen, or on all", keys: ["z"], run: () => app.views.centre() },
-    { id: "reset", label: "Camera as at first", keys: ["r", "0"], run: () => app.views.reset() },
+    { id: "reset", label: "All in sight", keys: ["r", "0"], run: () => app.views.reset() },
     ...ALONG.map(([name, from, up], k) => ({
       id: `along-${name}`, label: `Look along ${name}`, keys: [String(k + 1)],
       run: () => void (app.stage.look = { ...app.stage.look, from, up }),

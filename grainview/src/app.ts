@@ -183,7 +183,10 @@ export class App {
     if (id === "grain" && this.state.get<boolean>("follow")) this.choosing.turnTo();
     const aims = (id === "follow" || id === "isolate") && this.state.get<boolean>(id);
     if (aims && this.state.number("grain") < 0) this.tellBriefly("Choose a grain first: click it, or press y.");
-    if (!QUIET.has(id)) this.redress();
+    if (QUIET.has(id)) return;
+    const before = this.picture.shown;
+    this.redress();
+    if (id === "isolate" || id === "grain") this.views.turnToAlone(before);
   }
 
   private applyLook(): void {
@@ -247,20 +250,17 @@ export class App {
 
   /** Draw the frame anew with the settings of now. */
   redress(): void {
-    const { picture, state } = this;
+    const { picture } = this;
     if (!picture.frame) return;
     picture.dress(this.player.playing);
     this.stage.reach = picture.reachFrom(this.stage.look.target);
     this.overlay.field = fieldDirection(this.manifest, picture.frame.frame);
     this.choosing.show();
-    const bonds = { kind: state.get<string>("bonds"), scale: picture.bondScale!, count: picture.frame.pair.length / 2 };
-    const choose = (grain: number): void => this.choosing.choose(grain);
-    if (picture.painted) {
-      replaceKeepingFocus(this.page.legend, legend(picture.quantity, picture.painted, this.known, bonds, choose));
-    }
+    replaceKeepingFocus(this.page.legend, legend(picture.key, (grain) => this.choosing.choose(grain)));
     const scaled = picture.quantity.kind === "sequential";
     for (const id of ["palette", "log", "low", "high"]) this.panel.enable(id, scaled);
-    const told = `${this.manifest.grains} grains, ${bonds.count} contacts, coloured by ${picture.quantity.label}`;
+    const contacts = picture.frame.pair.length / 2;
+    const told = `${this.manifest.grains} grains, ${contacts} contacts, coloured by ${picture.quantity.label}`;
     this.page.canvas.setAttribute("aria-label", `${told}; press ? for keys`);
   }
 

@@ -1,6 +1,6 @@
 // Choosing grains, contacts and clusters, and what follows from it: rows of numbers, marks, a camera that goes along.
 
-import { clusterSizes, measureCluster, membersOf, nearest } from "./data/clusters";
+import { clusterSizes, maskOf, measureCluster, membersOf, nearest } from "./data/clusters";
 import type { Known } from "./data/quantities";
 import { type Dimension, SINGLE, type Source } from "./data/types";
 import { quantity } from "./data/units";
@@ -105,6 +105,13 @@ export class Choosing {
     this.state.set("ends", "");
     this.state.set("contact", "");
     this.state.set("grain", -1);
+  }
+
+  /** The chosen cluster as a mask; null: none is chosen, or a single grain. */
+  cluster(): Uint8Array | null {
+    const { frame } = this.picture;
+    const grain = this.state.number("grain");
+    return frame && grain >= 0 && !isSingle(frame, grain) ? maskOf(frame, grain) : null;
   }
 
   /** Middle of the chosen cluster, or of the contact, or null. */

@@ -2,9 +2,10 @@
 
 import * as three from "three";
 import { bondPaint, bondPieces, loadScale } from "./data/bonds";
-import { wholePositions } from "./data/clusters";
+import { maskOf, wholePositions } from "./data/clusters";
 import { paint, type Painted, type Scale } from "./data/colours";
 import type { Frames } from "./data/frames";
+import { type KeyPart, keyOf } from "./data/key";
 import { coverOf } from "./data/openness";
 import { type Known, QUANTITIES, type Quantity } from "./data/quantities";
 import { type Frame, SINGLE } from "./data/types";
@@ -48,6 +49,12 @@ export class Picture {
   /** Which grains are shown; null: all. */
   get shown(): Uint8Array | null {
     return this.world.shown;
+  }
+
+  /** What its colours mean. */
+  get key(): KeyPart[] {
+    const { painted, bondScale: scale } = this;
+    return painted && scale ? keyOf(this.quantity, painted, this.known, { kind: this.state.get("bonds"), scale }) : [];
   }
 
   setFrame(frame: Frame): void {
@@ -97,9 +104,7 @@ export class Picture {
 
   private shownGrains(frame: Frame): Uint8Array | null {
     const grain = this.state.number("grain");
-    if (!this.state.get<boolean>("isolate") || grain < 0) return null;
-    const name = frame.cluster[grain];
-    return Uint8Array.from(frame.cluster, (n, i) => Number(name === SINGLE ? i === grain : n === name));
+    return this.state.get<boolean>("isolate") && grain >= 0 ? maskOf(frame, grain) : null;
   }
 
   /** Trails come when their frames have come. */
@@ -137,8 +142,11 @@ export class Picture {
     return Math.max(this.world.reachFrom(target), Math.hypot(...this.boxed) / 2 + Math.hypot(...target));
   }
 
-  /** Height of the picture that holds all there is, its middle a target; of both cameras, whichever needs more. */
-  heightFor(target: number[], from: number[], up: number[], aspect: number): number {
+  /**
+   * Height of the picture that holds the grains of a mask (null: all there is, the box too), its middle a target; of
+   * both cameras, whichever needs more.
+   */
+  heightFor(target: number[], from: number[], up: number[], aspect: number, mask: Uint8Array | null): number {
     const away = new three.Vector3(...from).normalize();
     const side = new three.Vector3(...up).cross(away).normalize();
     const upwards = new three.Vector3().crossVectors(away, side);
@@ -151,11 +159,11 @@ export class Picture {
       const height = 2 * half + Math.max(v.dot(away), 0) / 2;
       if (height > most) most = height; // what is nowhere is held by none
     };
-    const { place, shown } = this;
+    const { place } = this;
     this.known.grains.radius.forEach((r, i) => {
-      if (!shown || shown[i]) hold(place[3 * i], place[3 * i + 1], place[3 * i + 2], (ARROW / 2) * r);
+      if (!mask || mask[i]) hold(place[3 * i], place[3 * i + 1], place[3 * i + 2], (ARROW / 2) * r);
     });
-    const [a, b, c] = this.boxed.map((length) => length / 2);
+    const [a, b, c] = mask ? [0, 0, 0] : this.boxed.map((length) => length / 2);
     if (a) for (const x of [-a, a]) for (const y of [-b, b]) for (const z of [-c, c]) hold(x, y, z, 0);
     return most || 1;
   }

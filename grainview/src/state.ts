@@ -30,7 +30,7 @@ export const SETTINGS: Setting[] = [
   { id: "arrows", label: "Moments", group: "Show", kind: "toggle", initial: true, key: "m" },
   { id: "box", label: "Box", group: "Show", kind: "toggle", initial: true, key: "x" },
   { id: "field", label: "Field and axes", group: "Show", kind: "toggle", initial: true, key: "f" },
-  { id: "whole", label: "Keep clusters whole", group: "Show", kind: "toggle", initial: false, key: "w" },
+  { id: "whole", label: "Keep clusters whole", group: "Show", kind: "toggle", initial: true, key: "w" },
   { id: "isolate", label: "Only the chosen cluster", group: "Show", kind: "toggle", initial: false, key: "i" },
   { id: "trails", label: "Trails (frames)", group: "Show", kind: "range", initial: 0, from: 0, to: 40, by: 1,
     key: "t", down: "T" },

@@ -17,29 +17,40 @@ export class Views {
     private readonly choosing: Choosing,
   ) {}
 
-  /** All that is shown and the box, from above a corner if not told otherwise. */
-  whole(from: Place = [0.52, -0.74, 0.43], up: Place = [0, 0, 1]): Look {
-    const { place, shown } = this.picture;
+  /** The grains of a mask, or all that is shown and the box; from above a corner if not told otherwise. */
+  whole(from: Place = [0.52, -0.74, 0.43], up: Place = [0, 0, 1], mask = this.picture.shown): Look {
+    const { place } = this.picture;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (let e = 0; e < place.length; e++) {
-      if ((shown && !shown[Math.floor(e / 3)]) || !Number.isFinite(place[e])) continue;
+      if ((mask && !mask[Math.floor(e / 3)]) || !Number.isFinite(place[e])) continue;
       low[e % 3] = Math.min(low[e % 3], place[e]);
       high[e % 3] = Math.max(high[e % 3], place[e]);
     }
     const target = low.map((l, a) => (l + high[a]) / 2 || 0) as Place;
-    return { target, from, up, height: MARGIN * this.picture.heightFor(target, from, up, this.stage.aspect) };
+    return { target, from, up, height: MARGIN * this.picture.heightFor(target, from, up, this.stage.aspect, mask) };
   }
 
   reset(): void {
     this.stage.look = this.whole();
   }
 
-  /** The middle of what is chosen becomes that of the picture; without anything chosen, all is in sight. */
+  /**
+   * What is chosen comes into the middle of the picture, a cluster as large as it fits; a contact or a single grain
+   * keeps its size, so that one sees where it is.  Without anything chosen, all is in sight.
+   */
   centre(): void {
-    const middle = this.choosing.middle();
-    if (middle) this.stage.look = { ...this.stage.look, target: middle as Place };
-    else this.stage.look = this.whole(this.stage.look.from, this.stage.look.up);
+    const { look } = this.stage;
+    const [cluster, middle] = [this.choosing.cluster(), this.choosing.middle()];
+    if (cluster || !middle) this.stage.look = this.whole(look.from, look.up, cluster ?? undefined);
+    else this.stage.look = { ...look, target: middle as Place };
+  }
+
+  /** Another cluster than before (a mask, null: all were shown) stands alone: it is as large as it fits. */
+  turnToAlone(before: Uint8Array | null): void {
+    const { shown } = this.picture;
+    if (!shown || (before && shown.every((on, i) => on === before[i]))) return;
+    this.stage.look = this.whole(this.stage.look.from, this.stage.look.up);
   }
 
   /** Go around the target: to the right and upwards [rad]. */

@@ -84,12 +84,14 @@ class View:
         page: the tab.
         shown: the run.
         source: of SOURCES.
-        settings: of the page, as its address has them; `look` as ten numbers.
+        settings: of the page, as its address has them; `look` as ten numbers.  Unless `whole` says otherwise, clusters
+            are cut by the faces of the box, as the positions of the file are.
     """
 
     def __init__(self, page: Page, shown: Shown, source: str = "server", **settings: Any):
         self.page, self.shown, self.ortho = page, shown, bool(settings.get("ortho"))
         self.frame = shown.frames[settings.get("frame", 0)]
+        settings.setdefault("whole", 0)
         if "look" in settings:
             settings["look"] = ",".join(f"{v:.5g}" for v in settings["look"])
         page.goto(shown.url[source] + "#" + "&".join(f"{name}={value}" for name, value in settings.items()))

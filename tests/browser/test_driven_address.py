@@ -13,7 +13,7 @@ from .small_runs import FRAMES, SmallRun
 SHARED = [
     {"frame": 3, "colour": "speed", "palette": "viridis", "low": 1e-3, "high": 8.5, "log": True, "theme": "dark"}
     | {"contact": "1-2", "bonds": "load", "size": 0.3, "box": False, "field": False, "speed": 7, "loop": True},
-    {"frame": 5, "size": 0.45, "arrows": False, "bonds": "mode", "bar": 0.3, "ortho": True, "whole": True, "grain": 2}
+    {"frame": 5, "size": 0.45, "arrows": False, "bonds": "mode", "bar": 0.3, "ortho": True, "whole": False, "grain": 2}
     | {"measure": True, "ends": "10-11", "live": False},
     {"frame": 6, "grain": 6, "isolate": True, "follow": True, "trails": 4, "shade": 1, "plot": "losses"},
 ]
@@ -58,7 +58,7 @@ def test_a_shared_address_shows_the_same(tabs, address, settings):
     theirs.open(shared)
     assert everything(theirs) == everything(mine)
     # the address has six digits of the camera: a pixel at an edge may fall to the other side
-    assert differ(mine.picture(), theirs.picture(), by=8) <= 40
+    assert differ(mine.picture(), theirs.picture(), by=8) <= 60
     for part in (".gv-legend", ".gv-time"):
         assert theirs.text(part) == mine.text(part)
     # what an address says is the same whoever opens it, and as often as it is opened
@@ -80,7 +80,6 @@ def test_an_address_is_edited_in_place(tabs, address):
     view.open(address)
     view.run("window.stillHere = true")
     view.put(bonds="off", grain=4)
-    first = view.look()
     view.tab.evaluate("() => { location.hash = 'frame=4&colour=radius&look=1,2,3,1,0,0,0,0,1,30'; }")
     view.tab.wait_for_timeout(50)
     view.settle()
@@ -91,9 +90,9 @@ def test_an_address_is_edited_in_place(tabs, address):
     view.tab.evaluate("() => { location.hash = 'frame=4'; }")
     view.tab.wait_for_timeout(50)
     view.settle()
-    assert view.look()["height"] == pytest.approx(first["height"], rel=0.1)
     assert view.tab.evaluate("() => window.stillHere")
     other.open(address + "#frame=4")
+    assert view.look() == other.look()
     assert differ(view.picture(), other.picture()) == 0
 
 

@@ -166,7 +166,7 @@ def test_one_unreadable_frame(view, file, tmp_path, content):
         view.run("app.studio.make({ kind: 'sequence', width: 64, height: 64, from: 2, to: 4 })")
     with zipfile.ZipFile(coming.value.path()) as files:
         assert files.namelist() == ["frame-000002.png", "frame-000004.png"]
-    view.tab.locator(".gv-note", has_text="frames 3").wait_for()
+    view.tab.locator(".gv-note", has_text="could not be shown: frames 3.").wait_for()
     view.open(view.tab.url.split("#")[0] + "#frame=3")  # the address of that frame opens what is next to it
     assert view.run("app.picture.frame.frame") == 2 and "frame-3" in note.inner_text()
 

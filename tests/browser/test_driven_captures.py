@@ -13,7 +13,9 @@ import pytest
 from .driving import Driven, differ, image
 
 
-def saved(view: Driven, kind: str = "png", *, clear: bool = False, **fields: int) -> tuple[str, bytes]:
+def saved(
+    view: Driven, kind: str = "png", *, clear: bool = False, words: bool = True, **fields: int
+) -> tuple[str, bytes]:
     """Name and content of what the dialog gives."""
     view.press("s")
     view.tab.locator("#gv-cap-kind").select_option(kind)
@@ -21,6 +23,7 @@ def saved(view: Driven, kind: str = "png", *, clear: bool = False, **fields: int
         view.tab.locator(f"#gv-cap-{name}").fill(str(value))
     if kind != "webm":
         view.tab.locator("#gv-cap-clear").set_checked(clear)
+    view.tab.locator("#gv-cap-words").set_checked(words)
     with view.tab.expect_download() as coming:
         view.tab.get_by_role("button", name="Save").click()
     view.tab.wait_for_selector(".gv-note", state="hidden")
@@ -55,7 +58,7 @@ def test_a_picture_has_its_size(untouched, size):
 def test_a_picture_shows_what_the_page_shows(untouched):
     """Drawn as large as the page has it, it differs at edges only: these are smoother."""
     shape = untouched.picture().shape
-    picture = image(saved(untouched, width=shape[1], height=shape[0])[1]).astype(int)
+    picture = image(saved(untouched, words=False, width=shape[1], height=shape[0])[1]).astype(int)
     page = untouched.picture().astype(int)
     far = np.abs(picture - page).max(axis=-1) > 40
     assert far.mean() < 0.03
@@ -72,6 +75,64 @@ def test_a_transparent_picture(view, theme):
     assert 0.002 < opaque < 0.5
     solid = image(saved(view, width=400, height=300)[1])
     assert (np.abs(solid.astype(int) - picture)[picture[..., 3] == 255].max(axis=-1) <= 3).mean() > 0.98
+
+
+def written(view: Driven, **fields: int) -> tuple[np.ndarray, np.ndarray]:
+    """A picture with words (H, W, 3), and where it differs from the one without (H, W)."""
+    _, plain = saved(view, words=False, **fields)
+    _, told = saved(view, **fields)
+    both = image(told)[..., :3].astype(int)
+    return both, (np.abs(both - image(plain)[..., :3]) > 8).any(-1)
+
+
+@pytest.mark.parametrize(("width", "height"), [(800, 500), (1600, 1000)])
+def test_the_legend_on_a_picture(view, width, height):
+    """A bar of the palette's 64 colours, as wide as 200 pixels in a picture 800 wide; nothing where nothing belongs."""
+    view.put(colour="speed", bonds="plain")
+    grow = width // 800
+    both, words = written(view, width=width, height=height)
+    palette = np.array(view.run("Object.values(app.manifest.palettes)[0]"))
+    columns = np.round((14 + 200 * np.arange(1, 63) / 63) * grow).astype(int)
+    off = np.abs(both[:, columns] - palette[1:63]).max(axis=(1, 2))
+    assert (off < 9).sum() >= 8 * grow, "no row of pixels has the colours of the palette"
+    rows, columns = np.nonzero(words)
+    left, right = columns < 240 * grow, columns > width - 200 * grow
+    assert (left & (rows < 110 * grow) | right & (rows > height - 50 * grow)).all()
+    assert not words[: 6 * grow].any() and not words[-6 * grow :].any()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("height", [500, 900])
+def test_the_bar_of_length_on_a_picture(view, theme, height):
+    """As long as a round number of metres is at the centre: height of the picture over that of the look, in pixels.
+
+    Its line is 1.6 pixels thick, so that it has four fifths of its colour in each of two rows; ends are off by a pixel.
+    """
+    view.put(theme=theme, ortho=True)
+    both, words = written(view, width=800, height=height)
+    ink = (np.abs(both - ([34, 38, 43] if theme == "light" else [232, 230, 223])).max(-1) < 80) & words
+    ends = [np.flatnonzero(row) for row in ink[-30:]]
+    long = max((1 + end[-1] - end[0] for end in ends if len(end) and len(end) == 1 + end[-1] - end[0]), default=0)
+    assert 40 < long <= 200
+    metres = (long - 1.6) * view.look()["height"] / height * view.run("app.manifest.unit")
+    round_ones = np.outer(10.0 ** np.arange(-12, 0), [1, 2, 5]).ravel()
+    assert np.abs(round_ones / metres - 1).min() < 2.5 / long
+
+
+def test_the_time_on_a_picture(view):
+    """The line at the top is another one at another time, and the same again at the same time; opaque letters, too,
+    where the background is transparent.
+    """
+    view.put(box=False)
+    tops = []
+    for frame in (2, 5, 2):
+        view.put(frame=frame)
+        both, words = written(view, width=800, height=500)
+        assert words[10:30, 14:100].sum() > 40
+        tops.append(both[10:30, 14:100])
+    assert (tops[0] == tops[2]).all() and (tops[0] != tops[1]).any()
+    clear = image(saved(view, clear=True, width=800, height=500)[1])
+    assert (clear[10:30, 14:100, 3] == 255).sum() > 20 and (clear[:8, :, 3] == 0).all()
 
 
 def test_the_page_is_not_transparent_afterwards(untouched):
@@ -126,13 +187,13 @@ def test_frames_given_the_wrong_way_round(untouched):
     assert zipfile.ZipFile(io.BytesIO(content)).namelist() == ["frame-000003.png", "frame-000004.png"]
 
 
-@pytest.mark.parametrize(("first", "last"), [(1, 4), (5, 5)])
-def test_a_movie(untouched, first, last):
-    """A WebM that the browser plays, as large as the picture on the page."""
+@pytest.mark.parametrize(("first", "last", "words"), [(1, 4, True), (5, 5, False)])
+def test_a_movie(untouched, first, last, words):
+    """A WebM that the browser plays, as large as the picture on the page; dark letters at its upper left, or none."""
     if not untouched.tab.evaluate("() => typeof MediaRecorder !== 'undefined'"):
         pytest.skip("this browser writes no movies")
     untouched.put(speed=10)
-    name, content = saved(untouched, "webm", **{"from": first, "to": last})
+    name, content = saved(untouched, "webm", words=words, **{"from": first, "to": last})
     assert name == "small.webm" and content[:4] == b"\x1aE\xdf\xa3"
     shape = untouched.picture().shape
     told = untouched.tab.context.new_page()
@@ -150,13 +211,15 @@ def test_a_movie(untouched, first, last):
             pen.drawImage(film, 0, 0);
             seen = new Set(pen.getImageData(0, 0, film.videoWidth, film.videoHeight).data).size;
           }
-          return [film.videoWidth, film.videoHeight, seen];
+          const top = pen.getImageData(8, 5, 70, 20).data;
+          const dark = top.filter((level, i) => i % 4 === 0 && level < 128).length;
+          return [film.videoWidth, film.videoHeight, seen, dark];
         }""",
         list(content),
     )
     told.close()
     assert played[0] == pytest.approx(shape[1], abs=1) and played[1] == pytest.approx(shape[0], abs=1)
-    assert played[2] > 30
+    assert played[2] > 30 and (played[3] > 20) == words
 
 
 def test_what_cannot_be_is_not_asked_for(view):

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from .driving import differ
+from .driving import Driven, differ
 from .small_runs import GRAINS, SIDE
 from .test_driven_settings import colours, legend, shown
 
 
 def test_one_cluster_alone(view):
     """Only its four grains are drawn, whole, and the contacts between them."""
+    look = view.look()
     view.put(grain=1, isolate=True, arrows=False)
+    view.run("app.stage.look = told[0]", look)
     assert shown(view) == [1] * 4 + [0] * (GRAINS - 4)
     corner = view.tab.locator("canvas.gv-canvas").bounding_box()
     alone = view.picture()
@@ -28,6 +30,53 @@ def test_one_cluster_alone(view):
         [1, 2],
         [2, 3],
     ]
+
+
+def room(view: Driven, *grains: int) -> float:
+    """How much of the canvas these grains take, wide or high, whichever is more; above 1 if one is not all within."""
+    canvas = view.tab.locator("canvas.gv-canvas").bounding_box()
+    size = np.array([canvas["width"], canvas["height"]])
+    at = np.array([view.place_of(grain) for grain in grains]) - [canvas["x"], canvas["y"]] - size / 2
+    radius = view.run("app.known.grains.radius[told[0]] * app.stage.pixelsPerLength", grains[0])
+    return float((2 * (np.abs(at) + radius) / size).max())
+
+
+CHOSEN = {"i": {"grain": 1}, "z": {"grain": 1}, "y": {"grain": 10, "isolate": True}}
+LOOKS = (
+    {"target": [0, 0, 0], "from": [0, -1, 0], "up": [0, 0, 1], "height": 200},
+    {"target": [300, -40, 7], "from": [0.6, -0.8, 0], "up": [0, 0, 1], "height": 3},
+)
+
+
+@pytest.mark.parametrize("ortho", [False, True])
+@pytest.mark.parametrize("key", CHOSEN)
+def test_a_chosen_cluster_fits_the_picture(view, key, ortho):
+    """Alone, centred, or alone in place of another: all of it is seen, and large, however the camera stood before.
+
+    Fitted are middles and two radii around each, for arrows, and 8 %.  Of a chain of four along x, seen at 53° to it,
+    grains are (2.4 + 1)/(2.4 + 2)/1.08 = 0.71 of the width, and less in perspective, which needs room for what is near.
+    """
+    for look in LOOKS:
+        view.fresh()
+        view.put(ortho=ortho, **CHOSEN[key])
+        view.run("app.stage.look = told[0]", look)
+        view.press(key)
+        assert 0.6 < room(view, 0, 1, 2, 3) < 1.0
+        assert np.allclose(view.look()["from"], look["from"], atol=1e-4)
+
+
+def test_another_grain_of_the_cluster_that_stands_alone(view):
+    """Choosing it leaves the camera where it is; so does centring a grain that touches none, but for the place."""
+    view.put(grain=1, isolate=True)
+    view.press("PageUp", "Control+ArrowLeft")
+    look = view.look()
+    view.press(".")
+    assert view.get("grain") == 2 and view.look() == look
+    view.fresh()
+    view.put(grain=10)
+    height = view.look()["height"]
+    view.press("z")
+    assert view.look()["height"] == pytest.approx(height) and room(view, 10) < 0.2
 
 
 @pytest.mark.parametrize(
@@ -60,18 +109,21 @@ def test_every_colouring_has_its_legend(view):
 
 
 def test_numbers_of_the_legend(view):
-    """They are the ends of the range, in the unit that is named; From and To are in SI."""
+    """They are the ends of the range, in the unit that is named; From and To are in SI; angles take no prefix."""
     view.put(colour="spin")
     view.control("low").fill("1e8")
     view.control("low").press("Enter")
     view.control("high").fill("4e8")
     view.control("high").press("Enter")
     view.settle()
-    assert "spin (Mrad/s)" in legend(view)
-    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["100", "250", "400"]
+    assert "spin (rad/s)" in legend(view)
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["1×10⁸", "2.5×10⁸", "4×10⁸"]
     view.control("log").click()
     view.settle()
-    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["100", "200", "400"]
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["1×10⁸", "2×10⁸", "4×10⁸"]
+    view.put(colour="speed", low=1e3, high=4e3, log=False)
+    assert "speed (km/s)" in legend(view)
+    assert view.tab.locator(".gv-ends span").all_inner_texts() == ["1", "2.5", "4"]
 
 
 def test_no_number_is_taken_back(view):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.clusters import cluster_labels
+from sand.view.scene import scene_of
 
 from .eye import Eye, inside
 from .looking import SOURCES, View, agree, size
@@ -58,6 +59,7 @@ def check_row(view: View, tables: dict, grain: int) -> None:
         # components have three digits: half of the last one of the largest is 5e-3 of it at most
         agree(row[name], vector, 5e-3) if vector.any() else None
         size(row[name], float(np.linalg.norm(vector)))
+    assert row["spin"].split("\n")[0].split(" ")[1:] == ["rad/s"], "angles take no prefix"
     assert int(row["contacts"]) == (frame.pair == grain).sum()
     v, w = np.linalg.norm(frame.velocity[grain]), np.linalg.norm(frame.spin[grain])
     energy = 0.5 * frame.mass[grain] * (float(v) ** 2 + 0.4 * frame.radius[grain] ** 2 * float(w) ** 2)
@@ -206,3 +208,23 @@ def test_colours_of_a_quantity(page, shows, palette, source):
         for i in free:
             x, y = pixels[i].astype(int)
             assert np.abs(image[y, x] - painted[i]).max() <= NEAR, (k, i)
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_clusters_are_whole_at_first_as_in_still_pictures(page, shows, source):
+    """Places are those of `sand plot`, a cluster as a whole by lengths of the box where its middle is at a face.
+
+    Places in single precision are off by 6e-8 of the box.
+    """
+    view, cut = View(page, shows("hundred"), source, whole=1), 0
+    assert page.evaluate("() => sandView.state.setting('whole').initial")
+    for k in FRAMES["hundred"]:
+        frame = view.go(k)
+        places = np.array(page.evaluate("() => [...sandView.picture.place]")).reshape(-1, 3) * view.shown.unit
+        drawn, side = scene_of(frame, frame.pair, frame.box).position, np.array(frame.drawn)
+        boxes = (places - drawn) / side
+        assert np.abs(boxes - np.rint(boxes)).max() < 1e-6
+        ends = np.rint(boxes)[frame.pair]
+        assert (ends[:, 0] == ends[:, 1]).all(), "a cluster is cut"
+        cut += (np.abs(places - frame.position) > 0.5 * side).any(1).sum()
+    assert cut > 0

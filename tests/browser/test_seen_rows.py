@@ -61,6 +61,24 @@ def check_dimension(view: View, place: np.ndarray) -> None:
     assert abs(value - found.value) < 5e-3 and abs(error - found.error) <= 0.5 * 10 ** np.floor(np.log10(found.error))
 
 
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        ({"value": 1.784, "error": None}, "1.78 ± not known"),
+        ({"value": None, "error": None}, "not known"),
+        ({"value": 1.784, "error": 0.02}, "1.78 ± 0.02"),
+    ],
+)
+def test_a_dimension_that_is_not_a_number(page, shows, told, words):
+    """JSON has null for it; the row says so, and not that it is infinite."""
+    view = View(page, shows("hundred"), shade=0)
+    page.evaluate("(told) => { sandView.source.dimension = async () => told; }", told)
+    view.set(grain=0)
+    cell = page.locator("tr:has(th:text-is('fractal dimension')) td")
+    cell.filter(has_not_text="…").wait_for()
+    assert cell.inner_text() == words
+
+
 @pytest.mark.parametrize("source", SOURCES)
 def test_distance_between_two_grains(page, shows, source):
     """By the nearest image, of centres and of surfaces; the ruler on the screen says the same."""

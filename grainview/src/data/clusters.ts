@@ -83,6 +83,12 @@ export function membersOf(frame: Frame, grain: number): number[] {
   return who;
 }
 
+/** 1 for the grains of the cluster that a grain is in, itself if it is single; 0 for all others. */
+export function maskOf(frame: Frame, grain: number): Uint8Array {
+  const name = frame.cluster[grain];
+  return Uint8Array.from(frame.cluster, (n, i) => Number(name === SINGLE ? i === grain : n === name));
+}
+
 export interface ClusterSummary {
   grains: number;
   contacts: number;

@@ -35,7 +35,7 @@ export interface Manifest {
     materials: string[];
     named: Record<string, number>;
   };
-  dimensions: Record<string, [number, number]>[] | null;
+  dimensions: Record<string, [number | null, number | null]>[] | null;
 }
 
 /** Of the grains, what never changes; radius in units of the manifest's `unit`, the rest SI. */
@@ -86,7 +86,7 @@ export interface Series {
   events: { time: number[]; made: number[]; broken: number[] };
 }
 
-export type Dimension = { value: number; error: number } | { reason: string };
+export type Dimension = { value: number | null; error: number | null } | { reason: string };
 
 /** Where a page has its data from: a server, blocks of its own file, or a notebook's kernel. */
 export interface Source {

@@ -2,12 +2,13 @@
 
 const PREFIXES = ["y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P"];
 
-/** Units that take a prefix; others, as A m², get a power of ten. */
-const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "rad/s", "kg", "C"]);
+/** Units that take a prefix; others, as A m², get a power of ten. So do rad/s: nobody says Grad/s. */
+const PREFIXED = new Set(["m", "s", "J", "N", "m/s", "kg", "C"]);
 
-/** A number with at most `digits` digits: 0.001234, 1.234e-7, −12.3. */
-export function digits(value: number, count = 4): string {
-  if (!Number.isFinite(value)) return Number.isNaN(value) ? "not known" : value > 0 ? "∞" : "−∞";
+/** A number with at most `count` digits: 0.001234, 1.234×10⁻⁷, −12.3; null is what JSON has for NaN. */
+export function digits(value: number | null, count = 4): string {
+  if (value === Infinity || value === -Infinity) return value > 0 ? "∞" : "−∞";
+  if (value === null || !Number.isFinite(value)) return "not known";
   if (value === 0) return "0";
   const size = Math.abs(value);
   const plain = size >= 1e-3 && size < 1e6;

@@ -8,6 +8,7 @@ export interface Wish {
   height: number;
   transparent: boolean;
   dark: boolean;
+  write: ((pen: CanvasRenderingContext2D) => void) | null; // on the picture, while the stage is of its size
 }
 
 /** Largest side of a picture. */
@@ -32,6 +33,7 @@ export async function picture(world: World, wish: Wish): Promise<Blob> {
     if (!pen) throw new Error("this browser gives no canvas for a picture of this size; take a smaller one");
     pen.imageSmoothingQuality = "high";
     pen.drawImage(stage.canvas, 0, 0, wish.width, wish.height);
+    wish.write?.(pen);
   } finally {
     renderer.setPixelRatio(before.ratio);
     world.setTheme(wish.dark ? DARK : LIGHT);
@@ -73,7 +75,7 @@ export function canRecord(): boolean {
   return typeof MediaRecorder !== "undefined" && FORMS.some((form) => MediaRecorder.isTypeSupported(form));
 }
 
-/** Frames as a WebM movie of what the canvas shows, so many a second. */
+/** Frames as a WebM movie of what a canvas shows, so many a second. */
 export async function movie(
   canvas: HTMLCanvasElement,
   frames: number[],

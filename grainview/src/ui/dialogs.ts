@@ -25,6 +25,7 @@ export interface CaptureWish {
   width: number;
   height: number;
   transparent: boolean;
+  words: boolean; // time, legend and scale bar
   kind: "png" | "sequence" | "webm";
   from: number;
   to: number;
@@ -49,6 +50,8 @@ export function askCapture(
   kind.value = initial.kind === "webm" && !webm ? "sequence" : initial.kind;
   const clear = h("input", { id: "gv-cap-clear", type: "checkbox" });
   clear.checked = initial.transparent;
+  const words = h("input", { id: "gv-cap-words", type: "checkbox" });
+  words.checked = initial.words;
   const form = h(
     "form",
     { method: "dialog" },
@@ -58,7 +61,8 @@ export function askCapture(
     number("gv-cap-from", "From frame", initial.from, 0, lastFrame),
     number("gv-cap-to", "To frame", initial.to, 0, lastFrame),
     h("p", {}, h("label", { for: "gv-cap-clear" }, "Transparent background"), clear),
-    h("p", { class: "gv-faint" }, "Without legend and scale bar. A movie is as large as the picture on the page."),
+    h("p", {}, h("label", { for: "gv-cap-words" }, "Time, legend and scale bar"), words),
+    h("p", { class: "gv-faint" }, "Without axes and numbers. A movie is as large as the picture on the page."),
     h("button", { type: "submit", class: "gv-go" }, "Save"),
   );
   const value = (id: string): number => Number((form.querySelector(`#${id}`) as HTMLInputElement).value);
@@ -69,6 +73,7 @@ export function askCapture(
       from: Math.min(value("gv-cap-from"), value("gv-cap-to")),
       to: Math.max(value("gv-cap-from"), value("gv-cap-to")),
       transparent: clear.checked,
+      words: words.checked,
       kind: kind.value as CaptureWish["kind"],
     }),
   );

@@ -59,6 +59,14 @@ export function contactRows(c: number, frame: Frame, known: Known): Row[] {
   return rows;
 }
 
+/** D ± its error, or why there is none; null: on its way. */
+function fractal(found: Dimension | null): string {
+  if (found === null) return "…";
+  if ("reason" in found) return found.reason;
+  const value = digits(found.value, 3);
+  return found.value === null ? value : `${value} ± ${digits(found.error, 1)}`;
+}
+
 export function clusterRows(
   i: number,
   frame: Frame,
@@ -68,9 +76,6 @@ export function clusterRows(
 ): Row[] {
   const { manifest, grains } = known;
   const one = measureCluster(frame, grains, whole, membersOf(frame, i));
-  const fractal = dimension === null ? "…" : "value" in dimension
-    ? `${digits(dimension.value, 3)} ± ${digits(dimension.error, 1)}`
-    : dimension.reason;
   return [
     ["grains N", String(one.grains)],
     ["contacts", String(one.contacts)],
@@ -80,7 +85,7 @@ export function clusterRows(
     ["radius of gyration", quantity(one.gyration * manifest.unit, "m")],
     ["moment", told(one.moment, "A m²")],
     ["over the sum of sizes", digits(one.alignment)],
-    ["fractal dimension", fractal],
+    ["fractal dimension", fractal(dimension)],
   ];
 }
 

@@ -1,72 +1,28 @@
-// What the colours mean: a bar with its range and unit, or names.
+// What the colours mean, on the page: a bar with its range and unit, or names.
 
-import { MODES } from "../data/bonds";
-import { colourOfMaterial, colourOfName, css, type Painted, type Scale } from "../data/colours";
-import type { Known, Quantity } from "../data/quantities";
-import { digits, prefixed } from "../data/units";
+import type { KeyPart, Swatch } from "../data/key";
 import { h } from "./dom";
 
-const NAMED = 6; // clusters that the legend names
-
-/** A bar of colours with numbers under it. */
-function bar(scale: Scale, label: string, unit: string): HTMLElement {
-  const size = Math.max(Math.abs(scale.low), Math.abs(scale.high));
-  const [one, name] = prefixed(size, unit);
-  const middle = scale.log ? Math.sqrt(scale.low * scale.high) : (scale.low + scale.high) / 2;
+function bar(colours: string[], numbers: string[]): HTMLElement[] {
   const strip = h("div", { class: "gv-strip" });
-  strip.style.background = `linear-gradient(to right, ${scale.palette.map(css).join(",")})`;
-  const numbers = [scale.low, middle, scale.high].map((v) => h("span", {}, digits(v / one, 3)));
-  const title = name ? `${label} (${name})` : label;
-  return h("div", {}, h("div", { class: "gv-legend-title" }, title), strip, h("div", { class: "gv-ends" }, ...numbers));
+  strip.style.background = `linear-gradient(to right, ${colours.join(",")})`;
+  return [strip, h("div", { class: "gv-ends" }, ...numbers.map((text) => h("span", {}, text)))];
 }
 
-function swatch(colour: string, text: string): HTMLElement {
+function row({ colour, text, grain }: Swatch, choose: (grain: number) => void): HTMLElement {
+  if (colour === null) return h("li", { class: "gv-faint" }, text);
   const dot = h("span", { class: "gv-dot" });
   dot.style.background = colour;
-  return h("li", {}, dot, text);
+  const press = { type: "button", title: "choose this cluster", click: () => choose(grain ?? -1) };
+  return h("li", {}, dot, grain === undefined ? text : h("button", press, text));
 }
 
-function clusters(painted: Painted, known: Known, choose: (grain: number) => void): HTMLElement {
-  const sizes = new Map<number, [count: number, grain: number]>();
-  let single = 0;
-  painted.values.forEach((name, grain) => {
-    if (Number.isNaN(name)) single++;
-    else sizes.set(name, [(sizes.get(name)?.[0] ?? 0) + 1, sizes.get(name)?.[1] ?? grain]);
+/** The key of a frame; rows of clusters choose them. */
+export function legend(parts: KeyPart[], choose: (grain: number) => void): HTMLElement[] {
+  return parts.map((part) => {
+    const content = "bar" in part
+      ? bar(part.bar, part.numbers)
+      : [h("ul", {}, ...part.rows.map((one) => row(one, choose)))];
+    return h("div", {}, h("div", { class: "gv-legend-title" }, part.title), ...content);
   });
-  const largest = [...sizes].sort((a, b) => b[1][0] - a[1][0] || a[0] - b[0]);
-  const rows = largest.slice(0, NAMED).map(([name, [count, grain]]) => {
-    const row = swatch(css(colourOfName(name, known.manifest)), "");
-    const told = `${count} grains`;
-    row.append(h("button", { type: "button", title: "choose this cluster", click: () => choose(grain) }, told));
-    return row;
-  });
-  const rest = largest.length - NAMED;
-  if (rest > 0) rows.push(h("li", { class: "gv-faint" }, `and ${rest} more`));
-  if (single) rows.push(swatch(known.manifest.colours.single, `${single} single`));
-  return h("div", {}, h("div", { class: "gv-legend-title" }, "clusters"), h("ul", {}, ...rows));
-}
-
-function materials(known: Known): HTMLElement {
-  const rows = known.manifest.materials.map((name, i) => swatch(css(colourOfMaterial(i, known.manifest)), name));
-  return h("div", {}, h("div", { class: "gv-legend-title" }, "material"), h("ul", {}, ...rows));
-}
-
-/** The legend of a frame as it is drawn. */
-export function legend(
-  quantity: Quantity,
-  painted: Painted,
-  known: Known,
-  bonds: { kind: string; scale: Scale; count: number },
-  choose: (grain: number) => void,
-): HTMLElement[] {
-  const parts: HTMLElement[] = [];
-  if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit));
-  else parts.push(quantity.id === "material" ? materials(known) : clusters(painted, known, choose));
-  if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + pushes", "N"));
-  if (bonds.kind === "mode") {
-    const rows = MODES.map((mode, m) => swatch(known.manifest.colours.modes[m], mode));
-    rows.push(swatch(known.manifest.colours.within, "within all limits"));
-    parts.push(h("div", {}, h("div", { class: "gv-legend-title" }, "contacts at the limit of"), h("ul", {}, ...rows)));
-  }
-  return parts;
 }

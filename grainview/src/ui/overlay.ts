@@ -13,6 +13,19 @@ export function roundLength(most: number): number {
   return [5, 2, 1].map((m) => m * power).find((v) => v <= most * (1 + 1e-9)) ?? power;
 }
 
+/** A bar of a round length, and what is written at it. */
+export interface LengthBar {
+  pixels: number;
+  text: string;
+}
+
+/** The longest bar of a round length not above `most` pixels; `unit` in metres; in perspective true at its centre. */
+export function lengthBar(stage: Stage, unit: number, most: number): LengthBar {
+  const pixels = stage.pixelsPerLength / unit; // for a metre
+  const length = roundLength(most / pixels);
+  return { pixels: length * pixels, text: quantity(length, "m", 3) + (stage.isOrthographic ? "" : " at the centre") };
+}
+
 export class Overlay {
   readonly element = svg("svg", { class: "gv-overlay", "aria-hidden": "true" });
   measured: [number[], number[], string] | null = null;
@@ -54,13 +67,11 @@ export class Overlay {
   }
 
   private scaleBar(): SVGElement[] {
-    const pixels = this.stage.pixelsPerLength / this.unit; // for a metre
-    const length = roundLength(Math.min(140, 0.25 * this.stage.width) / pixels);
-    const wide = length * pixels;
+    const { pixels: wide, text: told } = lengthBar(this.stage, this.unit, Math.min(140, 0.25 * this.stage.width));
     const [x, y] = [this.stage.width - 18 - wide, this.stage.height - 18];
     const bar = svg("path", { d: `M${x} ${y - 4}V${y}H${x + wide}V${y - 4}`, class: "gv-bar" });
     const text = svg("text", { x: x + wide, y: y - 7, class: "gv-bar-name" });
-    text.textContent = quantity(length, "m", 3) + (this.stage.isOrthographic ? "" : " at the centre");
+    text.textContent = told;
     return [bar, text];
   }
 

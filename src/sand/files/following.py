@@ -5,21 +5,19 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import overload
 
 import numpy as np
 
 from ..core.errors import BadInput
-from .frame import Frame
+from .frame import Frame, FrameSequence
 from .trajectory import Frames
 
 TORN_AT_MOST = 64
 """Frames at the end of a file that are looked at before it is said to be broken."""
 
 
-class Following(Sequence[Frame]):
+class Following(FrameSequence):
     """Frames of a trajectory that grows; safe to be read from several threads.
 
     Args:
@@ -139,18 +137,9 @@ class Following(Sequence[Frame]):
     def __len__(self) -> int:
         return len(self.times)
 
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Frame]: ...
-
-    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+    def _frame(self, number: int) -> Frame:
         with self.lock:
-            return self._frames[index % len(self)]
+            return self._frames[number]
 
     def pairs(self, index: int) -> np.ndarray:
         """Grains in contact (C, 2) in a frame ≥ 0.  Raises BadInput for one that is not whole."""

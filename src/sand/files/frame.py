@@ -1,4 +1,4 @@
-"""One frame of trajectory.gsd: what it holds, and back in SI.
+"""One frame of trajectory.gsd: what it holds, and back in SI; frames in a row.
 
 Positions, diameters and box are in units of a reference radius (float32 would not do in metres); the rest is
 SI.  Orientations are scalar first, as GSD has them.
@@ -29,8 +29,10 @@ the same.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
-from typing import Any
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, overload
 
 import numpy as np
 
@@ -164,3 +166,25 @@ class Frame:
     def __len__(self) -> int:
         """Number of grains."""
         return len(self.radius)
+
+
+class FrameSequence(Sequence[Frame]):
+    """Frames of a file at `path`, by number or slice; a subclass says how many (`__len__`) and reads one (`_frame`)."""
+
+    path: Path
+
+    @abstractmethod
+    def _frame(self, number: int) -> Frame:
+        """A frame from 0 to the last.  Raises BadInput for one that is not whole."""
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+        return self._frame(index % len(self))

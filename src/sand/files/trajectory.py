@@ -7,16 +7,16 @@ import ctypes
 import os
 import time as wall
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
 from ..core.box import Box
 from ..core.errors import BadInput, FilesFailed
 from ..core.grains import Grains
-from .frame import Frame, stored_frame
+from .frame import Frame, FrameSequence, stored_frame
 from .gsd_index import CHUNKS, cut, make_room, mend, read_index, refuse_impossible_sizes
 
 FLUSH_EVERY = 1.0
@@ -146,7 +146,7 @@ def _opened(path: Path, go_on: bool) -> Any:
     return gsd.hoomd.open(str(path), "r+" if go_on and path.exists() else "w")
 
 
-class Frames(Sequence[Frame]):
+class Frames(FrameSequence):
     """The frames of a trajectory, each read when asked for.
 
     Args:
@@ -173,20 +173,11 @@ class Frames(Sequence[Frame]):
     def __len__(self) -> int:
         return len(self._file)
 
-    @overload
-    def __getitem__(self, index: int) -> Frame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Frame]: ...
-
-    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+    def _frame(self, number: int) -> Frame:
         try:
-            return Frame(self._file[index % len(self)])
+            return Frame(self._file[number])
         except Exception as error:  # whatever a broken file makes the reader do
-            raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+            raise BadInput(f"frame {number} of {self.path} is not one of SAND ({error})") from error
 
     @property
     def is_ours(self) -> bool:
