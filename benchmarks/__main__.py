@@ -8,7 +8,7 @@ import warnings
 
 from sand.run.record import versions
 
-from . import files
+from . import files, regimes, scaling
 from .long_range import growth, savings, tell
 from .rows import all_rows
 from .table import HEAD, about, line, tell_about
@@ -22,6 +22,8 @@ def main() -> None:
     parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
     parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
     parser.add_argument("--page", action="store_true", help="what the page of a run costs in a browser, instead")
+    parser.add_argument("--scaling", action="store_true", help="cost of a grain's step from 100 grains on, instead")
+    parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     if options.page:
@@ -38,6 +40,11 @@ def main() -> None:
         cost = files.costs(1000 if options.quick else 10_000)
         print(json.dumps(cost)) if options.json else files.tell(cost)
         return
+    for module, asked in ((scaling, options.scaling), (regimes, options.regimes)):
+        if asked:
+            told = module.rows(options.quick)
+            print(json.dumps(about() | {"rows": list(told)})) if options.json else module.tell(told)
+            return
     table(options.quick, options.json)
 
 
