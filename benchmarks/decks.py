@@ -43,17 +43,18 @@ def data(grains: sand.Grains, box: float | None = None, moments: bool = False, u
     size = f"{2.0 * float(grains.radius[0]) / unit:.10g} {density:.10g}"
     walls = "\n".join(f"{-half:.17g} {half:.17g} {axis}lo {axis}hi" for axis in "xyz")
     head = f"grains\n\n{len(grains)} atoms\n1 atom types\n\n{walls}\n\n"
+    moving = [f"{k + 1} {x:.17g} {y:.17g} {z:.17g} 0 0 0" for k, (x, y, z) in enumerate(grains.velocity)]
+    speeds = "\n\nVelocities\n\n" + "\n".join(moving) + "\n"
     if not moments:
         rows = [f"{k + 1} 1 {size} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(place)]
-        speeds = [f"{k + 1} {x:.17g} {y:.17g} {z:.17g} 0 0 0" for k, (x, y, z) in enumerate(grains.velocity)]
-        return head + "Atoms # sphere\n\n" + "\n".join(rows) + "\n\nVelocities\n\n" + "\n".join(speeds) + "\n"
+        return head + "Atoms # sphere\n\n" + "\n".join(rows) + speeds
     # too weak to move anything: what a pair costs does not depend on it
     arrow = 1e-5 * grains.moment / np.linalg.norm(grains.moment, axis=1)[:, None]
     rows = [
         f"{k + 1} 1 {x:.17g} {y:.17g} {z:.17g} {size} 0.0 {u:.9g} {v:.9g} {w:.9g}"
         for k, ((x, y, z), (u, v, w)) in enumerate(zip(place, arrow, strict=True))
     ]
-    return head + "Atoms # hybrid\n\n" + "\n".join(rows) + "\n"
+    return head + "Atoms # hybrid\n\n" + "\n".join(rows) + speeds
 
 
 def contact_steps(grains: sand.Grains, box: float | None = None) -> tuple[str, str]:

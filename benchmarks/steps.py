@@ -54,6 +54,12 @@ def paired(sim: sand.Simulation, program: lammps.Lammps | None, quick: bool, ste
     return in_turns(ours, lambda: program.run(theirs).step, rounds)
 
 
+def same_contacts(program: lammps.Lammps | None, contacts: int, world: str) -> None:
+    """Raises RuntimeError if LAMMPS begins with another number of them."""
+    if program is not None and (theirs := program.contacts()) != contacts:
+        raise RuntimeError(f"{world}: {contacts} contacts, but {theirs} in LAMMPS")
+
+
 def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict[str, Any]:
     """Everything that a step of touching grains needs: ledger, contacts that move, form and break, checks of lists.
 
@@ -66,8 +72,7 @@ def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict
     contacts = len(sim.contacts["pair"])
     sim.run(steps=WARM_UP)
     with beside(decks.contact_steps(grains)) as program:
-        if program is not None and (theirs := program.contacts()) != contacts:
-            raise RuntimeError(f"{kind}, {count} grains: {contacts} contacts, but {theirs} in LAMMPS")
+        same_contacts(program, contacts, f"{kind}, {count} grains")
         steps = max(GRAIN_STEPS // count, 20) // (2 if quick else 1)
         moved, first = sim.world.count[MOVED], sim.world.steps
         pair = paired(sim, program, quick, steps)
@@ -114,9 +119,12 @@ def dipole_step(quick: bool) -> dict[str, Any]:
 
 def together(count: int, far: str, quick: bool) -> dict[str, Any]:
     """Contacts and dipoles of a loose aggregate; LAMMPS sums dipoles in every step, and so may we."""
-    grains = worlds.shaken(worlds.loose(count), MOMENT)
+    grains = worlds.shaken(worlds.loose(count), MOMENT, worlds.SLOW)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=sand.Verlet(far=far))
+    contacts = len(sim.contacts["pair"])
+    sim.run(steps=WARM_UP)
     with beside(decks.contacts_and_dipoles(grains)) as program:
+        same_contacts(program, contacts, f"{count} grains")
         pair = paired(sim, program, quick)
     way = "" if far == "every step" else ", cycles"
     flops = 81.0 * count * (count - 1) / 2
