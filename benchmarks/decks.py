@@ -12,8 +12,7 @@ import numpy as np
 import sand
 from sand.physics.tangential import roll_stiffness
 
-STEP = 1e-10
-"""Seconds of a step of LAMMPS' contacts, a little less than SAND takes; what a step costs does not depend on it."""
+from . import worlds
 
 
 def law(grains: sand.Grains, twisting: str = "marshall") -> str:
@@ -71,7 +70,7 @@ pair_style granular
 pair_coeff * * {law(grains)}
 neighbor 0.1 bin
 neigh_modify every 1 delay 0 check yes
-timestep {1e6 * STEP}
+timestep {1e6 * worlds.STEP}
 fix 1 all nve/sphere
 thermo 100000000
 """
@@ -96,7 +95,7 @@ pair_coeff * * granular {law(grains)}
 pair_coeff * * lj/cut/dipole/cut 0.0 0.1
 neighbor 0.1 bin
 {_rooms(len(grains))}
-timestep {1e6 * STEP}
+timestep {1e6 * worlds.STEP}
 fix 1 all nve/sphere update dipole
 thermo 100000000
 """

@@ -45,7 +45,8 @@ def cost(kind: str, count: int, shuffled: bool) -> Cost:
     if shuffled:
         place = np.random.default_rng(8).permutation(place)
     begun = time.thread_time()
-    sim = sand.Simulation(worlds.shaken(place, speed=worlds.SLOW), [sand.Contact()])
+    grains = worlds.shaken(place, speed=worlds.SLOW)
+    sim = sand.Simulation(grains, [sand.Contact()], stepping=worlds.stepping(kind))
     sim.run(steps=1)
     built = time.thread_time() - begun
     steps = max(GRAIN_STEPS // count, 5)

@@ -68,7 +68,7 @@ def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict
     gas = kind == "gas"
     speed = worlds.SLOW if gas or calm else worlds.SPEED
     grains = worlds.shaken(worlds.PLACES[kind](count), speed=speed)
-    sim = sand.Simulation(grains, [sand.Contact()])
+    sim = sand.Simulation(grains, [sand.Contact()], stepping=worlds.stepping(kind))
     contacts = len(sim.contacts["pair"])
     sim.run(steps=WARM_UP)
     with beside(decks.contact_steps(grains)) as program:

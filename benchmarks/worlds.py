@@ -14,6 +14,8 @@ RADIUS = 6e-7
 """Of their grains [m]."""
 LARGEST = 10_000
 """Grains of the largest cluster that is built in one piece; more are several clusters side by side."""
+STEP = 1e-10
+"""Seconds of a step of LAMMPS, a little less than SAND takes in contacts."""
 SPEED = 0.05
 """Largest speed of a grain along each axis [m/s]: contacts ring and roll, and none breaks."""
 SLOW = 0.005
@@ -59,6 +61,11 @@ def sparse(count: int) -> np.ndarray:
     side = int(np.ceil(count ** (1 / 3) - 1e-9))
     grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:count]
     return RADIUS * (3.0 * grid + np.random.default_rng(3).uniform(-0.2, 0.2, grid.shape))
+
+
+def stepping(kind: str) -> sand.Verlet:
+    """Steps as SAND chooses them; LAMMPS' own where nothing touches, or they would be far longer."""
+    return sand.Verlet(step=STEP) if kind == "gas" else sand.Verlet()
 
 
 PLACES = {"loose": loose, "fcc": dense, "gas": sparse}
