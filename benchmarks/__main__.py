@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 import warnings
 
 from sand.run.record import versions
 
-from . import files
+from . import files, regimes, scaling
 from .long_range import growth, savings, tell
 from .rows import all_rows
+from .table import HEAD, about, line, tell_about
 
 
 def main() -> None:
@@ -22,6 +22,8 @@ def main() -> None:
     parser.add_argument("--long-range", action="store_true", help="what lists and multiple time steps save, instead")
     parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
     parser.add_argument("--page", action="store_true", help="what the page of a run costs in a browser, instead")
+    parser.add_argument("--scaling", action="store_true", help="cost of a grain's step from 100 grains on, instead")
+    parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     if options.page:
@@ -38,15 +40,27 @@ def main() -> None:
         cost = files.costs(1000 if options.quick else 10_000)
         print(json.dumps(cost)) if options.json else files.tell(cost)
         return
-    rows = all_rows(options.quick)
-    if options.json:
-        print(json.dumps({"machine": platform.processor() or platform.machine(), "versions": versions(), "rows": rows}))
+    for module, asked in ((scaling, options.scaling), (regimes, options.regimes)):
+        if asked:
+            told = module.rows(options.quick)
+            print(json.dumps(about() | {"rows": list(told)})) if options.json else module.tell(told)
+            return
+    table(options.quick, options.json)
+
+
+def table(quick: bool, as_json: bool) -> None:
+    """The rows, printed as they come, or one JSON object."""
+    told = about()
+    if as_json:
+        print(json.dumps(told | {"rows": list(all_rows(quick))}))
         return
-    print(f"{'what':34} {'ours':>10} {'target':>8} {'peer':>10} {'ratio':>7}  unit")
-    for r in rows:
-        peer = f"{r['peer']:10.3g} {r['ratio']:7.1f}" if r["peer"] else f"{'-':>10} {'-':>7}"
-        mark = "" if r["met"] else "  MISSED"
-        print(f"{r['name']:34} {r['ours']:10.3g} {r['target']:8.3g} {peer}  {r['unit']} {r['peer_name']}{mark}")
+    tell_about(told)
+    print(HEAD)
+    missed = 0
+    for one in all_rows(quick):
+        print(line(one), flush=True)
+        missed += one["met"] is False
+    print(f"{missed} missed")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,26 +15,32 @@ from sand.experiments.flights import fly
 from sand.experiments.sampling import Task
 from sand.experiments.scattering import flight, trajectory
 
-from .timing import best, wall
+from .table import row
+from .timing import in_turns, thread
 
 GRAINS = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg", "temperature": "100 K"}
 TARGETS = {"none": 2000.0, "kT/2": 300.0}
 """Flights per second."""
 
 
-def flights(quick: bool) -> list[tuple[str, float, float, float | None]]:
-    """Name, milliseconds per flight, target and SciPy's for both kinds of spin; b up to 1.2 b_max, v_th, 10 b_max."""
-    rows = []
+def all_rows(quick: bool) -> Iterator[dict[str, Any]]:
+    """Flights with both kinds of spin; b up to 1.2 b_max, v_th, 10 b_max. SciPy flies a cold one of the same length."""
     for spin, rate in TARGETS.items():
         one = flight(**GRAINS, speed=1, speed_unit="thermal", spin=spin)
         number = 100 if quick else 1000
         tasks = [Task(k, 0, number // 10) for k in range(10)]
         width = 0.12 * one.scales.capture
         fly(one, [Task(0, 0, 1)], width)
-        seconds = best(lambda one=one, tasks=tasks, width=width: fly(one, tasks, width), 3) / number  # type: ignore[misc]
-        peer = wall(lambda one=one: in_scipy(one), 1) if spin == "none" and not quick else None  # type: ignore[misc]
-        rows.append((f"scattering, spin {spin}", 1e3 * seconds, 1e3 / rate, None if peer is None else 1e3 * peer))
-    return rows
+
+        def ours(one: Any = one, tasks: Any = tasks, width: float = width, number: int = number) -> float:
+            return thread(lambda: fly(one, tasks, width)) / number
+
+        def peer(one: Any = one) -> float:
+            return thread(lambda: in_scipy(one))
+
+        pair = in_turns(ours, peer if spin == "none" else None, 2 if quick else 3)
+        name = f"scattering, one flight, spin {spin}"
+        yield row(name, pair, "ms", 1e3 / rate, scale=1e3, of="SciPy DOP853, NumPy")
 
 
 def in_scipy(one: Any) -> None:

@@ -2,8 +2,22 @@
 
 from __future__ import annotations
 
+import resource
+import statistics
+import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Pair(NamedTuple):
+    """Ours beside a peer's, measured in turns."""
+
+    ours: float  # the least of all rounds, as whatever else runs on the machine only adds
+    peer: float
+    ratio: float  # the median of the rounds' ratios, peer's over ours
 
 
 def best(call: Callable[[], object], repeat: int = 7) -> float:
@@ -25,3 +39,63 @@ def wall(call: Callable[[], object], repeat: int = 3) -> float:
         call()
         times.append(time.perf_counter() - start)
     return min(times)
+
+
+def thread(call: Callable[[], object]) -> float:
+    """Thread time [s] of one call."""
+    start = time.thread_time()
+    call()
+    return time.thread_time() - start
+
+
+def of_command(words: Sequence[str], repeat: int = 3) -> float:
+    """Least CPU time [s] of a program, from its start to its end."""
+
+    def spent() -> float:
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
+    times = []
+    for _ in range(repeat):
+        before = spent()
+        subprocess.run(words, capture_output=True, check=True)
+        times.append(spent() - before)
+    return min(times)
+
+
+def per_step(sim: Any, steps: int) -> float:
+    """Thread time [s] of each of about so many steps of a simulation, which may go on to the end of a cycle."""
+    first = sim.world.steps
+    spent = thread(lambda: sim._engine.advance(np.inf, steps))
+    if sim.world.steps < first + steps:
+        raise RuntimeError(f"the world that is timed stopped after {sim.world.steps - first} of {steps} steps")
+    return spent / (sim.world.steps - first)
+
+
+def replayed(sim: Any, steps: int) -> Callable[[], float]:
+    """`per_step` that goes over the same steps, from where the world is now, in every call."""
+    start = sim.world.copy()
+
+    def again() -> float:
+        sim.world = sim._engine.world = start.copy()
+        return per_step(sim, steps)
+
+    return again
+
+
+def fitting(sim: Any, budget: float = 0.15) -> int:
+    """Steps that take about `budget` seconds, after some to warm up."""
+    sim.run(steps=20)
+    rough = per_step(sim, 5)
+    rough = per_step(sim, min(max(int(0.1 * budget / rough), 5), 1_000_000))
+    return min(max(int(budget / rough), 5), 10_000_000)
+
+
+def in_turns(ours: Callable[[], float], peer: Callable[[], float] | None, rounds: int = 5) -> Pair:
+    """Call both alternately; each returns seconds. Without a peer its time and the ratio are nan."""
+    mine, other = [], []
+    for _ in range(rounds):
+        mine.append(ours())
+        other.append(peer() if peer else np.nan)
+    ratios = [b / a for a, b in zip(mine, other, strict=True)]
+    return Pair(min(mine), min(other), statistics.median(ratios))

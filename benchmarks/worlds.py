@@ -8,6 +8,77 @@ import sand
 from sand.core.constants import MAGNETIC
 from sand.physics.adhesion import rest_overlap, rest_radius
 
+PEER = sand.SILICA.but(name="silica as in LAMMPS", density=2000.0, rolling_limit="2 angstrom")
+"""The material of worlds that are beside LAMMPS: E* = 27.8 GPa, γ = 25 mJ/m²."""
+RADIUS = 6e-7
+"""Of their grains [m]."""
+LARGEST = 10_000
+"""Grains of the largest cluster that is built in one piece; more are several clusters side by side."""
+STEP = 1e-10
+"""Seconds of a step of LAMMPS, a little less than SAND takes in contacts."""
+SPEED = 0.05
+"""Largest speed of a grain along each axis [m/s]: contacts ring and roll, and none breaks."""
+SLOW = 0.005
+"""The same where grains are not to meet, and contacts not to move."""
+
+
+def shaken(position: np.ndarray, moment: str | None = None, speed: float = SPEED) -> sand.Grains:
+    """Grains of PEER at these places (N, 3) [m], a little shaken; moments of random direction."""
+    rng = np.random.default_rng(4)
+    velocity = rng.uniform(-speed, speed, position.shape)
+    grains = sand.Grains(position - position.mean(0), RADIUS, PEER, velocity=velocity)
+    if moment is None:
+        return grains
+    arrow = rng.normal(size=position.shape)
+    arrow *= sand.Grains([[0, 0, 0]], RADIUS, PEER, moment=moment).moment[0, 2] / np.linalg.norm(arrow, axis=1)[:, None]
+    return sand.Grains(grains.position, RADIUS, PEER, velocity=velocity, moment=arrow)
+
+
+def loose(count: int, whole: int = LARGEST) -> np.ndarray:
+    """Places (N, 3) [m] of a ballistic particle-cluster aggregate, or of equal ones of `whole` grains side by side."""
+    body = sand.setup.bpca(min(count, whole), radius=RADIUS, material=PEER, seed=1).position
+    copies = -(-count // whole)
+    side = np.ptp(body, axis=0).max() + 4.0 * RADIUS
+    grid = np.stack(np.meshgrid(*[np.arange(np.ceil(copies ** (1 / 3) - 1e-9))] * 3, indexing="ij"), -1)
+    return (side * grid.reshape(-1, 1, 3)[:copies] + body).reshape(-1, 3)[:count]
+
+
+def dense(count: int) -> np.ndarray:
+    """Places of the innermost grains of a face-centred cubic packing, all contacts at rest: 12 of each grain."""
+    edge = np.sqrt(2.0) * rest_distance(PEER, RADIUS)
+    cells = int(0.4 * count ** (1 / 3)) + 2  # a sphere of N grains is 0.39 N^(1/3) edges wide, from its centre
+    grid = np.stack(np.meshgrid(*[np.arange(-cells, cells + 1)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
+    place = edge * (grid + np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])).reshape(-1, 3)
+    away = (place**2).sum(1)
+    inner = np.sort(np.argsort(away, kind="stable")[:count])
+    if count and np.sqrt(away[inner].max()) > cells * edge:
+        raise ValueError("the packing is cut off by the box it is made in")
+    return place[inner]
+
+
+def sparse(count: int) -> np.ndarray:
+    """Places of grains that touch nothing, about three radii apart."""
+    side = int(np.ceil(count ** (1 / 3) - 1e-9))
+    grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:count]
+    return RADIUS * (3.0 * grid + np.random.default_rng(3).uniform(-0.2, 0.2, grid.shape))
+
+
+def stepping(kind: str) -> sand.Verlet:
+    """Steps as SAND chooses them; LAMMPS' own where nothing touches, or they would be far longer."""
+    return sand.Verlet(step=STEP) if kind == "gas" else sand.Verlet()
+
+
+PLACES = {"loose": loose, "fcc": dense, "gas": sparse}
+
+
+def points(count: int) -> tuple[np.ndarray, float]:
+    """About so many points (N, 3) in a periodic cube at density 1, on jittered sites, in random order; its side."""
+    side = round(count ** (1 / 3))
+    rng = np.random.default_rng(5)
+    grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    place = grid + 0.5 - 0.5 * side + rng.uniform(-0.25, 0.25, grid.shape)
+    return rng.permutation(place), float(side)
+
 
 def rest_distance(material: sand.Material, radius: float) -> float:
     """Distance [m] of two equal grains whose contact is at rest."""

@@ -1,0 +1,124 @@
+"""Rows of single pieces: motion, lists of pairs, memory."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+import sand
+from sand.core.jit import kernel
+from sand.core.world import far_arrays
+from sand.kernels.cells import remake_far_list
+from sand.kernels.motion import drift, kick
+
+from . import decks, machine, worlds
+from .steps import beside
+from .table import row
+from .timing import best, in_turns, thread
+
+MOVED = 8 * (3 * (2 + 2) + 2 + 3 * 2 * 2 + 4 * 2 + 3 * 2)
+"""Bytes per grain of a kick (v and ω read and written, F and M, m and I read) and a drift (x, ϱ; μ from the body's)."""
+CANDIDATE = 17.0
+"""Operations per pair that a list looks at: 3 for r, 9 for the nearest image, 5 for r²."""
+NEIGHBOURS = (14, 50, 200)
+
+
+def _move(grains, span, dt, times):
+    """Kick and drift, `times` over."""
+    for _ in range(times):
+        kick(grains, dt)
+        drift(grains, span, dt)
+
+
+move = kernel(_move)
+
+
+def motion(count: int = 1000) -> dict[str, Any]:
+    """A kick and a drift of free grains that spin, in a periodic box."""
+    side = 3.0 * worlds.RADIUS * math.ceil(count ** (1 / 3))
+    grains = worlds.shaken(worlds.sparse(count), "1 A m^2/kg")
+    spin = np.random.default_rng(6).normal(size=(count, 3))
+    world = sand.Simulation(
+        sand.Grains(grains.position, worlds.RADIUS, worlds.PEER, moment=grains.moment, spin=spin),
+        box=sand.Box.periodic(side),
+    ).world
+    times = 400_000 // count
+    arrays = world.grains.arrays
+    seconds = best(lambda: move(arrays, world.box.span, 1e-12, times)) / times / count
+    share = machine.share_of_bandwidth(MOVED, MOVED * count, seconds)
+    return row(f"motion, {count} grains", seconds, "ns per grain", 2.5, scale=1e9, **share)
+
+
+def list_build(count: int, neighbours: int, quick: bool) -> dict[str, Any]:
+    """The list of all pairs within a reach, of points in random order in a periodic box."""
+    place, side = worlds.points(count)
+    reach = (3.0 * neighbours / (4.0 * math.pi)) ** (1 / 3)
+    points = sand.Grains(place, 0.2, worlds.PEER)
+    span, far = sand.Box.periodic(side).span, far_arrays(len(place), int(1.3 * neighbours * len(place)))
+    where = np.ascontiguousarray(place.T)
+
+    def ours() -> float:
+        def build() -> None:
+            far.anchor[...] = where
+            if remake_far_list(far, span, reach) < 0:
+                raise RuntimeError("no room for the list")
+
+        return thread(build)
+
+    ours()
+    steps = 3 if quick else 10
+    with beside(decks.lists(points, side, reach)) as program:
+        if program is not None:
+            program.run(3)
+        peer = None if program is None else lambda: program.run(steps).neighbour
+        pair = in_turns(ours, peer, 3 if quick else 5)
+    width = side / int(side / reach)
+    looked = CANDIDATE * len(place) * (27.0 * width**3 - 1.0)
+    return row(
+        f"pair list, {len(place)} grains, {neighbours} neighbours",
+        pair,
+        "ms",
+        scale=1e3,
+        of="LAMMPS",
+        ratio_asked=1.0,
+        **machine.share_of_flops(looked, pair.ours),
+    )
+
+
+def bytes_of(thing: Any) -> int:
+    """Of all arrays in it."""
+    if isinstance(thing, np.ndarray):
+        return thing.nbytes
+    if isinstance(thing, tuple):
+        return sum(bytes_of(part) for part in thing)
+    if dataclasses.is_dataclass(thing):
+        return sum(bytes_of(getattr(thing, part.name)) for part in dataclasses.fields(thing))
+    return bytes_of(thing.arrays) if isinstance(thing, sand.Grains) else 0
+
+
+def memory(quick: bool) -> list[dict[str, Any]]:
+    """All arrays of a world of grains with three contacts each, after a few steps."""
+    rows = []
+    for forces in ([sand.Contact()], [sand.Contact(), sand.Dipoles()]):
+        start = worlds.lattice(10 if quick else 22)
+        grains = start.grains
+        if len(forces) > 1:
+            arrow = np.random.default_rng(7).normal(size=grains.position.shape)
+            grains = sand.Grains(grains.position, 3e-7, sand.SILICA, velocity=grains.velocity, moment=1e-20 * arrow)
+        sim = sand.Simulation(grains, forces)
+        sim.run(steps=20)
+        name, most = ("contacts", 1.0) if len(forces) == 1 else ("contacts + dipoles", None)
+        rows.append(row(f"memory, {name}", bytes_of(sim.world) / len(grains), "kB per grain", most, scale=1e-3))
+    return rows
+
+
+def all_rows(quick: bool) -> Iterator[dict[str, Any]]:
+    """Motion, lists, memory."""
+    yield motion()
+    for neighbours in NEIGHBOURS:
+        yield list_build(100_000, neighbours, quick)
+    yield from memory(quick)

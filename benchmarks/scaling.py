@@ -1,0 +1,80 @@
+"""How the cost of a grain's step grows with the number of grains, numbered as they were built and at random."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import sand
+
+from . import worlds
+from .timing import per_step
+
+COUNTS = (100, 1000, 10_000, 100_000, 1_000_000)
+ROOM = 12_000
+"""Bytes that a grain may take while its world is built and timed."""
+GRAIN_STEPS = 1_000_000
+"""Grains times steps of a timed piece."""
+PIECES = 3
+PATIENCE = 120.0
+"""Longest time [s] that one world may take to be built."""
+KINDS = {"loose": "loose BPCA", "fcc": "dense fcc", "gas": "gas"}
+
+
+def available() -> float:
+    """Bytes of memory that this machine has to spare; infinite where it does not tell."""
+    told = Path("/proc/meminfo")
+    lines = told.read_text().splitlines() if told.exists() else []
+    return next((1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")), np.inf)
+
+
+class Cost(NamedTuple):
+    """Of one world."""
+
+    step: float  # thread time of a step of each grain [s]
+    building: float  # thread time until the first loads are there [s]
+
+
+def cost(kind: str, count: int, shuffled: bool) -> Cost:
+    """The best of some short pieces; contacts alone, calm."""
+    place = worlds.PLACES[kind](count)
+    if shuffled:
+        place = np.random.default_rng(8).permutation(place)
+    begun = time.thread_time()
+    grains = worlds.shaken(place, speed=worlds.SLOW)
+    sim = sand.Simulation(grains, [sand.Contact()], stepping=worlds.stepping(kind))
+    sim.run(steps=1)
+    built = time.thread_time() - begun
+    steps = max(GRAIN_STEPS // count, 5)
+    return Cost(min(per_step(sim, steps) for _ in range(PIECES)) / count, built)
+
+
+def rows(quick: bool) -> Iterator[dict[str, Any]]:
+    """One for each kind and number of grains; `quick` ends at 10⁴."""
+    for kind, name in KINDS.items():
+        building = 0.0
+        for count in COUNTS[:3] if quick else COUNTS:
+            one: dict[str, Any] = {"kind": name, "grains": count, "skipped": ""}
+            if ROOM * count > available():
+                one["skipped"] = f"needs {1e-9 * ROOM * count:.2g} GB of free memory"
+            elif 10.0 * building > PATIENCE:
+                one["skipped"] = f"would take {10.0 * building:.0f} s to build"
+            else:
+                plain, mixed = cost(kind, count, False), cost(kind, count, True)
+                building = max(plain.building, mixed.building)
+                one |= {"as built": 1e9 * plain.step, "at random": 1e9 * mixed.step, "building": building}
+            yield one
+
+
+def tell(told: Iterable[dict[str, Any]]) -> None:
+    """Print them as they come."""
+    print(f"{'':12} {'grains':>8} {'as built':>10} {'at random':>10}  ns per grain and step {'building':>10}  s")
+    for one in told:
+        text = one["skipped"]
+        if not text:
+            text = f"{one['as built']:10.3g} {one['at random']:10.3g} {'':22} {one['building']:10.3g}"
+        print(f"{one['kind']:12} {one['grains']:8d} {text}", flush=True)

@@ -1,0 +1,89 @@
+"""The table of `python -m benchmarks`: its rows are complete and judged rightly. No time is bounded here."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import sand
+
+table = pytest.importorskip("benchmarks.table", reason="benchmarks are not beside the tests")
+from benchmarks import decks, pieces, scaling, timing, worlds  # noqa: E402
+
+
+def test_a_row_is_met_if_all_that_it_is_asked_is():
+    """Target, ratio and share are judged together; a ratio without a peer is not judged."""
+    pair = timing.Pair(2e-9, 10e-9, 5.0)
+    good = table.row("x", pair, "ns", 2.5, scale=1e9, of="peer", ratio_asked=4.0, share=0.7, share_asked=0.65)
+    assert tuple(good) == table.KEYS
+    assert good["met"] is True
+    assert (good["ours"], good["peer"], good["ratio"]) == pytest.approx((2.0, 10.0, 5.0))
+    assert table.row("x", pair, "ns", 1.5, scale=1e9)["met"] is False
+    assert table.row("x", pair, "ns", ratio_asked=6.0)["met"] is False
+    assert table.row("x", pair, "ns", share=0.5, share_asked=0.65)["met"] is False
+    alone = table.row("x", 2.0, "ns", ratio_asked=6.0)
+    assert (alone["met"], alone["peer"], alone["peer_name"]) == (None, None, "")
+    assert "MISSED" in table.line(table.row("x", pair, "ns", 1.5, scale=1e9))
+    assert "MISSED" not in table.line(alone)
+
+
+def test_in_turns_takes_the_median_of_paired_ratios():
+    """Rounds (1, 4), (2, 4), (4, 4): least 1 and 4, ratios 4, 2, 1 with the median 2."""
+    mine, other = itertools.cycle([1.0, 2.0, 4.0]), itertools.repeat(4.0)
+    assert timing.in_turns(lambda: next(mine), lambda: next(other), 3) == (1.0, 4.0, 2.0)
+
+
+@pytest.mark.parametrize(("kind", "contacts"), [("loose", 12), ("fcc", 36), ("gas", 0)])
+def test_worlds_have_the_contacts_that_are_counted(kind, contacts):
+    """BPCA: N − 1. A grain with its 12 neighbours, which touch along the 24 edges of a cuboctahedron. A gas: none."""
+    place = worlds.PLACES[kind](13)
+    apart = np.linalg.norm(place[:, None] - place[None], axis=2)[np.triu_indices(13, 1)]
+    touching = int((apart < 2 * worlds.RADIUS).sum())
+    assert touching == contacts
+    sim = sand.Simulation(worlds.shaken(place), [sand.Contact()])
+    assert len(sim.contacts["pair"]) == touching
+
+
+def test_clusters_side_by_side_do_not_touch():
+    """25 grains in clusters of 10: 9 + 9 + 4 contacts."""
+    sim = sand.Simulation(worlds.shaken(worlds.loose(25, whole=10)), [sand.Contact()])
+    assert len(sim.contacts["pair"]) == 22
+
+
+def test_what_lammps_is_told_of_a_grain():
+    """Micro units: µm, pg/µm³ (the density of 2000 kg/m³ is 2), m/s."""
+    grains = worlds.shaken(np.array([[0.0, 0, 0], [2e-6, 0, 0]]))
+    lines = decks.data(grains).splitlines()
+    first = lines[lines.index("Atoms # sphere") + 2].split()
+    assert [float(word) for word in first] == pytest.approx([1, 1, 1.2, 2.0, -1.0, 0.0, 0.0])
+    speed = lines[lines.index("Velocities") + 2].split()[1:4]
+    assert [float(word) for word in speed] == pytest.approx(grains.velocity[0].tolist())
+
+
+def test_bytes_of_counts_every_array_of_a_world():
+    """Grains' arrays, contacts, pairs and lists, whatever nests them."""
+    world = worlds.lattice(3).world
+    parts = (world.grains.arrays, world.contacts, world.near, world.far, world.stages)
+    alone = (world.clock, world.count, world.lost)
+    assert pieces.bytes_of(world) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
+
+
+def test_a_replay_takes_the_same_steps():
+    """Each call ends in the same state, to the bit."""
+    sim = worlds.lattice(3)
+    sim.run(steps=5)
+    again = timing.replayed(sim, 10)
+    ends = []
+    for _ in range(2):
+        assert again() > 0.0
+        ends.append(sim.grains.position.copy())
+    assert sim.world.steps == 15
+    assert np.array_equal(*ends)
+
+
+def test_scaling_leaves_out_what_does_not_fit(monkeypatch):
+    """A row says so, in place of numbers."""
+    monkeypatch.setattr(scaling, "available", lambda: 0.0)
+    rows = list(scaling.rows(True))
+    assert len(rows) == 9
+    assert all("needs" in one["skipped"] for one in rows)
