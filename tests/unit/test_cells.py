@@ -155,9 +155,9 @@ def fast_gas(box, seed, contacts=False, **neighbours):
 def referee(sim):
     """Far forces, torques and fields of the same world over all pairs."""
     world = sim.world.copy()
-    rules = sim._engine.rules
-    all_pairs(world.grains.arrays, world.far, rules.span, rules.far[0])
-    return world.far.force, world.far.torque, world.grains.arrays.field
+    rules, far = sim._engine.rules, far_arrays(len(world.grains), 0)
+    all_pairs(world.grains.arrays, far, rules.span, rules.far[0])
+    return far.force, far.torque, world.grains.arrays.field
 
 
 @pytest.mark.parametrize(

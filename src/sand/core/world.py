@@ -76,8 +76,8 @@ class FarArrays(NamedTuple):
     mate: np.ndarray  # (P,) uint32: places of the neighbours
     home: np.ndarray  # (N,) uint32: cell of each grain
     cell: np.ndarray  # (M+1,) uint32: first place of each cell
-    here: np.ndarray  # (3, N) positions by place [m]
-    source: np.ndarray  # (3, N) moments, or charges in the first row, by place
+    here: np.ndarray  # (3, V) positions by place [m]; by grain where there is no list
+    source: np.ndarray  # (3, V) moments, or charges in the first row
     force: np.ndarray  # (3, N) far forces [N]
     torque: np.ndarray  # (3, N) far torques [N m]
     held_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
@@ -87,7 +87,7 @@ class FarArrays(NamedTuple):
     past_position: np.ndarray  # (3, N) at the last summation, or the one before [m]
     past_moment: np.ndarray  # (3, N) [A m²]
     path: np.ndarray  # (3, N) displacement since the last summation, summed over time [m s]
-    share: np.ndarray  # (2B, 3, N) forces and flux densities of each block of all pairs, where threads share the sum
+    share: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
 class StageArrays(NamedTuple):
@@ -102,21 +102,22 @@ KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_posi
 """The far arrays that a checkpoint holds; the others follow from them."""
 PICKED = ("soon", "mark")
 """Of the near pairs, what it leaves out: it is picked anew."""
-ALL_BLOCKS = 8
-"""Blocks of the sum over all pairs that threads may share."""
+LANES = 8
+"""Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 
 
-def far_arrays(grains: int, capacity: int, *, share: bool = False) -> FarArrays:
+def far_arrays(grains: int, capacity: int, blocks: int = 1) -> FarArrays:
     """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list.
 
     Args:
-        share: True for blocks of the sum over all pairs.
+        blocks: of a sum over all pairs; 0 where there is none.
     """
     vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
-    vectors["share"] = np.zeros((2 * ALL_BLOCKS if share else 0, 3, grains))
+    whole = (grains + LANES - 1) // LANES * LANES
+    vectors |= {"here": np.zeros((3, whole)), "source": np.zeros((3, whole)), "share": np.zeros((2 * blocks, 3, whole))}
     sizes = {"order": grains, "start": grains + 1, "mate": max(int(capacity), 16), "home": grains}
     sizes["cell"] = CELLS_PER_GRAIN * grains + 28
     return FarArrays(**(vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}))

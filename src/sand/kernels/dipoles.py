@@ -4,6 +4,7 @@ All pairs go by action and reaction (Newton's third law); listed ones stand in b
 row is a sum of its own that vectorises.
 """
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -13,13 +14,17 @@ import numpy as np
 from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.vec import accrue, add, cross, load, put, sub
-from ..core.world import ALL_BLOCKS
+from ..core.world import LANES
 from ..physics.dipole import pair_load, pair_load_cut
 from ..physics.dipole_rates import pair_rates
-from .sums import FarSums, Parts
+from .sums import FarSums, Parts, all_blocks
 
 ROWS_AT_ONCE = 256
 """Rows of the list in a block that one thread takes."""
+
+
+NOWHERE = 2e154
+"""A distance [m] whose square is infinite: its loads are 0."""
 
 
 class DipoleRules(NamedTuple):
@@ -61,7 +66,7 @@ def listed_rows(grains, far, span, rules, first, last):
         push = field = (0.0, 0.0, 0.0)
         for m in range(far.start[s], far.start[s + np.uint64(1)]):
             t = far.mate[m]
-            f, b, _, _ = cut_pair(here, load(far.here, t), span, mine, load(far.source, t), rules)
+            f, b, _, _ = cut_pair(here, load(far.here, t), span, mine, load(far.source, t), rules, True)
             push, field = add(push, f), add(field, b)
         i = far.order[s]
         accrue(far.force, i, push)
@@ -153,72 +158,91 @@ def loads_of_pair(grains, span, rules, i, j):
 
 
 @loop
-def bare_pair(here, there, span, mine, other, rules):
-    """Loads of a pair in an open box without a cut-off."""
-    return pair_load(sub(here, there), mine, other, rules.k)
+def bare_pair(here, there, span, mine, other, rules, real):
+    """Loads of a pair in an open box without a cut-off; none if it is not `real`."""
+    apart = sub(here, there)
+    return pair_load((apart[0] if real else NOWHERE, apart[1], apart[2]), mine, other, rules.k)
 
 
 @loop
-def cut_pair(here, there, span, mine, other, rules):
+def cut_pair(here, there, span, mine, other, rules, real):
     """The same with nearest images and a cut-off."""
-    return pair_load_cut(nearest_image(sub(here, there), span), mine, other, rules.k, rules.cutoff)
+    apart = nearest_image(sub(here, there), span)
+    return pair_load_cut((apart[0] if real else NOWHERE, apart[1], apart[2]), mine, other, rules.k, rules.cutoff)
 
 
 @loop
-def corner(grains, b):
+def corner(grains, b, blocks):
     """The first row of block b of the triangle of all pairs: blocks have equal areas."""
-    return np.uint64(grains.mass.size * math.sqrt(b / ALL_BLOCKS))
+    return np.uint64(grains.mass.size * math.sqrt(b / blocks))
 
 
-def all_pairs(pair_loads: Callable) -> FarSums:
-    """The sums over all pairs, each pair once (Newton's third law)."""
+@functools.cache
+def rows_of(pair_loads: Callable) -> Callable:
+    """The loop over some rows (uint64) of the triangle of all pairs, each pair once (Newton's third law).
+
+    Rows are as long as whole vectors: what is beyond the diagonal is no pair.
+    """
 
     @loop
-    def add_rows(grains, force, field, span, rules, first, last):
+    def add_rows(far, force, field, span, rules, first, last):
         for k in range(last - first):
             i = first + k
-            here, mine = load(grains.position, i), load(grains.moment, i)
+            here, mine = load(far.here, i), load(far.source, i)
             push = own = (0.0, 0.0, 0.0)
-            for j in range(i):
-                f, b1, b2, _ = pair_loads(here, load(grains.position, j), span, mine, load(grains.moment, j), rules)
+            for j in range((i + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)):
+                f, b1, b2, _ = pair_loads(here, load(far.here, j), span, mine, load(far.source, j), rules, j < i)
                 push, own = add(push, f), add(own, b1)
                 accrue(force, j, (-f[0], -f[1], -f[2]))
                 accrue(field, j, b2)
             accrue(force, i, push)
             accrue(field, i, own)
 
-    @loop
-    def loads(grains, far, span, rules):
-        clear_field(grains)
-        add_rows(grains, far.force, grains.field, span, rules, np.uint64(0), np.uint64(grains.mass.size))
-        add_torques(grains, far, span, rules)
+    return add_rows
 
-    @loop
-    def begin(grains, far, span, rules):
-        clear_field(grains)
+
+@loop
+def copy_moments(grains, far, span, rules):
+    """Positions and moments where there is room for whole vectors."""
+    for i in range(grains.mass.size):
+        put(far.here, i, load(grains.position, i))
+        put(far.source, i, load(grains.moment, i))
+
+
+@loop
+def add_shares(grains, far, span, rules):
+    """Forces, fields and torques from those of the blocks."""
+    clear_field(grains)
+    for b in range(all_blocks(grains)):
+        force, field = far.share[2 * b], far.share[2 * b + 1]
+        for i in range(corner(grains, b + 1, all_blocks(grains))):
+            accrue(far.force, i, load(force, i))
+            accrue(grains.field, i, load(field, i))
+    add_torques(grains, far, span, rules)
+
+
+def all_pairs(pair_loads: Callable) -> FarSums:
+    """The sums over all pairs."""
+    add_rows = rows_of(pair_loads)
 
     @loop
     def block(grains, far, span, rules, b):
         force, field = far.share[2 * b], far.share[2 * b + 1]
-        for i in range(corner(grains, b + 1)):
+        for i in range(far.here.shape[1]):
             put(force, i, (0.0, 0.0, 0.0))
             put(field, i, (0.0, 0.0, 0.0))
-        add_rows(grains, force, field, span, rules, corner(grains, b), corner(grains, b + 1))
+        first, last = corner(grains, b, all_blocks(grains)), corner(grains, b + 1, all_blocks(grains))
+        add_rows(far, force, field, span, rules, first, last)
 
     @loop
-    def end(grains, far, span, rules):
-        for b in range(ALL_BLOCKS):
-            force, field = far.share[2 * b], far.share[2 * b + 1]
-            for i in range(corner(grains, b + 1)):
-                accrue(far.force, i, load(force, i))
-                accrue(grains.field, i, load(field, i))
-        add_torques(grains, far, span, rules)
+    def loads(grains, far, span, rules):
+        copy_moments(grains, far, span, rules)
+        for b in range(all_blocks(grains)):
+            block(grains, far, span, rules, b)
+        add_shares(grains, far, span, rules)
 
-    @loop
-    def blocks(grains):
-        return ALL_BLOCKS
-
-    return FarSums(loads, cut_rates, energy_shares, loads_of_pair, Parts(begin, block, end, blocks))
+    parts = Parts(copy_moments, block, add_shares, all_blocks)
+    return FarSums(loads, cut_rates, energy_shares, loads_of_pair, parts)
 
 
 BARE = all_pairs(bare_pair)

@@ -100,29 +100,33 @@ def kick_far(grains, far, dt):
 
 
 @functools.cache
-def bonded_loops(pair: Callable) -> tuple[Callable, Callable]:
+def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     """Far loads of pairs in contact apart from all others: they ring with their contact, the others hardly.
 
-    The first loop adds them to what the grains carry, and takes them out of the far loads just summed if `due`.
-    The second lets contacts change sides between two cycles: new ones (`bonded` 0) come out of the far loads,
-    dead ones (flag 2) go back to them.
+    The first loop adds them to the loads of the contacts, before these are gathered, and vectorises; the second takes
+    them out of the far loads just summed.  The third lets contacts change sides between two cycles: new ones
+    (`bonded` 0) come out of the far loads, dead ones (flag 2) go back to them.
     """
 
     @loop
-    def add_bonded(grains, contacts, count, far, span, numbers, due):
+    def add_bonded(grains, contacts, count, span, numbers):
+        for c in range(count[CONTACTS]):
+            force, torque1, torque2 = pair(grains, span, numbers, contacts.pair[0, c], contacts.pair[1, c])
+            part = 1.0 if contacts.bonded[c] == 1 else 0.0
+            accrue(contacts.push, c, scale(part, force))
+            accrue(contacts.torque1, c, scale(part, torque1))
+            accrue(contacts.torque2, c, scale(part, torque2))
+
+    @loop
+    def take_out_bonded(grains, contacts, count, far, span, numbers):
         for c in range(count[CONTACTS]):
             if contacts.bonded[c] == 1:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, numbers, i, j)
-                accrue(grains.force, i, force)
-                accrue(grains.force, j, scale(-1.0, force))
-                accrue(grains.torque, i, torque1)
-                accrue(grains.torque, j, torque2)
-                if due:
-                    accrue(far.force, i, scale(-1.0, force))
-                    accrue(far.force, j, force)
-                    accrue(far.torque, i, scale(-1.0, torque1))
-                    accrue(far.torque, j, scale(-1.0, torque2))
+                accrue(far.force, i, scale(-1.0, force))
+                accrue(far.force, j, force)
+                accrue(far.torque, i, scale(-1.0, torque1))
+                accrue(far.torque, j, scale(-1.0, torque2))
 
     @loop
     def change_sides(grains, contacts, count, far, span, numbers):
@@ -139,7 +143,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable]:
                     accrue(far.torque, j, scale(sign, torque2))
                 contacts.bonded[c] = 1
 
-    return add_bonded, change_sides
+    return add_bonded, take_out_bonded, change_sides
 
 
 @loop

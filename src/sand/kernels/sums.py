@@ -23,6 +23,18 @@ def _no_blocks(grains):
     return 0
 
 
+CREW_FROM = 1000
+"""Fewest grains for which large loops are cut into blocks; below, a block is less work than to share it."""
+ALL_BLOCKS = 8
+"""Blocks of a sum over all pairs, then."""
+
+
+@loop
+def all_blocks(grains):
+    """Blocks of a sum over all pairs."""
+    return ALL_BLOCKS if grains.mass.size >= CREW_FROM else 1
+
+
 class Parts(NamedTuple):
     """The sum of loads in blocks that threads may share; `loads` of FarSums is their sum but for rounding."""
 

@@ -18,7 +18,7 @@ from ..forces.contact import Contact
 from ..forces.gas import Gas
 from ..kernels.gas import VACUUM
 from ..kernels.outside import is_ours
-from ..kernels.sums import FarSums
+from ..kernels.sums import NO_FAR_FORCE, FarSums, all_blocks
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
 from ..setup.frame import Bonds
@@ -105,7 +105,7 @@ def build_engine(
         stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
     )
     plan = _plan(grains, given, composed, sums, verlet, isinstance(stepping, Adaptive))
-    world = _world(grains, box, found, plan, share=plan.crew and (not found.search.listed or None in cutoffs))
+    world = _world(grains, box, found, plan, all_pairs=not found.search.listed or None in cutoffs)
     engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
     held = _seed(engine, given.contact, contacts)
     if given.contact is not None and fresh:
@@ -154,7 +154,7 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
     )
 
 
-def _world(grains: Grains, box: Box, found: Found, plan: Plan, *, share: bool) -> World:
+def _world(grains: Grains, box: Box, found: Found, plan: Plan, *, all_pairs: bool) -> World:
     """The grains in their box, with room for contacts and pairs, and for stages if there are any."""
     count = len(grains)
     world = World(
@@ -162,7 +162,11 @@ def _world(grains: Grains, box: Box, found: Found, plan: Plan, *, share: bool) -
         box,
         contact_arrays(count, SPREAD * count, len(Bond._fields)),
         near_pairs(count, SPREAD * count),
-        far_arrays(count, SPREAD * count if found.search.listed else 0, share=share),
+        far_arrays(
+            count,
+            SPREAD * count if found.search.listed else 0,
+            all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0,
+        ),
         stages=stage_arrays(count if plan.adaptive else 0),
     )
     world.grains.arrays.position[...] = box.wrap(grains.position).T

@@ -98,7 +98,7 @@ def _cut_impulse(grains, far, span, clock, elapsed):
 
 
 @loop
-def _no_bonded(grains, contacts, count, far, span, numbers, due):
+def _no_bonded(grains, contacts, count, span, numbers):
     """Pairs in contact are not apart from the others."""
 
 
@@ -117,7 +117,7 @@ def loads_loop(plan: Plan) -> Callable:
     add_outside, _ = outside_loops(plan.outside)
     _, gather_all, far_loads = large_loops(plan)
     between = add_foretold_loads if plan.foretell else add_held_loads if plan.impulse else _nothing_between
-    add_bonded = bonded_loops(plan.far.pair)[0] if plan.split else _no_bonded
+    take_out_bonded = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
 
     @loop
     def sum_loads(grains, contacts, far, clock, count, rules, due, elapsed):
@@ -127,8 +127,7 @@ def loads_loop(plan: Plan) -> Callable:
             clear_far_loads(far)
             far_loads(grains, contacts, far, count, rules)
             count[FAR_SUMS] += 1
-        add_bonded(grains, contacts, count, far, rules.span, rules.far, due)
-        if due:
+            take_out_bonded(grains, contacts, count, far, rules.span, rules.far)
             add_far_loads(grains, far)
         else:
             between(grains, far, elapsed)
@@ -146,7 +145,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
     sum_loads = loads_loop(plan)
     pass_contacts, _, _ = large_loops(plan)
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
-    change_sides = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
+    add_bonded, _, change_sides = bonded_loops(plan.far.pair) if plan.split else (_no_bonded, None, _no_change)
     begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
     stir = stir_gas if plan.gas else no_gas
 
@@ -194,6 +193,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
         parted = update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh, flagged)
         dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
         due = clock[LEFT] == 0.0 or parted or fresh > 0
+        add_bonded(grains, contacts, count, rules.span, rules.far)
         sum_loads(grains, contacts, far, clock, count, rules, due, elapsed)
         kick(grains, 0.5 * dt)
         if due:

@@ -15,6 +15,7 @@ from ..core.atomics import fetch_add, give_way, read, write
 from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.world import CONTACTS
 from ..kernels.contacts import contact_pass, gather
+from ..kernels.sums import CREW_FROM
 from .rules import Plan
 
 WORD, DONE, INSIDE, FLAGGED = 0, 8, 16, 24
@@ -27,10 +28,6 @@ GRAINS_AT_ONCE = 2048
 """Contacts and grains in a block: some 10 µs of work, and whole vectors."""
 _BITS = 24
 _MASK = (1 << _BITS) - 1
-
-
-CREW_FROM = 1000
-"""Fewest grains for which large loops are cut into blocks; below, a block is less work than to share it."""
 
 
 def is_large(grains: int) -> bool:
