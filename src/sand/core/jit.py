@@ -21,7 +21,7 @@ import numba
 from numba.core import event
 from numba.extending import register_jitable
 
-__all__ = ["CAN_SHARE", "cache_folder", "compiling", "formula", "kernel", "loop", "rare", "shared"]
+__all__ = ["CAN_SHARE", "COMPILED", "cache_folder", "compiling", "formula", "kernel", "loop", "rare", "shared"]
 
 # As fast as fastmath=True, but NaN and infinity stay what they are, so that guards can see them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -109,6 +109,8 @@ _LOWERED = _leave_work_to_the_kernel()
 _BARE: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _INNER = _BARE | _LOWERED[False]
 
+COMPILED = not numba.config.DISABLE_JIT
+"""False where numba is told to leave everything to Python."""
 CAN_SHARE = bool(_LOWERED[True])
 """Can `shared` loops be kept apart, so that all threads get the same bits from them?"""
 

@@ -5,16 +5,20 @@ import math
 import numpy as np
 
 from ..core.box import nearest_image
-from ..core.jit import loop, rare
+from ..core.jit import COMPILED, loop, rare
 from ..core.vec import across, add, dot, load, load4, put, scale, sub
 from ..core.world import (
     CONTACT_STEP,
     CONTACTS,
+    LANES,
     PAIRS,
 )
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned
+
+FEW = 4
+"""Contacts that are faster done one by one than as a vector."""
 
 
 @loop
@@ -64,8 +68,12 @@ def twist_gain(grains, contacts, c, pose, dt):
 
 
 @loop
-def contact_pass(grains, contacts, first, last, span, law, dt):
-    """Twist, loads and flag of the contacts first…last − 1 (uint64); True if any passed a limit.  Vectorises."""
+def contact_pass(grains, contacts, first, last, used, span, law, dt):
+    """Twist, loads and flag of the contacts first…last − 1 (uint64); True if any passed a limit.  Vectorises.
+
+    Args:
+        used: number of contacts in use (uint64); columns beyond it may be passed over, to no effect.
+    """
     flagged = 0.0
     for k in range(last - first):
         c = first + k
@@ -87,8 +95,18 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
         contacts.flag[c] = 1.0 if beyond else 0.0
-        flagged += contacts.flag[c]
+        flagged += contacts.flag[c] if c < used else 0.0
     return flagged > 0.0
+
+
+@loop
+def whole_vectors(contacts, number):
+    """The number of columns to pass over for so many contacts: if many are left over, they are a vector of their own.
+
+    What is beyond the contacts in use is worked out as well, and never read.
+    """
+    whole = (number + LANES - 1) // LANES * LANES
+    return min(whole, contacts.pair.shape[1]) if COMPILED and number % LANES >= FEW else number
 
 
 @rare

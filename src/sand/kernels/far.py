@@ -7,6 +7,7 @@ from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..core.world import CONTACTS
+from .contacts import whole_vectors
 
 HELD_CHANGE = 0.5
 """Change of a grain's far load, in parts of it, at which its held part follows.
@@ -110,7 +111,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
 
     @loop
     def add_bonded(grains, contacts, count, span, numbers):
-        for c in range(count[CONTACTS]):
+        for c in range(whole_vectors(contacts, count[CONTACTS])):
             force, torque1, torque2 = pair(grains, span, numbers, contacts.pair[0, c], contacts.pair[1, c])
             part = 1.0 if contacts.bonded[c] == 1 else 0.0
             accrue(contacts.push, c, scale(part, force))

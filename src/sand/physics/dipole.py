@@ -18,6 +18,24 @@ class Cutoff(NamedTuple):
 
 
 @formula
+def invariants(apart, moment1, moment2):
+    """1/r², μ1·r, μ2·r, μ1·μ2 and (μ1·r)(μ2·r)/r² of a pair."""
+    inverse2 = 1.0 / dot(apart, apart)
+    along1, along2 = dot(moment1, apart), dot(moment2, apart)
+    return inverse2, along1, along2, dot(moment1, moment2), along1 * along2 * inverse2
+
+
+@formula
+def loads_of(apart, moment1, moment2, inverse3, a, b, inward):
+    """Force a μ2 + b μ1 + inward r on 1, and flux densities b r − inverse3 μ2 at 1, a r − inverse3 μ1 at 2."""
+    return (
+        axpy(inward, apart, add(scale(a, moment2), scale(b, moment1))),
+        sub(scale(b, apart), scale(inverse3, moment2)),
+        sub(scale(a, apart), scale(inverse3, moment1)),
+    )
+
+
+@formula
 def pair_load(apart, moment1, moment2, k):
     """Force on 1 [N], flux density at 1 from 2, flux density at 2 from 1 [T] (Eqs. 35, 39).
 
@@ -26,18 +44,11 @@ def pair_load(apart, moment1, moment2, k):
 
     Also the energy U = −μ1·B1 [J].
     """
-    inverse2 = 1.0 / dot(apart, apart)
+    inverse2, along1, along2, both, product = invariants(apart, moment1, moment2)
     inverse3 = k * inverse2 * math.sqrt(inverse2)
-    along1 = dot(moment1, apart)
-    along2 = dot(moment2, apart)
-    both = dot(moment1, moment2)
     three = 3.0 * inverse3 * inverse2
-    product = along1 * along2 * inverse2
-    a = three * along1
-    b = three * along2
-    force = axpy(three * (both - 5.0 * product), apart, add(scale(a, moment2), scale(b, moment1)))
-    field1 = sub(scale(b, apart), scale(inverse3, moment2))
-    field2 = sub(scale(a, apart), scale(inverse3, moment1))
+    inward = three * (both - 5.0 * product)
+    force, field1, field2 = loads_of(apart, moment1, moment2, inverse3, three * along1, three * along2, inward)
     return force, field1, field2, inverse3 * (both - 3.0 * product)
 
 
@@ -55,14 +66,15 @@ def pair_load_cut(apart, moment1, moment2, k, cutoff):
 
     F = S F_dipole − U ∇S and B → S B; torques and r×F still cancel, since ∇S points along r.
     """
-    force, field1, field2, energy = pair_load(apart, moment1, moment2, k)
     weight, slope = cut_weight(dot(apart, apart), cutoff)
-    return (
-        axpy(energy * slope, apart, scale(weight, force)),
-        scale(weight, field1),
-        scale(weight, field2),
-        weight * energy,
-    )
+    inverse2, along1, along2, both, product = invariants(apart, moment1, moment2)
+    bare3 = k * inverse2 * math.sqrt(inverse2)
+    energy = bare3 * (both - 3.0 * product)
+    inverse3 = weight * bare3
+    three = 3.0 * inverse3 * inverse2
+    inward = three * (both - 5.0 * product) + slope * energy
+    force, field1, field2 = loads_of(apart, moment1, moment2, inverse3, three * along1, three * along2, inward)
+    return force, field1, field2, weight * energy
 
 
 @formula

@@ -68,7 +68,8 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
             first = b * CONTACTS_AT_ONCE
             last = min(first + CONTACTS_AT_ONCE, count[CONTACTS])
             step = rules.crew.step[0]
-            if contact_pass(grains, contacts, np.uint64(first), np.uint64(last), rules.span, rules.contact, step):
+            span, law, used = rules.span, rules.contact, np.uint64(count[CONTACTS])
+            if contact_pass(grains, contacts, np.uint64(first), np.uint64(last), used, span, law, step):
                 write(rules.crew.board, FLAGGED, 1)
         elif task == GATHER:
             first = b * GRAINS_AT_ONCE

@@ -8,15 +8,16 @@ import numpy as np
 from ..core.atomics import read, write
 from ..core.jit import loop
 from ..core.world import CONTACTS, STEP
-from ..kernels.contacts import contact_pass, gather
+from ..kernels.contacts import contact_pass, gather, whole_vectors
 from .crew import CONTACTS_AT_ONCE, FAR, FLAGGED, GATHER, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
 from .rules import Plan
 
 
 @loop
 def _pass_alone(grains, contacts, far, clock, count, rules):
-    last = np.uint64(count[CONTACTS])
-    return contact_pass(grains, contacts, np.uint64(0), last, rules.span, rules.contact, clock[STEP])
+    used = np.uint64(count[CONTACTS])
+    last = np.uint64(whole_vectors(contacts, count[CONTACTS]))
+    return contact_pass(grains, contacts, np.uint64(0), last, used, rules.span, rules.contact, clock[STEP])
 
 
 @loop
