@@ -39,6 +39,7 @@ _HOMES = {
     "resume": "run.build",
     "open": "run.opened",
     "Observer": "run.observers",
+    "set_threads": "core.threads",
     "Outcome": "run.outcome",
     "Result": "run.outcome",
 }
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from .core.material import MAGNETITE as MAGNETITE
     from .core.material import SILICA as SILICA
     from .core.material import Material as Material
+    from .core.threads import set_threads as set_threads
     from .forces.central import Attraction as Attraction
     from .forces.central import Charges as Charges
     from .forces.contact import Contact as Contact

@@ -61,13 +61,15 @@ def _many(case: str, seeds: list[int], workers: int) -> list[dict[str, Any]]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
+    from ..core.threads import one_thread
     from ..experiments.collision_case import run_seeds
     from ..files.folder import read_toml
 
     content = read_toml(case)
     if workers == 1:
         return run_seeds(content, seeds)
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=one_thread) as pool:
         return run_seeds(content, seeds, pool)
 
 

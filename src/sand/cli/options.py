@@ -14,6 +14,14 @@ quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show where in the program an error arose.")
 
 
+threads = click.option(
+    "--threads",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Threads for a large simulation (default: one for each core, or $SAND_THREADS); results are the same.",
+)
+
+
 def end_of_run(text: str) -> Any:
     """The option --until, with `text` as its help."""
     return click.option("--until", metavar="TIME", help=text)

@@ -8,18 +8,21 @@ from typing import Any
 import click
 
 from ..core.errors import BadInput
+from ..core.threads import set_threads
 from . import options, report
 
 
 @click.command("resume", short_help="Go on with a run from its newest checkpoint.")
 @click.argument("folder", metavar="DIR")
 @options.end_of_run('A later end than planned, such as "10 us".')
+@options.threads
 @options.as_json
 @options.quiet
 @options.debug
-def command(folder: str, until: str | None, as_json: bool, quiet: bool) -> int:
+def command(folder: str, until: str | None, threads: int | None, as_json: bool, quiet: bool) -> int:
     """Go on with the run in DIR from its newest checkpoint, to its planned end or to --until."""
     asked = options.seconds(until)
+    set_threads(threads)
     from ..run.build import resume
     from .launch import End, launch
 

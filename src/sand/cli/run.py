@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..core.errors import BadInput
+from ..core.threads import set_threads
 from ..files.folder import CASE, TRAJECTORY
 from . import options, report
 
@@ -21,6 +22,7 @@ from . import options, report
 @options.end_of_run('End of the run instead of that in the case, such as "5 us".')
 @click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed instead of that in the case.")
 @click.option("--overwrite", is_flag=True, help="Replace the run that the folder holds.")
+@options.threads
 @options.as_json
 @options.quiet
 @options.debug
@@ -32,6 +34,7 @@ def command(
     until: str | None,
     seed: int | None,
     overwrite: bool,
+    threads: int | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -44,6 +47,7 @@ def command(
     says everything else; without it, the earlier run's own case.toml does.
     """
     end = options.seconds(until)
+    set_threads(threads)
     from ..run.build import simulation_of
     from ..run.case import GrainsSection, read_case
     from .launch import End, launch, refuse_folder

@@ -11,6 +11,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 
 from ..core.errors import BadInput
+from ..core.threads import one_thread
 
 ANSWER = 10.0
 """Seconds that a scheduler has for its first answer."""
@@ -46,8 +47,9 @@ def executor_for(workers: int = 1, scheduler: str | None = None) -> Iterator[Exe
 
 
 def _leave_signals_to_parent() -> None:
-    """Ctrl-C goes to all processes of a terminal; the parent alone answers it."""
+    """Ctrl-C goes to all processes of a terminal; the parent alone answers it.  Cores are shared by processes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    one_thread()
 
 
 def _start(pool: Executor, workers: int) -> None:

@@ -1,0 +1,123 @@
+"""Threads: the same bits for any number of them, and the same numbers as without blocks but for rounding."""
+
+import time
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core import threads
+from sand.core.errors import BadInput
+from sand.core.world import CONTACTS, MOVED
+from sand.run import translate
+from sand.stepping.crew import INSIDE, LEAVE, WORD, crew_for, is_large, new_crew
+
+pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
+
+
+@pytest.fixture(autouse=True)
+def as_before():
+    """Leave the number of threads as it was."""
+    yield
+    sand.set_threads(None)
+
+
+def shaken_lattice(cutoff):
+    """1100 magnetic iron grains in touch, shaken so that contacts move: large enough for a crew."""
+    grid = np.stack(np.meshgrid(np.arange(11), np.arange(10), np.arange(10), indexing="ij"), -1).reshape(-1, 3)
+    rng = np.random.default_rng(4)
+    moment = rng.normal(size=grid.shape)
+    moment *= 6e-18 / np.linalg.norm(moment, axis=1)[:, None]
+    spin, velocity = 5e9 * rng.normal(size=grid.shape), 3.0 * rng.normal(size=grid.shape)
+    grains = sand.Grains(grid * 1.985e-8, 1e-8, sand.IRON, moment=moment, velocity=velocity, spin=spin)
+    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff=cutoff)])
+
+
+def state(sim):
+    """All numbers of the world, as bytes."""
+    return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
+
+
+@pytest.mark.parametrize("cutoff", [None, "0.05 um"])
+def test_threads_change_no_bit(cutoff):
+    """60 steps, run in two pieces, with 1, 2 and 3 threads; all pairs and listed ones; contacts move and break."""
+    ends = []
+    for number in (1, 2, 3):
+        sand.set_threads(number)
+        sim = shaken_lattice(cutoff)
+        assert sim._engine._plan.crew
+        sim.run(steps=25)
+        sim.run(steps=35)
+        ends.append(state(sim))
+    assert sim.world.count[CONTACTS] > 2000
+    assert sim.world.count[MOVED] > 100
+    assert ends[0] == ends[1] == ends[2]
+
+
+def test_blocks_change_only_rounding(monkeypatch):
+    """One step in blocks and one without part by less than 1e-12 of what they changed.
+
+    Sums over 1100 grains in another order differ by √1100 ε = 7e-15 of their size.
+    """
+    sim = {}
+    for large in (True, False):
+        monkeypatch.setattr(translate, "is_large", lambda grains, large=large: large)
+        sim[large] = shaken_lattice(None)
+        assert sim[large]._engine._plan.crew is large
+        sim[large].run(steps=1)
+    for name in ("force", "torque", "velocity", "spin", "position"):
+        one, other = (getattr(sim[large].world.grains.arrays, name) for large in (True, False))
+        assert np.abs(one - other).max() < 1e-12 * np.abs(one).max(), name
+
+
+def test_a_helper_that_comes_too_late_touches_nothing():
+    """It finds LEAVE on its board and goes, with nobody counted inside."""
+    sim = shaken_lattice(None)
+    sim.run(steps=1)
+    before, world, crew = state(sim), sim.world, new_crew()
+    crew.board[WORD] = LEAVE << 48
+    rules = sim._engine.rules._replace(crew=crew)
+    crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)
+    assert crew.board[INSIDE] == 0
+    assert state(sim) == before
+
+
+def test_helpers_go_home_with_their_simulation():
+    """No thread of a crew outlives its simulation by more than a moment."""
+    import threading
+
+    def crew():
+        return [t for t in threading.enumerate() if t.name == "sand-crew"]
+
+    sand.set_threads(2)
+    sim = shaken_lattice(None)
+    sim.run(steps=1)
+    assert len(crew()) == 1
+    del sim
+    deadline = time.monotonic() + 10.0
+    while crew() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert not crew()
+
+
+def test_small_simulations_have_no_crew():
+    """Below a thousand grains."""
+    assert is_large(1000)
+    assert not is_large(999)
+
+
+def test_how_many(monkeypatch):
+    """What is set goes before the environment, and that before the number of cores."""
+    monkeypatch.setenv("SAND_THREADS", "3")
+    assert threads.threads() == 3
+    sand.set_threads(5)
+    assert threads.threads() == 5
+    sand.set_threads(None)
+    monkeypatch.delenv("SAND_THREADS")
+    assert threads.threads() == threads.cores()
+    for wrong in (0, -1, 1.5, "many"):
+        with pytest.raises(BadInput, match="whole number"):
+            sand.set_threads(wrong)
+    monkeypatch.setenv("SAND_THREADS", "two")
+    with pytest.raises(BadInput, match="SAND_THREADS = 'two'"):
+        threads.threads()
