@@ -6,6 +6,7 @@ import argparse
 import json
 import warnings
 
+import sand
 from sand.run.record import versions
 
 from . import files, regimes, scaling
@@ -26,6 +27,7 @@ def main() -> None:
     parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    sand.set_threads(1)  # a row that needs more says so
     if options.page:
         from . import page  # needs Playwright and a Chromium
 

@@ -194,7 +194,9 @@ def choose_step(grains, far, start, near, clock, count, span, control):
     """
     between = clock[LEFT] == 0.0
     alone = count[CONTACTS] == 0
-    if alone or count[STEPS] - count[LOOKED] >= CHECK_EVERY or (between and clock[CYCLE] > clock[STEP]):
+    # a step of the user's own is looked at only for numbers that are not finite
+    each = (alone and control.fixed == 0.0) or (between and clock[CYCLE] > clock[STEP])
+    if each or count[STEPS] - count[LOOKED] >= CHECK_EVERY:
         may_grow = count[STEPS] - count[GROWN] >= GROW_EVERY
         if between:
             clock[CALM], cycle = calm_steps(grains, far, start, count, control)
