@@ -1,4 +1,4 @@
-"""How the cost of a grain's step grows with the number of grains, numbered as they were built and at random."""
+"""How the cost of a grain's step grows with the number of grains, numbered as built, at random and along a curve."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ GRAIN_STEPS = 1_000_000
 PIECES = 3
 PATIENCE = 120.0
 """Longest time [s] that one world may take to be built."""
+WAYS = ("as built", "at random", "in order")
+"""How grains are numbered; in order: along a curve through space, from random numbers."""
 KINDS = {"loose": "loose BPCA", "fcc": "dense fcc", "gas": "gas"}
 
 
@@ -39,13 +41,15 @@ class Cost(NamedTuple):
     building: float  # thread time until the first loads are there [s]
 
 
-def cost(kind: str, count: int, shuffled: bool) -> Cost:
+def cost(kind: str, count: int, numbered: str) -> Cost:
     """The best of some short pieces; contacts alone, calm."""
     place = worlds.PLACES[kind](count)
-    if shuffled:
+    if numbered != "as built":
         place = np.random.default_rng(8).permutation(place)
     begun = time.thread_time()
     grains = worlds.shaken(place, speed=worlds.SLOW)
+    if numbered == "in order":
+        grains = sand.setup.in_space_order(grains)
     sim = sand.Simulation(grains, [sand.Contact()], stepping=worlds.stepping(kind))
     sim.run(steps=1)
     built = time.thread_time() - begun
@@ -64,17 +68,18 @@ def rows(quick: bool) -> Iterator[dict[str, Any]]:
             elif 10.0 * building > PATIENCE:
                 one["skipped"] = f"would take {10.0 * building:.0f} s to build"
             else:
-                plain, mixed = cost(kind, count, False), cost(kind, count, True)
-                building = max(plain.building, mixed.building)
-                one |= {"as built": 1e9 * plain.step, "at random": 1e9 * mixed.step, "building": building}
+                costs = {way: cost(kind, count, way) for way in WAYS}
+                building = max(each.building for each in costs.values())
+                one |= {way: 1e9 * each.step for way, each in costs.items()} | {"building": building}
             yield one
 
 
 def tell(told: Iterable[dict[str, Any]]) -> None:
     """Print them as they come."""
-    print(f"{'':12} {'grains':>8} {'as built':>10} {'at random':>10}  ns per grain and step {'building':>10}  s")
+    ways = " ".join(f"{way:>10}" for way in WAYS)
+    print(f"{'':12} {'grains':>8} {ways}  ns per grain and step {'building':>10}  s")
     for one in told:
         text = one["skipped"]
         if not text:
-            text = f"{one['as built']:10.3g} {one['at random']:10.3g} {'':22} {one['building']:10.3g}"
+            text = " ".join(f"{one[way]:10.3g}" for way in WAYS) + f" {'':22} {one['building']:10.3g}"
         print(f"{one['kind']:12} {one['grains']:8d} {text}", flush=True)

@@ -9,6 +9,7 @@ from .fractal import fractal
 from .frame import Bonds, Start, from_frame
 from .gas import gas
 from .moments import magnetic_energy, relaxed
+from .order import in_space_order
 from .population import Lognormal, PowerLaw
 
 pca = bpca
@@ -33,6 +34,7 @@ __all__ = [
     "gas",
     "grain",
     "hexagonal",
+    "in_space_order",
     "lattice",
     "magnetic_energy",
     "pca",

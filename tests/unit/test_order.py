@@ -1,0 +1,40 @@
+"""Numbering along a space-filling curve."""
+
+import numpy as np
+
+import sand
+from sand.setup.order import places_on_curve
+
+
+def test_places_interleave_the_bits():
+    """x, y, z of 21 bits each: bit b of axis a is bit 3b + a of the place (corners of a cube, and a power of two)."""
+    top = 2**21 - 1
+    corners = np.array([[0, 0, 0], [top, 0, 0], [0, top, 0], [0, 0, top], [top, top, top], [2**7, 0, 2**20]], float)
+    spread = sum(1 << (3 * b) for b in range(21))
+    expected = [0, spread, spread << 1, spread << 2, spread * 7, (1 << 21) | (1 << 62)]
+    assert places_on_curve(corners).tolist() == expected
+
+
+def test_the_same_grains_in_another_order():
+    """Every quantity goes along; contacts of an aggregate are nearer in memory than in the order of its growth."""
+    grains = sand.setup.bpca(2000, radius="0.1 um", material=sand.SILICA, seed=3)
+    grains.arrays.velocity[...] = grains.arrays.position * 2.0
+    ordered = sand.setup.in_space_order(grains)
+    order = np.argsort(places_on_curve(grains.position), kind="stable")
+    assert sorted(order) == list(range(2000))
+    for name, array in grains.arrays._asdict().items():
+        assert (getattr(ordered.arrays, name) == array[..., order]).all(), name
+    assert (ordered.velocity == 2.0 * ordered.position).all()
+
+    def distance(some):
+        pair = np.asarray(sand.Box.open().close_pairs(some.position, 2.001e-7), dtype=np.int64)
+        return np.median(np.abs(pair[:, 0] - pair[:, 1]))
+
+    assert distance(ordered) < 0.1 * distance(grains)
+
+
+def test_points_in_one_place_or_a_plane():
+    """No extent along an axis, or none at all, is no error."""
+    assert (places_on_curve(np.zeros((3, 3))) == 0).all()
+    plane = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
+    assert len(set(places_on_curve(plane).tolist())) == 3
