@@ -16,6 +16,9 @@ from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned
 
+WAITS, BROKE, YIELDED = 1.0, 2.0, 3.0
+"""Flags of a contact that passed a limit: to be settled; broken in this step; moved in the pass over all contacts."""
+
 
 @loop
 def bond_at(b, c):
@@ -64,9 +67,9 @@ def twist_gain(grains, contacts, c, pose, dt):
 
 
 @loop
-def contact_pass(grains, contacts, first, last, span, law, dt):
-    """Twist, loads and flag of the contacts first…last − 1 (uint64); True if any passed a limit.  Vectorises."""
-    flagged = 0.0
+def quiet_pass(grains, contacts, first, last, span, law, dt):
+    """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises."""
+    waiting = 0.0
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
@@ -86,9 +89,9 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = 1.0 if beyond else 0.0
-        flagged += contacts.flag[c]
-    return flagged > 0.0
+        contacts.flag[c] = WAITS if beyond else 0.0
+        waiting += contacts.flag[c]
+    return waiting
 
 
 @rare

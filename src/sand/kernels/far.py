@@ -7,6 +7,7 @@ from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..core.world import CONTACTS
+from .contacts import BROKE
 
 HELD_CHANGE = 0.5
 """Change of a grain's far load, in parts of it, at which its held part follows.
@@ -127,7 +128,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable]:
     @loop
     def change_sides(grains, contacts, count, far, span, numbers):
         for c in range(count[CONTACTS]):
-            dead = contacts.flag[c] == 2.0
+            dead = contacts.flag[c] == BROKE
             if dead or contacts.bonded[c] == 0:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, numbers, i, j)
