@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import CONTACTS, CYCLE, FAR_SUMS, LISTED
+from sand.core.threads import set_threads
+from sand.core.world import BROKEN, CONTACTS, CYCLE, FAR_SUMS, LISTED, MOVED
 
-from .setups import random_aggregate, struck_chain
+from .setups import random_aggregate, rest_distance, struck_chain
 
 
 def gas_simulation(**options):
@@ -199,3 +200,23 @@ def test_kernels_against_plain_python_loops():
         torque[j] += t2
     assert g.force == pytest.approx(force, abs=1e-9 * np.abs(force).max())
     assert g.torque == pytest.approx(torque, abs=1e-9 * np.abs(torque).max())
+
+
+def test_the_number_of_threads_changes_nothing():
+    """A lattice of 1000 grains that spin: most contacts move in each step, some break. The same for 1, 2, 3 threads."""
+    radius, rng = 1e-8, np.random.default_rng(5)
+    place = np.stack(np.meshgrid(*[np.arange(10)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    place = rest_distance(sand.SILICA, radius, radius) * place
+    given = {"velocity": rng.normal(size=place.shape), "spin": rng.normal(scale=3e9, size=place.shape)}
+    ends = []
+    for number in (1, 2, 3):
+        set_threads(number)
+        sim = sand.Simulation(sand.Grains(place, radius, sand.SILICA, **given), [sand.Contact()])
+        try:
+            sim.run(steps=200)
+        finally:
+            set_threads(None)
+        ends.append(state(sim))
+    count = sim.world.count
+    assert count[BROKEN] > 0 and count[MOVED] > 0.5 * 200 * count[CONTACTS]
+    assert ends[0] == ends[1] == ends[2]

@@ -74,7 +74,8 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     """It finds LEAVE on its board and goes, with nobody counted inside."""
     sim = shaken_lattice(None)
     sim.run(steps=1)
-    before, world, crew = state(sim), sim.world, new_crew()
+    before, world = state(sim), sim.world
+    crew = new_crew(world.contacts)
     crew.board[WORD] = LEAVE << 48
     rules = sim._engine.rules._replace(crew=crew)
     crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)

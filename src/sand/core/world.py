@@ -45,7 +45,7 @@ class ContactArrays(NamedTuple):
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) 1.0 where a limit was passed in this step, 2.0 where the contact broke
+    flag: np.ndarray  # (C,) 0.0, or what became of it where a limit was passed in this step: kernels.contacts.WAITS …
     bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
     side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin

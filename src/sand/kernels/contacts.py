@@ -19,6 +19,8 @@ from ..physics.rotation import turned
 
 FEW = 4
 """Contacts that are faster done one by one than as a vector."""
+WAITS, BROKE, YIELDED = 1.0, 2.0, 3.0
+"""Flags of a contact that passed a limit: to be settled; broken in this step; moved in the pass over all contacts."""
 
 
 @loop
@@ -68,13 +70,13 @@ def twist_gain(grains, contacts, c, pose, dt):
 
 
 @loop
-def contact_pass(grains, contacts, first, last, used, span, law, dt):
-    """Twist, loads and flag of the contacts first…last − 1 (uint64); True if any passed a limit.  Vectorises.
+def quiet_pass(grains, contacts, first, last, used, span, law, dt):
+    """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises.
 
     Args:
         used: number of contacts in use (uint64); columns beyond it may be passed over, to no effect.
     """
-    flagged = 0.0
+    waiting = 0.0
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
@@ -94,19 +96,21 @@ def contact_pass(grains, contacts, first, last, used, span, law, dt):
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = 1.0 if beyond else 0.0
-        flagged += contacts.flag[c] if c < used else 0.0
-    return flagged > 0.0
+        contacts.flag[c] = WAITS if beyond else 0.0
+        waiting += contacts.flag[c] if c < used else 0.0
+    return waiting
 
 
 @loop
 def whole_vectors(contacts, number):
     """The number of columns to pass over for so many contacts: if many are left over, they are a vector of their own.
 
-    What is beyond the contacts in use is worked out as well, and never read.
+    What is beyond the contacts in use is worked out as well, and never read.  Both are uint64.
     """
-    whole = (number + LANES - 1) // LANES * LANES
-    return min(whole, contacts.pair.shape[1]) if COMPILED and number % LANES >= FEW else number
+    lanes = np.uint64(LANES)
+    whole = (number + lanes - np.uint64(1)) // lanes * lanes
+    fits = COMPILED and whole <= np.uint64(contacts.pair.shape[1])
+    return whole if fits and number % lanes >= np.uint64(FEW) else number
 
 
 @rare

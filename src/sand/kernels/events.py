@@ -24,31 +24,10 @@ from ..core.world import (
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.impact import speed_gained
-from ..physics.rotation import turn, turned, turned_back
-from .contacts import bond_at, pose_at, twist_gain, write_loads
+from ..physics.rotation import turned_back
+from .contacts import BROKE, WAITS, bond_at, pose_at, write_loads
+from .moving import strain_before
 from .neighbours import bond_of, forget_touch
-
-
-@loop
-def strain_before(grains, contacts, span, c, pose, bond, dt):
-    """Displacements at the start of the step, from where the grains came."""
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    apart = sub(
-        scale(pose.distance, pose.n),
-        scale(dt, sub(load(grains.velocity, i), load(grains.velocity, j))),
-    )
-    distance = math.sqrt(dot(apart, apart))
-    q1 = turn(load4(grains.orientation, i), scale(-dt, load(grains.spin, i)))
-    q2 = turn(load4(grains.orientation, j), scale(-dt, load(grains.spin, j)))
-    earlier = law_of.Pose(
-        scale(1.0 / distance, apart),
-        distance,
-        turned(q1, load(contacts.pointer1, c)),
-        turned(q2, load(contacts.pointer2, c)),
-        contacts.twist[c] - twist_gain(grains, contacts, c, pose, dt),
-    )
-    r1, r2 = grains.radius[i], grains.radius[j]
-    return law_of.strain_of(earlier, r1 + r2 - distance, r1, r2, bond)
 
 
 @loop
@@ -95,7 +74,7 @@ def damp(grains, contacts, span, c, dt):
 def damp_contacts(grains, contacts, count, lost, span, dt):
     """Damping of all contacts."""
     for c in range(count[CONTACTS]):
-        if contacts.flag[c] != 2.0:
+        if contacts.flag[c] != BROKE:
             book(contacts.lost, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
 
 
@@ -106,7 +85,7 @@ def book_stiffness(grains, contacts, count, lost, span, dt):
         bond = bond_at(contacts.bond, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
-        before = strain_before(grains, contacts, span, c, pose, bond, dt)
+        before = strain_before(grains, contacts, c, pose, bond, dt)
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         earlier, now = stiffened_at(before.overlap, bond), stiffened_at(strain.overlap, bond)
         book(contacts.lost, lost, c, STIFFNESS, law_of.lost_to_stiffness(before, strain, earlier, now))
@@ -127,7 +106,7 @@ def knock(grains, i, j, n, impulse):
 
 @rare
 def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
-    """Book the energy of a neck that snapped inside the step, and mark the contact as dead (flag 2).
+    """Book the energy of a neck that snapped inside the step, and mark the contact as dead.
 
     The force −(5/9)F_c ended τ ago; velocity Verlet let it act until half the step: the difference is
     given as an impulse.
@@ -143,7 +122,7 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     # the damping force acted until the break: half a step by Verlet, the rest by the impulse
     book(contacts.lost, lost, c, DAMPING, -contacts.damped[c] * opening * (dt - since))
     count[BROKEN] += 1
-    contacts.flag[c] = 2.0
+    contacts.flag[c] = BROKE
     put(contacts.push, c, (0.0, 0.0, 0.0))
     put(contacts.torque1, c, (0.0, 0.0, 0.0))
     put(contacts.torque2, c, (0.0, 0.0, 0.0))
@@ -153,10 +132,10 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
 
 @rare
 def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
-    """Break or move the contacts that passed a limit; returns True if any broke."""
+    """Break or move the contacts that wait for it; returns True if any broke."""
     parted = False
     for c in range(count[CONTACTS]):
-        if contacts.flag[c] == 0.0:
+        if contacts.flag[c] != WAITS:
             continue
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
@@ -164,7 +143,7 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         if law_of.beyond_limits(strain, pose.n, bond):
-            before = strain_before(grains, contacts, span, c, pose, bond, dt)
+            before = strain_before(grains, contacts, c, pose, bond, dt)
             y = adhesion.root(adhesion.stretch(strain.overlap, bond.pull_off_overlap))
             now = law_of.stiffened(bond, y, law.follow)
             if strain.overlap < -bond.break_overlap:
@@ -193,7 +172,7 @@ def drop_broken(contacts, count):
     """Close the gaps that broken contacts leave; the order of the others stays."""
     kept = 0
     for c in range(count[CONTACTS]):
-        if contacts.flag[c] == 2.0:
+        if contacts.flag[c] == BROKE:
             continue
         if kept != c:
             for row in range(2):

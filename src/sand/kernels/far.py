@@ -3,11 +3,13 @@
 import functools
 from collections.abc import Callable
 
+import numpy as np
+
 from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..core.world import CONTACTS
-from .contacts import whole_vectors
+from .contacts import BROKE, whole_vectors
 
 HELD_CHANGE = 0.5
 """Change of a grain's far load, in parts of it, at which its held part follows.
@@ -111,7 +113,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
 
     @loop
     def add_bonded(grains, contacts, count, span, numbers):
-        for c in range(whole_vectors(contacts, count[CONTACTS])):
+        for c in range(whole_vectors(contacts, np.uint64(count[CONTACTS]))):
             force, torque1, torque2 = pair(grains, span, numbers, contacts.pair[0, c], contacts.pair[1, c])
             part = 1.0 if contacts.bonded[c] == 1 else 0.0
             accrue(contacts.push, c, scale(part, force))
@@ -132,7 +134,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     @loop
     def change_sides(grains, contacts, count, far, span, numbers):
         for c in range(count[CONTACTS]):
-            dead = contacts.flag[c] == 2.0
+            dead = contacts.flag[c] == BROKE
             if dead or contacts.bonded[c] == 0:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, numbers, i, j)

@@ -77,7 +77,8 @@ class Engine:
         """The rules for one call of the driver, with a crew at work if there is one."""
         if self._hands is None:
             return self.rules
-        w, rules = self.world, self.rules._replace(crew=new_crew())
+        w = self.world
+        rules = self.rules._replace(crew=new_crew(w.contacts.flag.size))
         self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
         return rules
 

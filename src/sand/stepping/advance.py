@@ -189,7 +189,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
         fresh = new_touches(grains, near, count, rules.span)
         if count[CONTACTS] + fresh > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
-        flagged = pass_contacts(grains, contacts, far, clock, count, rules)
+        flagged = pass_contacts(grains, contacts, far, clock, count, lost, rules)
         parted = update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fresh, flagged)
         dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
         due = clock[LEFT] == 0.0 or parted or fresh > 0

@@ -14,13 +14,14 @@ import numpy as np
 from ..core.atomics import fetch_add, give_way, read, write
 from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.world import CONTACTS
-from ..kernels.contacts import contact_pass, gather
+from ..kernels.contacts import gather
+from ..kernels.moving import contact_pass, keep_passed
 from ..kernels.sums import CREW_FROM
 from .rules import Plan
 
-WORD, DONE, INSIDE, FLAGGED = 0, 8, 16, 24
-"""Places on the board, a line of the cache apart: the work at hand, its finished blocks, helpers at work, flags."""
-PLACES = 32
+WORD, DONE, INSIDE = 0, 8, 16
+"""Places on the board, a line of the cache apart: the work at hand, its finished blocks, helpers at work."""
+PLACES = 24
 PATIENCE = 4000
 """Looks at the board before a waiting thread lets others run on its core."""
 CONTACTS_AT_ONCE = 512
@@ -42,13 +43,14 @@ PASS, GATHER, FAR, LEAVE = range(1, 5)
 class Crew(NamedTuple):
     """What the threads share besides the world."""
 
-    board: Any  # (32,) int64; made anew for every call of the driver
+    board: Any  # (24,) int64; made anew for every call of the driver
     step: Any  # (1,) float64: length of the step at hand [s]
+    passed: Any  # (B, 8) float64: what the pass over each block of contacts found, by `Passed`
 
 
-def new_crew() -> Crew:
-    """A board without work."""
-    return Crew(np.zeros(PLACES, np.int64), np.zeros(1))
+def new_crew(contacts: int) -> Crew:
+    """A board without work, for up to so many contacts."""
+    return Crew(np.zeros(PLACES, np.int64), np.zeros(1), np.zeros((contacts // CONTACTS_AT_ONCE + 1, 8)))
 
 
 @loop
@@ -67,10 +69,9 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
         if task == PASS:
             first = b * CONTACTS_AT_ONCE
             last = min(first + CONTACTS_AT_ONCE, count[CONTACTS])
-            step = rules.crew.step[0]
-            span, law, used = rules.span, rules.contact, np.uint64(count[CONTACTS])
-            if contact_pass(grains, contacts, np.uint64(first), np.uint64(last), used, span, law, step):
-                write(rules.crew.board, FLAGGED, 1)
+            span, law, step = rules.span, rules.contact, rules.crew.step[0]
+            found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, law, step)
+            keep_passed(rules.crew.passed, b, found)
         elif task == GATHER:
             first = b * GRAINS_AT_ONCE
             last = min(first + GRAINS_AT_ONCE, grains.mass.size)

@@ -5,19 +5,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..core.atomics import read, write
 from ..core.jit import loop
 from ..core.world import CONTACTS, STEP
-from ..kernels.contacts import contact_pass, gather, whole_vectors
-from .crew import CONTACTS_AT_ONCE, FAR, FLAGGED, GATHER, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
+from ..kernels.contacts import gather
+from ..kernels.moving import book_passed, contact_pass, kept_passed
+from .crew import CONTACTS_AT_ONCE, FAR, GATHER, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
 from .rules import Plan
 
 
 @loop
-def _pass_alone(grains, contacts, far, clock, count, rules):
-    used = np.uint64(count[CONTACTS])
-    last = np.uint64(whole_vectors(contacts, count[CONTACTS]))
-    return contact_pass(grains, contacts, np.uint64(0), last, used, rules.span, rules.contact, clock[STEP])
+def _pass_alone(grains, contacts, far, clock, count, lost, rules):
+    last = np.uint64(count[CONTACTS])
+    passed = contact_pass(grains, contacts, np.uint64(0), last, rules.span, rules.contact, clock[STEP])
+    book_passed(count, lost, passed)
+    return passed.waiting > 0.0
 
 
 @loop
@@ -27,7 +28,7 @@ def _gather_alone(grains, contacts, far, count, rules):
 
 @functools.cache
 def large_loops(plan: Plan) -> tuple[Callable, Callable, Callable]:
-    """Pass over all contacts (True if any passed a limit), gathering of their loads, sum of the long-range loads."""
+    """Pass over all contacts (True if any wait), gathering of their loads, sum of the long-range loads."""
     return _by_a_crew(plan) if plan.crew else _alone(plan)
 
 
@@ -46,12 +47,16 @@ def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable]:
     begin, _, end, far_blocks = plan.far.parts
 
     @loop
-    def pass_together(grains, contacts, far, clock, count, rules):
+    def pass_together(grains, contacts, far, clock, count, lost, rules):
         rules.crew.step[0] = clock[STEP]
-        write(rules.crew.board, FLAGGED, 0)
         blocks = blocks_of(count[CONTACTS], CONTACTS_AT_ONCE)
         share(PASS, blocks, grains, contacts, far, count, rules)
-        return read(rules.crew.board, FLAGGED) > 0
+        waiting = False
+        for b in range(blocks):
+            passed = kept_passed(rules.crew.passed, b)
+            waiting |= passed.waiting > 0.0
+            book_passed(count, lost, passed)
+        return waiting
 
     @loop
     def gather_together(grains, contacts, far, count, rules):

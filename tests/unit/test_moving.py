@@ -1,0 +1,167 @@
+"""Contacts that are moved in the pass over all of them, beside those that are settled one by one."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from sand.core.box import Box
+from sand.core.grains import GrainArrays, Grains
+from sand.core.jit import kernel
+from sand.core.material import SILICA
+from sand.core.vec import axpy, load4, put, scale
+from sand.core.world import BROKEN, CONTACTS, COUNT, LOST, MOVED, ROLLING, SLIDING, TWISTING, contact_arrays, near_pairs
+from sand.forces.contact import Contact
+from sand.kernels.contacts import BROKE, WAITS, YIELDED, pose_at, quiet_pass, twist_gain
+from sand.kernels.events import settle_flagged
+from sand.kernels.motion import drift
+from sand.kernels.moving import book_passed, contact_pass, strain_before
+from sand.physics.contact import Bond, bond_between, strain_of
+from sand.physics.rotation import turned_back
+from sand.physics.tangential import pointers_for
+from sand.stepping.rules import ContactRules
+
+PAIRS = 403
+"""Contacts of a test: whole blocks, and a rest that fills no vector."""
+STEP = 1e-11
+STATE = ("pointer1", "pointer2", "twist", "push", "torque1", "torque2", "lost")
+
+
+def _pass_and_settle(grains, contacts, near, count, lost, span, law, dt):
+    passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, dt)
+    book_passed(count, lost, passed)
+    settle_flagged(grains, contacts, near, count, lost, span, law, dt)
+    return passed.waiting
+
+
+pass_and_settle = kernel(_pass_and_settle, keep=False)
+
+
+def one_by_one(grains, contacts, near, count, lost, span, law, dt):
+    """The referee, in Python: a pass that moves nothing, then every contact beyond a limit by itself."""
+    used = np.uint64(count[CONTACTS])
+    quiet_pass(grains, contacts, np.uint64(0), used, used, span, law, dt)
+    settle_flagged(grains, contacts, near, count, lost, span, law, dt)
+
+
+def some_contacts(material, box, seed=1):
+    """Pairs of grains of any size in a box, their contacts anywhere below and beyond each limit, also of breaking."""
+    rng = np.random.default_rng(seed)
+
+    def vectors(size):
+        v = rng.normal(size=(PAIRS, 3))
+        return size * v / np.linalg.norm(v, axis=1)[:, None]
+
+    pairing = Contact().pairing(material, material)
+    r1, r2 = rng.uniform(5e-9, 2e-8, (2, PAIRS))
+    mass = 4 / 3 * np.pi * 2000.0 * np.array([r1, r2]) ** 3
+    n, contacts = vectors(1.0), contact_arrays(2 * PAIRS, PAIRS, len(Bond._fields))
+    grains = GrainArrays(*(np.zeros_like(a) for a in Grains(np.zeros((2 * PAIRS, 3)), 1e-8, material).arrays))
+    grains.orientation[:] = rng.normal(size=(4, 2 * PAIRS))
+    grains.orientation[:] /= np.linalg.norm(grains.orientation, axis=0)
+    grains.radius[:], grains.mass[:] = np.concatenate((r1, r2)), mass.ravel()
+    grains.velocity[:] = rng.normal(size=(3, 2 * PAIRS))
+    grains.spin[:] = 1e8 * rng.normal(size=(3, 2 * PAIRS))
+    contacts.flag[:PAIRS] = 1.0  # much moved in the step before
+    contacts.lost[:] = rng.uniform(0.0, 1e-20, contacts.lost.shape)
+    for c in range(PAIRS):
+        bond = bond_between(pairing, r1[c], r2[c], *mass[:, c])
+        across = [np.cross(n[c], v) for v in vectors(1.0)[:2]]
+        slide, roll, twist = rng.uniform(0.0, 1.6, 3)
+        slide, roll = scale(slide * bond.slide_limit, across[0]), scale(roll * bond.roll_limit, across[1])
+        n1, n2 = pointers_for(slide, roll, n[c], r1[c], r2[c])
+        pressed = rng.uniform(-1.1, 2.0) if c % 10 else rng.uniform(5.0, 20.0)
+        centre = rng.uniform(-1e-7, 1e-7, 3)
+        apart = r1[c] + r2[c] - pressed * bond.pull_off_overlap * (0.2 if bond.hertz > 0.0 else 1.0)
+        put(grains.position, c, axpy(0.5 * apart, n[c], centre))
+        put(grains.position, c + PAIRS, axpy(-0.5 * apart, n[c], centre))
+        put(contacts.pointer1, c, turned_back(load4(grains.orientation, c), n1))
+        put(contacts.pointer2, c, turned_back(load4(grains.orientation, c + PAIRS), n2))
+        contacts.pair[:, c] = c, c + PAIRS
+        contacts.twist[c] = twist * bond.twist_limit * rng.choice((-1.0, 1.0))
+        contacts.bond[:, c] = bond
+    grains.position[:] = box.wrap(grains.position.T).T
+    count = np.zeros(len(COUNT), np.int64)
+    count[CONTACTS] = PAIRS
+    return grains, contacts, near_pairs(2 * PAIRS, 16), count, np.zeros(len(LOST))
+
+
+def law_for(release=False, follow=False):
+    return ContactRules(True, np.zeros((10, 1, 1)), release, follow, False, 25.0)
+
+
+OPTIONS = {
+    "clamped": (SILICA, Box.open(), law_for()),
+    "released": (SILICA, Box.open(), law_for(release=True)),
+    "periodic": (SILICA, Box.periodic(2.2e-7, None, 3e-7), law_for()),
+    "following": (SILICA, Box.open(), law_for(follow=True)),
+    "hertzian": (SILICA.but(name="dry", surface_energy=0.0), Box.open(), law_for()),
+}
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_contacts_moved_in_the_pass_are_as_if_moved_one_by_one(option):
+    """Same pointers, twists, loads, losses, to rounding: 1e-12 of the largest of each kind.
+
+    Pointers have errors of 1e-16, displacements are 1e-3 of a radius: forces and energies are known to some 1e-13.
+    """
+    material, box, law = OPTIONS[option]
+    world = some_contacts(material, box)
+    other = copy.deepcopy(world)
+    waited = pass_and_settle(*world, box.span, law, STEP)
+    with np.errstate(invalid="ignore"):
+        one_by_one(*other, box.span, law, STEP)
+    contacts, expected = world[1], other[1]
+    for name in STATE:
+        a, b = getattr(contacts, name)[..., :PAIRS], getattr(expected, name)[..., :PAIRS]
+        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max(), name
+    assert (world[3] == other[3]).all()
+    np.testing.assert_allclose(world[4], other[4], rtol=1e-12, atol=1e-12 * np.abs(other[4]).max())
+    flag, waits = contacts.flag[:PAIRS], expected.flag[:PAIRS]
+    assert ((flag == BROKE) == (waits == BROKE)).all() and ((flag > 0) == (waits > 0)).all()
+    # there are all sorts of contacts, and it is the pass that moves them, but for those it must leave alone
+    assert 0 < world[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
+    if option in ("clamped", "released", "periodic"):
+        assert np.sum(flag == YIELDED) > PAIRS / 4 and np.sum(flag == WAITS) > 0
+        assert world[3][BROKEN] < waited < PAIRS / 3
+        assert world[3][MOVED] >= np.sum(flag == YIELDED)
+        assert (world[4][[SLIDING, ROLLING, TWISTING]] != 0.0).all()
+    if option == "following":
+        assert not np.any(flag == YIELDED)
+
+
+def test_the_strain_before_a_step_is_that_of_grains_put_back():
+    """Displacements at the start of a step are those of a world that drifted back; 1e-12 of the largest."""
+    grains, contacts, *_ = some_contacts(SILICA, Box.periodic(2.2e-7, None, 3e-7))
+    span = Box.periodic(2.2e-7, None, 3e-7).span
+    back = copy.deepcopy(grains)
+    drift(back, span, -STEP)
+    found, expected = [], []
+    for c in range(PAIRS):
+        bond, radii = Bond(*contacts.bond[:, c]), (grains.radius[c], grains.radius[c + PAIRS])
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        found.append(np.hstack(strain_before(grains, contacts, c, pose, bond, STEP)))
+        twist = contacts.twist[c] - twist_gain(grains, contacts, c, pose, STEP)
+        then = pose_at(back, contacts, span, c, twist)
+        expected.append(np.hstack(strain_of(then, sum(radii) - then.distance, *radii, bond)))
+    found, expected = np.array(found), np.array(expected)
+    assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
+
+
+def test_what_a_contact_does_not_lose_stays_in_its_record():
+    """Contacts that do not move keep pointers and records bit by bit, whatever their neighbours in a block do."""
+    world = some_contacts(SILICA, Box.open(), seed=2)
+    before = copy.deepcopy(world[1])
+    pass_and_settle(*world, Box.open().span, law_for(), STEP)
+    still = world[1].flag[:PAIRS] == 0.0
+    for name in ("pointer1", "pointer2", "lost"):
+        assert (getattr(world[1], name)[:, :PAIRS][:, still] == getattr(before, name)[:, :PAIRS][:, still]).all()
+
+
+def test_a_quiet_block_waits_to_be_settled():
+    """Where nothing moved in the step before, the pass moves nothing; contacts are settled one by one."""
+    world = some_contacts(SILICA, Box.open())
+    world[1].flag[:] = 0.0
+    waited = pass_and_settle(*world, Box.open().span, law_for(), STEP)
+    assert waited > PAIRS / 2 and not np.any(world[1].flag == YIELDED)
+    assert world[3][MOVED] > PAIRS / 2
