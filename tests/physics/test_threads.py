@@ -75,7 +75,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     sim = shaken_lattice(None)
     sim.run(steps=1)
     before, world = state(sim), sim.world
-    crew = new_crew(world.contacts)
+    crew = new_crew(world.contacts.flag.size)
     crew.board[WORD] = LEAVE << 48
     rules = sim._engine.rules._replace(crew=crew)
     crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)
@@ -87,8 +87,10 @@ def test_helpers_go_home_with_their_simulation():
     """No thread of a crew outlives its simulation by more than a moment."""
     import threading
 
+    others = set(threading.enumerate())
+
     def crew():
-        return [t for t in threading.enumerate() if t.name == "sand-crew"]
+        return [t for t in threading.enumerate() if t.name == "sand-crew" and t not in others]
 
     sand.set_threads(2)
     sim = shaken_lattice(None)
