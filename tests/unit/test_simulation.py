@@ -220,6 +220,26 @@ def test_steps_are_counted_through_growing_arrays():
     assert sim.world.steps == 32
 
 
+@pytest.mark.parametrize(
+    ("far", "there", "not_there"),
+    [
+        ("impulse", ("held_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "here")),
+        ("taylor", ("torque_rate", "past_position", "past_moment"), ("held_force", "path", "order", "cell")),
+        ("every step", ("force", "torque"), ("held_torque", "force_rate", "past_position", "source")),
+    ],
+)
+def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
+    """Far arrays have columns where the plan needs them; contacts begin with a quarter more than touch."""
+    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(place, 1e-8, sand.SILICA, moment="1 A m^2/kg")
+    forces, search = [sand.Contact(), sand.Dipoles(cutoff="none")], sand.Neighbours(search="all pairs")
+    sim = sand.Simulation(grains, forces, stepping=sand.Verlet(far=far), neighbours=search)
+    arrays = sim.world.far._asdict()
+    assert all(arrays[name].shape[-1] == 64 for name in there)
+    assert not any(arrays[name].size for name in not_there)
+    assert sim.world.contacts.pair.shape[1] == 1.25 * 3 * 4 * 4 * 3
+
+
 def test_a_row_is_written_once(tmp_path):
     """Asking again for a time that is reached adds no row and no frame."""
     seen = []

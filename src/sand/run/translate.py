@@ -10,7 +10,7 @@ from ..core.box import Box
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.material import SILICA
-from ..core.world import World, contact_arrays, far_arrays, near_pairs, stage_arrays
+from ..core.world import FOR_IMPULSES, FOR_LIST, FOR_RATES, World, contact_arrays, far_arrays, near_pairs, stage_arrays
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact
 from ..forces.gas import Gas
@@ -28,8 +28,10 @@ from ..stepping.verlet import Verlet
 from .engine import Engine
 from .first_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
 
-SPREAD = 8
-"""Columns for contacts and near pairs per grain to begin with; they grow when needed."""
+SPARE = 1.25
+"""Room for contacts and near pairs to begin with, in pairs that touch at the start; it grows when needed."""
+MATES = 4
+"""Room per grain for neighbours in the list, likewise."""
 IDLE = 1e5
 """Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
 STIR_PART = 0.05
@@ -100,7 +102,9 @@ def build_engine(
     here = grains.copy()
     here.arrays.position[...] = box.wrap(grains.position).T
     start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
-    world = _world(here, box, found, plan, share=plan.crew and (not found.search.listed or None in cutoffs))
+    room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
+    share = plan.crew and (not found.search.listed or None in cutoffs)
+    world = _world(here, box, found, plan, room, share=share)
     engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
     held = seed_contacts(engine, given.contact, contacts)
     if given.contact is not None:
@@ -134,15 +138,22 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
     )
 
 
-def _world(grains: Grains, box: Box, found: Found, plan: Plan, *, share: bool) -> World:
-    """The grains in their box, with room for contacts and pairs, and for stages if there are any."""
-    count = len(grains)
+def _world(grains: Grains, box: Box, found: Found, plan: Plan, room: int, *, share: bool) -> World:
+    """The grains in their box, with `room` for contacts and pairs, and for whatever else the plan needs."""
+    count, listed = len(grains), found.search.listed
+    needed = {*(FOR_LIST if listed else ()), *(FOR_IMPULSES if plan.impulse else ())}
+    needed |= set(FOR_RATES if plan.foretell else ())
     return World(
         grains,
         box,
-        contact_arrays(count, SPREAD * count, len(Bond._fields)),
-        near_pairs(count, SPREAD * count),
-        far_arrays(count, SPREAD * count if found.search.listed else 0, share=share),
+        contact_arrays(count, room, len(Bond._fields)),
+        near_pairs(count, room),
+        far_arrays(
+            count,
+            MATES * count if listed else 0,
+            share=share,
+            needless={*FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
+        ),
         stages=stage_arrays(count if plan.adaptive else 0),
     )
 
