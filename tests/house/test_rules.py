@@ -176,6 +176,19 @@ def test_help_is_light():
     assert done.stdout.strip() == "[]"
 
 
+def test_a_gas_is_built_light():
+    """Nothing is loaded that takes long and is not needed before the first step."""
+    program = (
+        "import sys, sand\n"
+        "gas = sand.setup.gas(8, '0.5 um', radius='10 nm', material='iron', moment='200 A m^2/kg')\n"
+        "sand.Simulation(gas, [sand.Contact(), sand.Dipoles()], box='0.5 um')\n"
+        "heavy = {'scipy.sparse', 'scipy.spatial', 'matplotlib', 'gsd', 'pint', 'tqdm'} & set(sys.modules)\n"
+        "print(sorted(heavy))"
+    )
+    done = subprocess.run([sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def without_comments(text: str) -> str:
     """TypeScript or CSS without comments; `//` after a colon belongs to an address."""
     return re.sub(r"/\*.*?\*/|(?<!:)//[^\n]*", "", text, flags=re.DOTALL)

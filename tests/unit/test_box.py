@@ -31,6 +31,18 @@ def test_an_open_box_changes_nothing():
     assert (Box.open().nearest(v) == v).all()
 
 
+@pytest.mark.parametrize("box", [Box.open(), Box.periodic(1.0, None, 1.0), Box.periodic(1.0)])
+def test_close_pairs_of_few_points_and_of_many(box, monkeypatch):
+    """Looking at all pairs and the tree of SciPy find the same, in the same order."""
+    points = np.random.default_rng(4).uniform(-0.7, 0.7, (150, 3))
+    few = box.close_pairs(points, 0.2)
+    monkeypatch.setattr("sand.core.box.FEW", 0)
+    many = box.close_pairs(points, 0.2)
+    assert len(few) > 100
+    assert (few == many).all()
+    assert few.dtype == many.dtype
+
+
 def test_ways_to_say_it():
     """A length is a cube; None or no length is an open axis."""
     assert as_box("1 um") == Box.periodic(1e-6) == Box((1e-6, 1e-6, 1e-6))

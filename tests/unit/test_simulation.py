@@ -59,6 +59,29 @@ def test_overlaps_name_ten_pairs_and_count_the_rest():
     assert "180 more" in caught.value.problems[-1]
 
 
+def test_contacts_that_are_held_may_overlap_by_more():
+    """A row of 31 pairs too close together: those given as contacts, in whatever order, are not among the complaints.
+
+    Pairs alternate between two sizes, of which only the larger may overlap by so much: 2 δ0, which goes as r^(1/3).
+    """
+    limit = 2.0 * (2e-8 - rest_distance(sand.SILICA, 1e-8, 1e-8))
+    size = np.repeat(np.where(np.arange(31) % 2, 1e-8, 4e-8), 2)
+    place = 1e-6 * np.repeat(np.arange(31), 2)
+    place[1::2] += 2.0 * size[1::2] - 1.3 * limit
+    grains = sand.Grains(np.stack([place, 0 * place, 0 * place], axis=1), size, sand.SILICA)
+    wrong = [2 * k for k in range(31) if k % 2]
+    first = [2, 10, 58]
+    pairs = np.array([[2, 3], [11, 10], [59, 58]])
+    held = sand.setup.Bonds(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Simulation(grains, [sand.Contact()], contacts=held)
+    named = [f"grains {i} and {i + 1} overlap by {1.3 * limit:.3g} m at the start" for i in wrong if i not in first]
+    *told, rest = caught.value.problems
+    assert [line.split(";")[0] for line in told] == named[:10]
+    assert all(f"at most {limit:.3g} m may be: move them apart" in line for line in told)
+    assert rest == f"… and {len(named) - 10} more overlapping pairs"
+
+
 def test_overlap_is_measured_across_the_faces_of_the_box():
     """Two grains that touch only through the periodic boundary are seen."""
     grains = sand.Grains([[-9.5e-8, 0, 0], [9.5e-8, 0, 0]], 1e-8, sand.SILICA)
@@ -190,11 +213,31 @@ def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
 def test_steps_are_counted_through_growing_arrays():
     """run(steps=N) takes N steps, also when the list of pairs outgrows its arrays on the way."""
     sim = struck_chain(length=30)
-    sim.world.near = type(sim.world.near)(
-        np.zeros((2, 1), np.uint32), np.zeros(1, np.uint8), np.zeros(1), np.zeros(1), np.full((3, 31), np.inf)
-    )
+    near = sim.world.near
+    columns = {name: array[..., :1].copy() for name, array in near._asdict().items() if name not in ("anchor", "mark")}
+    sim.world.near = near._replace(**columns)
     sim.run(steps=32)
     assert sim.world.steps == 32
+
+
+@pytest.mark.parametrize(
+    ("far", "there", "not_there"),
+    [
+        ("impulse", ("held_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "home")),
+        ("taylor", ("torque_rate", "past_position", "past_moment"), ("held_force", "path", "order", "cell")),
+        ("every step", ("force", "torque"), ("held_torque", "force_rate", "past_position", "order")),
+    ],
+)
+def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
+    """Far arrays have columns where the plan needs them; contacts begin with a quarter more than touch."""
+    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(place, 1e-8, sand.SILICA, moment="1 A m^2/kg")
+    forces, search = [sand.Contact(), sand.Dipoles(cutoff="none")], sand.Neighbours(search="all pairs")
+    sim = sand.Simulation(grains, forces, stepping=sand.Verlet(far=far), neighbours=search)
+    arrays = sim.world.far._asdict()
+    assert all(arrays[name].shape[-1] == 64 for name in there)
+    assert not any(arrays[name].size for name in not_there)
+    assert sim.world.contacts.pair.shape[1] == 1.25 * 3 * 4 * 4 * 3
 
 
 def test_a_row_is_written_once(tmp_path):

@@ -1,10 +1,12 @@
 """Units at the door."""
 
 import math
+import re
 
 import pint
 import pytest
 
+from sand.core import units
 from sand.core.errors import BadInput
 from sand.core.units import in_unit, si, spoken
 
@@ -36,6 +38,21 @@ def test_decimal_prefixes_are_exact():
     """'5 us' is the float 5e-06, not 5 times the float 1e-06."""
     assert in_unit("5 us", "s") == 5e-6
     assert in_unit("1.2 um", "m") == 1.2e-6
+
+
+@pytest.mark.parametrize("unit", ["m", "s", "kg", "K", "Pa", "T", "J/m^2", "A m^2/kg", "kg/m^3", "rad/s", "C", "1"])
+def test_units_that_need_no_pint_are_those_of_pint(unit):
+    """Every prefix of every unit that is read without it, alone and as a factor: the same number, or refused alike."""
+    registry = pint.UnitRegistry()
+    for name in units._COMMON:
+        for text in (name, f"{name}/m^2", f"J {name}^-1*A", f"A m²/{name}", f"kg·{name}**3 / s", f"J/kg {name}"):
+            spelled = re.sub(r"(?<=[A-Za-zµμÅ])(-?\d)", r"**\1", text.replace("²", "**2").replace("·", "*"))
+            try:
+                right = registry.Quantity(1.0, spelled).to(unit.replace("^", "**")).magnitude
+            except pint.DimensionalityError:
+                right = None
+            assert units._powers(text) is not None
+            assert units._factor(text, unit) == (right and pytest.approx(right, rel=1e-14, abs=0.0))
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..core.box import Box
 
@@ -20,6 +18,12 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
         (N,) integers 0…K−1.
     """
     ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    if not len(ends):
+        return np.arange(count)  # a gas need not wait for SciPy's graphs, which take long to load
+
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 

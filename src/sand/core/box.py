@@ -11,6 +11,9 @@ from .errors import BadInput
 from .jit import formula
 from .units import si
 
+FEW = 200
+"""Points whose pairs are all looked at."""
+
 
 class Span(NamedTuple):
     """What kernels know of a box: lengths L [m] and 1/L per axis, both 0 on an open axis."""
@@ -98,7 +101,12 @@ class Box:
 
         On periodic axes the nearest images count; `reach` must be below half the shortest of them.
         """
-        from scipy.spatial import cKDTree
+        if len(position) <= FEW:
+            first, second = np.triu_indices(len(position), 1)
+            apart = self.nearest(position[first] - position[second])
+            return np.stack([first, second], axis=1)[(apart**2).sum(axis=1) <= reach**2]
+
+        from scipy.spatial import cKDTree  # slow to load
 
         lengths = np.array([0.0 if v is None else v for v in self.lengths])
         folded = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)

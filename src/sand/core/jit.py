@@ -189,6 +189,24 @@ def cache_folder() -> Path:
 _FOLDER = cache_folder()
 
 
+def _load_alone(compiled: Any) -> None:
+    """Let what is kept be loaded without all that numba knows to compile, an eighth of a second of a start."""
+    try:
+        from numba.core.runtime import rtsys
+
+        cache = compiled._cache
+        guard, load = cache._guard_against_spurious_io_errors, cache._load_overload
+    except (ImportError, AttributeError):
+        return
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        rtsys.initialize(target)  # machine code may name its functions
+        with guard():
+            return load(signature, target)
+
+    cache.load_overload = load_overload
+
+
 def kernel(function: Callable, *, keep: bool = True, alone: bool = False) -> Callable:
     """Compile `function` on its first call and keep the result in our own cache folder.
 
@@ -201,9 +219,12 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False) -> Cal
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        return numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **_COMMON, **_NO_ALIASES)(function)
+        compiled = numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **_COMMON, **_NO_ALIASES)(function)
     finally:
         numba.config.CACHE_DIR = before
+    if keep:
+        _load_alone(compiled)
+    return compiled
 
 
 class _Listener(event.Listener):

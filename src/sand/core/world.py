@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -100,19 +101,26 @@ class StageArrays(NamedTuple):
 
 KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
+FOR_LIST = ("anchor", "order", "start", "home", "cell", "here", "source")
+FOR_IMPULSES = ("held_force", "held_torque", "past_position", "path")
+FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
+"""The far arrays that only a list, or cycles of either kind, read and write."""
 PICKED = ("soon", "mark")
 """Of the near pairs, what it leaves out: it is picked anew."""
 LANES = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
+GROWTH = 1.5
+"""Longer arrays are longer by this factor."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 
 
-def far_arrays(grains: int, capacity: int, blocks: int = 1) -> FarArrays:
+def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collection[str] = ()) -> FarArrays:
     """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list.
 
     Args:
         blocks: of a sum over all pairs; 0 where there is none.
+        needless: arrays that get no columns, since nothing will touch them.
     """
     vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
@@ -120,7 +128,8 @@ def far_arrays(grains: int, capacity: int, blocks: int = 1) -> FarArrays:
     vectors |= {"here": np.zeros((3, whole)), "source": np.zeros((3, whole)), "share": np.zeros((2 * blocks, 3, whole))}
     sizes = {"order": grains, "start": grains + 1, "mate": max(int(capacity), 16), "home": grains}
     sizes["cell"] = CELLS_PER_GRAIN * grains + 28
-    return FarArrays(**(vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}))
+    arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
+    return FarArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in needless}))
 
 
 def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
@@ -153,14 +162,15 @@ def stage_arrays(grains: int) -> StageArrays:
     return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
-def _grown(arrays: Any, per_grain: tuple[str, ...]) -> Any:
-    """The same columns in arrays twice as long."""
-    longer = {}
+def _grown(arrays: Any, per_grain: tuple[str, ...], least: int) -> Any:
+    """The same columns in longer arrays, with room for `least` pairs at least."""
+    columns = arrays.pair.shape[1]
+    more, longer = max(int(GROWTH * columns) + 1, least), {}
     for name, old in arrays._asdict().items():
         if name in per_grain:
             longer[name] = old
             continue
-        new = np.zeros((*old.shape[:-1], 2 * old.shape[-1]), old.dtype)
+        new = np.zeros((*old.shape[:-1], more * (old.shape[-1] // columns)), old.dtype)
         new[..., : old.shape[-1]] = old
         longer[name] = new
     return type(arrays)(**longer)
@@ -193,17 +203,17 @@ class World:
         """An independent copy: a snapshot."""
         return copy.deepcopy(self)
 
-    def grow_contacts(self) -> None:
-        """Twice the room for contacts."""
-        self.contacts = _grown(self.contacts, ("start",))
+    def grow_contacts(self, least: int = 0) -> None:
+        """More room for contacts, for `least` of them at least."""
+        self.contacts = _grown(self.contacts, ("start",), least)
 
-    def grow_pairs(self) -> None:
-        """Twice the room for near pairs."""
-        self.near = _grown(self.near, ("anchor", "mark"))
+    def grow_pairs(self, least: int = 0) -> None:
+        """More room for near pairs, for `least` of them at least."""
+        self.near = _grown(self.near, ("anchor", "mark"), least)
 
     def grow_rows(self) -> None:
-        """Twice the room for neighbours within the reach of long-range forces; what is there is not kept."""
-        self.far = self.far._replace(mate=np.zeros(2 * self.far.mate.size, np.uint32))
+        """More room for neighbours within the reach of long-range forces; what is there is not kept."""
+        self.far = self.far._replace(mate=np.zeros(int(GROWTH * self.far.mate.size) + 1, np.uint32))
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Every number of the state by name, for a checkpoint; unused columns are left out."""
@@ -228,10 +238,10 @@ class World:
             # checkpoints of earlier versions lack the last counters, which begin at 0
             n = saved[name].size if name == "count" and name in saved else None
             _take(getattr(self, name)[:n], saved, name)
-        while self.contacts.pair.shape[1] < self.count[CONTACTS]:
-            self.grow_contacts()
-        while self.near.pair.shape[1] < self.count[PAIRS]:
-            self.grow_pairs()
+        if self.contacts.pair.shape[1] < self.count[CONTACTS]:
+            self.grow_contacts(int(self.count[CONTACTS]))
+        if self.near.pair.shape[1] < self.count[PAIRS]:
+            self.grow_pairs(int(self.count[PAIRS]))
         for name in GrainArrays._fields:
             _take(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "near"):
@@ -242,7 +252,9 @@ class World:
                 n = array.shape[-1] if given is None else given.shape[-1]
                 _take(array[..., :n], saved, f"{group}/{name}")
         for name in KEPT_FAR:
-            _take(getattr(self.far, name), saved, f"far/{name}")
+            # checkpoints of earlier versions hold columns that nothing touches
+            if getattr(self.far, name).size:
+                _take(getattr(self.far, name), saved, f"far/{name}")
 
 
 def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:

@@ -85,8 +85,8 @@ class Engine:
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
         """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""
         w = self.world
-        while w.contacts.pair.shape[1] < len(pair):
-            w.grow_contacts()
+        if w.contacts.pair.shape[1] < len(pair):
+            w.grow_contacts(len(pair))
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
         return int(seed_contacts(w.grains.arrays, w.contacts, w.count, w.box.span, self.rules.contact, pairs, *given))

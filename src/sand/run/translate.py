@@ -6,23 +6,19 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from ..core.box import Box
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.material import SILICA
-from ..core.world import World, contact_arrays, far_arrays, near_pairs, stage_arrays
+from ..core.world import FOR_IMPULSES, FOR_LIST, FOR_RATES, World, contact_arrays, far_arrays, near_pairs, stage_arrays
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact
 from ..forces.gas import Gas
 from ..kernels.gas import VACUUM
 from ..kernels.outside import is_ours
 from ..kernels.sums import NO_FAR_FORCE, FarSums, all_blocks
-from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.contact import Bond
 from ..setup.frame import Bonds
-from ..setup.soundness import most_overlap
 from ..stepping.adaptive import Adaptive
 from ..stepping.control import IMPACT_PART, Control
 from ..stepping.crew import is_large
@@ -30,9 +26,12 @@ from ..stepping.neighbours import Found, Neighbours
 from ..stepping.rules import Books, ContactRules, Plan, Rules, Stirring
 from ..stepping.verlet import Verlet
 from .engine import Engine
+from .first_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
 
-SPREAD = 8
-"""Columns for contacts and near pairs per grain to begin with; they grow when needed."""
+SPARE = 1.25
+"""Room for contacts and near pairs to begin with, in pairs that touch at the start; it grows when needed."""
+MATES = 4
+"""Room per grain for neighbours in the list, likewise."""
 IDLE = 1e5
 """Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
 STIR_PART = 0.05
@@ -73,12 +72,7 @@ def build_engine(
         BadInput: every problem at once.
     """
     warnings = _checked(grains, forces, box)
-    given = Given(
-        next((f for f in forces if isinstance(f, Contact)), None),
-        [f for f in forces if isinstance(f, FarForce) and f.acts_on(grains)],
-        [f for f in forces if isinstance(f, GrainForce)],
-        [f for f in forces if isinstance(f, Gas)],
-    )
+    given = _given(forces, grains)
     reach = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in given.distant]
     found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None])
@@ -105,36 +99,25 @@ def build_engine(
         stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
     )
     plan = _plan(grains, given, composed, sums, verlet, isinstance(stepping, Adaptive))
-    world = _world(grains, box, found, plan, all_pairs=not found.search.listed or None in cutoffs)
+    here = grains.copy()
+    here.arrays.position[...] = box.wrap(grains.position).T
+    start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
+    room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
+    world = _world(here, box, found, plan, room, all_pairs=not found.search.listed or None in cutoffs)
     engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
-    held = _seed(engine, given.contact, contacts)
-    if given.contact is not None and fresh:
-        _refuse_overlaps(engine, given.contact, held)
+    held = seed_contacts(engine, given.contact, contacts)
+    if given.contact is not None:
+        refuse_overlaps(here, given.contact, start, held)
     return engine
 
 
-def _seed(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> set[tuple[int, ...]]:
-    """Put the contacts of an earlier run into the world; returns their pairs, sorted.  Raises BadInput."""
-    if contacts is None or not len(contacts.pair):
-        return set()
-    count, pair = len(engine.world.grains), np.asarray(contacts.pair)
-    if contact is None:
-        raise BadInput(f"{len(pair)} contacts are given, but there is no sand.Contact() among the forces; add it")
-    shapes = tuple(np.shape(part) for part in contacts)
-    if shapes != ((len(pair), 2), (len(pair), 3), (len(pair), 3), (len(pair),)):
-        raise BadInput(f"contacts have shapes {shapes}; they must be (C, 2), (C, 3), (C, 3), (C,)")
-    if pair.min() < 0 or pair.max() >= count or (pair[:, 0] == pair[:, 1]).any():
-        raise BadInput(f"contacts name grains that are not there; grains are 0 to {count - 1}, two different ones each")
-    held = {tuple(sorted(two)) for two in pair.tolist()}
-    if len(held) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
-        raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
-    wrong = engine.seed(pair, contacts.slide, contacts.roll, contacts.twist)
-    if wrong >= 0:
-        i, j = pair[wrong]
-        raise BadInput(
-            f"the contact of grains {i} and {j} is stretched beyond its break; these materials and radii do not hold it"
-        )
-    return held
+def _given(forces: Sequence[Force], grains: Grains) -> Given:
+    return Given(
+        next((f for f in forces if isinstance(f, Contact)), None),
+        [f for f in forces if isinstance(f, FarForce) and f.acts_on(grains)],
+        [f for f in forces if isinstance(f, GrainForce)],
+        [f for f in forces if isinstance(f, Gas)],
+    )
 
 
 def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
@@ -154,23 +137,26 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
     )
 
 
-def _world(grains: Grains, box: Box, found: Found, plan: Plan, *, all_pairs: bool) -> World:
-    """The grains in their box, with room for contacts and pairs, and for stages if there are any."""
-    count = len(grains)
-    world = World(
-        grains.copy(),
+def _world(grains: Grains, box: Box, found: Found, plan: Plan, room: int, *, all_pairs: bool) -> World:
+    """The grains in their box, with `room` for contacts and pairs, and for whatever else the plan needs."""
+    count, listed = len(grains), found.search.listed
+    blocks = all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0
+    needed = {*(FOR_LIST if listed else ()), *(FOR_IMPULSES if plan.impulse else ())}
+    needed |= set(FOR_RATES if plan.foretell else ())
+    needed |= {"here", "source"} if blocks else set()
+    return World(
+        grains,
         box,
-        contact_arrays(count, SPREAD * count, len(Bond._fields)),
-        near_pairs(count, SPREAD * count),
+        contact_arrays(count, room, len(Bond._fields)),
+        near_pairs(count, room),
         far_arrays(
             count,
-            SPREAD * count if found.search.listed else 0,
-            all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0,
+            MATES * count if listed else 0,
+            blocks,
+            needless={*FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
         ),
         stages=stage_arrays(count if plan.adaptive else 0),
     )
-    world.grains.arrays.position[...] = box.wrap(grains.position).T
-    return world
 
 
 def _stride(grains: Grains, box: Box, found: Found) -> float:
@@ -264,31 +250,3 @@ def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) ->
         damped=law.damping != "none",
         per_period=stepping.steps_per_period,
     )
-
-
-def _refuse_overlaps(engine: Engine, contact: Contact, held: set[tuple[int, ...]]) -> None:
-    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start.
-
-    Contacts that are `held` from an earlier run (sorted pairs) may be in the middle of an impact.
-    """
-    grains, box = engine.world.grains, engine.world.box
-    radius = grains.radius
-    pairs = box.close_pairs(grains.position, 2.0 * float(radius.max()))
-    pairs = pairs[[tuple(pair) not in held for pair in pairs.tolist()]]
-    overlap = grains.overlaps(pairs, box)
-    table = contact.pairings(grains.materials)
-    problems = []
-    for (i, j), delta in zip(pairs[overlap > 0.0], overlap[overlap > 0.0], strict=True):
-        reduced = radius[i] * radius[j] / (radius[i] + radius[j])
-        gamma, modulus = table[:2, grains.material[i], grains.material[j]]
-        rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
-        limit = float(most_overlap(rest, min(radius[i], radius[j])))
-        if delta > limit:
-            problems.append(
-                f"grains {i} and {j} overlap by {delta:.3g} m at the start; at most {limit:.3g} m may be: "
-                "move them apart"
-            )
-    if len(problems) > 10:
-        problems[10:] = [f"… and {len(problems) - 10} more overlapping pairs"]
-    if problems:
-        raise BadInput(problems)

@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from ..core.box import Box
 from ..core.errors import BadInput
@@ -105,6 +103,9 @@ def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarr
 
 def _largest(bonds: np.ndarray, ranks: int) -> np.ndarray:
     """The largest cluster among the first so many grains."""
+    from scipy.sparse import csr_array  # slow to load, and few runs begin with a deposit
+    from scipy.sparse.csgraph import connected_components
+
     inside = bonds[(bonds < ranks).all(axis=1)]
     graph = csr_array((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(ranks, ranks))
     _, label = connected_components(graph, directed=False)

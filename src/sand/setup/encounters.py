@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.units import in_unit, si
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 GAP = 0.5
 """Least distance between the bodies' surfaces at the start, in radii of the smallest grain."""
@@ -26,6 +28,8 @@ class Encounter(NamedTuple):
 
 def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
     """The body turned as a whole by a random rotation about its centre of mass; moments turn with it."""
+    from scipy.spatial.transform import Rotation  # slow to load
+
     return turned(body, Rotation.random(random_state=rng))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -96,14 +97,19 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
             "take one of at least 3 diameters"
         )
     placed = np.empty((len(radius), 3))
-    order = np.argsort(-radius, kind="stable")
-    for n, i in enumerate(order):
-        done = order[:n]
+    # cells wider than any two grains need, so that only those in and around a grain's own can be too close
+    sides = np.floor(lengths / (2.0 * radius.max() + gap)).astype(int).tolist()
+    cells: dict[tuple[int, ...], list[int]] = {}
+    for n, i in enumerate(np.argsort(-radius, kind="stable").tolist()):
         for _ in range(TRIES):
             here = (rng.random(3) - 0.5) * lengths
+            home = tuple((np.floor((here / lengths + 0.5) * sides).astype(int) % sides).tolist())
+            around = itertools.product(*({(c + k) % m for k in (-1, 0, 1)} for c, m in zip(home, sides, strict=True)))
+            done = [j for cell in around for j in cells.get(cell, ())]
             apart = box.nearest(here - placed[done])
             if np.all((apart**2).sum(axis=1) > (radius[i] + radius[done] + gap) ** 2):
                 placed[i] = here
+                cells.setdefault(home, []).append(i)
                 break
         else:
             filled = 4.0 / 3.0 * math.pi * (radius**3).sum() / lengths.prod()

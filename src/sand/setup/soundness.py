@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from ..core.box import Box
 from ..core.errors import BadInput
@@ -58,6 +55,10 @@ def _overlaps(body: Grains) -> list[str]:
 
 def _gaps(body: Grains) -> list[str]:
     """Grains outside the largest cluster, with their nearest neighbour."""
+    from scipy.sparse import csr_array  # slow to load, and only bodies from files are looked at
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     pairs, _ = _pairs(body)
     count = len(body)
     graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
