@@ -23,6 +23,8 @@ ROWS_AT_ONCE = 256
 """Rows of the list in a block that one thread takes."""
 
 
+FEW = 3
+"""Pairs that are faster done one by one than as a vector."""
 NOWHERE = 2e154
 """A distance [m] whose square is infinite: its loads are 0."""
 
@@ -174,6 +176,8 @@ def cut_pair(here, there, span, mine, other, rules, real):
 @loop
 def corner(grains, b, blocks):
     """The first row of block b of the triangle of all pairs: blocks have equal areas."""
+    if blocks == 1:
+        return np.uint64(b * grains.mass.size)
     return np.uint64(grains.mass.size * math.sqrt(b / blocks))
 
 
@@ -181,8 +185,9 @@ def corner(grains, b, blocks):
 def rows_of(pair_loads: Callable) -> Callable:
     """The loop over some rows (uint64) of the triangle of all pairs, each pair once (Newton's third law).
 
-    Rows are as long as whole vectors: what is beyond the diagonal is no pair.
+    Rows are as long as whole vectors, unless few pairs are left over: what is beyond the diagonal is no pair.
     """
+    lanes, few = np.uint64(LANES), np.uint64(FEW)
 
     @loop
     def add_rows(far, force, field, span, rules, first, last):
@@ -190,7 +195,8 @@ def rows_of(pair_loads: Callable) -> Callable:
             i = first + k
             here, mine = load(far.here, i), load(far.source, i)
             push = own = (0.0, 0.0, 0.0)
-            for j in range((i + np.uint64(LANES - 1)) // np.uint64(LANES) * np.uint64(LANES)):
+            whole = (i + lanes - np.uint64(1)) // lanes * lanes
+            for j in range(whole if i % lanes >= few else i):
                 f, b1, b2, _ = pair_loads(here, load(far.here, j), span, mine, load(far.source, j), rules, j < i)
                 push, own = add(push, f), add(own, b1)
                 accrue(force, j, (-f[0], -f[1], -f[2]))
@@ -237,6 +243,12 @@ def all_pairs(pair_loads: Callable) -> FarSums:
     @loop
     def loads(grains, far, span, rules):
         copy_moments(grains, far, span, rules)
+        if grains.mass.size <= FEW:  # no row reaches beyond the last grain
+            clear_field(grains)
+            last = np.uint64(grains.mass.size)
+            add_rows(far, far.force, grains.field, span, rules, np.uint64(0), last)
+            add_torques(grains, far, span, rules)
+            return
         for b in range(all_blocks(grains)):
             block(grains, far, span, rules, b)
         add_shares(grains, far, span, rules)
