@@ -1,5 +1,6 @@
 """Threads: the same bits for any number of them, and the same numbers as without blocks but for rounding."""
 
+import copy
 import time
 
 import numpy as np
@@ -9,7 +10,7 @@ import sand
 from sand.core import threads
 from sand.core.errors import BadInput
 from sand.core.world import CONTACTS, MOVED
-from sand.run import translate
+from sand.run import engine, translate
 from sand.stepping.crew import INSIDE, LEAVE, WORD, crew_for, is_large, new_crew
 
 pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
@@ -81,6 +82,32 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)
     assert crew.board[INSIDE] == 0
     assert state(sim) == before
+
+
+def test_helpers_leave_a_driver_that_fails(monkeypatch):
+    """Ctrl-C while it compiles, or an error in a formula: nobody is left at work on its arrays; copies have their own."""
+    boards = []
+
+    def watched(contacts):
+        boards.append(new_crew(contacts))
+        return boards[-1]
+
+    def fails(*arguments):
+        raise RuntimeError("broken")
+
+    sand.set_threads(2)
+    sim = shaken_lattice(None)
+    sim.run(steps=1)
+    monkeypatch.setattr(engine, "new_crew", watched)
+    works = sim._engine._advance
+    sim._engine._advance = fails
+    with pytest.raises(RuntimeError, match="broken"):
+        sim._engine.advance(1.0, 1)
+    assert boards[-1].board[WORD] == LEAVE << 48
+    assert boards[-1].board[INSIDE] == 0
+    sim._engine._advance = works
+    sim.run(steps=1)
+    assert copy.deepcopy(sim._engine._hands) is not sim._engine._hands
 
 
 def test_helpers_go_home_with_their_simulation():

@@ -143,7 +143,9 @@ def _registered(**options: Any) -> Callable[[Callable], Callable]:
     """A decorator for functions that kernels may call and that stay ordinary Python."""
 
     def register(function: Callable) -> Callable:
-        register_jitable(**options)(function)
+        ours = function.__module__.partition(".")[0] == "sand"
+        # others may do what needs numba's own environment, such as print
+        register_jitable(**(options if ours else {k: v for k, v in options.items() if k != "pipeline_class"}))(function)
         _once_for_each_type(function)
         return function
 

@@ -25,8 +25,8 @@ ROWS_AT_ONCE = 256
 
 FEW = 3
 """Pairs that are faster done one by one than as a vector."""
-NOWHERE = 2e154
-"""A distance [m] whose square is infinite: its loads are 0."""
+NOWHERE = 1e140
+"""A distance [m] so large that 1/r³ is 0, and so are the loads of any moments."""
 
 
 class DipoleRules(NamedTuple):

@@ -1,7 +1,7 @@
 """Energies for the books.  Looked at between steps, never inside them."""
 
 from ..core.jit import kernel, loop
-from ..core.vec import across, dot, load, norm
+from ..core.vec import across, axpy, dot, load, norm
 from ..core.world import CONTACTS
 from ..physics import adhesion
 from ..physics import contact as law_of
@@ -61,12 +61,13 @@ CONTACT_VECTORS = (
     ("slide_vector", "m", "sliding displacement ζ"),
     ("roll_vector", "m", "rolling displacement ξ"),
 )
-"""The vectors it tells after them, three rows each."""
+CONTACT_LOADS = ("force", "torque1", "torque2")
+"""The vectors it tells after them, three rows each, and then the loads of the contact law, damping included."""
 
 
 @kernel
 def measure_contacts(grains, contacts, count, span, follow, out):
-    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS and CONTACT_VECTORS."""
+    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
     for c in range(count[CONTACTS]):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
@@ -90,6 +91,9 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         out[12, c] = -bond.twist_stiffness * strain.twist
         for mode in range(4):
             out[13 + mode, c] = stored[mode]
+        push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, bond)
+        push = axpy(contacts.damped[c], pose.n, push)
         for axis in range(3):
+            out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = push[axis], torque1[axis], torque2[axis]
             out[17 + axis, c] = strain.slide[axis]
             out[20 + axis, c] = xi[axis]

@@ -55,8 +55,8 @@ class FarSums(NamedTuple):
 
     @property
     def parts(self) -> Parts:
-        """In blocks, or all of it before any block."""
-        return self.shared or Parts(self.loads, _no_block, _no_part, _no_blocks)
+        """In blocks; or all of it after the blocks of others, which need what it would overwrite."""
+        return self.shared or Parts(_no_part, _no_block, self.loads, _no_blocks)
 
 
 @loop

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.world import CONTACTS, LOST_IN_CONTACTS, World
-from ..kernels.measure import CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
+from ..kernels.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
 
 COLUMNS = (
     ("pair", "", "the two grains"),
@@ -33,17 +33,16 @@ class ContactTable(Mapping[str, np.ndarray]):
         used = int(world.count[CONTACTS])
         contacts = world.contacts
         scalars = len(CONTACT_ROWS)
-        rows = np.zeros((scalars + 3 * len(CONTACT_VECTORS), used))
+        names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
+        rows = np.zeros((scalars + 3 * len(names), used))
         measure_contacts(world.grains.arrays, contacts, world.count, world.box.span, follow, rows)
         self._columns: dict[str, np.ndarray] = {
             "pair": contacts.pair[:, :used].T.copy(),
             "formed": contacts.formed[:used].copy(),
         }
         self._columns |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
-        vectors = rows[scalars:].reshape(len(CONTACT_VECTORS), 3, used)
-        self._columns |= {name: vectors[k].T.copy() for k, (name, _, _) in enumerate(CONTACT_VECTORS)}
-        for name, stored in (("force", "push"), ("torque1", "torque1"), ("torque2", "torque2")):
-            self._columns[name] = getattr(contacts, stored)[:, :used].T.copy()
+        vectors = rows[scalars:].reshape(len(names), 3, used)
+        self._columns |= {name: vectors[k].T.copy() for k, name in enumerate(names)}
         for k, name in enumerate(LOST_IN_CONTACTS):
             if name != "breaking":
                 self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy()

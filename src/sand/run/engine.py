@@ -18,7 +18,7 @@ from ..kernels.sums import shares_for
 from ..stepping.adaptive import Adaptive
 from ..stepping.advance import driver_for
 from ..stepping.control import GROW_EVERY
-from ..stepping.crew import crew_for, new_crew
+from ..stepping.crew import crew_for, new_crew, send_away
 from ..stepping.flight import flight_driver_for
 from ..stepping.rules import Plan, Rules, Stop
 from ..stepping.verlet import Verlet
@@ -63,7 +63,12 @@ class Engine:
             stages = (w.stages,) if self._plan.adaptive else ()
             arrays = (w.grains.arrays, w.contacts, w.near, w.far, *stages, w.clock, w.count, w.lost)
             rules = self._rules_with_crew()
-            stop = Stop(self._advance(*arrays, rules, float(until), int(last)))
+            try:
+                stop = Stop(self._advance(*arrays, rules, float(until), int(last)))
+            except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
+                if self._hands is not None:
+                    send_away(rules.crew)
+                raise
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()
             elif stop is Stop.PAIRS_FULL:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import threading
 import weakref
 from collections.abc import Callable
 from typing import Any
 
+from ..core.jit import COMPILED
 from ..core.threads import threads
 
 
@@ -19,12 +21,21 @@ class Hands:
     """
 
     def __init__(self, help_along: Callable):
-        self._help = help_along
+        self._help, self._process = help_along, os.getpid()
         self._queues: list[queue.SimpleQueue] = []
         self._end = weakref.finalize(self, _send_home, self._queues)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Hands:
+        """Others of the same kind."""
+        return Hands(self._help)
+
     def call(self, arrays: tuple[Any, ...]) -> None:
         """Let all threads but the caller's own run the kernel on these arguments."""
+        if not COMPILED:  # without the compiler nothing is atomic
+            return
+        if self._process != os.getpid():  # threads do not come along into a fork
+            self._queues.clear()
+            self._process = os.getpid()
         while len(self._queues) < threads() - 1:
             line: queue.SimpleQueue = queue.SimpleQueue()
             threading.Thread(target=_work, args=(line, self._help), name="sand-crew", daemon=True).start()

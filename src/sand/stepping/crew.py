@@ -53,6 +53,13 @@ def new_crew(contacts: int) -> Crew:
     return Crew(np.zeros(PLACES, np.int64), np.zeros(1), np.zeros((contacts // CONTACTS_AT_ONCE + 1, 8)))
 
 
+def send_away(crew: Crew) -> None:
+    """Let the helpers of a driver that did not come to its end leave, and wait until they have."""
+    crew.board[WORD] = LEAVE << 2 * _BITS
+    while crew.board[INSIDE] > 0:
+        give_way()
+
+
 @loop
 def blocks_of(number, at_once):
     """How many blocks of `at_once` there are in `number`."""

@@ -1,0 +1,86 @@
+"""Sums of long-range loads in blocks beside the same sums at once, for forces together in any order."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.jit import formula, kernel
+from sand.core.world import far_arrays
+from sand.forces.base import compose_far
+from sand.kernels import central, dipoles
+from sand.kernels.cells import make_far_list
+from sand.kernels.far import clear_far_loads
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+def cloud():
+    """40 charged magnetic grains of iron in open space."""
+    rng = np.random.default_rng(6)
+    moment = 6e-18 * rng.normal(size=(40, 3))
+    charge = 1e-17 * rng.normal(size=40)
+    return sand.Grains(2e-7 * rng.random((40, 3)), 1e-9, sand.IRON, moment=moment, charge=charge)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [p for name in ("listed dipoles", "dipoles") for p in itertools.permutations([name, "listed charges"])],
+    ids=" then ".join,
+)
+def test_blocks_of_forces_together_are_their_sum(order):
+    """begin, blocks, end give what `loads` gives: F, M and B to rounding (1e-12 of the largest).
+
+    The functions are ordinary Python here.  Charges are summed whole, and use the same rooms of `far` as dipoles.
+    """
+    grains = cloud()
+    forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
+    sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
+    of_dipoles, (of_charges, _) = sim._engine.rules.far
+    numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
+    loops = {"listed dipoles": dipoles.LISTED, "listed charges": central.LISTED, "dipoles": dipoles.CUT}
+    sums, own = compose_far([loops[name] for name in order], [numbers[name] for name in order])
+    span, found = sim._engine.rules.span, []
+    for way in ("at once", "in blocks"):
+        arrays, far = sim.world.copy().grains.arrays, far_arrays(40, 4000)
+        make_far_list(arrays, far, sim.world.count.copy(), span, sim._engine.rules.search)
+        clear_far_loads(far)
+        if way == "at once":
+            sums.loads(arrays, far, span, own)
+        else:
+            sums.parts.begin(arrays, far, span, own)
+            for b in range(sums.parts.blocks(arrays)):
+                sums.parts.block(arrays, far, span, own, b)
+            sums.parts.end(arrays, far, span, own)
+        found.append((far.force, far.torque, arrays.field))
+    for once, blocks in zip(*found, strict=True):
+        assert np.abs(once).max() > 0.0
+        assert np.abs(once - blocks).max() < 1e-12 * np.abs(once).max()
+
+
+def test_forces_of_contacts_are_those_of_the_contact_law():
+    """Two magnetic grains head to tail in contact: the table has F = F_JKR n, without the dipoles' attraction.
+
+    That acts along n as well, and is a thousandth of it and more: it would be seen at 1e-9.
+    """
+    grains = sand.Grains([[0, 0, 0], [1.985e-8, 0, 0]], 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * 2)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()])
+    sim.run(steps=30)
+    force, normal = sim.contacts["force"][0], sim.contacts["normal_force"][0]
+    assert abs(np.linalg.norm(force) - abs(normal)) < 1e-9 * abs(normal)
+
+
+def test_a_formula_from_outside_may_print(capfd):
+    """What a user registers is compiled by numba as always: it may do what needs numba's environment."""
+
+    @formula
+    def talkative(x):
+        print("x is", x)
+        return 2.0 * x
+
+    def call(x):
+        return talkative(x)
+
+    assert kernel(call, keep=False)(1.5) == 3.0
+    assert "x is 1.5" in capfd.readouterr().out
