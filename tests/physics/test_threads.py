@@ -85,7 +85,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
 
 
 def test_helpers_leave_a_driver_that_fails(monkeypatch):
-    """Ctrl-C while it compiles, or an error in a formula: nobody is left at work on its arrays; copies have their own."""
+    """Ctrl-C while it compiles, or an error in a formula: nobody is left at work; copies have their own."""
     boards = []
 
     def watched(contacts):
