@@ -104,7 +104,8 @@ def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
 
     def begin():
         (run / "case.toml").write_bytes((looked_at[0] / "case.toml").read_bytes())
-        reel(run / "trajectory.gsd", [[(0, 1)], []], 3)
+        # both frames at once: a page may be made after the first as well
+        reel(tmp_path / "made.gsd", [[(0, 1)], []], 3).rename(run / "trajectory.gsd")
 
     later = threading.Timer(1.0, begin)
     later.start()
