@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.box import nearest_image
-from ..core.jit import loop
+from ..core.jit import formula, loop
 from ..core.vec import accrue, add, cross, load, put, sub
 from ..core.world import LANES
 from ..physics.dipole import pair_load, pair_load_cut
@@ -25,8 +25,8 @@ ROWS_AT_ONCE = 256
 
 FEW = 3
 """Pairs that are faster done one by one than as a vector."""
-NOWHERE = 1e140
-"""A distance [m] so large that 1/r³ is 0, and so are the loads of any moments."""
+NOWHERE = 1.4e154
+"""A distance [m] whose square is infinite: 1/r² is 0, with nothing in between that underflows, which is slow."""
 
 
 class DipoleRules(NamedTuple):
@@ -159,17 +159,23 @@ def loads_of_pair(grains, span, rules, i, j):
     return force, cross(mine, b1), cross(other, b2)
 
 
+@formula
+def moment_if(real, moment):
+    """No moment where there is no pair, so that no product of two overflows."""
+    return moment[0] if real else 0.0, moment[1] if real else 0.0, moment[2] if real else 0.0
+
+
 @loop
 def bare_pair(here, there, span, mine, other, rules, real):
     """Loads of a pair in an open box without a cut-off; none if it is not `real`."""
-    apart = sub(here, there)
+    apart, other = sub(here, there), moment_if(real, other)
     return pair_load((apart[0] if real else NOWHERE, apart[1], apart[2]), mine, other, rules.k)
 
 
 @loop
 def cut_pair(here, there, span, mine, other, rules, real):
     """The same with nearest images and a cut-off."""
-    apart = nearest_image(sub(here, there), span)
+    apart, other = nearest_image(sub(here, there), span), moment_if(real, other)
     return pair_load_cut((apart[0] if real else NOWHERE, apart[1], apart[2]), mine, other, rules.k, rules.cutoff)
 
 
