@@ -91,9 +91,9 @@ def _leave_work_to_the_kernel() -> dict[bool, dict[str, Any]]:
 
         def define_pipelines(self) -> Any:
             """As always."""
-            library = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-            library.enable_object_caching()
-            self.state.library = library
+            place = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+            place.enable_object_caching()
+            self.state["library"] = place
             return super().define_pipelines()
 
     class ApartCompiler(InnerCompiler):
