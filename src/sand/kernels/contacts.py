@@ -70,6 +70,14 @@ def twist_gain(grains, contacts, c, pose, dt):
 
 
 @loop
+def pose_after(grains, contacts, span, c, dt):
+    """How the grains of contact c stand at the end of a step of dt, with the twist that they gained in it."""
+    pose = pose_at(grains, contacts, span, c, 0.0)
+    twist = contacts.twist[c] + twist_gain(grains, contacts, c, pose, dt)
+    return law_of.Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
+
+
+@loop
 def quiet_pass(grains, contacts, first, last, used, span, law, dt):
     """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises.
 
@@ -82,9 +90,7 @@ def quiet_pass(grains, contacts, first, last, used, span, law, dt):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         bond = bond_at(contacts.bond, c)
         r1, r2 = grains.radius[i], grains.radius[j]
-        pose = pose_at(grains, contacts, span, c, 0.0)
-        twist = contacts.twist[c] + twist_gain(grains, contacts, c, pose, dt)
-        pose = law_of.Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
+        pose = pose_after(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
         s = adhesion.stretch(overlap, bond.pull_off_overlap)
         y = adhesion.root_in_reach(s)
@@ -92,7 +98,7 @@ def quiet_pass(grains, contacts, first, last, used, span, law, dt):
         push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
         beyond = law_of.beyond_limits(strain, pose.n, bond) | (s > adhesion.STRETCH_OF_POLYNOMIAL)
-        contacts.twist[c] = twist
+        contacts.twist[c] = pose.twist
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)

@@ -15,7 +15,7 @@ from ..core.world import MOVED, ROLLING, SLIDING, TWISTING
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned_back, turned_by
-from .contacts import WAITS, YIELDED, bond_at, pose_at, quiet_pass, twist_gain, whole_vectors
+from .contacts import WAITS, YIELDED, bond_at, pose_after, quiet_pass, twist_gain, whole_vectors
 
 BLOCK = np.uint64(128)
 """Contacts that are judged together."""
@@ -82,9 +82,7 @@ def _busy_pass(grains, contacts, first, last, span, law, dt):
         bond = bond_at(contacts.bond, c)
         r1, r2 = grains.radius[i], grains.radius[j]
         pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
-        pose = pose_at(grains, contacts, span, c, 0.0)
-        twist = contacts.twist[c] + twist_gain(grains, contacts, c, pose, dt)
-        pose = law_of.Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
+        pose = pose_after(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
         s = adhesion.stretch(overlap, bond.pull_off_overlap)
         y = adhesion.root_in_reach(s)
@@ -99,7 +97,7 @@ def _busy_pass(grains, contacts, first, last, span, law, dt):
         back1 = turned_back(load4(grains.orientation, i), n1)
         back2 = turned_back(load4(grains.orientation, j), n2)
         n1, n2 = _chosen(moves, n1, pose.n1), _chosen(moves, n2, pose.n2)
-        there = law_of.Pose(pose.n, pose.distance, n1, n2, wish.twist if moves else twist)
+        there = law_of.Pose(pose.n, pose.distance, n1, n2, wish.twist if moves else pose.twist)
         left = law_of.strain_of(there, overlap, r1, r2, bond)
         lost = law_of.lost_by_yielding(before, strain, left, now)
         lost = _chosen(moves, lost, (0.0, 0.0, 0.0))

@@ -9,13 +9,13 @@ from ..core.vec import add
 
 
 @loop
-def _no_part(grains, far, span, numbers):
-    pass
+def _no_sum(grains, far, span, numbers):
+    """Neither loads nor rates, and nothing before or after blocks."""
 
 
 @loop
-def _no_block(grains, far, span, numbers, b):
-    pass
+def _nothing_in(grains, far, span, numbers, place):
+    """Neither a block nor energies."""
 
 
 @loop
@@ -56,17 +56,7 @@ class FarSums(NamedTuple):
     @property
     def parts(self) -> Parts:
         """In blocks; or all of it after the blocks of others, which need what it would overwrite."""
-        return self.shared or Parts(_no_part, _no_block, self.loads, _no_blocks)
-
-
-@loop
-def _no_sum(grains, far, span, numbers):
-    pass
-
-
-@loop
-def _no_energies(grains, far, span, numbers, shares):
-    pass
+        return self.shared or Parts(_no_sum, _nothing_in, self.loads, _no_blocks)
 
 
 @loop
@@ -74,7 +64,7 @@ def _no_pair(grains, span, numbers, i, j):
     return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
-NO_FAR_FORCE = FarSums(_no_sum, _no_sum, _no_energies, _no_pair)
+NO_FAR_FORCE = FarSums(_no_sum, _no_sum, _nothing_in, _no_pair)
 
 
 @functools.cache
@@ -99,7 +89,7 @@ def far_together(first: FarSums, rest: FarSums) -> FarSums:
         force2, here2, there2 = rest_pair(grains, span, numbers[1], i, j)
         return add(force1, force2), add(here1, here2), add(there1, there2)
 
-    return FarSums(loads, rates, _no_energies, pair, parts_together(first.parts, rest.parts))
+    return FarSums(loads, rates, _nothing_in, pair, parts_together(first.parts, rest.parts))
 
 
 @functools.cache
