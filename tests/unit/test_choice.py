@@ -1,0 +1,73 @@
+"""The minima of the step's choice, and the pairs that may touch soon, beside plain searches."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.jit import kernel
+from sand.core.least import rank, ranked
+from sand.core.world import PAIRS, SOON
+from sand.kernels.neighbours import list_soon
+from sand.stepping.control import calm_steps, closing_step, grain_step, pair_step
+from sand.stepping.parts import SOON_PART
+
+
+def crowd():
+    """150 grains of 10 to 20 nm in a periodic box, some of them close, fast in all directions."""
+    rng = np.random.default_rng(7)
+    box = sand.Box.periodic("0.23 um")
+    radius = 1e-8 * rng.uniform(1.0, 2.0, 150)
+    grains = sand.setup.gas(150, box, radius=radius, material=sand.SILICA, temperature="300 K", seed=2)
+    sim = sand.Simulation(grains, [sand.Contact()], box=box)
+    sim.run(steps=300)
+    return sim
+
+
+def test_ranks_are_ordered_as_numbers():
+    """For x, y ≥ 0, infinity and subnormal numbers included: rank(x) < rank(y) as x < y; NaN is no minimum."""
+    numbers = [0.0, 5e-324, 1e-310, 1e-30, 1.0, 1.0 + 2e-16, 1e300, math.inf]
+    ranks = [rank(x) for x in numbers]
+    assert ranks == sorted(ranks) and len(set(ranks)) == len(ranks)
+    assert [ranked(bits) for bits in ranks] == numbers
+    assert rank(math.nan) > rank(math.inf)
+
+
+def test_choices_are_the_least_of_all():
+    """The loops that vectorise give the least of what grains and pairs allow one by one in Python, to rounding."""
+    sim = crowd()
+    w, rules = sim.world, sim._engine.rules
+    arrays, span, control = w.grains.arrays, rules.span, rules.control
+
+    def look(grains, far, start, near, count, span, control):
+        step, cycle = calm_steps(grains, far, start, count, control)
+        return step, cycle, closing_step(grains, near, count, span, control, math.inf)
+
+    step, cycle, closing = kernel(look, keep=False)(arrays, w.far, w.contacts.start, w.near, w.count, span, control)
+    each = [grain_step(arrays, w.far, w.contacts.start, control, i) for i in range(150)]
+    pairs = [pair_step(arrays, w.near, span, control, p) for p in range(w.count[PAIRS])]
+    assert len(pairs) > 50
+    assert math.isfinite(min(pairs))
+    assert step == pytest.approx(min(control.longest, min(one for one, _ in each)), rel=1e-13)
+    assert cycle == pytest.approx(min(control.longest, min(one for _, one in each)), rel=1e-13)
+    assert closing == pytest.approx(min(pairs), rel=1e-13)
+
+
+def test_what_may_touch_soon_is_what_is_close():
+    """All pairs of grains apart by less than twice the displacement that makes the pick stale, and no others."""
+    sim = crowd()
+    w, reach = sim.world, sim._engine.rules.control.reach
+    gap = 2.0 * SOON_PART * reach
+    list_soon(w.grains.arrays, w.near, w.count, sim._engine.rules.span, gap)
+    picked = {tuple(sorted(w.near.pair[:, p].tolist())) for p in w.near.soon[: w.count[SOON]].tolist()}
+    position, radius = sim.grains.position, sim.grains.radius
+    bound = {tuple(sorted(pair)) for pair in sim.contacts["pair"].tolist()}
+    close = set()
+    for i in range(150):
+        for j in range(i):
+            apart = np.linalg.norm(sim.box.nearest(position[i] - position[j]))
+            if apart < radius[i] + radius[j] + gap and (j, i) not in bound:
+                close.add((j, i))
+    assert len(close) > 3
+    assert picked == close
