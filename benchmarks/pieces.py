@@ -13,7 +13,7 @@ import sand
 from sand.core.jit import kernel
 from sand.core.world import far_arrays
 from sand.kernels.cells import remake_far_list
-from sand.kernels.motion import drift, kick
+from sand.kernels.motion import kick_and_drift
 
 from . import decks, machine, worlds
 from .steps import beside
@@ -30,8 +30,7 @@ NEIGHBOURS = (14, 50, 200)
 def _move(grains, span, dt, times):
     """Kick and drift, `times` over."""
     for _ in range(times):
-        kick(grains, dt)
-        drift(grains, span, dt)
+        kick_and_drift(grains, span, dt)
 
 
 move = kernel(_move)

@@ -26,6 +26,9 @@ COUNT = tuple(_NAMES.split())
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
 LOOKED, GROWN, REJECTED, NEEDED, SOON = range(12, 17)
 
+# --- places in NearPairs.watch (float64) -----------------------------------------------------------------
+FAR_LEEWAY, NEAR_LEEWAY, SOON_LEEWAY, FASTEST, QUICKEST, HARMLESS = range(6)
+
 # --- places in World.lost (float64): energy that left the grains, per channel [J] -----------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
 LOST_IN_CONTACTS = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
@@ -62,6 +65,7 @@ class NearPairs(NamedTuple):
     anchor: np.ndarray  # (3, N) positions when the list was made [m]
     soon: np.ndarray  # (P,) uint32: the pairs that may touch next, the first count[SOON]
     mark: np.ndarray  # (3, N) positions when they were picked [m]
+    watch: np.ndarray  # (6,) what spares looking at all grains or pairs in every step: kernels.watch
 
 
 class FarArrays(NamedTuple):
@@ -105,8 +109,8 @@ FOR_LIST = ("anchor", "order", "start", "home", "cell", "here", "source")
 FOR_IMPULSES = ("held_force", "held_torque", "past_position", "path")
 FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
 """The far arrays that only a list, or cycles of either kind, read and write."""
-PICKED = ("soon", "mark")
-"""Of the near pairs, what it leaves out: it is picked anew."""
+PICKED = ("soon", "mark", "watch")
+"""Of the near pairs, what it leaves out: it is picked or worked out anew."""
 LANES = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 GROWTH = 1.5
@@ -154,7 +158,7 @@ def near_pairs(grains: int, capacity: int) -> NearPairs:
     p = max(int(capacity), 16)
     nowhere = np.full((3, grains), np.inf)
     pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p, np.uint32)
-    return NearPairs(pair, touching, np.zeros(p), np.zeros(p), nowhere, soon, nowhere.copy())
+    return NearPairs(pair, touching, np.zeros(p), np.zeros(p), nowhere, soon, nowhere.copy(), np.full(6, -1.0))
 
 
 def stage_arrays(grains: int) -> StageArrays:
@@ -209,7 +213,7 @@ class World:
 
     def grow_pairs(self, least: int = 0) -> None:
         """More room for near pairs, for `least` of them at least."""
-        self.near = _grown(self.near, ("anchor", "mark"), least)
+        self.near = _grown(self.near, ("anchor", "mark", "watch"), least)
 
     def grow_rows(self) -> None:
         """More room for neighbours within the reach of long-range forces; what is there is not kept."""

@@ -40,21 +40,6 @@ class Grid(NamedTuple):
 
 
 @loop
-def list_is_stale(grains, anchor, span, limit):
-    """True once a grain is farther than `limit` [m] from where it was when the list was made.
-
-    What counts is the displacement, not the way: a grain that rings in its cluster moves as the cluster does, to
-    within its amplitude, and does not make the list stale.
-    """
-    strayed = 0.0
-    for i in range(grains.mass.size):
-        moved = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
-        # written so that an anchor at infinity (no list yet) counts as strayed
-        strayed += 0.0 if dot(moved, moved) <= limit * limit else 1.0
-    return strayed > 0.0
-
-
-@loop
 def axis_of_grid(low, high, length, reach):
     """Number of cells on one axis, where they begin, and how many there are in a metre."""
     start, extent = (-0.5 * length, length) if length > 0.0 else (low, high - low)

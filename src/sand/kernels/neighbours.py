@@ -8,7 +8,7 @@ import numpy as np
 from ..core.box import nearest_image
 from ..core.jit import loop, rare
 from ..core.vec import dot, load, put, sub
-from ..core.world import PAIRS, REBUILT, SOON
+from ..core.world import PAIRS, REBUILT, SOON, SOON_LEEWAY
 from ..physics.contact import Pairing, bond_between
 from .cells import FULL
 
@@ -131,7 +131,7 @@ def list_soon(grains, near, count, span, gap):
 @rare
 def forget_touch(near, count, i, j):
     """Mark the pair (i, j) of the list as no longer in contact; it may touch again soon."""
-    near.mark[0, 0] = math.inf
+    near.mark[0, 0], near.watch[SOON_LEEWAY] = math.inf, 0.0
     for p in range(count[PAIRS]):
         a, b = near.pair[0, p], near.pair[1, p]
         if (a == i and b == j) or (a == j and b == i):

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable
 
 from ..core.jit import kernel, loop
-from ..core.world import CONTACTS, CYCLE, FAR_SUMS, LEFT, STAGE, STEP, STEPS, TIME
+from ..core.world import CONTACTS, CYCLE, FAR_SUMS, FASTEST, LEFT, QUICKEST, STAGE, STEP, STEPS, TIME
 from ..kernels.events import new_touches
 from ..kernels.far import (
     add_far_loads,
@@ -25,6 +25,8 @@ from ..kernels.far import (
     renew_held_loads,
 )
 from ..kernels.motion import kick
+from ..kernels.sums import NO_FAR_FORCE
+from ..kernels.watch import begin_watch, forget_speeds, spend
 from .control import cycle_steps
 from .crew import dismiss, nobody_to_dismiss
 from .large import large_loops
@@ -98,6 +100,11 @@ def _cut_impulse(grains, far, span, clock, elapsed):
 
 
 @loop
+def _no_far(grains, contacts, far, count, rules):
+    """No grain feels another from afar."""
+
+
+@loop
 def _no_bonded(grains, contacts, count, span, numbers):
     """Pairs in contact are not apart from the others."""
 
@@ -120,15 +127,21 @@ def loads_loop(plan: Plan) -> Callable:
     take_out_bonded = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
 
     @loop
+    def sum_far(grains, contacts, far, count, rules):
+        clear_far_loads(far)
+        far_loads(grains, contacts, far, count, rules)
+        take_out_bonded(grains, contacts, count, far, rules.span, rules.far)
+        add_far_loads(grains, far)
+
+    add_far = _no_far if plan.far is NO_FAR_FORCE else sum_far
+
+    @loop
     def sum_loads(grains, contacts, far, clock, count, rules, due, elapsed):
         gather_all(grains, contacts, far, count, rules)
         add_outside(grains, clock[TIME] + clock[STEP], rules.outside)
         if due:
-            clear_far_loads(far)
-            far_loads(grains, contacts, far, count, rules)
+            add_far(grains, contacts, far, count, rules)
             count[FAR_SUMS] += 1
-            take_out_bonded(grains, contacts, count, far, rules.span, rules.far)
-            add_far_loads(grains, far)
         else:
             between(grains, far, elapsed)
 
@@ -141,13 +154,14 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
 
     The second half of a step of 0 s finds the pairs and the contacts that are there and works out the loads.
     """
-    _, drift_booked = outside_loops(plan.outside)
+    _, kick_and_drift = outside_loops(plan.outside)
     sum_loads = loads_loop(plan)
     pass_contacts, _, _ = large_loops(plan)
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
     add_bonded, _, change_sides = bonded_loops(plan.far.pair) if plan.split else (_no_bonded, None, _no_change)
     begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
     stir = stir_gas if plan.gas else no_gas
+    kicked_besides = plan.impulse or plan.gas
 
     @loop
     def cut_cycle(grains, contacts, far, clock, count, rules):
@@ -173,8 +187,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
             begin(grains, far, clock, dt)
         else:
             inside(grains, far, rules.span, clock, dt)
-        kick(grains, 0.5 * dt)
-        drift_booked(grains, clock, lost, rules, dt)
+        spend(near, kick_and_drift(grains, clock, lost, rules, dt))
         clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
         clock[STEP] = dt
         count[STAGE] = 1
@@ -195,7 +208,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
         due = clock[LEFT] == 0.0 or parted or fresh > 0
         add_bonded(grains, contacts, count, rules.span, rules.far)
         sum_loads(grains, contacts, far, clock, count, rules, due, elapsed)
-        kick(grains, 0.5 * dt)
+        near.watch[FASTEST], near.watch[QUICKEST] = kick(grains, 0.5 * dt)
         if due:
             end(grains, far, rules.span, clock, elapsed, dt)
             change_sides(grains, contacts, count, far, rules.span, rules.far)
@@ -207,6 +220,8 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
         count[STAGE] = 0
         if due:
             stir(grains, clock, count, lost, rules)
+            if kicked_besides:
+                forget_speeds(near)
         return Stop.STEPS_DONE
 
     return first_half, second_half
@@ -224,6 +239,7 @@ def driver_for(plan: Plan) -> Callable:
     @loop
     def steps_until(grains, contacts, near, far, clock, count, lost, rules, until, last):
         """Steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""
+        begin_watch(near, count)
         while True:
             if count[STAGE] == 0:
                 if clock[LEFT] == 0.0:

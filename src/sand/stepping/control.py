@@ -13,9 +13,11 @@ from ..core.world import (
     CONTACTS,
     CYCLE,
     FAR_LEVEL,
+    FASTEST,
     GRAIN1,
     GRAIN2,
     GROWN,
+    HARMLESS,
     LEFT,
     LEVEL,
     LOOKED,
@@ -47,7 +49,7 @@ CLOSING_PART = 0.2
 IMPACT_PART = 25.0
 """Largest way two grains about to touch, or along n in contact, may move in one step, in δ_c / per_period."""
 REACH_PART = 1.0 / 16.0
-"""Largest part of the list's reach that a grain may fly in one step; keeps `list_is_stale` safe."""
+"""Largest part of the list's reach that a grain may fly in one step; keeps the check of the list safe."""
 
 
 class Control(NamedTuple):
@@ -149,6 +151,13 @@ def pair_step(grains, near, span, control, p):
 
 
 @loop
+def _harmless(near, control):
+    """True if no two grains can meet so fast that they need a shorter step than contacts do."""
+    impact = control.impact * near.watch[HARMLESS]
+    return 4.0 * near.watch[FASTEST] < impact * impact
+
+
+@loop
 def closing_step(grains, near, count, span, control, wanted):
     """The longest step [s], at most `wanted`, that pairs about to touch or in contact allow."""
     least = rank(wanted)
@@ -203,7 +212,8 @@ def choose_step(grains, far, start, near, clock, count, span, control):
             if not clock[CALM] > 0.0:
                 return 0.0
             clock[FAR_LEVEL] = levelled(clock[FAR_LEVEL], cycle, may_grow)
-        wanted = closing_step(grains, near, count, span, control, clock[CALM])
+        quiet = not alone and _harmless(near, control)
+        wanted = clock[CALM] if quiet else closing_step(grains, near, count, span, control, clock[CALM])
         if not wanted > 0.0:
             return 0.0
         count[LOOKED] = count[STEPS]

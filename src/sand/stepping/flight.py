@@ -28,8 +28,9 @@ from ..core.world import (
     STEPS,
     TIME,
 )
-from ..kernels.cells import FULL, list_is_stale, make_far_list
+from ..kernels.cells import FULL, make_far_list
 from ..kernels.outside import outside_energy, outside_wrap
+from ..kernels.watch import begin_watch, farthest, forget_speeds, forget_ways
 from .advance import halves_for
 from .control import GROW_EVERY, calm_steps
 from .crew import dismiss, nobody_to_dismiss
@@ -52,7 +53,7 @@ TRIES = 30
 def refreshed(grains, far, count, rules):
     """Make the far list anew where a quarter of its margin is used up; FULL asks for longer arrays."""
     search = rules.search
-    if search.listed and list_is_stale(grains, far.anchor, rules.span, STALE_PART * search.margin):
+    if search.listed and not farthest(grains, far.anchor, rules.span) <= STALE_PART * search.margin:
         return make_far_list(grains, far, count, rules.span, search)
     return 0
 
@@ -135,6 +136,8 @@ def flight_for(plan: Plan) -> Callable:
         if stop != Stop.STEPS_DONE:
             return stop
         normalise_all(grains)
+        forget_speeds(near)
+        forget_ways(near)
         clock[TIME] += dt
         if rules.books.timed:
             lost[OUTSIDE] -= energy(grains, clock[TIME], rules.outside) - before + work_of(stages, dt)
@@ -169,6 +172,7 @@ def flight_driver_for(plan: Plan) -> Callable:
     @loop
     def steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
         """Steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
+        begin_watch(near, count)
         while True:
             stop = Stop.STEPS_DONE
             if count[STAGE] == 0:

@@ -5,17 +5,35 @@ import math
 from collections.abc import Callable
 
 from ..core.box import Span, nearest_image
-from ..core.jit import loop
+from ..core.jit import loop, rare
 from ..core.vec import dot, load, sub
-from ..core.world import CONTACTS, CYCLE, GAS, GRAIN1, GRAIN2, KICKED, LEFT, OUTSIDE, STEP, STEPS, TIME
-from ..kernels.cells import FULL, list_is_stale, make_far_list
+from ..core.world import (
+    CONTACTS,
+    CYCLE,
+    FAR_LEEWAY,
+    FASTEST,
+    GAS,
+    GRAIN1,
+    GRAIN2,
+    KICKED,
+    LEFT,
+    NEAR_LEEWAY,
+    OUTSIDE,
+    QUICKEST,
+    SOON_LEEWAY,
+    STEP,
+    STEPS,
+    TIME,
+)
+from ..kernels.cells import FULL, make_far_list
 from ..kernels.contacts import contact_step, sort_sides
 from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, settle_flagged
 from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
-from ..kernels.motion import drift
+from ..kernels.motion import kick_and_drift
 from ..kernels.neighbours import list_soon, make_near_list
 from ..kernels.outside import outside_energy, outside_loads, outside_wrap
+from ..kernels.watch import is_stale, look_up_harmless, look_up_speeds
 from .control import CHECK_EVERY, choose_step, name_culprits
 from .rules import Stop
 
@@ -28,15 +46,20 @@ OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @loop
-def _moves_too_far(grains, reach, dt):
-    """Stop and grain if one would fly more than half the smallest radius, or turn too far, in one step."""
+def _moves_too_far(fastest, quickest, reach, dt):
+    """Why no step of dt is taken at squares of speed and spin: farther than half the smallest radius, or a turn."""
+    flown, turned = dt * dt * fastest > 0.25 * reach * reach, dt * dt * quickest > LONGEST_TURN**2
+    return Stop.FLEW_TOO_FAR if flown else Stop.SPUN_TOO_FAR if turned else Stop.STEPS_DONE
+
+
+@rare
+def _stray(grains, reach, dt):
+    """The first grain that moves too far."""
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        if dt * dt * dot(v, v) > 0.25 * reach * reach:
-            return Stop.FLEW_TOO_FAR, i
-        if dt * dt * dot(w, w) > LONGEST_TURN**2:
-            return Stop.SPUN_TOO_FAR, i
-    return Stop.STEPS_DONE, -1
+        if _moves_too_far(dot(v, v), dot(w, w), reach, dt) != Stop.STEPS_DONE:
+            return i
+    return -1
 
 
 @loop
@@ -55,6 +78,7 @@ def _crushed(grains, contacts, count, span):
 def possible_step(grains, contacts, near, far, clock, count, rules):
     """The step to take now [s], and STEPS_DONE or why there is none."""
     count[GRAIN1] = count[GRAIN2] = -1
+    look_up_speeds(grains, near)
     dt = choose_step(grains, far, contacts.start, near, clock, count, rules.span, rules.control)
     if not dt > 0.0:
         return 0.0, Stop.NOT_FINITE
@@ -63,9 +87,9 @@ def possible_step(grains, contacts, near, far, clock, count, rules):
     if clock[TIME] + dt == clock[TIME]:
         name_culprits(grains, far, contacts.start, near, count, rules.span, rules.control)
         return 0.0, Stop.NO_STEP
-    stop, stray = _moves_too_far(grains, rules.control.reach, dt)
+    stop = _moves_too_far(near.watch[FASTEST], near.watch[QUICKEST], rules.control.reach, dt)
     if stop != Stop.STEPS_DONE:
-        count[GRAIN1] = stray
+        count[GRAIN1] = _stray(grains, rules.control.reach, dt)
         return 0.0, stop
     if count[STEPS] % CHECK_EVERY == 0:
         c = _crushed(grains, contacts, count, rules.span)
@@ -79,15 +103,16 @@ def possible_step(grains, contacts, near, far, clock, count, rules):
 def update_lists(grains, contacts, near, far, count, rules):
     """Make anew the lists that are too old for what this step needs; FULL stops ask for longer arrays."""
     span, search, reach = rules.span, rules.search, rules.control.reach
-    stale = rules.contact.on and list_is_stale(grains, near.anchor, span, 0.25 * reach)
-    old = search.listed and list_is_stale(grains, far.anchor, span, 0.5 * search.margin)
+    stale = rules.contact.on and is_stale(grains, near.anchor, span, 0.25 * reach, near, NEAR_LEEWAY)
+    old = search.listed and is_stale(grains, far.anchor, span, 0.5 * search.margin, near, FAR_LEEWAY)
     if old and make_far_list(grains, far, count, span, search) == FULL:
         return Stop.LIST_FULL, stale
     if stale:
         made = make_near_list(grains, contacts, near, far, count, span, reach, rules.contact, search.listed)
         if made == FULL:
             return Stop.PAIRS_FULL, stale
-    if rules.contact.on and (stale or list_is_stale(grains, near.mark, span, SOON_PART * reach)):
+        look_up_harmless(near, count)
+    if rules.contact.on and (stale or is_stale(grains, near.mark, span, SOON_PART * reach, near, SOON_LEEWAY)):
         list_soon(grains, near, count, span, 2.0 * SOON_PART * reach)
     return Stop.STEPS_DONE, stale
 
@@ -120,23 +145,24 @@ def bury_broken(grains, contacts, near, clock, count, rules):
 
 @functools.cache
 def outside_loops(outside: Callable) -> tuple[Callable, Callable]:
-    """Loads of the per-grain forces, and a drift that books what time and periodic boundaries do to their energy."""
+    """Loads of the per-grain forces; half a kick and a drift, with what time and boundaries do to their energy."""
     add_loads, energy, wrap = outside_loads(outside), outside_energy(outside), outside_wrap(outside)
 
     @loop
-    def drift_booked(grains, clock, lost, rules, dt):
+    def kick_and_drift_booked(grains, clock, lost, rules, dt):
         now, then = clock[TIME], clock[TIME] + dt
         gained = 0.0
         if rules.books.timed:
             gained += 0.5 * (energy(grains, then, rules.outside) - energy(grains, now, rules.outside))
-        drift(grains, OPEN if rules.books.moored else rules.span, dt)
+        way = kick_and_drift(grains, OPEN if rules.books.moored else rules.span, dt)
         if rules.books.timed:
             gained += 0.5 * (energy(grains, then, rules.outside) - energy(grains, now, rules.outside))
         if rules.books.moored:
             gained += wrap(grains, rules.span, then, rules.outside)
         lost[OUTSIDE] -= gained
+        return way
 
-    return add_loads, drift_booked
+    return add_loads, kick_and_drift_booked
 
 
 @loop
