@@ -195,7 +195,7 @@ def test_rigid_motion_strains_nothing(steps):
     g = mover.sim.world.grains.arrays
     for c in range(used):
         i, j = (int(k) for k in before.pair[:, c])
-        bond = bond_at(before.bond, c)
+        bond = bond_at(before, c)
         pose = pose_at(g, before, mover.sim.box.span, c, before.twist[c])
         strain = law.strain_of(pose, 0.0, g.radius[i], g.radius[j], bond)
         assert np.linalg.norm(strain.slide) < 1e-9 * bond.slide_limit

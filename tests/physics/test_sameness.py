@@ -89,20 +89,22 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 
 
 def test_growing_arrays_changes_nothing():
-    """With room for 16 contacts and pairs to begin with, or for many: the same bits."""
-    from sand.core.world import contact_arrays, near_pairs
+    """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
+    from sand.core.world import FOR_ALL, contact_arrays, near_pairs
     from sand.physics.contact import Bond
 
     ends = []
-    for room in (16, 4096):
+    for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.world.contacts = contact_arrays(n, room, len(Bond._fields))
-        sim.world.near = near_pairs(n, room)
+        sim.world.contacts = contact_arrays(n, room, len(Bond._fields), alike=alike)
+        sim.world.near, sim.world.alike = near_pairs(n, room, alike=alike), alike
+        rules = sim._engine.rules
+        sim._engine.rules = rules._replace(contact=rules.contact._replace(alike=alike))
         sim.run(until=1e-9)
-        ends.append(state(sim))
+        ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in FOR_ALL})
     assert sim.world.count[CONTACTS] > 16
-    assert ends[0] == ends[1]
+    assert all(end == ends[0] for end in ends)
 
 
 def test_a_frame_is_the_first_step_at_or_after_its_time():

@@ -29,7 +29,7 @@ def test_every_column_row_by_row(stiffness):
     assert set(table) == {name for name, _, _ in COLUMNS}
     force = np.zeros((15, 3))
     for c, (i, j) in enumerate(table["pair"]):
-        plain = bond_at(w.contacts.bond, c)
+        plain = bond_at(w.contacts, c)
         pose = pose_at(w.grains.arrays, w.contacts, sim.box.span, c, w.contacts.twist[c])
         r1, r2 = sim.grains.radius[i], sim.grains.radius[j]
         overlap = r1 + r2 - np.linalg.norm(sim.grains.position[i] - sim.grains.position[j])

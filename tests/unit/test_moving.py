@@ -40,7 +40,7 @@ pass_and_settle = kernel(_pass_and_settle, keep=False)
 def one_by_one(grains, contacts, near, count, lost, span, law, dt):
     """The referee, in Python: a pass that moves nothing, then every contact beyond a limit by itself."""
     used = np.uint64(count[CONTACTS])
-    quiet_pass(grains, contacts, np.uint64(0), used, used, span, law, dt)
+    quiet_pass(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
     settle_flagged(grains, contacts, near, count, lost, span, law, dt)
 
 

@@ -33,6 +33,8 @@ FAR_LEEWAY, NEAR_LEEWAY, SOON_LEEWAY, FASTEST, QUICKEST, HARMLESS = range(6)
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
 LOST_IN_CONTACTS = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
 LOST = (*LOST_IN_CONTACTS, "gas", "outside")
+ALWAYS = 5
+"""The first channels are there in every contact law, the others only with damping or stiffnesses that change."""
 
 
 class ContactArrays(NamedTuple):
@@ -43,8 +45,8 @@ class ContactArrays(NamedTuple):
     pointer2: np.ndarray  # (3, C) the same for grain 2
     twist: np.ndarray  # (C,) φ [rad]
     formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
-    bond: np.ndarray  # (K, C) constants of the contact law
-    lost: np.ndarray  # (L, C) energy it dissipated so far [J], by channel as in LOST_IN_CONTACTS
+    bond: np.ndarray  # (K, C) constants of the contact law; where all contacts are alike (K, BLOCK), all the same
+    lost: np.ndarray  # (L, C) energy it dissipated so far [J], the first 5 or all 7 channels of LOST_IN_CONTACTS
     damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
@@ -60,8 +62,8 @@ class NearPairs(NamedTuple):
 
     pair: np.ndarray  # (2, P) uint32
     touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
-    step: np.ndarray  # (P,) the step their contact needs [s]
-    length: np.ndarray  # (P,) δ_c of their contact [m]
+    step: np.ndarray  # (P,) the step their contact needs [s]; (1,) where all are alike
+    length: np.ndarray  # (P,) δ_c of their contact [m]; (1,) likewise
     anchor: np.ndarray  # (3, N) positions when the list was made [m]
     soon: np.ndarray  # (P,) uint32: the pairs that may touch next, the first count[SOON]
     mark: np.ndarray  # (3, N) positions when they were picked [m]
@@ -109,10 +111,14 @@ FOR_LIST = ("anchor", "order", "start", "home", "cell", "here", "source")
 FOR_IMPULSES = ("held_force", "held_torque", "past_position", "path")
 FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
 """The far arrays that only a list, or cycles of either kind, read and write."""
+FOR_ALL = ("bond", "step", "length")
+"""Numbers of contacts and near pairs that are the same for all where grains are equal."""
 PICKED = ("soon", "mark", "watch")
 """Of the near pairs, what it leaves out: it is picked or worked out anew."""
 LANES = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
+BLOCK = 128
+"""Contacts that are passed over together, whole vectors of them."""
 GROWTH = 1.5
 """Longer arrays are longer by this factor."""
 CELLS_PER_GRAIN = 4
@@ -136,16 +142,16 @@ def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collect
     return FarArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in needless}))
 
 
-def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
-    """Room for `capacity` contacts with `constants` numbers each."""
-    c = max(int(capacity), 16)
+def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = False, channels: int = 7) -> ContactArrays:
+    """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
+    c = max(int(room), 16)
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
     numbers = {k: np.zeros(c) for k in ("twist", "formed", "flag", "damped")}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
-        bond=np.zeros((constants, c)),
+        bond=np.zeros((constants, BLOCK if alike else c)),
         bonded=np.zeros(c, np.uint8),
-        lost=np.zeros((len(LOST_IN_CONTACTS), c)),
+        lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
         **vectors,
@@ -153,12 +159,13 @@ def contact_arrays(grains: int, capacity: int, constants: int) -> ContactArrays:
     )
 
 
-def near_pairs(grains: int, capacity: int) -> NearPairs:
+def near_pairs(grains: int, capacity: int, *, alike: bool = False) -> NearPairs:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
     p = max(int(capacity), 16)
     nowhere = np.full((3, grains), np.inf)
     pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p, np.uint32)
-    return NearPairs(pair, touching, np.zeros(p), np.zeros(p), nowhere, soon, nowhere.copy(), np.full(6, -1.0))
+    kind = np.zeros((2, 1 if alike else p))
+    return NearPairs(pair, touching, kind[0], kind[1], nowhere, soon, nowhere.copy(), np.full(6, -1.0))
 
 
 def stage_arrays(grains: int) -> StageArrays:
@@ -166,12 +173,12 @@ def stage_arrays(grains: int) -> StageArrays:
     return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
-def _grown(arrays: Any, per_grain: tuple[str, ...], least: int) -> Any:
-    """The same columns in longer arrays, with room for `least` pairs at least."""
+def _grown(arrays: Any, others: Collection[str], least: int) -> Any:
+    """The same columns in longer arrays, with room for `least` pairs at least; `others` have none for each pair."""
     columns = arrays.pair.shape[1]
     more, longer = max(int(GROWTH * columns) + 1, least), {}
     for name, old in arrays._asdict().items():
-        if name in per_grain:
+        if name in others:
             longer[name] = old
             continue
         new = np.zeros((*old.shape[:-1], more * (old.shape[-1] // columns)), old.dtype)
@@ -193,6 +200,7 @@ class World:
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     stages: StageArrays = field(default_factory=lambda: stage_arrays(0))
+    alike: bool = False  # all grains are equal, and with them the constants of all contacts
 
     @property
     def time(self) -> float:
@@ -207,13 +215,16 @@ class World:
         """An independent copy: a snapshot."""
         return copy.deepcopy(self)
 
+    def _for_all(self) -> tuple[str, ...]:
+        return FOR_ALL if self.alike else ()
+
     def grow_contacts(self, least: int = 0) -> None:
         """More room for contacts, for `least` of them at least."""
-        self.contacts = _grown(self.contacts, ("start",), least)
+        self.contacts = _grown(self.contacts, ("start", *self._for_all()), least)
 
     def grow_pairs(self, least: int = 0) -> None:
         """More room for near pairs, for `least` of them at least."""
-        self.near = _grown(self.near, ("anchor", "mark", "watch"), least)
+        self.near = _grown(self.near, ("anchor", "mark", "watch", *self._for_all()), least)
 
     def grow_rows(self) -> None:
         """More room for neighbours within the reach of long-range forces; what is there is not kept."""
@@ -229,6 +240,7 @@ class World:
                 if name in PICKED:
                     continue
                 n = used[group] * (2 if name == "side" else 1)
+                n = 1 if name in self._for_all() else n
                 out[f"{group}/{name}"] = array if name in per_grain else array[..., :n]
         return out | {f"far/{name}": getattr(self.far, name) for name in KEPT_FAR}
 
@@ -253,6 +265,10 @@ class World:
                 if name in PICKED:
                     continue
                 given = saved.get(f"{group}/{name}")
+                if name in self._for_all() and given is not None:
+                    # checkpoints of earlier versions hold the same numbers for each
+                    array[...] = given[..., :1] if given.shape[-1] else 0.0
+                    continue
                 n = array.shape[-1] if given is None else given.shape[-1]
                 _take(array[..., :n], saved, f"{group}/{name}")
         for name in KEPT_FAR:

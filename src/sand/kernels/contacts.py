@@ -24,8 +24,20 @@ WAITS, BROKE, YIELDED = 1.0, 2.0, 3.0
 
 
 @loop
-def bond_at(b, c):
-    """The stored constants of contact c, from the (K, C) array of bonds."""
+def alike(contacts):
+    """Do all contacts share their constants?  (If there is room for BLOCK of them, what is told does not matter.)"""
+    return contacts.bond.shape[1] != contacts.flag.size
+
+
+@loop
+def bond_at(contacts, c):
+    """The stored constants of contact c."""
+    return bond_in(contacts.bond, 0 if alike(contacts) else c)
+
+
+@loop
+def bond_in(b, c):
+    """Column c of a (K, …) array of constants."""
     return law_of.Bond(
         b[0, c],
         b[1, c],
@@ -78,17 +90,18 @@ def pose_after(grains, contacts, span, c, dt):
 
 
 @loop
-def quiet_pass(grains, contacts, first, last, used, span, law, dt):
+def quiet_pass(grains, contacts, first, last, used, column, span, law, dt):
     """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises.
 
     Args:
+        column: of the constants of the first; the others' follow.
         used: number of contacts in use (uint64); columns beyond it may be passed over, to no effect.
     """
     waiting = 0.0
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = bond_at(contacts.bond, c)
+        bond = bond_in(contacts.bond, column + k)
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_after(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
@@ -124,7 +137,7 @@ def write_loads(grains, contacts, span, law, c):
     """Loads of one contact from its stored pointers and twist, at any compression."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     r1, r2 = grains.radius[i], grains.radius[j]
-    bond = bond_at(contacts.bond, c)
+    bond = bond_at(contacts, c)
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
     y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
@@ -186,14 +199,14 @@ def contact_step(contacts, near, count, n, clock, per_period):
     """
     fastest, most = 0.0, 0
     for c in range(count[CONTACTS]):
-        fastest = max(fastest, bond_at(contacts.bond, c).fastest)
+        fastest = max(fastest, bond_at(contacts, c).fastest)
     for g in range(n):
         most = max(most, int(contacts.start[g + 1]) - int(contacts.start[g]))
     crowd = max(1.0, most / 6.0)
     clock[CONTACT_STEP] = math.inf
     if fastest > 0.0:
         clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(fastest * crowd) / per_period
-        for p in range(count[PAIRS]):
-            clock[CONTACT_STEP] = min(clock[CONTACT_STEP], near.step[p])
+        for k in range(min(count[PAIRS], near.step.size)):
+            clock[CONTACT_STEP] = min(clock[CONTACT_STEP], near.step[k])
         # few digits, so that sums of steps are exact: cycles of long-range forces then keep momenta to rounding
         clock[CONTACT_STEP] = np.float64(np.float32(clock[CONTACT_STEP]))

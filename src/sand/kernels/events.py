@@ -25,16 +25,17 @@ from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.impact import speed_gained
 from ..physics.rotation import turned_back
-from .contacts import BROKE, WAITS, bond_at, pose_at, write_loads
+from .contacts import BROKE, WAITS, alike, bond_at, pose_at, write_loads
 from .moving import strain_before
 from .neighbours import bond_of, forget_touch
 
 
 @loop
 def book(own, lost, c, channel, energy):
-    """Add an energy [J] lost by contact c to the books and to its own record, `own` (L, C)."""
+    """Add an energy [J] lost by contact c to the books and to its own record, `own` (L, C), if that has room."""
     lost[channel] += energy
-    own[channel, c] += energy
+    if channel < own.shape[0]:
+        own[channel, c] += energy
 
 
 @loop
@@ -53,7 +54,7 @@ def damp(grains, contacts, span, c, dt):
     that of the trapezoid rule, as velocity Verlet does it, with the force kept from the step before.
     """
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    bond = bond_at(contacts.bond, c)
+    bond = bond_at(contacts, c)
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(apart, apart))
     n = scale(1.0 / distance, apart)
@@ -82,7 +83,7 @@ def damp_contacts(grains, contacts, count, lost, span, dt):
 def book_stiffness(grains, contacts, count, lost, span, dt):
     """What stiffnesses that follow a(δ) took out of the springs of all contacts in this step."""
     for c in range(count[CONTACTS]):
-        bond = bond_at(contacts.bond, c)
+        bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
         before = strain_before(grains, contacts, c, pose, bond, dt)
@@ -139,7 +140,7 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
             continue
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
-        bond = bond_at(contacts.bond, c)
+        bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         if law_of.beyond_limits(strain, pose.n, bond):
@@ -183,8 +184,9 @@ def drop_broken(contacts, count):
                 contacts.push[row, kept] = contacts.push[row, c]
                 contacts.torque1[row, kept] = contacts.torque1[row, c]
                 contacts.torque2[row, kept] = contacts.torque2[row, c]
-            for row in range(contacts.bond.shape[0]):
-                contacts.bond[row, kept] = contacts.bond[row, c]
+            if not alike(contacts):
+                for row in range(contacts.bond.shape[0]):
+                    contacts.bond[row, kept] = contacts.bond[row, c]
             for row in range(contacts.lost.shape[0]):
                 contacts.lost[row, kept] = contacts.lost[row, c]
             contacts.damped[kept] = contacts.damped[c]
@@ -229,8 +231,10 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     for row in range(contacts.lost.shape[0]):
         contacts.lost[row, c] = 0.0
     bond = bond_of(grains, law.pairings, i, j)
+    first, last = (0, contacts.bond.shape[1]) if law.alike else (c, c + 1)
     for row in range(contacts.bond.shape[0]):
-        contacts.bond[row, c] = bond[row]
+        for k in range(first, last):
+            contacts.bond[row, k] = bond[row]
     write_loads(grains, contacts, span, law, c)
     return c
 
@@ -260,9 +264,9 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
             book(contacts.lost, lost, c, DAMPING, contacts.damped[c] * closing * since)
         reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
         # a step of 0 s finds what touches already
-        gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts.bond, c), dt) if dt > 0.0 else 0.0
+        gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts, c), dt) if dt > 0.0 else 0.0
         owed = contacts.damped[c] * since - reduced * gain
         knock(grains, i, j, n, owed - 0.5 * dt * dot(load(contacts.push, c), n))
-        book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts.bond, c)))
+        book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts, c)))
         near.touching[p] = 1
         count[MADE] += 1

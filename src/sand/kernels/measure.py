@@ -30,7 +30,7 @@ def measure_energies(grains, contacts, count, span, follow, out):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, bond = r1 + r2 - pose.distance, bond_at(contacts.bond, c)
+        overlap, bond = r1 + r2 - pose.distance, bond_at(contacts, c)
         y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
         stored = law_of.energies(pose, overlap, y, r1, r2, law_of.stiffened(bond, y, follow))
         for mode in range(4):
@@ -72,7 +72,7 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, plain = r1 + r2 - pose.distance, bond_at(contacts.bond, c)
+        overlap, plain = r1 + r2 - pose.distance, bond_at(contacts, c)
         y = adhesion.root(adhesion.stretch(overlap, plain.pull_off_overlap))
         bond = law_of.stiffened(plain, y, follow)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)

@@ -9,15 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import world
 from ..core.jit import formula, loop
 from ..core.vec import axpy, dot, load, load4, put, scale, sub
 from ..core.world import MOVED, ROLLING, SLIDING, TWISTING
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned_back, turned_by
-from .contacts import WAITS, YIELDED, bond_at, pose_after, quiet_pass, twist_gain, whole_vectors
+from .contacts import WAITS, YIELDED, alike, bond_in, pose_after, quiet_pass, twist_gain, whole_vectors
 
-BLOCK = np.uint64(128)
+BLOCK = np.uint64(world.BLOCK)
 """Contacts that are judged together."""
 BUSY = 0.1
 """Share of a block's contacts that passed a limit in the step before, from which it gets the longer pass."""
@@ -73,13 +74,13 @@ def _keep_record(own, c, slid, rolled, twisted):
 
 
 @loop
-def _busy_pass(grains, contacts, first, last, span, law, dt):
+def _busy_pass(grains, contacts, first, last, column, span, law, dt):
     """What `quiet_pass` does, but contacts beyond a limit are moved at once unless they break or are pressed hard."""
     waiting = moved = slid = rolled = twisted = 0.0
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = bond_at(contacts.bond, c)
+        bond = bond_in(contacts.bond, column + k)
         r1, r2 = grains.radius[i], grains.radius[j]
         pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
         pose = pose_after(grains, contacts, span, c, dt)
@@ -128,18 +129,20 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
     for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
         begin = first + b * BLOCK
         end = begin + BLOCK if begin + BLOCK < last else last
+        column = np.uint64(0) if alike(contacts) else begin
         busy = 0.0
         for k in range(end - begin):
             busy += 1.0 if contacts.flag[begin + k] > 0.0 else 0.0
         if busy > BUSY * (end - begin) and not law.follow:
-            part = _busy_pass(grains, contacts, begin, end, span, law, dt)
+            part = _busy_pass(grains, contacts, begin, end, column, span, law, dt)
             waiting += part.waiting
             moved += part.moved
             slid += part.slid
             rolled += part.rolled
             twisted += part.twisted
         else:
-            waiting += quiet_pass(grains, contacts, begin, whole_vectors(contacts, end), end, span, law, dt)
+            whole = whole_vectors(contacts, end)
+            waiting += quiet_pass(grains, contacts, begin, whole, end, column, span, law, dt)
     return Passed(waiting, moved, slid, rolled, twisted)
 
 

@@ -76,6 +76,12 @@ def kind_of(grains, law, i, j, last):
 
 
 @loop
+def kind_at(near, p):
+    """Where the numbers of pair p's kind stand: one place for all where all are alike."""
+    return p if near.step.size > 1 else 0
+
+
+@loop
 def are_near(grains, span, reach, i, j):
     """True if the gap of two grains is below `reach` [m]."""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
@@ -101,7 +107,8 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, listed)
                 kind = kind_of(grains, law, i, j, kind)
                 near.pair[0, found], near.pair[1, found] = i, j
                 near.touching[found] = 1 if in_contact(contacts, i, j) else 0
-                near.step[found], near.length[found] = kind.step, kind.length
+                own = kind_at(near, found)
+                near.step[own], near.length[own] = kind.step, kind.length
                 found += 1
     for i in range(grains.mass.size):
         put(near.anchor, i, load(grains.position, i))

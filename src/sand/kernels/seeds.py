@@ -35,7 +35,7 @@ def seed_contacts(grains, contacts, count, span, law, pair, slide, roll, twist):
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
         contacts.twist[c] = twist[k]
         write_loads(grains, contacts, span, law, c)
-        if wrong < 0 and r1 + r2 - distance < -bond_at(contacts.bond, c).break_overlap:
+        if wrong < 0 and r1 + r2 - distance < -bond_at(contacts, c).break_overlap:
             wrong = k
     sort_sides(contacts, count, grains.mass.size)
     return wrong

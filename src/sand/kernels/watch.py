@@ -35,8 +35,8 @@ def forget_ways(near):
 def look_up_harmless(near, count):
     """The speed [m/s] that is δ_c in the step of a contact, for the pair of the list for which it is least."""
     harmless = math.inf
-    for p in range(count[PAIRS]):
-        harmless = min(harmless, near.length[p] / near.step[p] if near.length[p] > 0.0 else math.inf)
+    for k in range(min(count[PAIRS], near.step.size)):
+        harmless = min(harmless, near.length[k] / near.step[k] if near.length[k] > 0.0 else math.inf)
     near.watch[HARMLESS] = harmless
 
 

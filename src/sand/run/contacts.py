@@ -45,7 +45,8 @@ class ContactTable(Mapping[str, np.ndarray]):
         self._columns |= {name: vectors[k].T.copy() for k, name in enumerate(names)}
         for k, name in enumerate(LOST_IN_CONTACTS):
             if name != "breaking":
-                self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy()
+                there = k < len(contacts.lost)
+                self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if there else np.zeros(used)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._columns[name]

@@ -10,7 +10,18 @@ from ..core.box import Box
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.material import SILICA
-from ..core.world import FOR_IMPULSES, FOR_LIST, FOR_RATES, World, contact_arrays, far_arrays, near_pairs, stage_arrays
+from ..core.world import (
+    ALWAYS,
+    FOR_IMPULSES,
+    FOR_LIST,
+    FOR_RATES,
+    LOST_IN_CONTACTS,
+    World,
+    contact_arrays,
+    far_arrays,
+    near_pairs,
+    stage_arrays,
+)
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact
 from ..forces.gas import Gas
@@ -103,7 +114,7 @@ def build_engine(
     here.arrays.position[...] = box.wrap(grains.position).T
     start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
     room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
-    world = _world(here, box, found, plan, room, all_pairs=not found.search.listed or None in cutoffs)
+    world = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
     engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
     held = seed_contacts(engine, given.contact, contacts)
     if given.contact is not None:
@@ -137,9 +148,10 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
     )
 
 
-def _world(grains: Grains, box: Box, found: Found, plan: Plan, room: int, *, all_pairs: bool) -> World:
-    """The grains in their box, with `room` for contacts and pairs, and for whatever else the plan needs."""
-    count, listed = len(grains), found.search.listed
+def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all_pairs: bool) -> World:
+    """The grains in their box, with `room` for contacts and pairs, and for whatever else plan and rules need."""
+    count, listed, alike = len(grains), rules.search.listed, rules.contact.alike
+    channels = len(LOST_IN_CONTACTS) if rules.contact.damped or rules.contact.follow else ALWAYS
     blocks = all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0
     needed = {*(FOR_LIST if listed else ()), *(FOR_IMPULSES if plan.impulse else ())}
     needed |= set(FOR_RATES if plan.foretell else ())
@@ -147,8 +159,8 @@ def _world(grains: Grains, box: Box, found: Found, plan: Plan, room: int, *, all
     return World(
         grains,
         box,
-        contact_arrays(count, room, len(Bond._fields)),
-        near_pairs(count, room),
+        contact_arrays(count, room, len(Bond._fields), alike=alike, channels=channels),
+        near_pairs(count, room, alike=alike),
         far_arrays(
             count,
             MATES * count if listed else 0,
@@ -156,6 +168,7 @@ def _world(grains: Grains, box: Box, found: Found, plan: Plan, room: int, *, all
             needless={*FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
         ),
         stages=stage_arrays(count if plan.adaptive else 0),
+        alike=alike,
     )
 
 
@@ -249,4 +262,5 @@ def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) ->
         follow=law.stiffness == "dt97",
         damped=law.damping != "none",
         per_period=stepping.steps_per_period,
+        alike=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
     )

@@ -26,6 +26,7 @@ from ..core.world import (
     STEP,
     STEPS,
 )
+from ..kernels.neighbours import kind_at
 from ..physics.surroundings import stiffness_of_field
 
 CHECK_EVERY = 16
@@ -140,7 +141,8 @@ def pair_step(grains, near, span, control, p):
     touching = near.touching[p] == 1
     # in contact only what loads the neck counts: a pair may spin as fast as it likes
     speed = abs(closing) if touching else math.sqrt(dot(moving, moving))
-    need, length = near.step[p], near.length[p]
+    kind = kind_at(near, p)
+    need, length = near.step[kind], near.length[kind]
     fast = (length > 0.0) & (speed * need > control.impact * length)
     need = control.impact * length / speed if fast else need
     gap = distance - grains.radius[i] - grains.radius[j]
