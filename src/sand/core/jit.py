@@ -1,4 +1,4 @@
-"""The door to the compiler: with `atomics`, the only module that names numba (CUDA apart).
+"""The door to the compiler: `lowering`, `atomics` and this are the only modules that name numba (CUDA apart).
 
 `formula`  scalar physics on floats and 3-tuples.  It stays an ordinary Python function.
 `rare`     like `formula`, but not pasted into the caller: for code that seldom runs.
@@ -43,75 +43,23 @@ def _promise_no_aliases() -> dict[str, Any]:
 _NO_ALIASES = _promise_no_aliases()
 
 
-def _leave_work_to_the_kernel() -> dict[bool, dict[str, Any]]:
-    """The option that keeps inner functions as they were lowered, apart or not; none where numba's inside has changed.
-
-    Numba makes machine code of every function before it pastes it into a caller, where all of that is done again.
-    """
+def _own_compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """The options for kernels, inner functions and those kept apart; none where numba's inside has changed."""
     try:
-        from numba.core.codegen import JITCodeLibrary
-        from numba.core.compiler import Compiler
-    except ImportError:
-        return {False: {}, True: {}}
-
-    class Lowered(JITCodeLibrary):
-        """Functions for kernels to be linked with, neither optimised nor turned into machine code."""
-
-        def _optimize_final_module(self) -> None:
-            pass
-
-        def _finalize_final_module(self) -> None:
-            self._finalize_dynamic_globals()
-            self._finalized = True
-
-        def get_pointer_to_function(self, name: str) -> int:
-            """None."""
-            self._ensure_finalized()
-            return 0
-
-        codegen = property(lambda self: self)
-
-        def set_env(self, name: str, env: Any) -> None:
-            """Nothing of ours reads an environment, and there is no machine code that could."""
-
-    class Apart(Lowered):
-        """The same for a function that must not be pasted into its callers."""
-
-        def add_llvm_module(self, ll_module: Any) -> None:
-            """Mark what is in it, before others are linked to it."""
-            for function in ll_module.functions:
-                if not function.is_declaration:
-                    function.add_function_attribute("noinline")
-            super().add_llvm_module(ll_module)
-
-    class InnerCompiler(Compiler):
-        """Numba's own compiler, but for where the result is kept."""
-
-        kept = Lowered
-
-        def define_pipelines(self) -> Any:
-            """As always."""
-            place = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-            place.enable_object_caching()
-            self.state["library"] = place
-            return super().define_pipelines()
-
-    class ApartCompiler(InnerCompiler):
-        """The same for such functions."""
-
-        kept = Apart
-
-    return {False: {"pipeline_class": InnerCompiler}, True: {"pipeline_class": ApartCompiler}}
+        from .lowering import ApartCompiler, InnerCompiler, KernelCompiler
+    except (ImportError, AttributeError):
+        return {}, {}, {}
+    return {"pipeline_class": KernelCompiler}, {"pipeline_class": InnerCompiler}, {"pipeline_class": ApartCompiler}
 
 
 # nobody calls these from Python once compiled: without their wrappers the first compile is shorter
-_LOWERED = _leave_work_to_the_kernel()
+_KERNEL, _LOWERED, _APART = _own_compilers()
 _BARE: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_INNER = _BARE | _LOWERED[False]
+_INNER = _BARE | _LOWERED
 
 COMPILED = not numba.config.DISABLE_JIT
 """False where numba is told to leave everything to Python."""
-CAN_SHARE = bool(_LOWERED[True])
+CAN_SHARE = bool(_APART)
 """Can `shared` loops be kept apart, so that all threads get the same bits from them?"""
 
 
@@ -157,7 +105,7 @@ _ALIASES = dict.fromkeys(_NO_ALIASES, False)
 formula = _registered(**_INNER, **_ALIASES, forceinline=True)
 rare = _registered(**_INNER, **_ALIASES, forceinline=False)
 loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
-shared = _registered(**_BARE, **_LOWERED[True], **_NO_ALIASES, forceinline=False)
+shared = _registered(**_BARE, **_APART, **_NO_ALIASES, forceinline=False)
 
 
 def _digest() -> str:
@@ -221,7 +169,9 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False) -> Cal
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        compiled = numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **_COMMON, **_NO_ALIASES)(function)
+        compiled = numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **_KERNEL, **_COMMON, **_NO_ALIASES)(
+            function
+        )
     finally:
         numba.config.CACHE_DIR = before
     if keep:
