@@ -109,10 +109,11 @@ class Apart(Lowered):
 
 
 _NEVER = ir.Constant(ir.IntType(1), 0)
-_QUIET = "_ZN4sand", "_ZN5numba"
-"""How the names of functions begin that do not raise."""
+_KNOWN = "_ZN4sand", "_ZN5numba7cpython8builtins", "_ZN5numba7cpython7numbers"
+"""How the names of functions begin that we can tell of: our own, and max, min, int, powers of integers."""
+_STEP_OF_0 = ("range() arg 3 must not be zero",)
 _loud: set[str] = set()
-"""Names of those that do, because they call others or say so."""
+"""Names of those that may raise: with bounds that are checked, for instance, or because they call others."""
 
 
 class _Builder(ir.IRBuilder):
@@ -148,15 +149,21 @@ class _Packer(ArgPacker):
 
 
 class _Convention(CPUCallConv):
-    """Calls of functions that do not raise."""
+    """Calls of functions that do not raise: how they ended need not be looked at."""
 
     def call_function(self, builder: Any, callee: Any, *given: Any, **options: Any) -> Any:
         """As always, but for the look at how it ended."""
         status, result = super().call_function(builder, callee, *given, **options)
-        if callee.name.startswith(_QUIET) and callee.name not in _loud:
+        if callee.name.startswith(_KNOWN) and callee.name not in _loud:
             return status._replace(is_error=_NEVER), result
         _loud.add(builder.function.name)
         return status, result
+
+    def return_user_exc(self, builder: Any, exc: Any, exc_args: Any = None, *rest: Any, **options: Any) -> None:
+        """Raise: callers must look, but for what ours never do, a `range` in steps of 0, a negative power of 0."""
+        if exc_args != _STEP_OF_0 and not builder.function.name.startswith(_KNOWN[1:]):
+            _loud.add(builder.function.name)
+        super().return_user_exc(builder, exc, exc_args, *rest, **options)
 
     def return_status_propagate(self, builder: Any, status: Any) -> None:
         """Pass on what was raised."""
@@ -218,11 +225,6 @@ class _Lower(Lower):
 
     def delvar(self, name: str) -> None:
         """Nothing of ours counts references."""
-
-    def lower_static_raise(self, inst: Any) -> None:
-        """Let callers look."""
-        _loud.add(self.function.name)
-        super().lower_static_raise(inst)
 
     def lower_normal_function(self, fndesc: Any) -> None:
         """All of a function."""
