@@ -118,6 +118,16 @@ def test_public_names_have_docstrings():
     assert not silent, silent
 
 
+def test_the_compiler_is_one_that_was_tried():
+    """A newer numba is slow, and without threads, until `core/lowering.py` has been tried with it: raise jit.TRIED."""
+    import numba
+
+    from sand.core.jit import CAN_SHARE, TRIED
+
+    assert TRIED[0] <= numba.version_info.short <= TRIED[1]
+    assert CAN_SHARE
+
+
 def test_only_the_door_names_the_compiler():
     """numba is imported in core/jit.py, core/lowering.py, core/atomics.py and kernels/gpu.py alone."""
     core = HOUSE / "core"

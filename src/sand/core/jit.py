@@ -43,8 +43,14 @@ def _promise_no_aliases() -> dict[str, Any]:
 _NO_ALIASES = _promise_no_aliases()
 
 
+TRIED = (0, 62), (0, 68)
+"""First and last version of numba whose inside `lowering` fits; others compile three times as long, without threads."""
+
+
 def _own_compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """The options for kernels, inner functions and those kept apart; none where numba's inside has changed."""
+    """The options for kernels, inner functions and those kept apart; none where numba's inside may be another."""
+    if not TRIED[0] <= numba.version_info.short <= TRIED[1]:
+        return {}, {}, {}
     try:
         from .lowering import ApartCompiler, InnerCompiler, KernelCompiler
     except (ImportError, AttributeError):

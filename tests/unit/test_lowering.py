@@ -1,0 +1,64 @@
+"""What the compiler leaves out for our code (`core/lowering.py`) must not swallow what is raised."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sand.core.jit import COMPILED, formula, kernel
+
+BEYOND = """
+import sys
+import numpy as np
+import sand
+from sand.core.jit import kernel
+from sand.kernels.motion import kicked
+grains = sand.Grains(np.zeros((3, 3)) + np.arange(3)[:, None], 0.1, sand.SILICA).arrays
+def kick_one(grains, i):
+    return kicked(grains, i, 1.0)[0][0]
+kick_one = kernel(kick_one, keep=False)
+assert kick_one(grains, 2) == 0.0
+try:
+    kick_one(grains, 99)
+except IndexError as error:
+    print("told", error)
+"""
+"""A function of ours that calls a function of ours that reads beyond the end of an array."""
+
+
+@formula
+def positive(x):
+    if x < 0.0:
+        raise ValueError("below 0")
+    return x
+
+
+@formula
+def root_of(x):
+    return positive(x) ** 0.5
+
+
+def test_an_error_in_an_inner_function_reaches_python():
+    """Raised two calls below a kernel; and what is not raised is right."""
+
+    def roots(values):
+        total = 0.0
+        for k in range(values.size):
+            total += root_of(values[k])
+        return total
+
+    roots = kernel(roots, keep=False)
+    assert roots(np.array([4.0, 9.0])) == pytest.approx(5.0, rel=1e-15)
+    with pytest.raises(ValueError, match="below 0"):
+        roots(np.array([4.0, -9.0]))
+
+
+@pytest.mark.skipif(not COMPILED, reason="Python checks bounds by itself")
+def test_bounds_that_are_checked_are_told(tmp_path):
+    """With NUMBA_BOUNDSCHECK=1, which one turns on to find a wrong index, one in our own functions is an IndexError."""
+    env = os.environ | {"NUMBA_BOUNDSCHECK": "1", "SAND_CACHE": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", BEYOND], env=env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("told")
