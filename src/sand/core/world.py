@@ -264,13 +264,13 @@ class World:
             for name, array in getattr(self, group)._asdict().items():
                 if name in PICKED:
                     continue
-                given = saved.get(f"{group}/{name}")
-                if name in self._for_all() and given is not None:
-                    # checkpoints of earlier versions hold the same numbers for each
-                    array[...] = given[..., :1] if given.shape[-1] else 0.0
-                    continue
-                n = array.shape[-1] if given is None else given.shape[-1]
-                _take(array[..., :n], saved, f"{group}/{name}")
+                key = f"{group}/{name}"
+                if name in self._for_all() and key in saved:  # format 1 has the same numbers for each
+                    saved = saved | {key: np.repeat(saved[key][..., :1], array.shape[-1], axis=-1)}
+                if name == "lost" and key in saved:  # and channels that nothing fills
+                    saved = saved | {key: saved[key][: len(array)]}
+                n = saved[key].shape[-1] if key in saved else array.shape[-1]
+                _take(array[..., :n], saved, key)
         for name in KEPT_FAR:
             # checkpoints of earlier versions hold columns that nothing touches
             if getattr(self.far, name).size:

@@ -33,7 +33,7 @@ import numpy as np
 from ..core.errors import BadInput
 from .folder import replace_file
 
-VERSION = 1
+VERSION = 2
 """Of the file format; a newer program reads older versions, an older one refuses newer files."""
 KEPT = 2
 _META = "meta.json"
