@@ -1,8 +1,9 @@
 """How our compiled code is made: numba's own way, without what ours does not need.
 
 Numba makes machine code of every function before it pastes it into a caller, where all of that is done again; here a
-function that only kernels call stays as it was lowered, and is linked with a kernel once.  Nothing of ours raises or
-counts references, and the tuples of arrays that go from function to function are not put together to be taken apart.
+function that only kernels call stays as it was lowered, and is linked with a kernel once.  Nothing of ours counts
+references, how a call ended is looked at only where something can be raised, and the tuples of arrays that go from
+function to function are not put together to be taken apart.
 
 All of it leans on numba's inside.  Where that has changed, the import fails, and `jit` does without.
 """

@@ -200,7 +200,7 @@ class World:
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     stages: StageArrays = field(default_factory=lambda: stage_arrays(0))
-    alike: bool = False  # all grains are equal, and with them the constants of all contacts
+    alike: bool = False  # radii, masses, materials are equal and stay so: one set of constants for all contacts
 
     @property
     def time(self) -> float:
@@ -218,6 +218,12 @@ class World:
     def _for_all(self) -> tuple[str, ...]:
         return FOR_ALL if self.alike else ()
 
+    def _columns(self, group: str, name: str) -> int | None:
+        """How many columns of an array of contacts or near pairs a checkpoint holds; None: all."""
+        used = int(self.count[CONTACTS if group == "contacts" else PAIRS])
+        n = 1 if name in self._for_all() else 2 * used if name == "side" else used
+        return None if name in ("start", "anchor") else n
+
     def grow_contacts(self, least: int = 0) -> None:
         """More room for contacts, for `least` of them at least."""
         self.contacts = _grown(self.contacts, ("start", *self._for_all()), least)
@@ -232,16 +238,12 @@ class World:
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Every number of the state by name, for a checkpoint; unused columns are left out."""
-        used = {"contacts": int(self.count[CONTACTS]), "near": int(self.count[PAIRS])}
         out = {"clock": self.clock, "count": self.count, "lost": self.lost}
         out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
-        for group, per_grain in (("contacts", ("start",)), ("near", ("anchor",))):
+        for group in ("contacts", "near"):
             for name, array in getattr(self, group)._asdict().items():
-                if name in PICKED:
-                    continue
-                n = used[group] * (2 if name == "side" else 1)
-                n = 1 if name in self._for_all() else n
-                out[f"{group}/{name}"] = array if name in per_grain else array[..., :n]
+                if name not in PICKED:
+                    out[f"{group}/{name}"] = array[..., : self._columns(group, name)]
         return out | {f"far/{name}": getattr(self.far, name) for name in KEPT_FAR}
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
@@ -264,16 +266,15 @@ class World:
             for name, array in getattr(self, group)._asdict().items():
                 if name in PICKED:
                     continue
-                key = f"{group}/{name}"
-                if name in self._for_all() and key in saved:  # format 1 has the same numbers for each
+                key, n = f"{group}/{name}", self._columns(group, name)
+                if name in self._for_all() and key in saved:  # format 1 has the same numbers for each, if any
                     saved = saved | {key: np.repeat(saved[key][..., :1], array.shape[-1], axis=-1)}
-                if name == "lost" and key in saved:  # and channels that nothing fills
+                    n = saved[key].shape[-1]
+                if name == "lost" and key in saved:  # it has channels that nothing fills, too
                     saved = saved | {key: saved[key][: len(array)]}
-                n = saved[key].shape[-1] if key in saved else array.shape[-1]
                 _take(array[..., :n], saved, key)
         for name in KEPT_FAR:
-            # checkpoints of earlier versions hold columns that nothing touches
-            if getattr(self.far, name).size:
+            if getattr(self.far, name).size:  # format 1 may hold columns that nothing touches
                 _take(getattr(self.far, name), saved, f"far/{name}")
 
 

@@ -34,7 +34,10 @@ from ..core.errors import BadInput
 from .folder import replace_file
 
 VERSION = 2
-"""Of the file format; a newer program reads older versions, an older one refuses newer files."""
+"""Of the file format; a newer program reads older versions, an older one refuses newer files.
+
+Since 2 there is one column of constants where all grains are equal, and no row for losses that a contact cannot have.
+"""
 KEPT = 2
 _META = "meta.json"
 

@@ -44,7 +44,7 @@ class GrainForce(Force, Protocol):
 
     Attributes:
         formula: `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], made by
-            `sand.core.jit.formula`.
+            `sand.core.jit.formula`.  The energy is one of place, moment and time, not of velocity or spin.
     """
 
     formula: Callable

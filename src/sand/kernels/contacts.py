@@ -11,11 +11,11 @@ from ..core.world import (
     CONTACT_STEP,
     CONTACTS,
     LANES,
-    PAIRS,
 )
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned
+from .kinds import kinds
 
 FEW = 4
 """Contacts that are faster done one by one than as a vector."""
@@ -206,7 +206,7 @@ def contact_step(contacts, near, count, n, clock, per_period):
     clock[CONTACT_STEP] = math.inf
     if fastest > 0.0:
         clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(fastest * crowd) / per_period
-        for k in range(min(count[PAIRS], near.step.size)):
+        for k in range(kinds(near, count)):
             clock[CONTACT_STEP] = min(clock[CONTACT_STEP], near.step[k])
         # few digits, so that sums of steps are exact: cycles of long-range forces then keep momenta to rounding
         clock[CONTACT_STEP] = np.float64(np.float32(clock[CONTACT_STEP]))

@@ -232,9 +232,10 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
         contacts.lost[row, c] = 0.0
     bond = bond_of(grains, law.pairings, i, j)
     first, last = (0, contacts.bond.shape[1]) if law.alike else (c, c + 1)
-    for row in range(contacts.bond.shape[0]):
-        for k in range(first, last):
-            contacts.bond[row, k] = bond[row]
+    if c == 0 or not law.alike:
+        for row in range(contacts.bond.shape[0]):
+            for k in range(first, last):
+                contacts.bond[row, k] = bond[row]
     write_loads(grains, contacts, span, law, c)
     return c
 

@@ -4,7 +4,7 @@ import math
 
 from ..core.box import nearest_image
 from ..core.jit import loop
-from ..core.least import rank, ranked
+from ..core.least import rank, rank_for_most, ranked
 from ..core.vec import axpy, dot, load, load4, put, put4, scale
 from ..physics.rotation import turn, turned
 
@@ -25,7 +25,7 @@ def kick(grains, dt):
     fastest = quickest = rank(0.0)
     for i in range(grains.mass.size):
         v, w = kicked(grains, i, dt)
-        fastest, quickest = max(fastest, rank(dot(v, v))), max(quickest, rank(dot(w, w)))
+        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
     return ranked(fastest), ranked(quickest)
 
 
@@ -38,7 +38,7 @@ def kick_and_drift(grains, span, dt):
     fastest = rank(0.0)
     for i in range(grains.mass.size):
         v, w = kicked(grains, i, 0.5 * dt)
-        fastest = max(fastest, rank(dot(v, v)))
+        fastest = max(fastest, rank_for_most(dot(v, v)))
         put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
         q = turn(load4(grains.orientation, i), scale(dt, w))
         put4(grains.orientation, i, q)

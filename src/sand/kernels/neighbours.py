@@ -11,6 +11,7 @@ from ..core.vec import dot, load, put, sub
 from ..core.world import PAIRS, REBUILT, SOON, SOON_LEEWAY
 from ..physics.contact import Pairing, bond_between
 from .cells import FULL
+from .kinds import kind_at
 
 
 @loop
@@ -73,12 +74,6 @@ def kind_of(grains, law, i, j, last):
         return last
     bond = bond_of(grains, law.pairings, i, j)
     return Kind((a, b), 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period, bond.break_overlap)
-
-
-@loop
-def kind_at(near, p):
-    """Where the numbers of pair p's kind stand: one place for all where all are alike."""
-    return p if near.step.size > 1 else 0
 
 
 @loop

@@ -9,14 +9,15 @@ import math
 
 from ..core.box import nearest_image
 from ..core.jit import loop
-from ..core.least import rank, ranked
+from ..core.least import rank, rank_for_most, ranked
 from ..core.vec import dot, load, sub
-from ..core.world import FAR_LEEWAY, FASTEST, HARMLESS, NEAR_LEEWAY, PAIRS, QUICKEST, SOON_LEEWAY
+from ..core.world import FAR_LEEWAY, FASTEST, HARMLESS, NEAR_LEEWAY, QUICKEST, SOON_LEEWAY
+from .kinds import kinds
 
 UNKNOWN = -1.0
 """What stands for a speed that must be looked up, or a leeway that is spent."""
-ROUNDING = 1.0 + 1e-9
-"""Ways are taken this much longer, so that leeways are never too large."""
+SPARED = 0.999
+"""Part of a limit that is leeway: positions are rounded in every step, and what is left is far more than that."""
 
 
 @loop
@@ -35,7 +36,7 @@ def forget_ways(near):
 def look_up_harmless(near, count):
     """The speed [m/s] that is δ_c in the step of a contact, for the pair of the list for which it is least."""
     harmless = math.inf
-    for k in range(min(count[PAIRS], near.step.size)):
+    for k in range(kinds(near, count)):
         harmless = min(harmless, near.length[k] / near.step[k] if near.length[k] > 0.0 else math.inf)
     near.watch[HARMLESS] = harmless
 
@@ -54,16 +55,16 @@ def largest_speeds(grains):
     fastest = quickest = rank(0.0)
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        fastest, quickest = max(fastest, rank(dot(v, v))), max(quickest, rank(dot(w, w)))
+        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
     return ranked(fastest), ranked(quickest)
 
 
 @loop
 def spend(near, way):
     """No grain flew farther than this [m]."""
-    near.watch[FAR_LEEWAY] -= way * ROUNDING
-    near.watch[NEAR_LEEWAY] -= way * ROUNDING
-    near.watch[SOON_LEEWAY] -= way * ROUNDING
+    near.watch[FAR_LEEWAY] -= way
+    near.watch[NEAR_LEEWAY] -= way
+    near.watch[SOON_LEEWAY] -= way
 
 
 @loop
@@ -75,7 +76,7 @@ def look_up_speeds(grains, near):
 
 @loop
 def farthest(grains, anchor, span):
-    """Largest displacement [m] of a grain from its anchor; not a number for one at infinity in a periodic box.
+    """Largest displacement [m] of a grain from its anchor; not a number for an anchor at infinity.
 
     What counts is the displacement, not the way: a grain that rings in its cluster moves as the cluster does, to
     within its amplitude, and does not make a list stale.
@@ -83,16 +84,16 @@ def farthest(grains, anchor, span):
     most = rank(0.0)
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
-        most = max(most, rank(abs(dot(moved, moved))))  # what is no number may have a sign
+        most = max(most, rank_for_most(dot(moved, moved)))
     return math.sqrt(ranked(most))
 
 
 @loop
-def is_stale(grains, anchor, span, limit, near, leeway):
+def is_stale(grains, anchor, span, limit, watch, leeway):
     """True once a grain is farther than `limit` [m] from its anchor; `leeway` is the place of this list's."""
-    if near.watch[leeway] > 0.0:
+    if watch[leeway] > 0.0:
         return False
     strayed = farthest(grains, anchor, span)
-    near.watch[leeway] = limit - strayed
+    watch[leeway] = SPARED * limit - strayed
     # written so that an anchor at infinity (no list yet) counts as strayed
     return not strayed <= limit

@@ -13,7 +13,7 @@ from . import adhesion, tangential
 
 
 class Bond(NamedTuple):
-    """The constants of one contact; made by `bond_between`, stored as one column per contact."""
+    """The constants of one contact; made by `bond_between`, stored as columns of an array."""
 
     reduced_radius: float  # R [m]
     rest_radius: float  # a₀ [m]

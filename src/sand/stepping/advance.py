@@ -154,7 +154,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
 
     The second half of a step of 0 s finds the pairs and the contacts that are there and works out the loads.
     """
-    _, kick_and_drift = outside_loops(plan.outside)
+    _, kick_and_drift_booked = outside_loops(plan.outside)
     sum_loads = loads_loop(plan)
     pass_contacts, _, _ = large_loops(plan)
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
@@ -187,7 +187,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
             begin(grains, far, clock, dt)
         else:
             inside(grains, far, rules.span, clock, dt)
-        spend(near, kick_and_drift(grains, clock, lost, rules, dt))
+        spend(near, kick_and_drift_booked(grains, clock, lost, rules, dt))
         clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
         clock[STEP] = dt
         count[STAGE] = 1

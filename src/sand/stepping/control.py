@@ -26,7 +26,7 @@ from ..core.world import (
     STEP,
     STEPS,
 )
-from ..kernels.neighbours import kind_at
+from ..kernels.kinds import kind_at
 from ..physics.surroundings import stiffness_of_field
 
 CHECK_EVERY = 16

@@ -53,11 +53,11 @@ def _moves_too_far(fastest, quickest, reach, dt):
 
 
 @rare
-def _stray(grains, reach, dt):
-    """The first grain that moves too far."""
+def _stray(grains, reach, dt, stop):
+    """The first grain that moves too far in the way that this stop tells."""
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        if _moves_too_far(dot(v, v), dot(w, w), reach, dt) != Stop.STEPS_DONE:
+        if _moves_too_far(dot(v, v), dot(w, w), reach, dt) == stop:
             return i
     return -1
 
@@ -89,7 +89,7 @@ def possible_step(grains, contacts, near, far, clock, count, rules):
         return 0.0, Stop.NO_STEP
     stop = _moves_too_far(near.watch[FASTEST], near.watch[QUICKEST], rules.control.reach, dt)
     if stop != Stop.STEPS_DONE:
-        count[GRAIN1] = _stray(grains, rules.control.reach, dt)
+        count[GRAIN1] = _stray(grains, rules.control.reach, dt, stop)
         return 0.0, stop
     if count[STEPS] % CHECK_EVERY == 0:
         c = _crushed(grains, contacts, count, rules.span)
@@ -103,8 +103,8 @@ def possible_step(grains, contacts, near, far, clock, count, rules):
 def update_lists(grains, contacts, near, far, count, rules):
     """Make anew the lists that are too old for what this step needs; FULL stops ask for longer arrays."""
     span, search, reach = rules.span, rules.search, rules.control.reach
-    stale = rules.contact.on and is_stale(grains, near.anchor, span, 0.25 * reach, near, NEAR_LEEWAY)
-    old = search.listed and is_stale(grains, far.anchor, span, 0.5 * search.margin, near, FAR_LEEWAY)
+    stale = rules.contact.on and is_stale(grains, near.anchor, span, 0.25 * reach, near.watch, NEAR_LEEWAY)
+    old = search.listed and is_stale(grains, far.anchor, span, 0.5 * search.margin, near.watch, FAR_LEEWAY)
     if old and make_far_list(grains, far, count, span, search) == FULL:
         return Stop.LIST_FULL, stale
     if stale:
@@ -112,7 +112,7 @@ def update_lists(grains, contacts, near, far, count, rules):
         if made == FULL:
             return Stop.PAIRS_FULL, stale
         look_up_harmless(near, count)
-    if rules.contact.on and (stale or is_stale(grains, near.mark, span, SOON_PART * reach, near, SOON_LEEWAY)):
+    if rules.contact.on and (stale or is_stale(grains, near.mark, span, SOON_PART * reach, near.watch, SOON_LEEWAY)):
         list_soon(grains, near, count, span, 2.0 * SOON_PART * reach)
     return Stop.STEPS_DONE, stale
 

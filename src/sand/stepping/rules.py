@@ -46,7 +46,7 @@ class ContactRules(NamedTuple):
     follow: bool  # stiffnesses: False frozen at a₀, True following the contact radius
     damped: bool  # is there any damping
     per_period: float  # steps per fastest period
-    alike: bool = False  # all grains are equal: one set of constants for all contacts
+    alike: bool = False  # as in World: one set of constants for all contacts
 
 
 class Beat(NamedTuple):
