@@ -10,7 +10,6 @@ import pytest
 from sand.core.jit import COMPILED, formula, kernel
 
 BEYOND = """
-import sys
 import numpy as np
 import sand
 from sand.core.jit import kernel

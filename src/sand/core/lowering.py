@@ -260,8 +260,9 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         """What is done, in this order."""
         self.state.targetctx.__class__ = _Context  # a copy for this function
-        self.state.library = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        self.state.library.enable_object_caching()
+        place = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        place.enable_object_caching()
+        self.state["library"] = place
         manager = PassManager("sand")
         for each in self.passes:
             manager.add_pass(each, each.__name__)
