@@ -7,6 +7,7 @@ import sand
 from sand.core.world import FAR_LEEWAY, FASTEST, MADE, NEAR_LEEWAY, QUICKEST, REBUILT, SOON_LEEWAY
 from sand.kernels.watch import farthest, largest_speeds
 from sand.stepping.parts import SOON_PART
+from sand.stepping.rules import Stop
 
 
 def crowd(forces=None, **options):
@@ -64,3 +65,44 @@ def test_no_grain_is_farther_than_its_leeway_allows():
         assert np.sqrt(w.near.watch[[FASTEST, QUICKEST]]) == pytest.approx(speeds, rel=1e-14)
         assert np.sqrt(largest_speeds(w.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
     assert spared > 10
+
+
+@pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.FLEW_TOO_FAR, 2), (0.0, Stop.SPUN_TOO_FAR, 0)])
+def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
+    """Grain 0 spins too fast for the user's step, grain 2 flies too fast or rests."""
+    position, still = np.diag([0.0, 1e-7, 2e-7]), np.zeros((3, 3))
+    velocity, spin = still.copy(), still.copy()
+    velocity[2, 0], spin[0, 0] = speed, 1e13
+    grains = sand.Grains(position, 1e-8, sand.SILICA, velocity=velocity, spin=spin)
+    sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="0.1 ps"))
+    sim._engine.begin()
+    assert sim._engine.advance(np.inf, 1) is stop
+    assert sim._engine.culprits() == (culprit,)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_no_number_is_the_largest(sign):
+    """A grain that is nowhere makes lists stale, and its speed is not passed over; processors make NaN with a sign."""
+    arrays = crowd().grains.copy().arrays
+    anchor, span = arrays.position.copy(), sand.Box.open().span
+    arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
+    assert np.isnan(largest_speeds(arrays)[0]) and np.isfinite(largest_speeds(arrays)[1])
+    assert np.isnan(farthest(arrays, anchor, span))
+
+
+@pytest.mark.parametrize("name", ["contacts/twist", "contacts/side", "contacts/bond", "near/pair", "near/step"])
+@pytest.mark.parametrize("radius", [[1e-8, 1e-8, 1e-8], [1e-8, 1e-8, 9e-9]], ids=["alike", "unlike"])
+def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
+    """Two contacts: one column less of what is kept for each is BadInput; equal grains keep one for all."""
+    place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [1.998e-8 + 0.999 * (radius[1] + radius[2]), 0, 0]])
+    sim = sand.Simulation(sand.Grains(place, radius, sand.SILICA), [sand.Contact()])
+    sim.run(steps=1)
+    world, saved = sim.world.copy(), sim.world.to_arrays()
+    assert world.alike == (radius[2] == radius[0]) and len(sim.contacts["pair"]) == 2
+    world.from_arrays(saved)
+    fewer = saved | {name: saved[name][..., :1]}
+    if world.alike and name in ("contacts/bond", "near/step"):
+        world.from_arrays(fewer)
+    else:
+        with pytest.raises(sand.BadInput, match=name):
+            world.from_arrays(fewer)
