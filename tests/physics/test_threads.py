@@ -130,6 +130,18 @@ def test_helpers_go_home_with_their_simulation():
     assert not crew()
 
 
+@pytest.mark.parametrize("number", [1000, 4200])
+def test_helpers_come_where_they_save_time(number):
+    """A chain of 1000 without long-range forces is done before a helper has begun, one of 4200 is not."""
+    sand.set_threads(2)
+    chain = sand.Grains(np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]], 1e-8, sand.SILICA)
+    sim = sand.Simulation(chain, [sand.Contact()])
+    sim.run(steps=1)
+    assert sim._engine._plan.crew
+    assert sim.world.count[CONTACTS] == number - 1
+    assert len(sim._engine._hands._queues) == (number > 4100)
+
+
 def test_small_simulations_have_no_crew():
     """Below a thousand grains."""
     assert is_large(1000)

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from typing import Any, ClassVar
 
 from llvmlite import ir  # type: ignore[import-untyped]
+from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager  # type: ignore[import-untyped]
 from llvmlite.ir import instructions as made  # type: ignore[import-untyped]
 from numba.core import typed_passes as typed
@@ -100,13 +101,6 @@ class Lowered(Kernel):
 
 class Apart(Lowered):
     """The same for a function that must not be pasted into its callers."""
-
-    def add_llvm_module(self, ll_module: Any) -> None:
-        """Mark what is in it."""
-        for function in ll_module.functions:
-            if not function.is_declaration:
-                function.add_function_attribute("noinline")
-        super().add_llvm_module(ll_module)
 
 
 _NEVER = ir.Constant(ir.IntType(1), 0)
@@ -207,12 +201,21 @@ def _drop_unused(function: Any) -> None:
         block.instructions[:] = [i for i in block.instructions if id(i) not in gone]
 
 
+_SLOW_TO_GATHER = get_host_cpu_name().startswith("znver")
+"""Processors that take numbers from many places faster one by one than by their instruction for it: all of AMD's."""
+
+
 class _Lower(Lower):
     """From numba's own language to LLVM's."""
 
     def setup_function(self, fndesc: Any) -> None:
         """Begin."""
         super().setup_function(fndesc)
+        if isinstance(self.library, Apart):
+            self.function.attributes.add("noinline")
+        if _SLOW_TO_GATHER:  # llvmlite knows no attributes with a value, but writes down what is in the set
+            features = f"{self.context.codegen()._tm_features},+prefer-no-gather".lstrip(",")
+            set.add(self.function.attributes, f'"target-features"="{features}"')
         self.builder = _Builder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
 

@@ -9,7 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ..core.world import CONTACT_STEP, FAR_SUMS, GRAIN1, GRAIN2, GROWN, LOOKED, MADE, MOVED, STAGE, STEPS, World
+from ..core.world import (
+    CONTACT_STEP,
+    CONTACTS,
+    FAR_SUMS,
+    GRAIN1,
+    GRAIN2,
+    GROWN,
+    LOOKED,
+    MADE,
+    MOVED,
+    STAGE,
+    STEPS,
+    World,
+)
 from ..forces.base import FarForce, GrainForce
 from ..kernels.cells import FULL, remake_far_list
 from ..kernels.outside import outside_shares_for
@@ -18,7 +31,7 @@ from ..kernels.sums import shares_for
 from ..stepping.adaptive import Adaptive
 from ..stepping.advance import driver_for
 from ..stepping.control import GROW_EVERY
-from ..stepping.crew import crew_for, new_crew, send_away
+from ..stepping.crew import crew_for, new_crew, send_away, wants_help
 from ..stepping.flight import flight_driver_for
 from ..stepping.rules import Plan, Rules, Stop
 from ..stepping.verlet import Verlet
@@ -84,7 +97,8 @@ class Engine:
             return self.rules
         w = self.world
         rules = self.rules._replace(crew=new_crew(w.contacts.flag.size))
-        self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
+        if wants_help(self._plan, int(w.count[CONTACTS])):
+            self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
         return rules
 
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:

@@ -16,7 +16,7 @@ from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.world import CONTACTS
 from ..kernels.contacts import gather
 from ..kernels.moving import contact_pass, keep_passed
-from ..kernels.sums import CREW_FROM
+from ..kernels.sums import CREW_FROM, NO_FAR_FORCE
 from .rules import Plan
 
 WORD, DONE, INSIDE = 0, 8, 16
@@ -27,6 +27,8 @@ PATIENCE = 4000
 CONTACTS_AT_ONCE = 512
 GRAINS_AT_ONCE = 2048
 """Contacts and grains in a block: some 10 µs of work, and whole vectors."""
+HELP_FROM = 8 * CONTACTS_AT_ONCE
+"""Contacts from which a helper saves more time than handing it work takes, where nothing else can be shared."""
 _BITS = 24
 _MASK = (1 << _BITS) - 1
 
@@ -34,6 +36,11 @@ _MASK = (1 << _BITS) - 1
 def is_large(grains: int) -> bool:
     """True if a simulation of so many grains is for a crew, be it of one thread."""
     return CAN_SHARE and grains >= CREW_FROM
+
+
+def wants_help(plan: Plan, contacts: int) -> bool:
+    """True if helpers save time: without long-range forces a thousand contacts are done before a helper has begun."""
+    return plan.far is not NO_FAR_FORCE or contacts >= HELP_FROM
 
 
 PASS, GATHER, FAR, LEAVE = range(1, 5)
