@@ -132,11 +132,16 @@ def test_a_grain_that_is_nowhere_is_listed_nowhere(lengths, odd):
         assert found[40].sum() == found[:, 40].sum() == 0 or np.isfinite(odd)
 
 
-def test_three_cells_are_needed():
-    """Fewer than three cells on a periodic side would meet a neighbour twice: then there is no list."""
-    assert cells.three_cells_fit((None, 3.0, 1.0), 1.0 / 3.0 - 1e-9)
-    assert not cells.three_cells_fit((None, 0.9, 1.0), 1.0 / 3.0)
-    assert cells.three_cells_fit((None, None, None), 1e9)
+@pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (1.0, 3.0, 0.6), (0.7, None, 1.0), (None, 1.0, 2.1)])
+@pytest.mark.parametrize("reach", [0.34, 0.49, 0.7])
+def test_boxes_that_are_not_three_cells_wide(lengths, reach):
+    """One or two cells on a periodic side have no neighbours beside them: each pair is listed once all the same."""
+    box = Box(lengths)
+    position = (np.random.default_rng(8).random((130, 3)) - 0.5) * [1.0 if x is None else x for x in lengths]
+    apart = box.nearest(position[:, None] - position[None])
+    close = (apart**2).sum(axis=-1) < reach**2
+    np.fill_diagonal(close, False)
+    assert (rows(position, box, reach) == close).all()
 
 
 def fast_gas(box, seed, contacts=False, **neighbours):
@@ -167,6 +172,7 @@ def referee(sim):
         ((1e-6, None, 1e-6), "5 nm", False),
         ((None, None, None), "20 nm", False),
         ((1e-6, 1e-6, 1e-6), "15 nm", True),
+        ((0.5e-6, 0.7e-6, 1e-6), "15 nm", True),
     ],
 )
 def test_listed_forces_are_those_of_all_pairs(lengths, margin, contacts):
@@ -253,9 +259,9 @@ def test_ringing_does_not_make_lists():
 @pytest.mark.parametrize(
     ("count", "box", "how", "said"),
     [
-        (120, "1 um", {}, "cells and a list of pairs closer than 270 nm (cut-off 200 nm, margin 70 nm)"),
-        (120, "0.8 um", {}, "all pairs: the box, 800 nm, is less than three cells of 270 nm wide"),
-        (120, "0.8 um", {"search": "cells"}, "all pairs (cells asked for): the box, 800 nm, is less than three"),
+        (120, "1 um", {}, "cells and a list of pairs closer than 220 nm (cut-off 200 nm, margin 20 nm)"),
+        (120, "0.45 um", {}, "all pairs: a sphere of 220 nm holds 0.49 of the box, more than 0.4"),
+        (120, "0.45 um", {"search": "cells"}, "cells and a list of pairs closer than 220 nm"),
         (20, "1 um", {}, "all pairs: fewer than 64 grains"),
         (120, "1 um", {"search": "all pairs"}, "all pairs, asked for"),
     ],

@@ -18,11 +18,8 @@ TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED, FLIGHT = 
 CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", "calm", "kicked", "flight")
 
 # --- places in World.count (int64) -----------------------------------------------------------------
-_NAMES = (
-    "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums "
-    "looked grown rejected needed soon"
-)
-COUNT = tuple(_NAMES.split())
+_NAMES = "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected "
+COUNT = (*_NAMES.split(), "needed", "soon")
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
 LOOKED, GROWN, REJECTED, NEEDED, SOON = range(12, 17)
 
@@ -273,8 +270,9 @@ class World:
                 if name == "lost" and key in saved:  # it has channels that nothing fills, too
                     saved = saved | {key: saved[key][: len(array)]}
                 _take(array[..., :n], saved, key)
-        for name in KEPT_FAR:
-            if getattr(self.far, name).size:  # format 1 may hold columns that nothing touches
+        for name in KEPT_FAR:  # format 1 may hold columns that nothing touches; without a list nothing is anchored
+            listless = name == "anchor" and saved.get("far/anchor", self.far.anchor).size == 0
+            if getattr(self.far, name).size and not listless:
                 _take(getattr(self.far, name), saved, f"far/{name}")
 
 

@@ -8,12 +8,14 @@ import numpy as np
 from ..core.box import nearest_image
 from ..core.jit import kernel, loop, rare
 from ..core.vec import dot, load, put, sub
-from ..core.world import CELLS_PER_GRAIN, LISTED
+from ..core.world import CELLS_PER_GRAIN, LANES, LISTED
 
 FULL = -1
 """Answer of the makers of lists when the arrays are too short."""
 FINEST = 16
 """Most cells along x in the width of one along y or z: more would shorten the stretches of a row by little."""
+WITH_NEIGHBOURS = 3
+"""Fewest cells on a periodic axis, so that the two beside each are two."""
 SLACK = 1e-6
 """Part of the square of the reach by which a stretch is longer than it need be, so that rounding cuts no pair off."""
 ROUNDING = 1e-6
@@ -41,9 +43,14 @@ class Grid(NamedTuple):
 
 @loop
 def axis_of_grid(low, high, length, reach):
-    """Number of cells on one axis, where they begin, and how many there are in a metre."""
+    """Number of cells on one axis, where they begin, and how many there are in a metre.
+
+    With two on a periodic axis, or with one and its images, a grain would meet others from both sides: then all is
+    one cell, without neighbours.
+    """
     start, extent = (-0.5 * length, length) if length > 0.0 else (low, high - low)
     number = max(1, min(int(extent / reach), 1 << 20)) if extent > 0.0 else 1
+    number = 1 if length > 0.0 and number < WITH_NEIGHBOURS else number
     return number, start, number / extent if extent > 0.0 else 0.0
 
 
@@ -51,8 +58,8 @@ def axis_of_grid(low, high, length, reach):
 def grid_for(anchor, span, reach):
     """Cells at least `reach` wide, at most CELLS_PER_GRAIN per grain and never fewer than 27 in all.
 
-    Open axes are cut where the outermost grains are.  On periodic axes the box must be three cells wide.  Along x
-    each is cut once more, into FINEST or until there is a cell for each grain.
+    Open axes are cut where the outermost grains are; a periodic one that is less than three cells wide is not cut.
+    Along x each is cut once more, into FINEST or until there is a cell for each grain.
     """
     low, high = load(anchor, 0), load(anchor, 0)
     for i in range(anchor.shape[1]):
@@ -122,11 +129,11 @@ def sort_into_cells(far, span, grid):
 
 @loop
 def neighbour_on_axis(c, step, number, periodic):
-    """The cell `step` further, or −1 where an open axis ends."""
+    """The cell `step` further, or −1 where an open axis ends or is not cut."""
     there = c + step
     if 0 <= there < number:
         return there
-    if not periodic:
+    if not periodic or number == 1:
         return -1
     return there - number if there >= number else there + number
 
@@ -146,7 +153,7 @@ def list_stretch(far, span, limit, s, first, last, found):
     has to be guessed.  The distance is odd in its two grains to the last bit, so that both have the pair or neither.
     """
     here, length = load(far.here, s), last - first
-    if found + np.int64(length) > far.mate.size:
+    if found + np.int64(length) + LANES > far.mate.size:  # whole vectors are read
         return FULL
     for k in range(length):
         apart = nearest_image(sub(here, load(far.here, first + k)), span)
@@ -164,9 +171,13 @@ def list_stretch(far, span, limit, s, first, last, found):
 def list_row(far, grid, span, limit, s, x, row, left, found):
     """Append the neighbours of place s in the row of cells from `row` on; FULL if there is no room.
 
-    Those within ±√left [m] along x are looked at.  Beyond a periodic wall they are a stretch of their own.
+    Those within ±√left [m] along x are looked at.  Beyond a periodic wall they are a stretch of their own.  All are
+    where the axis is less than three times as wide as the reach.
     """
     nx = grid.counts[0]
+    if span.x > 0.0 and nx == grid.fine:
+        begin, end = np.uint64(far.cell[row]), np.uint64(far.cell[row + nx])
+        return list_stretch(far, span, limit, np.uint64(s), begin, end, found)
     wide, home = math.sqrt(left) * grid.per_length[0] + ROUNDING, cell_at(x, nx)
     # never more cells than hold the reach: in a box of three, one more would be met from both sides;
     # never fewer than one, should a coordinate be no number
@@ -230,8 +241,3 @@ def make_far_list(grains, far, count, span, search):
 def remake_far_list(far, span, reach):
     """The list of an earlier run from its anchors, as it was; FULL if there is no room."""
     return rows_from_anchors(far, span, reach)
-
-
-def three_cells_fit(lengths, reach):
-    """True if every periodic side of a box holds three cells of this width [m]."""
-    return all(length is None or int(length / reach) >= 3 for length in lengths)

@@ -7,15 +7,12 @@ import numpy as np
 from ..core.box import nearest_image
 from ..core.jit import COMPILED, loop, rare
 from ..core.vec import across, add, dot, load, load4, put, scale, sub
-from ..core.world import (
-    CONTACT_STEP,
-    CONTACTS,
-    LANES,
-)
+from ..core.world import CONTACT_STEP, CONTACTS
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned
 from .kinds import kinds
+from .vectors import filled_up
 
 FEW = 4
 """Contacts that are faster done one by one than as a vector."""
@@ -126,10 +123,8 @@ def whole_vectors(contacts, number):
 
     What is beyond the contacts in use is worked out as well, and never read.  Both are uint64.
     """
-    lanes = np.uint64(LANES)
-    whole = (number + lanes - np.uint64(1)) // lanes * lanes
-    fits = COMPILED and whole <= np.uint64(contacts.pair.shape[1])
-    return whole if fits and number % lanes >= np.uint64(FEW) else number
+    whole = filled_up(number, np.uint64(FEW))
+    return whole if COMPILED and whole <= np.uint64(contacts.pair.shape[1]) else number
 
 
 @rare

@@ -14,10 +14,10 @@ import numpy as np
 from ..core.box import nearest_image
 from ..core.jit import formula, loop
 from ..core.vec import accrue, add, cross, load, put, sub
-from ..core.world import LANES
 from ..physics.dipole import pair_load, pair_load_cut
 from ..physics.dipole_rates import pair_rates
 from .sums import FarSums, Parts, all_blocks
+from .vectors import filled_up
 
 ROWS_AT_ONCE = 256
 """Rows of the list in a block that one thread takes."""
@@ -61,14 +61,20 @@ def pack_moments(grains, far, span, rules):
 
 @loop
 def listed_rows(grains, far, span, rules, first, last):
-    """Listed pairs of the places first…last − 1 (uint64), with nearest images and a cut-off."""
+    """Listed pairs of the places first…last − 1 (uint64), with nearest images and a cut-off.
+
+    Whole vectors, unless few pairs are left over: beyond its end a row goes on with what is no pair of it.
+    """
+    few = np.uint64(FEW)
     for k in range(last - first):
         s = first + k
         here, mine = load(far.here, s), load(far.source, s)
         push = field = (0.0, 0.0, 0.0)
-        for m in range(far.start[s], far.start[s + np.uint64(1)]):
-            t = far.mate[m]
-            f, b, _, _ = cut_pair(here, load(far.here, t), span, mine, load(far.source, t), rules, True)
+        begin = np.uint64(far.start[s])
+        pairs = np.uint64(far.start[s + np.uint64(1)]) - begin
+        for m in range(filled_up(pairs, few)):
+            t = far.mate[begin + m]
+            f, b, _, _ = cut_pair(here, load(far.here, t), span, mine, load(far.source, t), rules, m < pairs)
             push, field = add(push, f), add(field, b)
         i = far.order[s]
         accrue(far.force, i, push)
@@ -193,7 +199,7 @@ def rows_of(pair_loads: Callable) -> Callable:
 
     Rows are as long as whole vectors, unless few pairs are left over: what is beyond the diagonal is no pair.
     """
-    lanes, few = np.uint64(LANES), np.uint64(FEW)
+    few = np.uint64(FEW)
 
     @loop
     def add_rows(far, force, field, span, rules, first, last):
@@ -201,8 +207,7 @@ def rows_of(pair_loads: Callable) -> Callable:
             i = first + k
             here, mine = load(far.here, i), load(far.source, i)
             push = own = (0.0, 0.0, 0.0)
-            whole = (i + lanes - np.uint64(1)) // lanes * lanes
-            for j in range(whole if i % lanes >= few else i):
+            for j in range(filled_up(i, few)):
                 f, b1, b2, _ = pair_loads(here, load(far.here, j), span, mine, load(far.source, j), rules, j < i)
                 push, own = add(push, f), add(own, b1)
                 accrue(force, j, (-f[0], -f[1], -f[2]))

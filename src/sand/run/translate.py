@@ -86,7 +86,8 @@ def build_engine(
     given = _given(forces, grains)
     reach = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in given.distant]
-    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None])
+    flights = isinstance(stepping, Adaptive)
+    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], flights=flights)
     far = [
         (f, f.sums(box, found.search.listed and r is not None), f.numbers(grains, box))
         for f, r in zip(given.distant, cutoffs, strict=True)

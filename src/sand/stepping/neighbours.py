@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -10,13 +11,17 @@ from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
 from ..core.units import si, spoken
-from ..kernels.cells import Search, three_cells_fit
+from ..kernels.cells import Search
 
 SEARCHES = ("auto", "cells", "all pairs")
-MARGIN = 0.35
+MARGIN = 0.1
 """Margin of the list over the cut-off, Δr/r_c; the paper has 0.3–0.4."""
+MARGIN_OF_FLIGHTS = 0.35
+"""The same where steps are as long as the margin lets them be."""
 LIST_FROM = 64
 """Fewest grains for which "auto" makes a list."""
+LIST_UP_TO = 0.4
+"""Largest part of a periodic box within the list's reach for which "auto" makes one: each pair is in two rows."""
 
 
 class Found(NamedTuple):
@@ -32,11 +37,12 @@ class Neighbours:
 
     Args:
         search: "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
-            "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if three of them fit
-            into each periodic side of the box.
-        margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.35 of the cut-off, or half the
-            smallest radius where no force has one. The list is made anew when a grain is more than Δr/2 from where
-            it was; a wide margin makes long but lasting lists. No choice changes a result by more than rounding.
+            "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if no more than 0.4
+            of a periodic box is within reach of a grain.
+        margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
+            the list limits the steps (Runge–Kutta), or half the smallest radius where no force has one. The list is
+            made anew when a grain is more than Δr/2 from where it was; a wide margin makes long but lasting lists.
+            No choice changes a result by more than rounding.
 
     Raises:
         BadInput: an unknown word, or a margin that is not a length above 0.
@@ -63,32 +69,33 @@ class Neighbours:
         """Its settings in SI."""
         return {"search": self.search, "margin": self.margin}
 
-    def choose(self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float]) -> Found:
+    def choose(
+        self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, flights: bool = False
+    ) -> Found:
         """The search for these grains.
 
         Args:
             reach: gap [m] up to which pairs count as near a contact.
             cutoffs: radii [m] of the long-range forces that have one.
+            flights: whether steps may be as long as the list lasts.
         """
         touch = 2.0 * float(grains.radius.max()) + reach
         widest = max(cutoffs, default=0.0)
         # the list of near pairs is made out of this one, and its own margin is half its reach
         margin = self.margin
         if margin == "auto":
-            margin = MARGIN * widest if widest > 0.0 else 0.5 * reach
+            margin = (MARGIN_OF_FLIGHTS if flights else MARGIN) * widest if widest > 0.0 else 0.5 * reach
         whole = max(widest, touch) + margin
         nothing = Search(False, whole, margin)
         if self.search == "all pairs":
             return Found(nothing, "all pairs, asked for")
-        if not three_cells_fit(box.lengths, whole):
-            asked = " (cells asked for)" if self.search == "cells" else ""
-            return Found(
-                nothing,
-                f"all pairs{asked}: the box, {spoken(box.shortest, 'm')}, is less than three cells of "
-                f"{spoken(whole, 'm')} wide",
-            )
-        if self.search == "auto" and len(grains) < LIST_FROM:
-            return Found(nothing, f"all pairs: fewer than {LIST_FROM} grains")
+        if self.search == "auto":
+            if len(grains) < LIST_FROM:
+                return Found(nothing, f"all pairs: fewer than {LIST_FROM} grains")
+            share = 4.0 / 3.0 * math.pi * whole**3 / box.volume
+            if share > LIST_UP_TO:
+                held = f"a sphere of {spoken(whole, 'm')} holds {share:.2g} of the box, more than {LIST_UP_TO}"
+                return Found(nothing, f"all pairs: {held}")
         purpose = f"cut-off {spoken(widest, 'm')}" if widest > touch else f"contacts {spoken(touch, 'm')}"
         return Found(
             Search(True, whole, margin),
