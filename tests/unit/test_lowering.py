@@ -1,13 +1,17 @@
 """What the compiler leaves out for our code (`core/lowering.py`) must not swallow what is raised."""
 
+import gc
 import os
 import subprocess
 import sys
 
+import numba
 import numpy as np
 import pytest
 
+import sand
 from sand.core.jit import COMPILED, formula, kernel
+from sand.kernels.motion import kicked
 
 BEYOND = """
 import numpy as np
@@ -61,3 +65,28 @@ def test_bounds_that_are_checked_are_told(tmp_path):
     done = subprocess.run([sys.executable, "-c", BEYOND], env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("told")
+
+
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_who_passes_arguments_otherwise_is_told():
+    """Numba's own functions take named tuples apart, ours do not: a call across says so instead of reading rubbish."""
+
+    def speed(grains):
+        return kicked(grains, 0, 1.0)[0][0]
+
+    grains = sand.Grains(np.zeros((1, 3)), 0.1, sand.SILICA, velocity=[[3.0, 0.0, 0.0]]).arrays
+    assert kernel(speed, keep=False)(grains) == 3.0
+    with pytest.raises(TypeError, match=r"sand\.core\.jit\.kernel"):
+        numba.njit(speed)(grains)
+
+
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_rubbish_is_collected_again_after_compiling():
+    """As before the first call, whether that was on or off."""
+    for wanted in (True, False):
+        try:
+            (gc.enable if wanted else gc.disable)()
+            kernel(lambda x: root_of(x), keep=False)(4.0)
+            assert gc.isenabled() is wanted
+        finally:
+            gc.enable()

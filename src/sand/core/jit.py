@@ -1,4 +1,4 @@
-"""The door to the compiler: `lowering`, `atomics` and this are the only modules that name numba (CUDA apart).
+"""The door to the compiler: only `lowering`, `convention`, `atomics` and this name numba (CUDA apart).
 
 `formula`  scalar physics on floats and 3-tuples.  It stays an ordinary Python function.
 `rare`     like `formula`, but not pasted into the caller: for code that seldom runs.

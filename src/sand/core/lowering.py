@@ -10,25 +10,22 @@ All of it leans on numba's inside.  Where that has changed, the import fails, an
 
 from __future__ import annotations
 
+import gc
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, ClassVar
+from typing import Any
 
-from llvmlite import ir  # type: ignore[import-untyped]
 from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager  # type: ignore[import-untyped]
 from llvmlite.ir import instructions as made  # type: ignore[import-untyped]
 from numba.core import typed_passes as typed
 from numba.core import untyped_passes as untyped
-from numba.core.callconv import CPUCallConv
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.cpu import CPUContext
-from numba.core.datamodel.packer import ArgPacker
 from numba.core.ir import Arg, Assign
 from numba.core.lowering import Lower
+
+from .convention import Builder, Context, ours_alone, take_apart
 
 __all__ = ["ApartCompiler", "InnerCompiler", "KernelCompiler"]
 
@@ -84,6 +81,8 @@ class Lowered(Kernel):
     def _get_module_for_linking(self) -> Any:
         """Its own code and that of all that it calls, for who is no kernel of ours."""
         whole = self.alone().clone()
+        if any(ours_alone(function.name) and not function.is_declaration for function in whole.functions):
+            raise TypeError(f"{self.name} takes arrays of a world: compile what calls it with sand.core.jit.kernel")
         for library in _below(self):
             whole.link_in(library.alone() if isinstance(library, Lowered) else library._get_module_for_linking(), True)
         return whole
@@ -101,83 +100,6 @@ class Lowered(Kernel):
 
 class Apart(Lowered):
     """The same for a function that must not be pasted into its callers."""
-
-
-_NEVER = ir.Constant(ir.IntType(1), 0)
-_KNOWN = "_ZN4sand", "_ZN5numba7cpython8builtins", "_ZN5numba7cpython7numbers"
-"""How the names of functions begin that we can tell of: our own, and max, min, int, powers of integers."""
-_STEP_OF_0 = ("range() arg 3 must not be zero",)
-_loud: set[str] = set()
-"""Names of those that may raise: with bounds that are checked, for instance, or because they call others."""
-
-
-class _Builder(ir.IRBuilder):
-    """Writes down less."""
-
-    def extract_value(self, agg: Any, idx: Any, name: str = "") -> Any:
-        """What was put into a tuple is taken from there, not out of the tuple."""
-        place = list(idx) if isinstance(idx, (list, tuple)) else [idx]
-        while place and isinstance(agg, made.InsertValue):
-            there = list(agg.indices)
-            if place[: len(there)] == there:
-                agg, place = agg.value, place[len(there) :]
-            elif there[: len(place)] == place:
-                break
-            else:
-                agg = agg.aggregate
-        return super().extract_value(agg, place, name) if place else agg
-
-    @contextmanager
-    def if_then(self, pred: Any, likely: bool | None = None) -> Iterator[Any]:
-        """Nothing where it never happens."""
-        if pred is _NEVER:
-            with self.goto_block(ir.Block(self.function)):
-                yield None
-        else:
-            with super().if_then(pred, likely) as end:
-                yield end
-
-
-class _Packer(ArgPacker):
-    def assign_names(self, args: Any, names: Any) -> None:
-        """They have names, if only numbers."""
-
-
-class _Convention(CPUCallConv):
-    """Calls of functions that do not raise: how they ended need not be looked at."""
-
-    def call_function(self, builder: Any, callee: Any, *given: Any, **options: Any) -> Any:
-        """As always, but for the look at how it ended."""
-        status, result = super().call_function(builder, callee, *given, **options)
-        if callee.name.startswith(_KNOWN) and callee.name not in _loud:
-            return status._replace(is_error=_NEVER), result
-        _loud.add(builder.function.name)
-        return status, result
-
-    def return_user_exc(self, builder: Any, exc: Any, exc_args: Any = None, *rest: Any, **options: Any) -> None:
-        """Raise: callers must look, but for what ours never do, a `range` in steps of 0, a negative power of 0."""
-        if exc_args != _STEP_OF_0 and not builder.function.name.startswith(_KNOWN[1:]):
-            _loud.add(builder.function.name)
-        super().return_user_exc(builder, exc, exc_args, *rest, **options)
-
-    def return_status_propagate(self, builder: Any, status: Any) -> None:
-        """Pass on what was raised."""
-        if status.is_error is not _NEVER:
-            super().return_status_propagate(builder, status)
-
-
-class _Context(CPUContext):
-    """What it takes to lower."""
-
-    call_conv = property(_Convention)
-    packers: ClassVar[dict[Any, Any]] = {}
-
-    def get_arg_packer(self, fe_args: Any) -> Any:
-        """One for each set of types."""
-        key = tuple(t._code for t in fe_args)
-        if key not in self.packers:
-            self.packers[key] = _Packer(self.data_model_manager, fe_args)
-        return self.packers[key]
 
 
 _PURE = made.ExtractValue, made.InsertValue, made.LoadInstr, made.CompareInstr, made.SelectInstr
@@ -210,13 +132,15 @@ class _Lower(Lower):
 
     def setup_function(self, fndesc: Any) -> None:
         """Begin."""
+        if type(self.library) is not Lowered:
+            take_apart(fndesc.mangled_name)
         super().setup_function(fndesc)
         if isinstance(self.library, Apart):
             self.function.attributes.add("noinline")
         if _SLOW_TO_GATHER:  # llvmlite knows no attributes with a value, but writes down what is in the set
             features = f"{self.context.codegen()._tm_features},+prefer-no-gather".lstrip(",")
             set.add(self.function.attributes, f'"target-features"="{features}"')
-        self.builder = _Builder(self.entry_block)
+        self.builder = Builder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
 
     def _find_singly_assigned_variable(self) -> None:
@@ -254,15 +178,24 @@ class KernelCompiler(CompilerBase):
         untyped.ReconstructSSA,
         typed.NopythonTypeInference,
         typed.PreLowerStripPhis,
-        typed.IRLegalization,
         typed.AnnotateTypes,
         _Lowering,
         typed.NoPythonBackend,
     )
 
+    def compile_extra(self, func: Any) -> Any:
+        """As always, but nobody looks meanwhile for what could be thrown away: little can, among millions of things."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()
+
     def define_pipelines(self) -> list[Any]:
         """What is done, in this order."""
-        self.state.targetctx.__class__ = _Context  # a copy for this function
+        self.state.targetctx.__class__ = Context  # a copy for this function
         place = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         place.enable_object_caching()
         self.state["library"] = place
