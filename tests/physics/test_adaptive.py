@@ -301,6 +301,27 @@ def bits(sim):
     return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
 
 
+@pytest.mark.parametrize("lengths", [(3e-7, 3e-7, 3e-7), (3e-7, None, None)])
+@pytest.mark.parametrize("margin", ["auto", "1 um"])
+def test_images_are_not_flown_through(lengths, margin):
+    """Two grains touch when their nearest images are at 2r, however wide the list: no step is half a box long.
+
+    They fly freely, so that the first touch is found by looking every 10 ps, 1e-11 m of way.
+    """
+    y = -3e-8 if lengths[1] else -1.4e-8
+    grains = sand.Grains([[0, 0, 0], [1e-7, y, 0]], R, sand.SILICA, velocity=[[-1.0, -0.011, 0.0], [0, 0, 0]])
+    box = sand.Box(lengths)
+    time = np.arange(0.0, 2e-6, 1e-11)[:, None]
+    apart = box.nearest(grains.position[0] + time * grains.velocity[0] - grains.position[1])
+    first = time[np.argmax((apart**2).sum(axis=1) <= (2 * R) ** 2), 0]
+    assert first > 1e-7
+    how = sand.Neighbours("cells", margin)
+    sim = sand.Simulation(grains, [sand.Contact()], box=box, stepping=sand.Adaptive(), neighbours=how)
+    sim.run(until=first + 1e-10)
+    assert sim.world.count[MADE] == 1
+    assert sim.world.contacts.formed[0] == pytest.approx(first, abs=2e-11)
+
+
 def test_pieces_and_cadence_change_no_bit():
     """Whole, in pieces, watched often: the same state; grains fly, touch, and go on with Verlet."""
     ends = []

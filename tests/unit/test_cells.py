@@ -260,7 +260,7 @@ def test_ringing_does_not_make_lists():
     ("count", "box", "how", "said"),
     [
         (120, "1 um", {}, "cells and a list of pairs closer than 220 nm (cut-off 200 nm, margin 20 nm)"),
-        (120, "0.45 um", {}, "all pairs: a sphere of 220 nm holds 0.49 of the box, more than 0.4"),
+        (120, "0.45 um", {}, "of the others within 220 nm, more than 0.4"),
         (120, "0.45 um", {"search": "cells"}, "cells and a list of pairs closer than 220 nm"),
         (20, "1 um", {}, "all pairs: fewer than 64 grains"),
         (120, "1 um", {"search": "all pairs"}, "all pairs, asked for"),
@@ -288,3 +288,33 @@ def test_wrong_settings_have_a_line_each():
     assert len(caught.value.problems) == 2
     assert "did you mean 'cells'" in caught.value.problems[0]
     assert "margin" in caught.value.problems[1]
+
+
+@pytest.mark.parametrize("earlier", [Neighbours("all pairs"), Neighbours("cells", "150 nm")])
+@pytest.mark.parametrize("far", ["impulse", "taylor"])
+def test_a_state_without_a_list_or_with_a_wide_one_goes_on(earlier, far):
+    """Runs of earlier versions: their loads and energies are at once those of all pairs, and so is what follows.
+
+    Sums in another order: 1e-12 of the largest.
+    """
+    box = "0.6 um"
+    grains = sand.setup.gas(
+        120, box, radius="10 nm", material=sand.IRON, moment="20 A m^2/kg", temperature="1e6 K", seed=2
+    )
+    grains.arrays.charge[...] = 1e-18 * np.random.default_rng(3).normal(size=120)
+    forces = [sand.Contact(), sand.Dipoles(cutoff="0.18 um"), sand.Charges(cutoff="0.18 um")]
+    options = {"box": box, "stepping": sand.Verlet(far=far)}
+    begun = sand.Simulation(grains, forces, neighbours=earlier, **options)
+    begun.run(until="0.3 ns")
+    moved = begun.box.nearest(begun.grains.position - grains.position)
+    assert np.sqrt((moved**2).sum(axis=1)).max() > 1e-8
+    saved = begun.world.to_arrays(), {"temperature": 1e6, "wall_seconds": 0.0}
+    goes_on = sand.Simulation(grains, forces, neighbours=Neighbours("cells", "2 nm"), restart=saved, **options)
+    there, here = begun.loads(), goes_on.loads()
+    for name, energy in there["energy"].items():
+        assert here["energy"][name] == pytest.approx(energy, rel=1e-12)
+    begun.run(steps=40)
+    goes_on.run(steps=40)
+    for name in ("velocity", "spin", "force"):
+        ours, theirs = (getattr(sim.grains.arrays, name) for sim in (goes_on, begun))
+        assert np.abs(ours - theirs).max() < 1e-12 * np.abs(theirs).max(), name

@@ -1,5 +1,5 @@
-"""Integers that several threads read and change: what a crew of threads needs to share its work (beside jit and
-lowering, the only module that names numba).
+"""Integers that several threads read and change: what a crew of threads needs to share its work (one of
+the few modules that name numba).
 
 Memory is ordered as if all threads took turns: what one thread wrote before an atomic write, another sees after it has
 read that.  Without the compiler the functions do the same for a single thread.

@@ -5,7 +5,7 @@ that go from function to function, some 400 numbers, are passed as they are: num
 puts them together again in each function.  Kernels and functions that are kept apart take them apart, because only of
 arguments of their own can LLVM be told that no two arrays overlap.
 
-All of it leans on numba's inside, as `lowering` does, which alone reads it.
+All of it leans on numba's inside, as `lowering` does; nobody else imports this.
 """
 
 from __future__ import annotations

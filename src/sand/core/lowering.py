@@ -2,8 +2,7 @@
 
 Numba makes machine code of every function before it pastes it into a caller, where all of that is done again; here a
 function that only kernels call stays as it was lowered, and is linked with a kernel once.  Nothing of ours counts
-references, how a call ended is looked at only where something can be raised, and the tuples of arrays that go from
-function to function are not put together to be taken apart.
+references, and nothing is thrown away before all is done.  `convention` tells how functions call each other.
 
 All of it leans on numba's inside.  Where that has changed, the import fails, and `jit` does without.
 """

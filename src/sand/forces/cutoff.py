@@ -20,7 +20,7 @@ SHARP = 1e15
 UNCUT = Cutoff(1e300, 1e-200)
 """No cut: the weight is 1 and its slope 0 at any distance; infinities would make 0 × ∞."""
 ROOM = 1.35
-"""Half the box over the automatic cut-off: leaves room for a list's margin."""
+"""Half the box over the automatic cut-off: so much farther the paper's list reached."""
 
 
 class Choice(NamedTuple):

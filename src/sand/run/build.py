@@ -171,7 +171,7 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
         },
         "forces": forces,
         "stepping": simulation.stepping.parameters(),
-        "neighbours": simulation.neighbours.parameters(),
+        "neighbours": simulation.neighbours.parameters(),  # as chosen at the start
     }
 
 

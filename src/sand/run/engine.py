@@ -97,7 +97,7 @@ class Engine:
             return self.rules
         w = self.world
         rules = self.rules._replace(crew=new_crew(w.contacts.flag.size))
-        if wants_help(self._plan, int(w.count[CONTACTS])):
+        if wants_help(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
             self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
         return rules
 
@@ -125,9 +125,19 @@ class Engine:
         """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
         w = self.world
         w.from_arrays(saved)
-        if self.rules.search.listed and np.isfinite(w.far.anchor).all():
+        if self.rules.search.listed:
+            if not self._list_lasts():
+                w.far.anchor[...] = w.grains.arrays.position
             while remake_far_list(w.far, self.rules.span, self.rules.search.reach) == FULL:
                 w.grow_rows()
+
+    def _list_lasts(self) -> bool:
+        """False if a run of an earlier version had no list, or a wider one, for which grains may have gone farther."""
+        w = self.world
+        if not np.isfinite(w.far.anchor).all():
+            return False
+        moved = w.box.nearest((w.grains.arrays.position - w.far.anchor).T)
+        return bool((moved**2).sum(axis=1).max() <= (0.5 * self.rules.search.margin) ** 2)
 
     def energies_at_grains(self) -> dict[str, np.ndarray]:
         """Energy [J] of each grain, (N,), by force: half of each pair's, and what per-grain forces give."""

@@ -90,8 +90,8 @@ class Simulation:
         self.start = grains.copy()
         parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, int(self.seed or 0))
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
-        self.stepping = self._engine.stepping
-        self.world = self._engine.world
+        self.stepping, self.world = self._engine.stepping, self._engine.world
+        self.neighbours = self.neighbours.settled(self._engine.rules.search) if restart is None else self.neighbours
         self.temperature = kinetic_temperature(grains)
         columns = [force.column for force, _, _ in self._engine.far] + [f.name for f in self._engine.outside]
         self.ledger = Ledger(columns)

@@ -176,13 +176,12 @@ def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all
 def _stride(grains: Grains, box: Box, found: Found) -> float:
     """The longest way [m] that a grain may go in one Runge–Kutta step, so that no pair is missed.
 
-    With a list, Δr/4, as `stepping.touch.first_touch` argues.  Without, an image of a grain other than the nearest
-    must not come to touch: it is half a box side away, and two grains close that less r1 + r2 together.  A tenth is
-    kept back for what lies between two stages.
+    With a list, Δr/4, as `stepping.touch.first_touch` argues.  And an image of a grain other than the nearest must not
+    come to touch: it is half a box side away, and two grains close that less r1 + r2 together.  A tenth is kept back
+    for what lies between two stages.
     """
-    if found.search.listed:
-        return 0.9 * 0.25 * found.search.margin
-    return 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
+    images = 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
+    return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images
 
 
 def _books(outside: Sequence[GrainForce], box: Box) -> Books:

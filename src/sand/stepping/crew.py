@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.atomics import fetch_add, give_way, read, write
+from ..core.grains import GrainArrays
 from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.world import CONTACTS
 from ..kernels.contacts import gather
 from ..kernels.moving import contact_pass, keep_passed
-from ..kernels.sums import CREW_FROM, NO_FAR_FORCE
+from ..kernels.sums import CREW_FROM
 from .rules import Plan
 
 WORD, DONE, INSIDE = 0, 8, 16
@@ -38,9 +39,9 @@ def is_large(grains: int) -> bool:
     return CAN_SHARE and grains >= CREW_FROM
 
 
-def wants_help(plan: Plan, contacts: int) -> bool:
-    """True if helpers save time: without long-range forces a thousand contacts are done before a helper has begun."""
-    return plan.far is not NO_FAR_FORCE or contacts >= HELP_FROM
+def wants_help(plan: Plan, grains: GrainArrays, contacts: int) -> bool:
+    """True if helpers save time: without sums to share, a thousand contacts are done before a helper has begun."""
+    return plan.far.parts.blocks(grains) > 0 or contacts >= HELP_FROM
 
 
 PASS, GATHER, FAR, LEAVE = range(1, 5)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
@@ -21,7 +22,21 @@ MARGIN_OF_FLIGHTS = 0.35
 LIST_FROM = 64
 """Fewest grains for which "auto" makes a list."""
 LIST_UP_TO = 0.4
-"""Largest part of a periodic box within the list's reach for which "auto" makes one: each pair is in two rows."""
+"""Largest part of the other grains within the list's reach for which "auto" makes one: each pair is in two rows."""
+SAMPLES = 64, 4096
+"""Grains, and others, that are looked at for it."""
+
+
+def share_within(position: np.ndarray, box: Box, reach: float) -> float:
+    """Which part of the other grains is closer than `reach` [m] to a grain, on average; from a sample of them.
+
+    Args:
+        position: (N, 3) [m], N ≥ 2.
+    """
+    some, others = (np.unique(np.linspace(0, len(position) - 1, most).astype(int)) for most in SAMPLES)
+    apart = box.nearest(position[some][:, None] - position[others])
+    another = some[:, None] != others
+    return float(((apart**2).sum(axis=-1) < reach**2)[another].mean())
 
 
 class Found(NamedTuple):
@@ -37,8 +52,8 @@ class Neighbours:
 
     Args:
         search: "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
-            "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if no more than 0.4
-            of a periodic box is within reach of a grain.
+            "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if at the start no
+            more than 0.4 of the others are within reach of a grain, on average.
         margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
             the list limits the steps (Runge–Kutta), or half the smallest radius where no force has one. The list is
             made anew when a grain is more than Δr/2 from where it was; a wide margin makes long but lasting lists.
@@ -69,6 +84,10 @@ class Neighbours:
         """Its settings in SI."""
         return {"search": self.search, "margin": self.margin}
 
+    def settled(self, search: Search) -> Neighbours:
+        """What was chosen, so that a run that goes on from elsewhere chooses the same."""
+        return Neighbours("cells" if search.listed else "all pairs", search.margin)
+
     def choose(
         self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, flights: bool = False
     ) -> Found:
@@ -92,9 +111,9 @@ class Neighbours:
         if self.search == "auto":
             if len(grains) < LIST_FROM:
                 return Found(nothing, f"all pairs: fewer than {LIST_FROM} grains")
-            share = 4.0 / 3.0 * math.pi * whole**3 / box.volume
+            share = share_within(grains.position, box, whole)
             if share > LIST_UP_TO:
-                held = f"a sphere of {spoken(whole, 'm')} holds {share:.2g} of the box, more than {LIST_UP_TO}"
+                held = f"a grain has {share:.2g} of the others within {spoken(whole, 'm')}, more than {LIST_UP_TO}"
                 return Found(nothing, f"all pairs: {held}")
         purpose = f"cut-off {spoken(widest, 'm')}" if widest > touch else f"contacts {spoken(touch, 'm')}"
         return Found(
