@@ -73,11 +73,15 @@ def per_step(sim: Any, steps: int) -> float:
 
 
 def replayed(sim: Any, steps: int) -> Callable[[], float]:
-    """`per_step` that goes over the same steps, from where the world is now, in every call."""
+    """`per_step` that goes over the same steps, from where the world is now, in every call.
+
+    A copied world is in no cache: a tenth as many steps go before those that count.
+    """
     start = sim.world.copy()
 
     def again() -> float:
         sim.world = sim._engine.world = start.copy()
+        per_step(sim, steps // 10 + 1)
         return per_step(sim, steps)
 
     return again
