@@ -130,16 +130,20 @@ def test_helpers_go_home_with_their_simulation():
     assert not crew()
 
 
-@pytest.mark.parametrize("number", [1000, 4200])
-def test_helpers_come_where_they_save_time(number):
-    """A chain of 1000 without long-range forces is done before a helper has begun, one of 4200 is not."""
+@pytest.mark.parametrize(
+    ("number", "forces", "helpers"),
+    [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 0), (1000, [sand.Dipoles("0.1 um")], 1)],
+)
+def test_helpers_come_where_they_save_time(number, forces, helpers):
+    """1000 contacts are done before a helper has begun, 4200 are not; sums of dipoles are shared, of charges not."""
     sand.set_threads(2)
-    chain = sand.Grains(np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]], 1e-8, sand.SILICA)
-    sim = sand.Simulation(chain, [sand.Contact()])
+    place = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
+    chain = sand.Grains(place, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
+    sim = sand.Simulation(chain, [sand.Contact(), *forces])
     sim.run(steps=1)
     assert sim._engine._plan.crew
     assert sim.world.count[CONTACTS] == number - 1
-    assert len(sim._engine._hands._queues) == (number > 4100)
+    assert len(sim._engine._hands._queues) == helpers
 
 
 def test_small_simulations_have_no_crew():

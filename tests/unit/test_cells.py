@@ -273,6 +273,16 @@ def test_the_search_is_stated(count, box, how, said):
     assert said in sim.choices["neighbours"]
 
 
+@pytest.mark.parametrize("box", ["3 um", (1e-6, None, None), None])
+def test_an_aggregate_within_reach_of_itself_has_no_list(box):
+    """However large the box: each pair would stand in two rows of a list that leaves none out."""
+    block = sand.setup.lattice(5, radius="10 nm", material=sand.IRON)
+    grains = sand.Grains(block.position, 1e-8, sand.IRON, moment="20 A m^2/kg")
+    box = None if box is None else sand.Box(box) if isinstance(box, tuple) else box
+    sim = sand.Simulation(grains, [sand.Dipoles(cutoff="0.3 um")], box=box)
+    assert sim.choices["neighbours"] == "all pairs: a grain has 1 of the others within 330 nm, more than 0.4"
+
+
 def test_a_margin_of_contacts_alone():
     """Without a cut-off the list reaches r1 + r2 + r_min and the margin given, or r_min/2."""
     for margin, said in (("auto", "margin 5 nm"), ("3 nm", "margin 3 nm")):
