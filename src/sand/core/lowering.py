@@ -129,12 +129,16 @@ _SLOW_TO_GATHER = get_host_cpu_name().startswith("znver")
 class _Lower(Lower):
     """From numba's own language to LLVM's."""
 
+    def __init__(self, context: Any, place: Any, *given: Any, **options: Any):
+        super().__init__(context, place, *given, **options)
+        self._inner, self._apart = type(place) is Lowered, isinstance(place, Apart)
+
     def setup_function(self, fndesc: Any) -> None:
         """Begin."""
-        if type(self.library) is not Lowered:
+        if not self._inner:
             take_apart(fndesc.mangled_name)
         super().setup_function(fndesc)
-        if isinstance(self.library, Apart):
+        if self._apart:
             self.function.attributes.add("noinline")
         if _SLOW_TO_GATHER:  # llvmlite knows no attributes with a value, but writes down what is in the set
             features = f"{self.context.codegen()._tm_features},+prefer-no-gather".lstrip(",")
