@@ -8,6 +8,7 @@ import sys
 import numba
 import numpy as np
 import pytest
+from llvmlite.binding import get_host_cpu_name
 
 import sand
 from sand.core.jit import COMPILED, formula, kernel
@@ -78,6 +79,15 @@ def test_who_passes_arguments_otherwise_is_told():
     assert kernel(speed, keep=False)(grains) == 3.0
     with pytest.raises(TypeError, match=r"sand\.core\.jit\.kernel"):
         numba.njit(speed)(grains)
+
+
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_numbers_are_gathered_by_no_instruction_where_that_is_slow():
+    """LLVM is told so on AMD's Zen, and nowhere else."""
+    root = kernel(lambda x: root_of(x), keep=False)
+    root(4.0)
+    (code,) = root.inspect_llvm().values()
+    assert ("+prefer-no-gather" in code) == get_host_cpu_name().startswith("znver")
 
 
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")

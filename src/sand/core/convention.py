@@ -74,7 +74,7 @@ _whole: set[str] = set()
 
 
 def ours_alone(name: str) -> bool:
-    """True of a function that who calls it by numba's own rules would not be understood by."""
+    """True for a function that only ours may call: others would pass its arguments in another way."""
     return name in _whole
 
 

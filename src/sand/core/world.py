@@ -18,8 +18,11 @@ TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED, FLIGHT = 
 CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", "calm", "kicked", "flight")
 
 # --- places in World.count (int64) -----------------------------------------------------------------
-_NAMES = "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums looked grown rejected "
-COUNT = (*_NAMES.split(), "needed", "soon")
+_NAMES = (
+    "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums "
+    "looked grown rejected needed soon"
+)
+COUNT = tuple(_NAMES.split())
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
 LOOKED, GROWN, REJECTED, NEEDED, SOON = range(12, 17)
 
@@ -151,8 +154,7 @@ def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = Fals
         lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
-        **vectors,
-        **numbers,
+        **(vectors | numbers),
     )
 
 
