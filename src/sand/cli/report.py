@@ -31,7 +31,7 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
         return nullcontext()
     from ..core.jit import compiling as watch
 
-    return watch(lambda: note("compiling (once per version of SAND), about a third of a minute …"))
+    return watch(lambda: note("compiling (once per version of SAND), about a quarter of a minute …"))
 
 
 def emit(content: dict[str, Any]) -> None:
