@@ -65,11 +65,11 @@ def of_command(words: Sequence[str], repeat: int = 3) -> float:
 
 def per_step(sim: Any, steps: int) -> float:
     """Thread time [s] of each of about so many steps of a simulation, which may go on to the end of a cycle."""
-    first = sim.world.steps
+    first = sim.steps
     spent = thread(lambda: sim._engine.advance(np.inf, steps))
-    if sim.world.steps < first + steps:
-        raise RuntimeError(f"the world that is timed stopped after {sim.world.steps - first} of {steps} steps")
-    return spent / (sim.world.steps - first)
+    if sim.steps < first + steps:
+        raise RuntimeError(f"the world that is timed stopped after {sim.steps - first} of {steps} steps")
+    return spent / (sim.steps - first)
 
 
 def replayed(sim: Any, steps: int) -> Callable[[], float]:
@@ -80,7 +80,7 @@ def replayed(sim: Any, steps: int) -> Callable[[], float]:
     start = sim.world.copy()
 
     def again() -> float:
-        sim.world = sim._engine.world = start.copy()
+        sim._engine.world = start.copy()
         per_step(sim, steps // 10 + 1)
         return per_step(sim, steps)
 

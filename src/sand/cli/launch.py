@@ -67,7 +67,7 @@ def _goal(simulation: Any, end: End | None) -> tuple[float, float]:
         return simulation.planned
     return (
         math.inf if end.until is None else end.until,
-        math.inf if end.steps is None else simulation.world.steps + end.steps,
+        math.inf if end.steps is None else simulation.steps + end.steps,
     )
 
 

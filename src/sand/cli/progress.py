@@ -40,7 +40,7 @@ class Progress(Observer):
 
     def tick(self, simulation: Any) -> None:
         """The bar moves; tqdm itself sees to it that it is not drawn too often."""
-        here = simulation.time if self._by_time else simulation.world.steps
+        here = simulation.time if self._by_time else simulation.steps
         total = self._end if self._by_time else self._last_step
         if self._bar is None:
             self._take(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames

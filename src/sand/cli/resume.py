@@ -39,7 +39,7 @@ def command(folder: str, until: str | None, threads: int | None, as_json: bool, 
 def _is_there(simulation: Any) -> bool:
     """True if the planned end is reached."""
     end, last_step = simulation.planned
-    return simulation.time >= end or simulation.world.steps >= last_step
+    return simulation.time >= end or simulation.steps >= last_step
 
 
 def _stand(simulation: Any) -> str:

@@ -20,11 +20,11 @@ CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "far_level", 
 # --- places in World.count (int64) -----------------------------------------------------------------
 _NAMES = (
     "steps stage contacts pairs made broken moved rebuilt grain1 grain2 listed far_sums "
-    "looked grown rejected needed soon"
+    "looked grown rejected needed soon ordered"
 )
 COUNT = tuple(_NAMES.split())
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
-LOOKED, GROWN, REJECTED, NEEDED, SOON = range(12, 17)
+LOOKED, GROWN, REJECTED, NEEDED, SOON, ORDERED = range(12, 18)
 
 # --- places in NearPairs.watch (float64) -----------------------------------------------------------------
 FAR_LEEWAY, NEAR_LEEWAY, SOON_LEEWAY, FASTEST, QUICKEST, HARMLESS = range(6)
@@ -199,6 +199,7 @@ class World:
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     stages: StageArrays = field(default_factory=lambda: stage_arrays(0))
+    order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))  # the grain at each place, run.places
     alike: bool = False  # radii, masses, materials are equal and stay so: one set of constants for all contacts
 
     @property
@@ -243,7 +244,8 @@ class World:
             for name, array in getattr(self, group)._asdict().items():
                 if name not in PICKED:
                     out[f"{group}/{name}"] = array[..., : self._columns(group, name)]
-        return out | {f"far/{name}": getattr(self.far, name) for name in KEPT_FAR}
+        out |= {f"far/{name}": getattr(self.far, name) for name in KEPT_FAR}
+        return out | ({"order": self.order} if self.order.size else {})
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
         """Take over the numbers of `to_arrays`; the grains' number and materials are this world's own.
@@ -255,6 +257,9 @@ class World:
             # checkpoints of earlier versions lack the last counters, which begin at 0
             n = saved[name].size if name == "count" and name in saved else None
             _take(getattr(self, name)[:n], saved, name)
+        if "order" in saved:
+            self.order = np.zeros(len(self.grains), np.uint32)
+            _take(self.order, saved, "order")
         if self.contacts.pair.shape[1] < self.count[CONTACTS]:
             self.grow_contacts(int(self.count[CONTACTS]))
         if self.near.pair.shape[1] < self.count[PAIRS]:
@@ -286,14 +291,5 @@ def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
     target[...] = saved[name]
 
 
-__all__ = [name for name in dir() if name.isupper()] + [
-    "ContactArrays",
-    "FarArrays",
-    "NearPairs",
-    "StageArrays",
-    "World",
-    "contact_arrays",
-    "far_arrays",
-    "near_pairs",
-    "stage_arrays",
-]
+_MADE = "ContactArrays FarArrays NearPairs StageArrays World contact_arrays far_arrays near_pairs stage_arrays"
+__all__ = [name for name in dir() if name.isupper() and name[0] != "_"] + _MADE.split()

@@ -194,7 +194,7 @@ def _judge(
         gyration_after=gyration_radius(grains.position[largest], grains.mass[largest]),
         rebound=_rebound(grains, labels, order),
         time=simulation.time,
-        steps=simulation.world.steps,
+        steps=simulation.steps,
         drift=simulation.ledger.drift,
         quiet=quiet,
     )

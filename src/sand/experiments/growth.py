@@ -103,7 +103,7 @@ def one_box(content: dict[str, Any], seed: int, folder: str) -> str:
     else:
         # a folder without a checkpoint is what a kill at the very start leaves
         simulation, until = simulation_of(case, place, overwrite=True), case.run.until
-    steps = None if case.run.steps is None else case.run.steps - simulation.world.steps
+    steps = None if case.run.steps is None else case.run.steps - simulation.steps
     if steps is not None and steps <= 0:
         return "finished"
     return simulation.run(until, steps=steps).outcome.name.lower()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from ..core.box import nearest_image
-from ..core.jit import COMPILED, loop, rare
+from ..core.jit import COMPILED, kernel, loop, rare
 from ..core.vec import across, add, dot, load, load4, put, scale, sub
 from ..core.world import CONTACT_STEP, CONTACTS
 from ..physics import adhesion, tangential
@@ -183,6 +183,12 @@ def sort_sides(contacts, count, n):
     for g in range(n):
         start[g] = start[g + 1]
     start[n] = 2 * total
+
+
+@kernel
+def resort_sides(contacts, count, n):
+    """The same, from Python."""
+    sort_sides(contacts, count, n)
 
 
 @rare

@@ -19,6 +19,7 @@ from ..core.world import (
     LOOKED,
     MADE,
     MOVED,
+    ORDERED,
     STAGE,
     STEPS,
     World,
@@ -33,9 +34,11 @@ from ..stepping.advance import driver_for
 from ..stepping.control import GROW_EVERY
 from ..stepping.crew import crew_for, new_crew, send_away, wants_help
 from ..stepping.flight import flight_driver_for
+from ..stepping.neighbours import Neighbours
 from ..stepping.rules import Plan, Rules, Stop
 from ..stepping.verlet import Verlet
 from .hands import Hands
+from .places import RENEWED_EVERY, inverse, order_on_curve, rearrange, sort_columns
 
 
 @dataclass
@@ -43,23 +46,26 @@ class Engine:
     """A world and the compiled code that moves it.
 
     Attributes:
-        world: the state.
+        world: the state, its grains numbered as the user knows them.
         rules: everything that does not change, as the kernels take it.
         warnings: what the forces had to say about these grains.
         far: the long-range forces that some grain feels, with their loops and numbers.
         outside: the per-grain forces.
         search: how neighbours are found, in words.
         stepping: the integrator, with a number for everything that depends on the grains at the start.
+        neighbours: their settings, likewise, unless they are those of an earlier run.
     """
 
-    world: World
+    _world: World
     rules: Rules
     warnings: list[str]
     outside: Sequence[GrainForce]
     far: Sequence[tuple[FarForce, Any, Any]]
     search: str
     stepping: Verlet | Adaptive
+    neighbours: Neighbours
     _plan: Plan
+    _away: bool = field(init=False, default=False)  # are grains at places of their own now?
     _advance: Callable = field(init=False)
     _hands: Hands | None = field(init=False, default=None)
 
@@ -68,10 +74,60 @@ class Engine:
         if self._plan.crew:
             self._hands = Hands(crew_for(self._plan)[1])
 
+    @property
+    def world(self) -> World:
+        """The state, its grains numbered as the user knows them."""
+        self.come_home()
+        return self._world
+
+    @world.setter
+    def world(self, other: World) -> None:
+        self._world, self._away = other, False
+
+    def come_home(self) -> None:
+        """Every grain gets the number back that the user knows it by; while it is looked at, it keeps that."""
+        if self._away:
+            rearrange(self._world, inverse(self._world.order))
+            self._away = False
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return self._world.time
+
+    @property
+    def steps(self) -> int:
+        """Taken so far."""
+        return self._world.steps
+
+    def _to_places(self) -> None:
+        """Grains where steps are fast, if that is not where they are."""
+        if not self._world.order.size or self.steps >= self._world.count[ORDERED] + RENEWED_EVERY:
+            w = self.world
+            w.order, w.count[ORDERED] = order_on_curve(w), w.steps
+            rearrange(w, w.order)
+            sort_columns(w)
+            self._remake_list()
+        elif not self._away:
+            rearrange(self._world, self._world.order)
+        self._away = True
+
     def advance(self, until: float, most_steps: float) -> Stop:
         """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
-        w = self.world
-        last = min(w.steps + most_steps, 2**62)
+        last = min(self.steps + most_steps, 2**62)
+        if not self.neighbours.along_curve(len(self._world.grains)):
+            return self._drive(until, last)
+        while True:
+            if self.time < until and self.steps < last:
+                self._to_places()
+            renewed = self._world.count[ORDERED] + RENEWED_EVERY
+            stop = self._drive(until, min(last, renewed))
+            if not (stop is Stop.STEPS_DONE and renewed <= self.steps < last):
+                return stop
+
+    def _drive(self, until: float, last: float) -> Stop:
+        """On to a time [s] or a step, as the grains stand now."""
+        w = self._world
         while True:
             stages = (w.stages,) if self._plan.adaptive else ()
             arrays = (w.grains.arrays, w.contacts, w.near, w.far, *stages, w.clock, w.count, w.lost)
@@ -95,7 +151,7 @@ class Engine:
         """The rules for one call of the driver, with a crew at work if there is one."""
         if self._hands is None:
             return self.rules
-        w = self.world
+        w = self._world
         rules = self.rules._replace(crew=new_crew(w.contacts.flag.size))
         if wants_help(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
             self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
@@ -116,7 +172,7 @@ class Engine:
         w.count[STAGE] = 1
         w.count[LOOKED] = w.count[GROWN] = -GROW_EVERY
         w.clock[CONTACT_STEP] = math.inf
-        self.advance(-math.inf, 1)
+        self._drive(-math.inf, 1)
         w.count[STEPS] = w.count[MADE] = w.count[MOVED] = w.count[FAR_SUMS] = 0
         w.lost[:] = 0.0
         w.contacts.lost[:] = 0.0
@@ -125,15 +181,22 @@ class Engine:
         """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
         w = self.world
         w.from_arrays(saved)
-        if self.rules.search.listed:
-            if not self._list_lasts():
-                w.far.anchor[...] = w.grains.arrays.position
-            while remake_far_list(w.far, self.rules.span, self.rules.search.reach) == FULL:
-                w.grow_rows()
+        if w.order.size:  # lists depend on it
+            rearrange(w, w.order)
+            self._away = True
+        if self.rules.search.listed and not self._list_lasts():
+            w.far.anchor[...] = w.grains.arrays.position
+        self._remake_list()
+
+    def _remake_list(self) -> None:
+        """The list of the anchors, if there is one, for the numbers that grains have now."""
+        w, search = self._world, self.rules.search
+        while search.listed and remake_far_list(w.far, w.box.span, search.reach) == FULL:
+            w.grow_rows()
 
     def _list_lasts(self) -> bool:
         """False if a run of an earlier version had no list, or a wider one, for which grains may have gone farther."""
-        w = self.world
+        w = self._world
         if not np.isfinite(w.far.anchor).all():
             return False
         moved = w.box.nearest((w.grains.arrays.position - w.far.anchor).T)

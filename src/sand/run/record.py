@@ -57,7 +57,7 @@ class Record:
         if self._trajectory is not None:
             return
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
-        steps = simulation.world.steps if self._resumed else None
+        steps = simulation.steps if self._resumed else None
         self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, steps)
         if not self._resumed:
             self._frame(simulation)
@@ -96,7 +96,7 @@ class Record:
         if self._trajectory is not None:
             self._trajectory.flush(sync=True)
         meta = {
-            "steps": simulation.world.steps,
+            "steps": simulation.steps,
             "time": simulation.time,
             "until": None if math.isinf(self._ends[0]) else self._ends[0],
             "last_step": None if math.isinf(self._ends[1]) else int(self._ends[1]),

@@ -15,6 +15,7 @@ from ..core.box import as_box
 from ..core.errors import BadInput, FilesFailed, Interrupted
 from ..core.grains import Grains
 from ..core.units import si, spoken
+from ..core.world import World
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
 from ..setup.frame import Bonds
@@ -24,6 +25,7 @@ from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
 from .at_grains import at_grains
 from .contacts import ContactTable
+from .ends import ends_of
 from .ledger import Ledger, kinetic_energies, take_stock
 from .observers import Observer, Schedule
 from .outcome import OF_STOP, Outcome, Result
@@ -90,8 +92,7 @@ class Simulation:
         self.start = grains.copy()
         parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, int(self.seed or 0))
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
-        self.stepping, self.world = self._engine.stepping, self._engine.world
-        self.neighbours = self.neighbours.settled(self._engine.rules.search) if restart is None else self.neighbours
+        self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
         self.temperature = kinetic_temperature(grains)
         columns = [force.column for force, _, _ in self._engine.far] + [f.name for f in self._engine.outside]
         self.ledger = Ledger(columns)
@@ -107,14 +108,24 @@ class Simulation:
             if "ledger" in arrays:
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
             elif self.record:
-                self.ledger.restore(self.record.earlier_rows(self.world.steps))
+                self.ledger.restore(self.record.earlier_rows(self.steps))
         for text in self._engine.warnings:
             warnings.warn(text, stacklevel=2)
 
     @property
+    def world(self) -> World:
+        """The state."""
+        return self._engine.world
+
+    @property
     def time(self) -> float:
         """[s]"""
-        return self.world.time
+        return self._engine.time
+
+    @property
+    def steps(self) -> int:
+        """Taken so far."""
+        return self._engine.steps
 
     @property
     def is_sound(self) -> bool:
@@ -181,14 +192,7 @@ class Simulation:
         """
         if self._broken:
             raise BadInput(f"this simulation cannot go on: {self._broken}")
-        end = math.inf if until is None else si(until, "s", "until")
-        last = math.inf if steps is None else self.world.steps + _whole_steps(steps)
-        if until is None and steps is None:
-            end, last = self.planned
-        if end == last == math.inf:
-            raise BadInput("run needs an end: until='5 us' or steps=1000")
-        if until is not None and end < self.time:
-            raise BadInput(f"until = {until!r} lies before the present time, {self.time:.6g} s")
+        end, last = ends_of(until, steps, self.time, self.steps, self.planned)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
             self.frame_every = (end - self.time) / 200.0
         try:
@@ -201,6 +205,7 @@ class Simulation:
                     outcome = self._loop(end, last, signals)
                 finally:
                     self.wall_seconds += wall.monotonic() - begun
+                    self._engine.come_home()
             return self._close(outcome)
         except FilesFailed as error:
             if self.record:
@@ -249,21 +254,21 @@ class Simulation:
 
     def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
         frames = Schedule(self.frame_every or math.inf, self.time)
-        burst, guarded = 64, self.world.steps
+        burst, guarded = 64, self.steps
         while True:
             began = wall.monotonic()
-            left = max(min(burst, last - self.world.steps, guarded + GUARD_EVERY - self.world.steps), 0)
+            left = max(min(burst, last - self.steps, guarded + GUARD_EVERY - self.steps), 0)
             stop = self._engine.advance(min(end, frames.due), left)
             spent = wall.monotonic() - began
             if left == burst:
                 burst = max(64, min(int(burst * min(BURST / max(spent, 1e-9), 2.0)), 10**7))
             if stop in OF_STOP:
                 return OF_STOP[stop]
-            if self.world.steps - guarded >= GUARD_EVERY:
-                guarded = self.world.steps
+            if self.steps - guarded >= GUARD_EVERY:
+                guarded = self.steps
                 if not self.is_sound:
                     return Outcome.RUNAWAY
-            done = self.time >= end or self.world.steps >= last
+            done = self.time >= end or self.steps >= last
             output = stop is Stop.TIME_REACHED or done
             if output:
                 self._look()
@@ -283,7 +288,7 @@ class Simulation:
             named = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
         if outcome.is_physics:
             self._look()
-        result = Result(outcome, self.world.steps, self.time, self.ledger.drift, named)
+        result = Result(outcome, self.steps, self.time, self.ledger.drift, named)
         if self.record:
             self.record.close(self, result)
         for observer in self.observers:
@@ -291,9 +296,3 @@ class Simulation:
         if outcome is Outcome.INTERRUPTED:
             raise Interrupted(result)
         return result
-
-
-def _whole_steps(steps: Any) -> int:
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise BadInput(f"steps = {steps!r} must be a whole number of at least 1")
-    return int(steps)

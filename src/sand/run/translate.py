@@ -116,7 +116,9 @@ def build_engine(
     start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
     room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     world = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
-    engine = Engine(world, rules, warnings, given.outside, far, found.reason, stepping, plan)
+    chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
+    search = found.reason + ("; in memory along a curve through space" if chosen.along_curve(len(grains)) else "")
+    engine = Engine(world, rules, warnings, given.outside, far, search, stepping, chosen, plan)
     held = seed_contacts(engine, given.contact, contacts)
     if given.contact is not None:
         refuse_overlaps(here, given.contact, start, held)

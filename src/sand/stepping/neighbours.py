@@ -15,6 +15,7 @@ from ..core.units import si, spoken
 from ..kernels.cells import Search
 
 SEARCHES = ("auto", "cells", "all pairs")
+ORDERS = ("auto", "curve", "as given")
 MARGIN = 0.1
 """Margin of the list over the cut-off, Δr/r_c; the paper has 0.3–0.4."""
 MARGIN_OF_FLIGHTS = 0.35
@@ -23,6 +24,8 @@ LIST_FROM = 64
 """Fewest grains for which "auto" makes a list."""
 LIST_UP_TO = 0.4
 """Largest part of the other grains within the list's reach for which "auto" makes one: each pair is in two rows."""
+CURVE_FROM = 10_000
+"""Fewest grains for which "auto" keeps an order of its own: fewer fit into the caches, however they are numbered."""
 SAMPLES = 64, 4096
 """Grains, and others, that are looked at for it."""
 
@@ -57,7 +60,11 @@ class Neighbours:
         margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
             the list limits the steps (Runge–Kutta), or half the smallest radius where no force has one. The list is
             made anew when a grain is more than Δr/2 from where it was; a wide margin makes long but lasting lists.
-            No choice changes a result by more than rounding.
+        order: where grains stand in memory while steps are taken; "curve": along one that fills space, made anew every
+            2000 steps, so that neighbours are close; "as given": by their numbers; "auto": along a curve from
+            10,000 grains on. All that is looked at or written has the numbers of the start.
+
+    No choice changes a result by more than rounding.
 
     Raises:
         BadInput: an unknown word, or a margin that is not a length above 0.
@@ -65,13 +72,16 @@ class Neighbours:
 
     search: str = "auto"
     margin: Any = "auto"
+    order: str = "auto"
 
     __pydantic_config__ = FORBID_EXTRA
 
     def __post_init__(self) -> None:
         problems = []
-        if self.search not in SEARCHES:
-            problems.append(f"neighbours: search = {self.search!r}; {did_you_mean(str(self.search), SEARCHES)}")
+        for name, allowed in (("search", SEARCHES), ("order", ORDERS)):
+            said = getattr(self, name)
+            if said not in allowed:
+                problems.append(f"neighbours: {name} = {said!r}; {did_you_mean(str(said), allowed)}")
         if self.margin != "auto":
             try:
                 object.__setattr__(self, "margin", si(self.margin, "m", "neighbours: margin", above=0.0))
@@ -82,11 +92,16 @@ class Neighbours:
 
     def parameters(self) -> dict[str, Any]:
         """Its settings in SI."""
-        return {"search": self.search, "margin": self.margin}
+        return {"search": self.search, "margin": self.margin, "order": self.order}
 
-    def settled(self, search: Search) -> Neighbours:
+    def along_curve(self, count: int) -> bool:
+        """True if so many grains are kept in an order of their own."""
+        return self.order == "curve" or (self.order == "auto" and count >= CURVE_FROM)
+
+    def settled(self, search: Search, count: int) -> Neighbours:
         """What was chosen, so that a run that goes on from elsewhere chooses the same."""
-        return Neighbours("cells" if search.listed else "all pairs", search.margin)
+        order = "curve" if self.along_curve(count) else "as given"
+        return Neighbours("cells" if search.listed else "all pairs", search.margin, order)
 
     def choose(
         self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, flights: bool = False

@@ -1,0 +1,195 @@
+"""Grains in an order of their own while steps are taken: nobody sees it, and it changes nothing but rounding."""
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.world import CONTACTS, LISTED, ORDERED, REBUILT
+from sand.run import engine as engines
+from sand.run.places import inverse, order_on_curve, rearrange
+
+from .test_sameness import state
+
+EVERY = 700
+"""Steps between two orders in these tests, so that some are made."""
+
+
+@pytest.fixture(autouse=True)
+def often(monkeypatch):
+    """Orders are made anew more often, as runs are short."""
+    monkeypatch.setattr(engines, "RENEWED_EVERY", EVERY)
+
+
+def stirred(order="curve", **options):
+    """A hot magnetic gas whose grains (all different) meet, with a list, cycles and gas drag."""
+    box = sand.Box.periodic("0.3 um")
+    even = sand.setup.gas(
+        80, box, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="2e5 K", seed=2
+    )
+    radius = np.random.default_rng(1).uniform(8e-9, 12e-9, 80)
+    grains = sand.Grains(
+        even.position, radius, sand.IRON, velocity=even.velocity, spin=even.spin, moment=even.moment, charge=1e-19
+    )
+    forces = [sand.Contact(), sand.Dipoles(cutoff="0.08 um"), sand.Gas(pressure="1 mbar", temperature="300 K")]
+    options |= {"neighbours": sand.Neighbours(margin="20 nm", order=order)}
+    return sand.Simulation(grains, forces, box=box, seed=2, **options)
+
+
+def listed(world):
+    """The pairs in the rows of the far list, by grain."""
+    far, place = world.far, np.repeat(np.arange(len(world.grains)), np.diff(world.far.start.astype(int)))
+    return set(zip(far.order[place].tolist(), far.order[far.mate[: far.start[-1]]].tolist(), strict=True))
+
+
+def test_there_and_back():
+    """Grain k becomes grain rows[k], and the inverse order undoes it: every number, list and bit is as it was.
+
+    In between, each contact, near pair, and entry of the far list names the same grains as before.
+    """
+    sim = stirred()
+    sim.run(steps=2000)
+    world = sim.world
+    before, pairs = state(sim), listed(world)
+    assert world.count[CONTACTS] > 0
+    kept, near = world.contacts.pair[:, : world.count[CONTACTS]].copy(), world.near.pair[:, :1].copy()
+    radius, order = world.grains.radius.copy(), order_on_curve(world)
+    rearrange(world, order)
+    assert (world.grains.radius == radius[order]).all() and (world.grains.radius != radius).any()
+    assert (order[world.contacts.pair[:, : world.count[CONTACTS]]] == kept).all()
+    assert (order[world.near.pair[:, :1]] == near).all()
+    assert {(order[i], order[j]) for i, j in listed(world)} == pairs
+    rearrange(world, inverse(order))
+    assert state(sim) == before and listed(world) == pairs
+
+
+def test_everybody_sees_the_numbers_of_the_start():
+    """Radii, masses and ids never change their row; contacts are between grains that overlap; losses add up.
+
+    Whoever kept the grains from before a run finds them, too, where they were.
+    """
+    sim = stirred()
+    grains, start = sim.grains, sim.start
+    for _ in range(4):
+        sim.run(steps=EVERY)
+        assert sim.world.order.tolist() != list(range(80))
+        for name in ("radius", "mass", "inertia", "charge", "id"):
+            assert (getattr(grains, name) == getattr(start, name)).all(), name
+        i, j = sim.contacts["pair"].T
+        gap = np.linalg.norm(sim.box.nearest(grains.position[i] - grains.position[j]), axis=1)
+        assert (gap < (grains.radius[i] + grains.radius[j]) * 1.01).all()
+    assert sim.world.count[CONTACTS] > 0 and sim.world.count[ORDERED] == 3 * EVERY
+    assert abs(sim.ledger.drift) < 1e-3
+
+
+def test_watching_and_cutting_up_change_nothing():
+    """Orders are made at steps that depend on the number of steps alone: the same bits however often grains go home."""
+
+    class Curious(sand.Observer):
+        def see(self, simulation, row):
+            simulation.loads()
+            simulation.grains.position.sum()
+
+    whole, pieces, watched = stirred(), stirred(), stirred(observers=[Curious()], frame_every="20 ps")
+    for steps in (1, 2, EVERY - 50, 100, EVERY, 3 * EVERY):
+        pieces.run(steps=steps)
+    whole.run(steps=pieces.steps)
+    watched.run(steps=pieces.steps)
+    assert whole.world.count[ORDERED] >= 4 * EVERY
+    assert state(whole) == state(pieces) == state(watched)
+
+
+def test_going_on_from_a_checkpoint_changes_nothing(tmp_path):
+    """The order is in the saved state, and the lists are made from it as they were: the same bits as in one run.
+
+    The run's own case.toml says that there is one.
+    """
+    whole, part = stirred(), stirred(out=tmp_path / "run")
+    part.run(steps=EVERY + 300)
+    assert 'order = "curve"' in (tmp_path / "run" / "case.toml").read_text()
+    rest = sand.resume(tmp_path / "run")
+    assert rest.world.order.tolist() == part.world.order.tolist()
+    assert state(rest) == state(part)
+    rest.run(steps=2 * EVERY)
+    whole.run(steps=rest.steps)
+    assert whole.world.count[LISTED] >= 3 and whole.world.count[REBUILT] > 3
+    assert state(whole) == state(rest)
+
+
+def test_only_rounding_tells_the_orders_apart():
+    """Steps of a loose, shaken aggregate in both orders: sums are the same but for the order of their terms.
+
+    Each step adds rounding of some 1e-16 of the largest force; 300 steps of a tenth of a contact's period, most of them
+    elastic, let differences of position grow to some 1e-13 of a radius; 1e-9 is far above, an error far below.
+    """
+    ends = []
+    for order in ("curve", "as given"):
+        body = sand.setup.bpca(300, radius="0.1 um", material=sand.SILICA, seed=4)
+        rng = np.random.default_rng(3)
+        some = rng.permutation(300)
+        speed = rng.uniform(-0.01, 0.01, (300, 3))
+        grains = sand.Grains(body.position[some], body.radius[some], sand.SILICA, velocity=speed)
+        sim = sand.Simulation(grains, [sand.Contact()], neighbours=sand.Neighbours(order=order))
+        sim.run(steps=300)
+        assert (sim.world.order.size > 0) == (order == "curve")
+        pair = np.sort(sim.contacts["pair"], axis=1)
+        ends.append((sim.grains.position.copy(), pair[np.lexsort(pair.T)]))
+    assert np.abs(ends[0][0] - ends[1][0]).max() < 1e-9 * 1e-7
+    assert (ends[0][1] == ends[1][1]).all()
+
+
+def test_kicks_of_a_gas_go_to_the_grain_not_to_the_place():
+    """Random numbers have the grain's id for an address: without other forces, each goes the same way in any order."""
+    ends = []
+    for order in ("curve", "as given"):
+        grains = sand.setup.gas(60, "3 um", radius="50 nm", material=sand.SILICA, temperature="300 K", seed=5)
+        gas = sand.Gas(pressure="10 mbar", temperature="300 K")
+        sim = sand.Simulation(grains, [gas], box="3 um", seed=7, neighbours=sand.Neighbours(order=order))
+        sim.run(steps=2 * EVERY)
+        ends.append(sim.grains.velocity.copy())
+    assert np.abs(ends[0] - ends[1]).max() < 1e-12 * np.abs(ends[0]).max()
+
+
+def test_the_grain_that_stops_a_run_is_named_by_its_own_number():
+    """Spun beyond what a step may turn: the culprit is the grain that was spun, wherever it stood."""
+    sim = stirred()
+    sim.run(steps=10)
+    guilty = int(sim.world.order[5])
+    assert guilty != 5
+    sim.world.grains.arrays.spin[:, guilty] = 1e18
+    assert guilty in sim.run(steps=10).grains
+
+
+def test_runge_kutta_steps_in_an_order_of_their_own():
+    """Adaptive steps, with contacts on the way: cut up, the same bits; seen by their numbers."""
+    whole, pieces = stirred(stepping=sand.Adaptive()), stirred(stepping=sand.Adaptive())
+    for steps in (100, EVERY, EVERY - 100, EVERY):
+        pieces.run(steps=steps)
+        assert (pieces.grains.radius == pieces.start.radius).all()
+    whole.run(steps=pieces.steps)
+    assert whole.world.count[ORDERED] >= 2 * EVERY
+    assert state(whole) == state(pieces)
+
+
+def test_home_after_a_mishap():
+    """Whoever kept the grains finds them at their own rows after an observer's error in the middle of a run, too."""
+
+    class Clumsy(sand.Observer):
+        def tick(self, simulation):
+            raise RuntimeError("stumbled")
+
+    sim = stirred(observers=[Clumsy()], frame_every="1 s")
+    grains = sim.grains
+    with pytest.raises(RuntimeError, match="stumbled"):
+        sim.run(steps=1000)
+    assert sim.steps < 1000 and sim.world.order.size == 80
+    assert (grains.radius == sim.start.radius).all()
+
+
+def test_who_gets_an_order_of_its_own():
+    """ "auto" means ten thousand grains or more; the settled word stands in the choices; a wrong word is refused."""
+    assert sand.Neighbours().along_curve(10_000) and not sand.Neighbours().along_curve(9999)
+    assert not sand.Neighbours(order="as given").along_curve(10**6)
+    assert stirred().neighbours.order == "curve" and "along a curve" in stirred().choices["neighbours"]
+    assert stirred("auto").neighbours.order == "as given" and "curve" not in stirred("auto").choices["neighbours"]
+    with pytest.raises(sand.BadInput, match=r"order = 'curves'.*curve"):
+        sand.Neighbours(order="curves")
