@@ -14,8 +14,8 @@ from ..setup.order import places_on_curve
 
 RENEWED_EVERY = 2000
 """Steps after which the order is made anew: even fast grains pass few others in them, and it costs as much as a few."""
-OF_GRAINS = ("anchor", "home", *(name for name in KEPT_FAR if name != "anchor"), *FOR_RATES[:2])
-"""The far arrays with a column for each grain that outlast a step."""
+OF_GRAINS = (*KEPT_FAR, *FOR_RATES[:2])
+"""The far arrays with a column for each grain that outlast a sum."""
 NOT_OF_PAIRS = ("side", "start", "anchor", *PICKED)
 """What contacts and near pairs have no column of."""
 
