@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import CONTACTS, LISTED, ORDERED, PAIRS, REBUILT
+from sand.core.world import CONTACTS, LISTED, ORDERED, PAIRS, REBUILT, SOON
 from sand.run import engine as engines
 from sand.run.places import OF_GRAINS, inverse, order_on_curve, rearrange
+from sand.stepping.parts import SOON_PART
 
 from .test_sameness import state
 
@@ -33,6 +34,15 @@ def stirred(order="curve", **options):
     forces = [sand.Contact(), sand.Dipoles(cutoff="0.08 um"), sand.Gas(pressure="1 mbar", temperature="300 K")]
     options |= {"neighbours": sand.Neighbours(margin="20 nm", order=order)}
     return sand.Simulation(grains, forces, box=box, seed=2, **options)
+
+
+def shaken(order):
+    """A loose aggregate whose grains are numbered at random, a little shaken."""
+    body = sand.setup.bpca(300, radius="0.1 um", material=sand.SILICA, seed=4)
+    rng = np.random.default_rng(3)
+    some, speed = rng.permutation(300), rng.uniform(-0.01, 0.01, (300, 3))
+    grains = sand.Grains(body.position[some], body.radius[some], sand.SILICA, velocity=speed)
+    return sand.Simulation(grains, [sand.Contact()], neighbours=sand.Neighbours(order=order))
 
 
 def listed(world):
@@ -140,18 +150,31 @@ def test_only_rounding_tells_the_orders_apart():
     """
     ends = []
     for order in ("curve", "as given"):
-        body = sand.setup.bpca(300, radius="0.1 um", material=sand.SILICA, seed=4)
-        rng = np.random.default_rng(3)
-        some = rng.permutation(300)
-        speed = rng.uniform(-0.01, 0.01, (300, 3))
-        grains = sand.Grains(body.position[some], body.radius[some], sand.SILICA, velocity=speed)
-        sim = sand.Simulation(grains, [sand.Contact()], neighbours=sand.Neighbours(order=order))
+        sim = shaken(order)
         sim.run(steps=300)
         assert (sim.world.order.size > 0) == (order == "curve")
         pair = np.sort(sim.contacts["pair"], axis=1)
         ends.append((sim.grains.position.copy(), pair[np.lexsort(pair.T)]))
     assert np.abs(ends[0][0] - ends[1][0]).max() < 1e-9 * 1e-7
     assert (ends[0][1] == ends[1][1]).all()
+
+
+def test_who_may_touch_soon_is_known_in_the_new_order():
+    """In the step after an order was made, every near pair that is closer than SOON_PART of the reach is picked.
+
+    What is picked are columns of the near list, which were sorted.
+    """
+    sim = shaken("curve")
+    sim.run(steps=EVERY)
+    listed = sim.world.count[REBUILT]
+    sim._engine.advance(np.inf, 1)
+    w, reach = sim._engine._world, sim._engine.rules.control.reach
+    assert w.count[ORDERED] == EVERY and w.count[REBUILT] == listed
+    i, j = w.near.pair[:, : w.count[PAIRS]].astype(int)
+    apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)
+    close = (apart < w.grains.radius[i] + w.grains.radius[j] + SOON_PART * reach) & (w.near.touching[: i.size] == 0)
+    assert close.sum() > 5
+    assert set(np.flatnonzero(close)) <= set(w.near.soon[: w.count[SOON]].tolist())
 
 
 def test_kicks_of_a_gas_go_to_the_grain_not_to_the_place():
