@@ -38,7 +38,10 @@ ALWAYS = 5
 
 
 class ContactArrays(NamedTuple):
-    """One column per contact; the first count[CONTACTS] columns are in use, in the order they formed."""
+    """One column per contact; the first count[CONTACTS] columns are in use.
+
+    They are in the order they formed, or in that of their grains where an order is kept.
+    """
 
     pair: np.ndarray  # (2, C) uint32: grains 1 and 2
     pointer1: np.ndarray  # (3, C) unit vector to the contact, body frame of grain 1

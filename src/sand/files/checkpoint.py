@@ -12,6 +12,7 @@ A NumPy archive of plain arrays, without pickles, written beside, synced and ren
 | grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
 | contacts/… | pairs, pointers in body frames, twist, time of touch, constants, losses, loads, contacts per grain |
 | near/… | the list of pairs that may touch, and the positions when it was made |
+| order | the grain at each place in memory, (N,), where an order is kept; all else is in the order of the grains |
 | far/… | loads of the last long-range summation, what their cycle has used up, positions when the list was made |
 
 Random numbers are functions of the seed, the grain and the number of the kick, so that there is no state of a generator

@@ -35,8 +35,8 @@ def places_on_curve(position: np.ndarray) -> np.ndarray:
 def in_space_order(grains: Grains) -> Grains:
     """The same grains, numbered along a curve that fills space (Morton 1966).
 
-    A step of 1e5 grains or more is bound by memory. Where numbers come at random, grains that touch lie far apart in
-    it; along the curve they lie close. The order in which an aggregate grew is about as good. Nothing else changes.
+    Where numbers come at random, grains that touch lie far apart in memory; along the curve they lie close. Large
+    simulations do so by themselves (`Neighbours.order`), and keep the numbers. Nothing else changes.
 
     Args:
         grains: at their places.
