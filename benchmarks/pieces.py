@@ -13,7 +13,7 @@ import sand
 from sand.core.jit import kernel
 from sand.core.world import far_arrays
 from sand.kernels.cells import remake_far_list
-from sand.kernels.motion import kick_and_drift
+from sand.kernels.motion import kick_and_drift_for
 
 from . import decks, machine, worlds
 from .steps import beside
@@ -25,6 +25,9 @@ MOVED = 8 * (3 * (2 + 2) + 2 + 3 * 2 * 2 + 4 * 2 + 3 * 2)
 CANDIDATE = 17.0
 """Operations per pair that a list looks at: 3 for r, 9 for the nearest image, 5 for r²."""
 NEIGHBOURS = (14, 50, 200)
+
+
+kick_and_drift = kick_and_drift_for(True)
 
 
 def _move(grains, span, dt, times):

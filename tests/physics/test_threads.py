@@ -76,7 +76,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     sim = shaken_lattice(None)
     sim.run(steps=1)
     before, world = state(sim), sim.world
-    crew = new_crew(world.contacts.flag.size)
+    crew = new_crew(len(world.grains), world.contacts.flag.size)
     crew.board[WORD] = LEAVE << 48
     rules = sim._engine.rules._replace(crew=crew)
     crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)
@@ -88,8 +88,8 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     """Ctrl-C while it compiles, or an error in a formula: nobody is left at work; copies have their own."""
     boards = []
 
-    def watched(contacts):
-        boards.append(new_crew(contacts))
+    def watched(grains, contacts):
+        boards.append(new_crew(grains, contacts))
         return boards[-1]
 
     def fails(*arguments):

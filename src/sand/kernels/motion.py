@@ -1,12 +1,20 @@
 """Kick, drift, turn: velocity Verlet for translation and rotation (Eqs. 28, 29, 31–33 with 1/m and 1/I)."""
 
+import functools
 import math
+from collections.abc import Callable
+
+import numpy as np
 
 from ..core.box import nearest_image
 from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.vec import axpy, dot, load, load4, put, put4, scale
 from ..physics.rotation import turn, turned
+from .contacts import gather
+
+AT_ONCE = np.uint64(256)
+"""Grains whose loads are gathered before they are kicked; their forces stay in the first cache."""
 
 
 @loop
@@ -20,27 +28,60 @@ def kicked(grains, i, dt):
 
 
 @loop
+def kick_some(grains, first, last, dt):
+    """Velocities and spins of the grains first…last − 1 (uint64); ranks of the largest squares of speed and spin."""
+    fastest = quickest = rank(0.0)
+    for k in range(last - first):
+        v, w = kicked(grains, first + k, dt)
+        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
+    return fastest, quickest
+
+
+@loop
 def kick(grains, dt):
     """All velocities and spins; returns squares of the largest speed [m²/s²] and spin [1/s²]."""
-    fastest = quickest = rank(0.0)
-    for i in range(grains.mass.size):
-        v, w = kicked(grains, i, dt)
-        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
+    fastest, quickest = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
     return ranked(fastest), ranked(quickest)
 
 
 @loop
-def kick_and_drift(grains, span, dt):
-    """Kick for dt/2; then x += v dt, wrapped into a periodic box, ϱ turned by ω dt; the moments follow.
+def gather_and_kick(grains, contacts, first, last, dt):
+    """Loads of contacts, the only ones, and the kick that they give, few grains at a time; as `kick_some`."""
+    fastest = quickest = rank(0.0)
+    while first < last:
+        end = min(first + AT_ONCE, last)
+        gather(grains, contacts, first, end)
+        v, w = kick_some(grains, first, end, dt)
+        fastest, quickest, first = max(fastest, v), max(quickest, w), end
+    return fastest, quickest
 
-    Returns the longest way [m].
-    """
-    fastest = rank(0.0)
-    for i in range(grains.mass.size):
-        v, w = kicked(grains, i, 0.5 * dt)
-        fastest = max(fastest, rank_for_most(dot(v, v)))
-        put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
-        q = turn(load4(grains.orientation, i), scale(dt, w))
-        put4(grains.orientation, i, q)
-        put(grains.moment, i, turned(q, load(grains.body_moment, i)))
-    return dt * math.sqrt(ranked(fastest))
+
+@loop
+def _moment_follows(grains, i, q):
+    put(grains.moment, i, turned(q, load(grains.body_moment, i)))
+
+
+@loop
+def _no_moment(grains, i, q):
+    """There is none."""
+
+
+@functools.cache
+def kick_and_drift_for(magnetic: bool) -> Callable:
+    """The loop of the first half of a step, with moments that turn with their grains or without any."""
+    follow = _moment_follows if magnetic else _no_moment
+
+    @loop
+    def kick_and_drift(grains, span, dt):
+        """Kick for dt/2; then x += v dt, wrapped into its box, ϱ turned by ω dt; returns the longest way [m]."""
+        fastest = rank(0.0)
+        for i in range(grains.mass.size):
+            v, w = kicked(grains, i, 0.5 * dt)
+            fastest = max(fastest, rank_for_most(dot(v, v)))
+            put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
+            q = turn(load4(grains.orientation, i), scale(dt, w))
+            put4(grains.orientation, i, q)
+            follow(grains, i, q)
+        return dt * math.sqrt(ranked(fastest))
+
+    return kick_and_drift

@@ -152,7 +152,7 @@ class Engine:
         if self._hands is None:
             return self.rules
         w = self._world
-        rules = self.rules._replace(crew=new_crew(w.contacts.flag.size))
+        rules = self.rules._replace(crew=new_crew(len(w.grains), w.contacts.flag.size))
         if wants_help(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
             self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
         return rules

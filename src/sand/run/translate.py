@@ -148,6 +148,7 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
         adaptive=adaptive,
         crew=is_large(len(grains)),
         keep=all(is_ours(f.formula) for f in given.outside),
+        magnetic=bool(grains.body_moment.any()),
     )
 
 

@@ -114,6 +114,11 @@ def _no_change(grains, contacts, count, far, span, numbers):
     """As above."""
 
 
+@loop
+def no_cycle(grains, contacts, far, clock, count, rules):
+    """A cycle of one step needs no cutting."""
+
+
 _IMPULSES = (_begin_impulse, _inside_impulses, _end_impulse, _cut_impulse)
 _NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
 
@@ -121,8 +126,8 @@ _NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
 @functools.cache
 def loads_loop(plan: Plan) -> Callable:
     """The loop that sums forces and torques at the end of a step: the far ones if `due`, else what stands for them."""
-    add_outside, _ = outside_loops(plan.outside)
-    _, gather_all, far_loads = large_loops(plan)
+    add_outside, _ = outside_loops(plan.outside, plan.magnetic)
+    _, gather_all, _, far_loads = large_loops(plan)
     between = add_foretold_loads if plan.foretell else add_held_loads if plan.impulse else _nothing_between
     take_out_bonded = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
 
@@ -149,14 +154,33 @@ def loads_loop(plan: Plan) -> Callable:
 
 
 @functools.cache
+def loads_and_kick_loop(plan: Plan) -> Callable:
+    """The loop for the end of a step: `loads_loop`, and the kick for its second half; returns what `kick` does."""
+    sum_loads = loads_loop(plan)
+    _, _, gather_and_kick_all, _ = large_loops(plan)
+
+    @loop
+    def bare_loads_and_kick(grains, contacts, far, clock, count, rules, due, elapsed):
+        count[FAR_SUMS] += 1
+        return gather_and_kick_all(grains, contacts, far, count, rules, 0.5 * clock[STEP])
+
+    @loop
+    def loads_and_kick(grains, contacts, far, clock, count, rules, due, elapsed):
+        sum_loads(grains, contacts, far, clock, count, rules, due, elapsed)
+        return kick(grains, 0.5 * clock[STEP])
+
+    return bare_loads_and_kick if plan.bare else loads_and_kick
+
+
+@functools.cache
 def halves_for(plan: Plan) -> tuple[Callable, Callable]:
     """The two halves of a velocity Verlet step for one plan.
 
     The second half of a step of 0 s finds the pairs and the contacts that are there and works out the loads.
     """
-    _, kick_and_drift_booked = outside_loops(plan.outside)
-    sum_loads = loads_loop(plan)
-    pass_contacts, _, _ = large_loops(plan)
+    _, kick_and_drift_booked = outside_loops(plan.outside, plan.magnetic)
+    sum_loads, loads_and_kick = loads_loop(plan), loads_and_kick_loop(plan)
+    pass_contacts, _, _, _ = large_loops(plan)
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
     add_bonded, _, change_sides = bonded_loops(plan.far.pair) if plan.split else (_no_bonded, None, _no_change)
     begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
@@ -173,12 +197,14 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
             change_sides(grains, contacts, count, far, rules.span, rules.far)
             clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
+    cut_short = no_cycle if plan.bare else cut_cycle
+
     @loop
     def first_half(grains, contacts, near, far, clock, count, lost, rules):
         """Choose the step, kick half of it, drift; anything but STEPS_DONE: no step was taken."""
         dt, stop = possible_step(grains, contacts, near, far, clock, count, rules)
         if stop != Stop.STEPS_DONE:
-            cut_cycle(grains, contacts, far, clock, count, rules)
+            cut_short(grains, contacts, far, clock, count, rules)
             return stop
         if clock[LEFT] == 0.0:
             cycle = dt * cycle_steps(clock, count, rules.beat, dt)
@@ -207,8 +233,8 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
         dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
         due = clock[LEFT] == 0.0 or parted or fresh > 0
         add_bonded(grains, contacts, count, rules.span, rules.far)
-        sum_loads(grains, contacts, far, clock, count, rules, due, elapsed)
-        near.watch[FASTEST], near.watch[QUICKEST] = kick(grains, 0.5 * dt)
+        fastest, quickest = loads_and_kick(grains, contacts, far, clock, count, rules, due, elapsed)
+        near.watch[FASTEST], near.watch[QUICKEST] = fastest, quickest
         if due:
             end(grains, far, rules.span, clock, elapsed, dt)
             change_sides(grains, contacts, count, far, rules.span, rules.far)

@@ -14,8 +14,10 @@ import numpy as np
 from ..core.atomics import fetch_add, give_way, read, write
 from ..core.grains import GrainArrays
 from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
+from ..core.least import ranked
 from ..core.world import CONTACTS
 from ..kernels.contacts import gather
+from ..kernels.motion import gather_and_kick
 from ..kernels.moving import contact_pass, keep_passed
 from ..kernels.sums import CREW_FROM
 from .rules import Plan
@@ -44,21 +46,23 @@ def wants_help(plan: Plan, grains: GrainArrays, contacts: int) -> bool:
     return plan.far.parts.blocks(grains) > 0 or contacts >= HELP_FROM
 
 
-PASS, GATHER, FAR, LEAVE = range(1, 5)
-"""What a word on the board asks for: contacts, their loads at grains, long-range loads, the end."""
+PASS, GATHER, GATHER_AND_KICK, FAR, LEAVE = range(1, 6)
+"""What a word on the board asks for: contacts, their loads at grains, these and a kick, long-range loads, the end."""
 
 
 class Crew(NamedTuple):
     """What the threads share besides the world."""
 
     board: Any  # (24,) int64; made anew for every call of the driver
-    step: Any  # (1,) float64: length of the step at hand [s]
+    step: Any  # (1,) float64: length of the step at hand, or of the kick [s]
     passed: Any  # (B, 8) float64: what the pass over each block of contacts found, by `Passed`
+    speeds: Any  # (G, 2) float64: largest squares of speed [m²/s²] and spin [1/s²] in each block of grains
 
 
-def new_crew(contacts: int) -> Crew:
-    """A board without work, for up to so many contacts."""
-    return Crew(np.zeros(PLACES, np.int64), np.zeros(1), np.zeros((contacts // CONTACTS_AT_ONCE + 1, 8)))
+def new_crew(grains: int, contacts: int) -> Crew:
+    """A board without work, for so many grains and up to so many contacts."""
+    passed = np.zeros((contacts // CONTACTS_AT_ONCE + 1, 8))
+    return Crew(np.zeros(PLACES, np.int64), np.zeros(1), passed, np.zeros((grains // GRAINS_AT_ONCE + 1, 2)))
 
 
 def send_away(crew: Crew) -> None:
@@ -91,6 +95,11 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
             first = b * GRAINS_AT_ONCE
             last = min(first + GRAINS_AT_ONCE, grains.mass.size)
             gather(grains, contacts, np.uint64(first), np.uint64(last))
+        elif task == GATHER_AND_KICK:
+            first = b * GRAINS_AT_ONCE
+            last = min(first + GRAINS_AT_ONCE, grains.mass.size)
+            v, w = gather_and_kick(grains, contacts, np.uint64(first), np.uint64(last), rules.crew.step[0])
+            rules.crew.speeds[b, 0], rules.crew.speeds[b, 1] = ranked(v), ranked(w)
         elif task == FAR:
             far_block(grains, far, rules.span, rules.far, b)
 

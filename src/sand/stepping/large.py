@@ -6,10 +6,12 @@ from collections.abc import Callable
 import numpy as np
 
 from ..core.jit import loop
+from ..core.least import rank, rank_for_most, ranked
 from ..core.world import CONTACTS, STEP
 from ..kernels.contacts import gather
+from ..kernels.motion import gather_and_kick
 from ..kernels.moving import book_passed, contact_pass, kept_passed
-from .crew import CONTACTS_AT_ONCE, FAR, GATHER, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
+from .crew import CONTACTS_AT_ONCE, FAR, GATHER, GATHER_AND_KICK, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
 from .rules import Plan
 
 
@@ -26,23 +28,29 @@ def _gather_alone(grains, contacts, far, count, rules):
     gather(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
 
 
+@loop
+def _gather_and_kick_alone(grains, contacts, far, count, rules, dt):
+    fastest, quickest = gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
+    return ranked(fastest), ranked(quickest)
+
+
 @functools.cache
-def large_loops(plan: Plan) -> tuple[Callable, Callable, Callable]:
-    """Pass over all contacts (True if any wait), gathering of their loads, sum of the long-range loads."""
+def large_loops(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
+    """Pass over all contacts (True if any wait), gathering of their loads, this and a kick, the long-range loads."""
     return _by_a_crew(plan) if plan.crew else _alone(plan)
 
 
-def _alone(plan: Plan) -> tuple[Callable, Callable, Callable]:
+def _alone(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
     sum_far = plan.far.loads
 
     @loop
     def far_alone(grains, contacts, far, count, rules):
         sum_far(grains, far, rules.span, rules.far)
 
-    return _pass_alone, _gather_alone, far_alone
+    return _pass_alone, _gather_alone, _gather_and_kick_alone, far_alone
 
 
-def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable]:
+def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
     share, _ = crew_for(plan)
     begin, _, end, far_blocks = plan.far.parts
 
@@ -64,9 +72,20 @@ def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable]:
         share(GATHER, blocks, grains, contacts, far, count, rules)
 
     @loop
+    def gather_and_kick_together(grains, contacts, far, count, rules, dt):
+        rules.crew.step[0] = dt
+        blocks = blocks_of(grains.mass.size, GRAINS_AT_ONCE)
+        share(GATHER_AND_KICK, blocks, grains, contacts, far, count, rules)
+        fastest = quickest = rank(0.0)
+        for b in range(blocks):
+            fastest = max(fastest, rank_for_most(rules.crew.speeds[b, 0]))
+            quickest = max(quickest, rank_for_most(rules.crew.speeds[b, 1]))
+        return ranked(fastest), ranked(quickest)
+
+    @loop
     def far_together(grains, contacts, far, count, rules):
         begin(grains, far, rules.span, rules.far)
         share(FAR, far_blocks(grains), grains, contacts, far, count, rules)
         end(grains, far, rules.span, rules.far)
 
-    return pass_together, gather_together, far_together
+    return pass_together, gather_together, gather_and_kick_together, far_together

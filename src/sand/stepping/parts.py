@@ -30,7 +30,7 @@ from ..kernels.contacts import contact_step, sort_sides
 from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, settle_flagged
 from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
-from ..kernels.motion import kick_and_drift
+from ..kernels.motion import kick_and_drift_for
 from ..kernels.neighbours import list_soon, make_near_list
 from ..kernels.outside import outside_energy, outside_loads, outside_wrap
 from ..kernels.watch import is_stale, look_up_harmless, look_up_speeds
@@ -144,8 +144,9 @@ def bury_broken(grains, contacts, near, clock, count, rules):
 
 
 @functools.cache
-def outside_loops(outside: Callable) -> tuple[Callable, Callable]:
+def outside_loops(outside: Callable, magnetic: bool) -> tuple[Callable, Callable]:
     """Loads of the per-grain forces; half a kick and a drift, with what time and boundaries do to their energy."""
+    kick_and_drift = kick_and_drift_for(magnetic)
     add_loads, energy, wrap = outside_loads(outside), outside_energy(outside), outside_wrap(outside)
 
     @loop

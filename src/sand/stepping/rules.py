@@ -35,6 +35,12 @@ class Plan(NamedTuple):
     adaptive: bool = False  # Runge–Kutta steps while nothing touches
     crew: bool = False  # large loops in blocks, for threads to share
     keep: bool = True  # the compiled code on disk, if all of it is ours
+    magnetic: bool = True  # some grain has a moment
+
+    @property
+    def bare(self) -> bool:
+        """True where contacts are the only forces."""
+        return self.outside is nothing and self.far is NO_FAR_FORCE
 
 
 class ContactRules(NamedTuple):
