@@ -54,7 +54,7 @@ def listed(world):
 def sides(world):
     """The contacts of each grain, as the gathering finds them."""
     start, side = world.contacts.start.tolist(), (world.contacts.side >> 1).tolist()
-    return [side[start[g] : start[g + 1]] for g in range(len(world.grains))]
+    return [sorted(side[start[g] : start[g + 1]]) for g in range(len(world.grains))]
 
 
 def test_there_and_back():

@@ -12,6 +12,7 @@ import numpy as np
 from .box import Box
 from .errors import BadInput
 from .grains import GrainArrays, Grains
+from .stages import StageArrays, stage_arrays
 
 # --- places in World.clock (float64) ---------------------------------------------------------------
 TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, FAR_LEVEL, CALM, KICKED, FLIGHT = range(10)
@@ -58,6 +59,7 @@ class ContactArrays(NamedTuple):
     bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
     side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
+    turn: np.ndarray  # (N + KINDS,) uint32: the grains as kernels.gathering takes them; (0,) for as they are numbered
 
 
 class NearPairs(NamedTuple):
@@ -100,14 +102,6 @@ class FarArrays(NamedTuple):
     share: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
-class StageArrays(NamedTuple):
-    """Room for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Never saved."""
-
-    start: np.ndarray  # (13, N) the state that a step begins with
-    rate: np.ndarray  # (7, 13, N) its rates of change at each stage
-    power: np.ndarray  # (7,) of the outside forces at each stage [W]
-
-
 KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
 FOR_LIST = ("anchor", "order", "start", "home", "cell", "here", "source")
@@ -116,8 +110,12 @@ FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
 """The far arrays that only a list, or cycles of either kind, read and write."""
 FOR_ALL = ("bond", "step", "length")
 """Numbers of contacts and near pairs that are the same for all where grains are equal."""
-PICKED = ("soon", "mark", "watch")
-"""Of the near pairs, what it leaves out: it is picked or worked out anew."""
+PICKED = ("soon", "mark", "watch", "turn")
+"""Of contacts and near pairs, what it leaves out: it is picked or worked out anew."""
+KINDS = 64
+"""Places behind all grains that sorting them by their contacts needs."""
+TURNS_FROM = 4000
+"""Fewest grains for which the gathering has an order of its own: fewer the processor learns by heart."""
 LANES = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 BLOCK = 128
@@ -157,6 +155,7 @@ def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = Fals
         lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
+        turn=np.zeros(grains + KINDS if grains >= TURNS_FROM else 0, np.uint32),
         **(vectors | numbers),
     )
 
@@ -168,11 +167,6 @@ def near_pairs(grains: int, capacity: int, *, alike: bool = False) -> NearPairs:
     pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p, np.uint32)
     kind = np.zeros((2, 1 if alike else p))
     return NearPairs(pair, touching, kind[0], kind[1], nowhere, soon, nowhere.copy(), np.full(6, -1.0))
-
-
-def stage_arrays(grains: int) -> StageArrays:
-    """Room for so many grains; 0 where no Runge–Kutta step is taken."""
-    return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
 def _grown(arrays: Any, others: Collection[str], least: int) -> Any:
@@ -229,7 +223,7 @@ class World:
 
     def grow_contacts(self, least: int = 0) -> None:
         """More room for contacts, for `least` of them at least."""
-        self.contacts = _grown(self.contacts, ("start", *self._for_all()), least)
+        self.contacts = _grown(self.contacts, ("start", "turn", *self._for_all()), least)
 
     def grow_pairs(self, least: int = 0) -> None:
         """More room for near pairs, for `least` of them at least."""
@@ -294,5 +288,5 @@ def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
     target[...] = saved[name]
 
 
-_MADE = "ContactArrays FarArrays NearPairs StageArrays World contact_arrays far_arrays near_pairs stage_arrays"
+_MADE = "ContactArrays FarArrays NearPairs World contact_arrays far_arrays near_pairs"
 __all__ = [name for name in dir() if name.isupper() and name[0] != "_"] + _MADE.split()

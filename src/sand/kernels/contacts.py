@@ -1,12 +1,12 @@
-"""Contacts: a pass per contact that vectorises, then a gather per grain in a fixed order."""
+"""Contacts: a pass per contact that vectorises."""
 
 import math
 
 import numpy as np
 
 from ..core.box import nearest_image
-from ..core.jit import COMPILED, kernel, loop, rare
-from ..core.vec import across, add, dot, load, load4, put, scale, sub
+from ..core.jit import COMPILED, loop, rare
+from ..core.vec import across, dot, load, load4, put, scale, sub
 from ..core.world import CONTACT_STEP, CONTACTS
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
@@ -141,54 +141,6 @@ def write_loads(grains, contacts, span, law, c):
     put(contacts.push, c, push)
     put(contacts.torque1, c, torque1)
     put(contacts.torque2, c, torque2)
-
-
-@loop
-def gather(grains, contacts, first, last):
-    """Set force and torque of the grains first…last − 1 (uint64) to the sum over their contacts, in a fixed order."""
-    for k in range(last - first):
-        g = first + k
-        force = torque = (0.0, 0.0, 0.0)
-        for s in range(contacts.start[g], contacts.start[g + 1]):
-            c = contacts.side[s] >> 1
-            if contacts.side[s] & 1:
-                force = sub(force, load(contacts.push, c))
-                torque = add(torque, load(contacts.torque2, c))
-            else:
-                force = add(force, load(contacts.push, c))
-                torque = add(torque, load(contacts.torque1, c))
-        put(grains.force, g, force)
-        put(grains.torque, g, torque)
-
-
-@rare
-def sort_sides(contacts, count, n):
-    """Rebuild the list of contacts per grain, each grain's in the order of the contacts."""
-    total = count[CONTACTS]
-    start, side = contacts.start, contacts.side
-    for g in range(n + 1):
-        start[g] = 0
-    for c in range(total):
-        start[contacts.pair[0, c] + 1] += 1
-        start[contacts.pair[1, c] + 1] += 1
-    for g in range(n):
-        start[g + 1] += start[g]
-    # fill from the back, so that `start` ends where it should
-    for k in range(total):
-        c = total - 1 - k
-        for end in range(2):
-            g = contacts.pair[1 - end, c]
-            start[g + 1] -= 1
-            side[start[g + 1]] = 2 * c + 1 - end
-    for g in range(n):
-        start[g] = start[g + 1]
-    start[n] = 2 * total
-
-
-@kernel
-def resort_sides(contacts, count, n):
-    """The same, from Python."""
-    sort_sides(contacts, count, n)
 
 
 @rare

@@ -11,7 +11,7 @@ from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.vec import axpy, dot, load, load4, put, put4, scale
 from ..physics.rotation import turn, turned
-from .contacts import gather
+from .gathering import gather
 
 AT_ONCE = np.uint64(256)
 """Grains whose loads are gathered before they are kicked; their forces stay in the first cache."""

@@ -7,8 +7,9 @@ from ..core.jit import kernel
 from ..core.vec import dot, load, load4, put, scale, sub
 from ..physics import tangential
 from ..physics.rotation import turned_back
-from .contacts import bond_at, sort_sides, write_loads
+from .contacts import bond_at, write_loads
 from .events import add_contact
+from .gathering import sort_sides
 
 
 @kernel

@@ -26,6 +26,7 @@ from ..core.world import (
 )
 from ..forces.base import FarForce, GrainForce
 from ..kernels.cells import FULL, remake_far_list
+from ..kernels.gathering import resort_sides
 from ..kernels.outside import outside_shares_for
 from ..kernels.seeds import seed_contacts
 from ..kernels.sums import shares_for
@@ -184,6 +185,8 @@ class Engine:
         if w.order.size:  # lists depend on it
             rearrange(w, w.order)
             self._away = True
+        elif w.contacts.turn.size:
+            resort_sides(w.contacts, w.count, len(w.grains))
         if self.rules.search.listed and not self._list_lasts():
             w.far.anchor[...] = w.grains.arrays.position
         self._remake_list()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.world import CONTACTS, FOR_ALL, FOR_RATES, GRAIN1, GRAIN2, KEPT_FAR, PAIRS, PICKED, World
-from ..kernels.contacts import resort_sides
+from ..kernels.gathering import resort_sides
 from ..setup.order import places_on_curve
 
 RENEWED_EVERY = 2000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..core.box import Box
 from ..core.errors import BadInput
@@ -88,10 +88,7 @@ def build_engine(
     cutoffs = [f.choose(grains, box).radius for f in given.distant]
     flights = isinstance(stepping, Adaptive)
     found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], flights=flights)
-    far = [
-        (f, f.sums(box, found.search.listed and r is not None), f.numbers(grains, box))
-        for f, r in zip(given.distant, cutoffs, strict=True)
-    ]
+    far = _far(given, grains, box, [found.search.listed and r is not None for r in cutoffs])
     verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
     control = _control(grains, verlet, given, reach)
     if isinstance(stepping, Adaptive):
@@ -123,6 +120,11 @@ def build_engine(
     if given.contact is not None:
         refuse_overlaps(here, given.contact, start, held)
     return engine
+
+
+def _far(given: Given, grains: Grains, box: Box, listed: Sequence[bool]) -> list[tuple[FarForce, FarSums, Any]]:
+    """Each long-range force with its loops and numbers."""
+    return [(f, f.sums(box, own), f.numbers(grains, box)) for f, own in zip(given.distant, listed, strict=True)]
 
 
 def _given(forces: Sequence[Force], grains: Grains) -> Given:

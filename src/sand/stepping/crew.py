@@ -16,7 +16,7 @@ from ..core.grains import GrainArrays
 from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.least import ranked
 from ..core.world import CONTACTS
-from ..kernels.contacts import gather
+from ..kernels.gathering import gather
 from ..kernels.motion import gather_and_kick
 from ..kernels.moving import contact_pass, keep_passed
 from ..kernels.sums import CREW_FROM

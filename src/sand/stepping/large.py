@@ -8,7 +8,7 @@ import numpy as np
 from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.world import CONTACTS, STEP
-from ..kernels.contacts import gather
+from ..kernels.gathering import gather
 from ..kernels.motion import gather_and_kick
 from ..kernels.moving import book_passed, contact_pass, kept_passed
 from .crew import CONTACTS_AT_ONCE, FAR, GATHER, GATHER_AND_KICK, GRAINS_AT_ONCE, PASS, blocks_of, crew_for

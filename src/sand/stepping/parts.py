@@ -26,10 +26,11 @@ from ..core.world import (
     TIME,
 )
 from ..kernels.cells import FULL, make_far_list
-from ..kernels.contacts import contact_step, sort_sides
+from ..kernels.contacts import contact_step
 from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_contacts, settle_flagged
 from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
+from ..kernels.gathering import sort_sides
 from ..kernels.motion import kick_and_drift_for
 from ..kernels.neighbours import list_soon, make_near_list
 from ..kernels.outside import outside_energy, outside_loads, outside_wrap

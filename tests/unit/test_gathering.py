@@ -1,0 +1,134 @@
+"""Loads of contacts at their grains, in whatever order the grains are taken."""
+
+import copy
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.jit import kernel
+from sand.core.world import CONTACTS, COUNT, KINDS, TURNS_FROM, contact_arrays
+from sand.kernels.gathering import AT_ONCE, DENSE, MOST, gather, resort_sides
+from sand.kernels.motion import gather_and_kick, kick, kick_and_drift_for
+
+GRAINS = TURNS_FROM + 37
+"""Enough for an order of their own, and a last block that is not full."""
+
+
+def _gather_all(grains, contacts):
+    gather(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
+
+
+def _both_at_once(grains, contacts, dt):
+    return gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
+
+
+gather_all, both_at_once, kick_all = (kernel(f, keep=False) for f in (_gather_all, _both_at_once, kick))
+
+
+def some(per_grain, count=GRAINS):
+    """Grains that move, and so many contacts per grain between neighbours in memory, with random loads, sorted."""
+    rng = np.random.default_rng(5)
+    grains = sand.Grains(
+        rng.normal(size=(count, 3)),
+        1e-7,
+        sand.SILICA,
+        velocity=rng.normal(size=(count, 3)),
+        spin=1e6 * rng.normal(size=(count, 3)),
+    ).arrays
+    near = rng.integers(0, count, 3 * int(per_grain * count)), rng.integers(1, 40, 3 * int(per_grain * count))
+    first, second = near[0], (near[0] + near[1]) % count
+    pair = np.unique(np.array([first, second]), axis=1)
+    pair = rng.permutation(pair, axis=1)[:, : int(per_grain * count)]
+    contacts, counters = contact_arrays(count, pair.shape[1], 15), np.zeros(len(COUNT), np.int64)
+    contacts.pair[:, : pair.shape[1]], counters[CONTACTS] = pair, pair.shape[1]
+    for loads in (contacts.push, contacts.torque1, contacts.torque2):
+        loads[...] = 1e-9 * rng.normal(size=loads.shape)
+    resort_sides(contacts, counters, count)
+    return grains, contacts, pair
+
+
+@pytest.mark.parametrize(("per_grain", "count"), [(1.0, GRAINS), (4.0, GRAINS), (1.0, 500)])
+def test_sums_are_those_of_brute_force(per_grain, count):
+    """F = Σ ±push, M = Σ torque of each end; terms of 1e-9, at most some 30, rounded to 1e-16 each: 1e-23."""
+    grains, contacts, pair = some(per_grain, count)
+    assert contacts.turn.size == (count + KINDS if count >= TURNS_FROM else 0)
+    used = pair.shape[1]
+    force, torque = np.zeros((3, count)), np.zeros((3, count))
+    for end, sign, own in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
+        np.add.at(force, (slice(None), pair[end]), sign * contacts.push[:, :used])
+        np.add.at(torque, (slice(None), pair[end]), own[:, :used])
+    grains.force[...] = grains.torque[...] = np.nan
+    gather_all(grains, contacts)
+    assert np.abs(grains.force - force).max() < 1e-23 and np.abs(grains.torque - torque).max() < 1e-23
+
+
+def test_each_row_has_its_contacts_in_a_fixed_order():
+    """First those that the grain is the first of, then the others, each in the order of the contacts."""
+    _, contacts, pair = some(2.0)
+    for g in range(0, GRAINS, 97):
+        row = contacts.side[contacts.start[g] : contacts.start[g + 1]].tolist()
+        expected = [2 * c for c in np.flatnonzero(pair[0] == g)] + [2 * c + 1 for c in np.flatnonzero(pair[1] == g)]
+        assert row == expected
+
+
+def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
+    """Each block has its own grains, each once; those with as many contacts of either end come in a row, by number.
+
+    Where contacts are many all come by number.
+    """
+    _, contacts, pair = some(1.0)
+    many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], MOST)
+    kind = many[0] * (MOST + 1) + many[1]
+    turn = contacts.turn[:GRAINS]
+    assert len(set(kind.tolist())) > 10
+    for first in range(0, GRAINS, AT_ONCE):
+        block = np.arange(first, min(first + AT_ONCE, GRAINS))
+        assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
+    _, crowded, _ = some(DENSE + 0.5)
+    assert crowded.turn[:GRAINS].tolist() == list(range(GRAINS))
+
+
+def test_gathering_and_kicking_at_once_is_one_after_the_other():
+    """The same loads, v + F dt/m, ω + M dt/I and largest squares of both: the same formulas, so to rounding, 1e-14."""
+    grains, contacts, _ = some(1.0)
+    other = copy.deepcopy(grains)
+    gather_all(grains, contacts)
+    fastest, quickest = kick_all(grains, 1e-9)
+    found = both_at_once(other, contacts, 1e-9)
+    for name in ("force", "torque", "velocity", "spin"):
+        assert np.allclose(getattr(other, name), getattr(grains, name), rtol=1e-14, atol=0.0), name
+    assert np.allclose(np.array(found).view(float), (fastest, quickest), rtol=1e-14)
+    assert fastest == pytest.approx((grains.velocity**2).sum(axis=0).max(), rel=1e-14)
+    assert quickest == pytest.approx((grains.spin**2).sum(axis=0).max(), rel=1e-14)
+
+
+def test_grains_without_moments_drift_as_those_with():
+    """Positions and orientations do not depend on moments; those that are there turn with their grains."""
+    grains, _, _ = some(1.0, 300)
+    grains.body_moment[...] = np.random.default_rng(1).normal(size=(3, 300))
+    with_moments, without = copy.deepcopy(grains), copy.deepcopy(grains)
+    span = sand.Box.open().span
+    ways = [
+        kernel(kick_and_drift_for(magnetic), keep=False)(one, span, 1e-9)
+        for magnetic, one in ((True, with_moments), (False, without))
+    ]
+    assert ways[0] == pytest.approx(ways[1], rel=1e-15)
+    for name in ("position", "velocity", "orientation", "spin"):
+        assert np.allclose(getattr(with_moments, name), getattr(without, name), rtol=1e-15, atol=0.0), name
+    assert (without.moment == grains.moment).all() and (with_moments.moment != grains.moment).all()
+
+
+def test_a_resumed_world_takes_its_turns(tmp_path):
+    """A checkpoint leaves them out; they are there again, and the run goes on with the same bits."""
+    side = round(GRAINS ** (1 / 3)) + 1
+    place = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
+    grains = sand.Grains(place * (1.0, 1.0, 1.2), 1e-7, sand.SILICA)
+    sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run")
+    sim.run(steps=3)
+    rest = sand.resume(tmp_path / "run")
+    assert sorted(rest.world.contacts.turn[:GRAINS].tolist()) == list(range(GRAINS))
+    assert (rest.world.contacts.turn[:GRAINS] == sim.world.contacts.turn[:GRAINS]).all()
+    sim.run(steps=3)
+    rest.run(steps=3)
+    assert (rest.grains.position == sim.grains.position).all() and (rest.grains.spin == sim.grains.spin).all()
