@@ -7,9 +7,10 @@ import pytest
 
 import sand
 from sand.core.jit import kernel
-from sand.core.world import CONTACTS, COUNT, KINDS, TURNS_FROM, contact_arrays
+from sand.core.world import CONTACTS, COUNT, FASTEST, KINDS, QUICKEST, TURNS_FROM, contact_arrays
 from sand.kernels.gathering import AT_ONCE, DENSE, MOST, gather, resort_sides
 from sand.kernels.motion import gather_and_kick, kick, kick_and_drift_for
+from sand.stepping.crew import GRAINS_AT_ONCE
 
 GRAINS = TURNS_FROM + 37
 """Enough for an order of their own, and a last block that is not full."""
@@ -119,12 +120,28 @@ def test_grains_without_moments_drift_as_those_with():
     assert (without.moment == grains.moment).all() and (with_moments.moment != grains.moment).all()
 
 
-def test_a_resumed_world_takes_its_turns(tmp_path):
-    """A checkpoint leaves them out; they are there again, and the run goes on with the same bits."""
+def large():
+    """A slab-like lattice of more grains than are shared out at once, in which only grain 5 and those beside it move."""
     side = round(GRAINS ** (1 / 3)) + 1
     place = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
-    grains = sand.Grains(place * (1.0, 1.0, 1.2), 1e-7, sand.SILICA)
-    sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run")
+    speed = np.zeros((GRAINS, 3))
+    speed[5] = 0.01
+    return sand.Grains(place * (1.0, 1.0, 1.2), 1e-7, sand.SILICA, velocity=speed)
+
+
+def test_the_fastest_grain_of_all_blocks_is_known():
+    """What the step is limited by are the largest squares of speed and spin among all grains."""
+    sim = sand.Simulation(large(), [sand.Contact()])
+    sim.run(steps=3)
+    watch, v, w = sim.world.near.watch, sim.grains.velocity, sim.grains.spin
+    assert GRAINS > GRAINS_AT_ONCE and (v**2).sum(axis=1).argmax() == 5
+    assert watch[FASTEST] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
+    assert watch[QUICKEST] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[QUICKEST] > 0.0
+
+
+def test_a_resumed_world_takes_its_turns(tmp_path):
+    """A checkpoint leaves them out; they are there again, and the run goes on with the same bits."""
+    sim = sand.Simulation(large(), [sand.Contact()], out=tmp_path / "run")
     sim.run(steps=3)
     rest = sand.resume(tmp_path / "run")
     assert sorted(rest.world.contacts.turn[:GRAINS].tolist()) == list(range(GRAINS))
