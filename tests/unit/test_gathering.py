@@ -121,7 +121,7 @@ def test_grains_without_moments_drift_as_those_with():
 
 
 def large():
-    """A slab-like lattice of more grains than are shared out at once, in which only grain 5 and those beside it move."""
+    """A lattice of more grains than are shared out at once, in which only grain 5 and those beside it move."""
     side = round(GRAINS ** (1 / 3)) + 1
     place = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
     speed = np.zeros((GRAINS, 3))
