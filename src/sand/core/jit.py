@@ -47,19 +47,19 @@ TRIED = (0, 62), (0, 68)
 """First and last version of numba whose inside `lowering` fits; others compile three times as long, without threads."""
 
 
-def _own_compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """The options for kernels, inner functions and those kept apart; none where numba's inside may be another."""
+def _own_compilers() -> list[dict[str, Any]]:
+    """Options for kernels, those with long loops, inner functions and those kept apart; none for another numba."""
     if not TRIED[0] <= numba.version_info.short <= TRIED[1]:
-        return {}, {}, {}
+        return [{}, {}, {}, {}]
     try:
-        from .lowering import ApartCompiler, InnerCompiler, KernelCompiler
+        from .lowering import ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
     except (ImportError, AttributeError):
-        return {}, {}, {}
-    return {"pipeline_class": KernelCompiler}, {"pipeline_class": InnerCompiler}, {"pipeline_class": ApartCompiler}
+        return [{}, {}, {}, {}]
+    return [{"pipeline_class": each} for each in (KernelCompiler, WideCompiler, InnerCompiler, ApartCompiler)]
 
 
 # nobody calls these from Python once compiled: without their wrappers the first compile is shorter
-_KERNEL, _LOWERED, _APART = _own_compilers()
+_KERNEL, _WIDE, _LOWERED, _APART = _own_compilers()
 _BARE: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _INNER = _BARE | _LOWERED
 
@@ -163,7 +163,7 @@ def _load_alone(compiled: Any) -> None:
     cache.load_overload = load_overload
 
 
-def kernel(function: Callable, *, keep: bool = True, alone: bool = False) -> Callable:
+def kernel(function: Callable, *, keep: bool = True, alone: bool = False, wide: bool = False) -> Callable:
     """Compile `function` on its first call and keep the result in our own cache folder.
 
     numba's global cache folder is put back at once: a user's own kernels go where the user wants.
@@ -171,13 +171,15 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False) -> Cal
     Args:
         keep: False for code that reaches formulas from outside SAND, whose edits our digest does not see.
         alone: True for code that other Python threads may run beside.
+        wide: True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
     """
+    if wide:  # what is kept is found by its name
+        function.__qualname__ += "_wide"
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        compiled = numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **_KERNEL, **_COMMON, **_NO_ALIASES)(
-            function
-        )
+        options = (_WIDE if wide else _KERNEL) | _COMMON | _NO_ALIASES
+        compiled = numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
     if keep:

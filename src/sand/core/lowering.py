@@ -13,7 +13,7 @@ import gc
 from collections import Counter
 from typing import Any
 
-from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
+from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # type: ignore[import-untyped]
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager  # type: ignore[import-untyped]
 from llvmlite.ir import instructions as made  # type: ignore[import-untyped]
 from numba.core import typed_passes as typed
@@ -26,7 +26,7 @@ from numba.core.lowering import Lower
 
 from .convention import Builder, Context, ours_alone, take_apart
 
-__all__ = ["ApartCompiler", "InnerCompiler", "KernelCompiler"]
+__all__ = ["ApartCompiler", "InnerCompiler", "KernelCompiler", "WideCompiler"]
 
 
 def _below(library: Any) -> list[Any]:
@@ -43,6 +43,8 @@ def _below(library: Any) -> list[Any]:
 
 class Kernel(JITCodeLibrary):
     """A kernel and all that it calls."""
+
+    wide = False
 
     def _optimize_functions(self, ll_module: Any) -> None:
         """Make the code small, for the kernel is optimised as a whole; numba does more, and again for each callee."""
@@ -63,6 +65,12 @@ class Kernel(JITCodeLibrary):
                 self._final_module.link_in(library.alone(), preserve=True)
         self._linking_libraries = [library for library in called if not isinstance(library, Lowered)]
         super().finalize()
+
+
+class WideKernel(Kernel):
+    """One whose loops are long enough for the longest vectors."""
+
+    wide = True
 
 
 class Lowered(Kernel):
@@ -98,7 +106,9 @@ class Lowered(Kernel):
 
 
 class Apart(Lowered):
-    """The same for a function that must not be pasted into its callers."""
+    """The same for a function that must not be pasted into its callers; only large loops are such."""
+
+    wide = True
 
 
 _PURE = made.ExtractValue, made.InsertValue, made.LoadInstr, made.CompareInstr, made.SelectInstr
@@ -125,6 +135,9 @@ def _drop_unused(function: Any) -> None:
 _SLOW_TO_GATHER = get_host_cpu_name().startswith("znver")
 """AMD's Zen: takes numbers from many places faster one by one than by its instruction for it (measured on Zen 4)."""
 
+_FAST_WHEN_WIDE = get_host_cpu_features().get("avx512fp16", False)
+"""Processors, Intel's since Sapphire Rapids, that do not slow down for 512 bits, of which LLVM uses half by itself."""
+
 
 class _Lower(Lower):
     """From numba's own language to LLVM's."""
@@ -132,6 +145,7 @@ class _Lower(Lower):
     def __init__(self, context: Any, place: Any, *given: Any, **options: Any):
         super().__init__(context, place, *given, **options)
         self._inner, self._apart = type(place) is Lowered, isinstance(place, Apart)
+        self._wide = place.wide and _FAST_WHEN_WIDE
 
     def setup_function(self, fndesc: Any) -> None:
         """Begin."""
@@ -143,6 +157,8 @@ class _Lower(Lower):
         if _SLOW_TO_GATHER:  # llvmlite knows no attributes with a value, but writes down what is in the set
             features = f"{self.context.codegen()._tm_features},+prefer-no-gather".lstrip(",")
             set.add(self.function.attributes, f'"target-features"="{features}"')
+        if self._wide:
+            set.add(self.function.attributes, '"prefer-vector-width"="512"')
         self.builder = Builder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
 
@@ -207,6 +223,12 @@ class KernelCompiler(CompilerBase):
             manager.add_pass(each, each.__name__)
         manager.finalize()
         return [manager]
+
+
+class WideCompiler(KernelCompiler):
+    """The same for those with long loops."""
+
+    kept = WideKernel
 
 
 class InnerCompiler(KernelCompiler):

@@ -43,6 +43,8 @@ SPARE = 1.25
 """Room for contacts and near pairs to begin with, in pairs that touch at the start; it grows when needed."""
 MATES = 4
 """Room per grain for neighbours in the list, likewise."""
+WIDE_FROM = 64
+"""Fewest grains for the longest vectors: of less, much is left over that fills none."""
 IDLE = 1e5
 """Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
 STIR_PART = 0.05
@@ -151,6 +153,7 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
         crew=is_large(len(grains)),
         keep=all(is_ours(f.formula) for f in given.outside),
         magnetic=bool(grains.body_moment.any()),
+        wide=len(grains) >= WIDE_FROM,
     )
 
 

@@ -285,4 +285,4 @@ def driver_for(plan: Plan) -> Callable:
         leave(rules)
         return stop
 
-    return kernel(advance, keep=plan.keep, alone=plan.crew)
+    return kernel(advance, keep=plan.keep, alone=plan.crew, wide=plan.wide)

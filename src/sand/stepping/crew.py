@@ -141,7 +141,7 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
             word = read(board, WORD)
         fetch_add(board, INSIDE, -1)
 
-    return share, kernel(help_along, keep=plan.keep, alone=True)
+    return share, kernel(help_along, keep=plan.keep, alone=True, wide=plan.wide)
 
 
 @loop

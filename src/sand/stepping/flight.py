@@ -195,4 +195,4 @@ def flight_driver_for(plan: Plan) -> Callable:
         leave(rules)
         return stop
 
-    return kernel(advance, keep=plan.keep, alone=plan.crew)
+    return kernel(advance, keep=plan.keep, alone=plan.crew, wide=plan.wide)

@@ -36,6 +36,7 @@ class Plan(NamedTuple):
     crew: bool = False  # large loops in blocks, for threads to share
     keep: bool = True  # the compiled code on disk, if all of it is ours
     magnetic: bool = True  # some grain has a moment
+    wide: bool = False  # so many grains that loops are made of the longest vectors
 
     @property
     def bare(self) -> bool:
