@@ -120,7 +120,7 @@ LANES = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 BLOCK = 128
 """Contacts that are passed over together, whole vectors of them."""
-GROWTH = 1.5
+GROWTH = 1.25
 """Longer arrays are longer by this factor."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""

@@ -39,7 +39,7 @@ from ..stepping.verlet import Verlet
 from .engine import Engine
 from .first_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
 
-SPARE = 1.25
+SPARE = 1.1
 """Room for contacts and near pairs to begin with, in pairs that touch at the start; it grows when needed."""
 MATES = 4
 """Room per grain for neighbours in the list, likewise."""
