@@ -23,15 +23,15 @@ def as_before():
     sand.set_threads(None)
 
 
-def shaken_lattice(cutoff):
-    """1100 magnetic iron grains in touch, shaken so that contacts move: large enough for a crew."""
-    grid = np.stack(np.meshgrid(np.arange(11), np.arange(10), np.arange(10), indexing="ij"), -1).reshape(-1, 3)
+def shaken_lattice(cutoff, size=(11, 10, 10)):
+    """Iron grains in touch, shaken so that contacts move, enough for a crew; magnetic, or with contacts alone."""
+    grid = np.stack(np.meshgrid(*map(np.arange, size), indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(4)
     moment = rng.normal(size=grid.shape)
     moment *= 6e-18 / np.linalg.norm(moment, axis=1)[:, None]
     spin, velocity = 5e9 * rng.normal(size=grid.shape), 3.0 * rng.normal(size=grid.shape)
     grains = sand.Grains(grid * 1.985e-8, 1e-8, sand.IRON, moment=moment, velocity=velocity, spin=spin)
-    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff=cutoff)])
+    return sand.Simulation(grains, [sand.Contact(), *([] if cutoff == "bare" else [sand.Dipoles(cutoff=cutoff)])])
 
 
 def state(sim):
@@ -39,14 +39,17 @@ def state(sim):
     return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
 
 
-@pytest.mark.parametrize("cutoff", [None, "0.05 um"])
-def test_threads_change_no_bit(cutoff):
-    """60 steps, run in two pieces, with 1, 2 and 3 threads; all pairs and listed ones; contacts move and break."""
+@pytest.mark.parametrize(("cutoff", "size"), [(None, (11, 10, 10)), ("0.05 um", (11, 10, 10)), ("bare", (17, 16, 16))])
+def test_threads_change_no_bit(cutoff, size):
+    """60 steps, run in two pieces, with 1, 2 and 3 threads; contacts move and break.
+
+    All pairs and listed ones; contacts alone, whose loads kick at once, in several blocks of grains that take turns.
+    """
     ends = []
     for number in (1, 2, 3):
         sand.set_threads(number)
-        sim = shaken_lattice(cutoff)
-        assert sim._engine._plan.crew
+        sim = shaken_lattice(cutoff, size)
+        assert sim._engine._plan.crew and sim._engine._plan.bare is (cutoff == "bare")
         sim.run(steps=25)
         sim.run(steps=35)
         ends.append(state(sim))

@@ -8,7 +8,7 @@ import pytest
 import sand
 from sand.core.jit import kernel
 from sand.core.world import CONTACTS, COUNT, FASTEST, KINDS, QUICKEST, TURNS_FROM, contact_arrays
-from sand.kernels.gathering import AT_ONCE, DENSE, MOST, gather, resort_sides
+from sand.kernels.gathering import BLOCK, DENSE, MOST, gather, resort_sides
 from sand.kernels.motion import gather_and_kick, kick, kick_and_drift_for
 from sand.stepping.crew import GRAINS_AT_ONCE
 
@@ -83,8 +83,8 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     kind = many[0] * (MOST + 1) + many[1]
     turn = contacts.turn[:GRAINS]
     assert len(set(kind.tolist())) > 10
-    for first in range(0, GRAINS, AT_ONCE):
-        block = np.arange(first, min(first + AT_ONCE, GRAINS))
+    for first in range(0, GRAINS, BLOCK):
+        block = np.arange(first, min(first + BLOCK, GRAINS))
         assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
     _, crowded, _ = some(DENSE + 0.5)
     assert crowded.turn[:GRAINS].tolist() == list(range(GRAINS))
@@ -120,21 +120,22 @@ def test_grains_without_moments_drift_as_those_with():
     assert (without.moment == grains.moment).all() and (with_moments.moment != grains.moment).all()
 
 
-def large():
-    """A lattice of more grains than are shared out at once, in which only grain 5 and those beside it move."""
+def large(moved=5):
+    """A lattice of more grains than are shared out at once, in which only one grain and those beside it move."""
     side = round(GRAINS ** (1 / 3)) + 1
     place = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
     speed = np.zeros((GRAINS, 3))
-    speed[5] = 0.01
+    speed[moved] = 0.1
     return sand.Grains(place * (1.0, 1.0, 1.2), 1e-7, sand.SILICA, velocity=speed)
 
 
-def test_the_fastest_grain_of_all_blocks_is_known():
+@pytest.mark.parametrize("moved", [5, GRAINS - 5])
+def test_the_fastest_grain_of_all_blocks_is_known(moved):
     """What the step is limited by are the largest squares of speed and spin among all grains."""
-    sim = sand.Simulation(large(), [sand.Contact()])
+    sim = sand.Simulation(large(moved), [sand.Contact()])
     sim.run(steps=3)
     watch, v, w = sim.world.near.watch, sim.grains.velocity, sim.grains.spin
-    assert GRAINS > GRAINS_AT_ONCE and (v**2).sum(axis=1).argmax() == 5
+    assert GRAINS > GRAINS_AT_ONCE and (v**2).sum(axis=1).argmax() == moved
     assert watch[FASTEST] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
     assert watch[QUICKEST] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[QUICKEST] > 0.0
 

@@ -22,6 +22,8 @@ class Progress(Observer):
         file: a terminal.
     """
 
+    looks_in_ticks = False
+
     def __init__(self, end: float, last_step: float, file: IO[str] | None = None):
         self._end, self._last_step = end, last_step
         self._by_time = math.isfinite(end)

@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numba
@@ -174,7 +175,9 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False, wide: 
         wide: True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
     """
     if wide:  # what is kept is found by its name
-        function.__qualname__ += "_wide"
+        name = f"{function.__qualname__}_wide"
+        function = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
+        function.__qualname__ = name
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:

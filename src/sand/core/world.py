@@ -115,7 +115,7 @@ PICKED = ("soon", "mark", "watch", "turn")
 KINDS = 64
 """Places behind all grains that sorting them by their contacts needs."""
 TURNS_FROM = 4000
-"""Fewest grains for which the gathering has an order of its own: fewer the processor learns by heart."""
+"""Fewest grains for which the gathering has an order of its own; what fewer have, the branch predictor learns."""
 LANES = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 BLOCK = 128

@@ -50,7 +50,7 @@ class GrainForce(Force, Protocol):
     formula: Callable
 
     def numbers(self) -> Any:
-        """What the formula gets as `parameters`: a NamedTuple of floats."""
+        """What the formula gets as `parameters`: a NamedTuple of floats, none for a single grain."""
 
     def flux_density_size(self) -> float:
         """Largest size over all times of the magnetic flux density it brings [T]; limits the step."""
@@ -73,7 +73,7 @@ class FarForce(Force, Protocol):
         """The loops that sum it: over listed pairs, or over all."""
 
     def numbers(self, grains: Grains, box: Box) -> Any:
-        """What the loops get: a NamedTuple."""
+        """What the loops get: a NamedTuple, without anything for each grain: those have other numbers in the loops."""
 
     def acts_on(self, grains: Grains) -> bool:
         """False if no grain feels it."""

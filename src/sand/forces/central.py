@@ -36,10 +36,11 @@ class Charges(WithCutoff):
     column: ClassVar[str] = "coulomb"
     references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4"
     constant: ClassVar[float] = COULOMB
+    massive: ClassVar[bool] = False
 
     def strengths(self, grains: Grains) -> np.ndarray:
-        """What attracts or repels, (N,): charges [C]."""
-        return grains.charge
+        """What attracts or repels, (N,): charges [C], or masses [kg]."""
+        return grains.mass if self.massive else grains.charge
 
     def sums(self, box: Box, listed: bool) -> FarSums:
         """The loops that sum it: over listed pairs, or over all."""
@@ -48,7 +49,7 @@ class Charges(WithCutoff):
     def numbers(self, grains: Grains, box: Box) -> CentralRules:
         """What the loops get."""
         radius = self.choose(grains, box).radius
-        return CentralRules(self.constant, cutoff_for(radius, self.cut), self.strengths(grains).copy())
+        return CentralRules(self.constant, cutoff_for(radius, self.cut), self.massive)
 
     def acts_on(self, grains: Grains) -> bool:
         """False if no grain feels it."""
@@ -76,7 +77,4 @@ class Attraction(Charges):
     column: ClassVar[str] = "gravitation"
     references: ClassVar[str] = "Newton 1687"
     constant: ClassVar[float] = -GRAVITATION
-
-    def strengths(self, grains: Grains) -> np.ndarray:
-        """What attracts, (N,): masses [kg]."""
-        return grains.mass
+    massive: ClassVar[bool] = True

@@ -14,7 +14,19 @@ class CentralRules(NamedTuple):
 
     k: float  # 1/(4πε₀) [N m²/C²], or −G [N m²/kg²]
     cutoff: Any
-    charges: Any  # (N,) charges [C], or masses [kg]
+    massive: bool  # masses attract, not charges
+
+
+@loop
+def strength(grains, rules, i):
+    """The charge [C] of grain i, or its mass [kg]."""
+    return grains.mass[i] if rules.massive else grains.charge[i]
+
+
+@loop
+def both(grains, rules, i, j):
+    """The product of two of them."""
+    return strength(grains, rules, i) * strength(grains, rules, j)
 
 
 @loop
@@ -24,24 +36,24 @@ def all_loads(grains, far, span, rules):
         here, push = load(grains.position, i), (0.0, 0.0, 0.0)
         for j in range(i):
             f = central_field(nearest_image(sub(here, load(grains.position, j)), span), rules.k, rules.cutoff)
-            push = axpy(rules.charges[j], f, push)
-            accrue(far.force, j, scale(-rules.charges[i] * rules.charges[j], f))
-        accrue(far.force, i, scale(rules.charges[i], push))
+            push = axpy(strength(grains, rules, j), f, push)
+            accrue(far.force, j, scale(-both(grains, rules, i, j), f))
+        accrue(far.force, i, scale(strength(grains, rules, i), push))
 
 
 @loop
-def pack_charges(grains, far, charges):
+def pack_charges(grains, far, rules):
     """Positions and charges in the order of the list."""
     for s in range(grains.mass.size):
         i = far.order[s]
         put(far.here, s, load(grains.position, i))
-        far.source[0, s] = charges[i]
+        far.source[0, s] = strength(grains, rules, i)
 
 
 @loop
 def listed_loads(grains, far, span, rules):
     """Forces of listed pairs."""
-    pack_charges(grains, far, rules.charges)
+    pack_charges(grains, far, rules)
     for s in range(grains.mass.size):
         here, push = load(far.here, s), (0.0, 0.0, 0.0)
         for m in range(far.start[s], far.start[s + 1]):
@@ -56,7 +68,7 @@ def rate_of_pair(grains, far, span, rules, i, j):
     """Rate of the force on i due to j [N/s]; `past_position` holds ṙ."""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     moving = sub(load(far.past_position, i), load(far.past_position, j))
-    return scale(rules.charges[i] * rules.charges[j], central_rate(apart, moving, rules.k, rules.cutoff))
+    return scale(both(grains, rules, i, j), central_rate(apart, moving, rules.k, rules.cutoff))
 
 
 @loop
@@ -82,7 +94,7 @@ def listed_rates(grains, far, span, rules):
 def pair_energy(grains, span, rules, i, j):
     """k S q_i q_j/r [J]"""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    return rules.charges[i] * rules.charges[j] * central_potential(apart, rules.k, rules.cutoff)
+    return both(grains, rules, i, j) * central_potential(apart, rules.k, rules.cutoff)
 
 
 @loop
@@ -107,7 +119,7 @@ def listed_energies(grains, far, span, rules, shares):
 def loads_of_pair(grains, span, rules, i, j):
     """Force on i of one pair; no torques."""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    force = scale(rules.charges[i] * rules.charges[j], central_field(apart, rules.k, rules.cutoff))
+    force = scale(both(grains, rules, i, j), central_field(apart, rules.k, rules.cutoff))
     return force, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 

@@ -1,16 +1,19 @@
 """Loads of contacts summed up at their grains, in a fixed order.
 
-Grains have few contacts, some more and some less, and the processor guesses how many.  It learns a thousand grains by
-heart, but not ten thousand.  There, within blocks of neighbours in memory, those with equally many come in a row.
+Grains have few contacts, some more and some less, and the processor guesses how many.  Its branch predictor learns the
+numbers of a thousand grains, but not of ten thousand.  There, within blocks of neighbours in memory, those with equally
+many come in a row.
 """
+
+import math
 
 from ..core.jit import kernel, loop, rare
 from ..core.vec import add, load, put, sub
 from ..core.world import CONTACTS, KINDS
 
-AT_ONCE = 64
+BLOCK = 64
 """Grains in a block; their contacts stay in the first cache."""
-MOST = 7
+MOST = math.isqrt(KINDS) - 1
 """Grains that are the first, or the second, of so many contacts or more are not told apart."""
 DENSE = 3
 """Contacts per grain from which most grains have equally many, as they are numbered."""
@@ -35,7 +38,7 @@ def _gather_at(grains, contacts, g):
 def gather(grains, contacts, first, last):
     """Set force and torque of the grains first…last − 1 (uint64) to the sum over their contacts, in a fixed order.
 
-    Both ends are multiples of AT_ONCE, but for the last grain of all.
+    Both ends are multiples of BLOCK, but for the last grain of all.
     """
     if contacts.turn.size > 0:
         for k in range(last - first):
@@ -85,8 +88,8 @@ def _kind(contacts, g):
 def _take_turns(contacts, n, total):
     """Fill `turn`: the grains of each block by their kind; by their numbers where contacts are many."""
     turn = contacts.turn
-    for first in range(0, n, AT_ONCE):
-        last = min(first + AT_ONCE, n)
+    for first in range(0, n, BLOCK):
+        last = min(first + BLOCK, n)
         for g in range(first, last):
             turn[g] = g
         if total < DENSE * n:

@@ -11,10 +11,10 @@ from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.vec import axpy, dot, load, load4, put, put4, scale
 from ..physics.rotation import turn, turned
-from .gathering import gather
+from .gathering import BLOCK, gather
 
-AT_ONCE = np.uint64(256)
-"""Grains whose loads are gathered before they are kicked; their forces stay in the first cache."""
+AT_ONCE = np.uint64(4 * BLOCK)
+"""Grains whose loads are gathered before they are kicked, whole blocks; their forces stay in the first cache."""
 
 
 @loop

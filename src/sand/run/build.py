@@ -192,8 +192,11 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
         """A table but for the end of the run, which may be changed."""
         return {key: value for key, value in content.get(name, {}).items() if (name, key) not in ENDS}
 
+    was = check_case(begun, str(path))
     for name in {**begun, **there}:
-        if fixed(begun, name) != fixed(there, name):
+        # earlier versions left out settings that are new: what counts is what is understood
+        meant = name not in {table for table, _ in ENDS} and getattr(was, name) == getattr(case, name)
+        if fixed(begun, name) != fixed(there, name) and not meant:
             raise BadInput(
                 f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; put it "
                 f"back, or start a new run from the last frame: sand run CASE.toml --from {folder}"

@@ -27,7 +27,7 @@ from .at_grains import at_grains
 from .contacts import ContactTable
 from .ends import ends_of
 from .ledger import Ledger, kinetic_energies, take_stock
-from .observers import Observer, Schedule
+from .observers import Observer, Schedule, tick_all
 from .outcome import OF_STOP, Outcome, Result
 from .record import Record
 from .signals import Signals
@@ -277,8 +277,7 @@ class Simulation:
                 return Outcome.FINISHED if self.is_sound else Outcome.RUNAWAY
             if self.record:
                 self.record.tick(self, output)
-            for observer in self.observers:
-                observer.tick(self)
+            tick_all(self.observers, self)
             if signals.received:
                 return Outcome.INTERRUPTED
 

@@ -17,7 +17,7 @@ from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.least import ranked
 from ..core.world import CONTACTS
 from ..kernels.gathering import gather
-from ..kernels.motion import gather_and_kick
+from ..kernels.motion import AT_ONCE, gather_and_kick
 from ..kernels.moving import contact_pass, keep_passed
 from ..kernels.sums import CREW_FROM
 from .rules import Plan
@@ -28,8 +28,8 @@ PLACES = 24
 PATIENCE = 4000
 """Looks at the board before a waiting thread lets others run on its core."""
 CONTACTS_AT_ONCE = 512
-GRAINS_AT_ONCE = 2048
-"""Contacts and grains in a block: some 10 µs of work, and whole vectors."""
+GRAINS_AT_ONCE = 8 * int(AT_ONCE)
+"""Contacts and grains in a block: some 10 µs of work, whole vectors, and whole blocks of the gathering."""
 HELP_FROM = 8 * CONTACTS_AT_ONCE
 """Contacts from which a helper saves more time than handing it work takes, where nothing else can be shared."""
 _BITS = 24
