@@ -156,9 +156,9 @@ def test_going_on_from_a_checkpoint_changes_nothing(tmp_path, cut):
 
 
 class Heavy(sand.Attraction):
-    """Newton's law, as if grains were a hundred million times as heavy: their own weight moves nothing in 300 steps."""
+    """Newton's law, as if grains were a thousand million times as heavy: their own mass moves nothing in 300 steps."""
 
-    constant = 1e16 * sand.Attraction.constant
+    constant = 1e18 * sand.Attraction.constant
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from sand.core.errors import FilesFailed
 from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 from sand.files.folder import LedgerFile, make_folder, read_ledger, read_toml, replace_file, write_json, write_toml
 from sand.files.trajectory import TrajectoryWriter, read_frames
+from sand.run.record import Record
 
 from ..physics.setups import struck_chain
 
@@ -156,6 +157,22 @@ def test_checkpoints_of_every_version_go_on(tmp_path, version):
     result = sim.run(until="80 ps")
     assert result.outcome is sand.Outcome.FINISHED
     assert result.drift < 1e-3
+
+
+@pytest.mark.parametrize("version", range(1, VERSION + 1))
+def test_an_old_run_that_is_killed_before_its_first_new_checkpoint_goes_on(tmp_path, monkeypatch, version):
+    """Its case.toml has settings by then that are newer than the checkpoint: they mean what was meant without them."""
+
+    def killed(record, simulation):
+        raise SystemExit
+
+    folder = tmp_path / "run"
+    shutil.copytree(Path(__file__).parents[1] / "reference" / f"run-v{version}", folder)
+    with monkeypatch.context() as patch, pytest.raises(SystemExit):
+        patch.setattr(Record, "save", killed)
+        sand.resume(folder).run(until="80 ps")
+    assert "order" in (folder / "case.toml").read_text()
+    assert sand.resume(folder).run(until="80 ps").outcome is sand.Outcome.FINISHED
 
 
 def test_the_checkpoint_knows_case_and_ledger(tmp_path):
