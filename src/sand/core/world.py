@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .aligned import all_aligned, whole
 from .box import Box
 from .errors import BadInput
 from .grains import GrainArrays, Grains
@@ -116,8 +117,6 @@ KINDS = 64
 """Places behind all grains that sorting them by their contacts needs."""
 TURNS_FROM = 4000
 """Fewest grains for which the gathering has an order of its own; what fewer have, the branch predictor learns."""
-LANES = 8
-"""Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 BLOCK = 128
 """Contacts that are passed over together, whole vectors of them."""
 GROWTH = 1.25
@@ -135,8 +134,8 @@ def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collect
     """
     vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
-    whole = (grains + LANES - 1) // LANES * LANES
-    vectors |= {"here": np.zeros((3, whole)), "source": np.zeros((3, whole)), "share": np.zeros((2 * blocks, 3, whole))}
+    v = whole(grains)
+    vectors |= {"here": np.zeros((3, v)), "source": np.zeros((3, v)), "share": np.zeros((2 * blocks, 3, v))}
     sizes = {"order": grains, "start": grains + 1, "mate": max(int(capacity), 16), "home": grains}
     sizes["cell"] = CELLS_PER_GRAIN * grains + 28
     arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
@@ -145,7 +144,7 @@ def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collect
 
 def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = False, channels: int = 7) -> ContactArrays:
     """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
-    c = max(int(room), 16)
+    c = whole(max(int(room), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
     numbers = {k: np.zeros(c) for k in ("twist", "formed", "flag", "damped")}
     return ContactArrays(
@@ -162,7 +161,7 @@ def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = Fals
 
 def near_pairs(grains: int, capacity: int, *, alike: bool = False) -> NearPairs:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
-    p = max(int(capacity), 16)
+    p = whole(max(int(capacity), 16))
     nowhere = np.full((3, grains), np.inf)
     pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p, np.uint32)
     kind = np.zeros((2, 1 if alike else p))
@@ -172,7 +171,7 @@ def near_pairs(grains: int, capacity: int, *, alike: bool = False) -> NearPairs:
 def _grown(arrays: Any, others: Collection[str], least: int) -> Any:
     """The same columns in longer arrays, with room for `least` pairs at least; `others` have none for each pair."""
     columns = arrays.pair.shape[1]
-    more, longer = max(int(GROWTH * columns) + 1, least), {}
+    more, longer = whole(max(int(GROWTH * columns) + 1, least)), {}
     for name, old in arrays._asdict().items():
         if name in others:
             longer[name] = old
@@ -180,7 +179,7 @@ def _grown(arrays: Any, others: Collection[str], least: int) -> Any:
         new = np.zeros((*old.shape[:-1], more * (old.shape[-1] // columns)), old.dtype)
         new[..., : old.shape[-1]] = old
         longer[name] = new
-    return type(arrays)(**longer)
+    return all_aligned(type(arrays)(**longer))
 
 
 @dataclass
@@ -199,6 +198,11 @@ class World:
     order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))  # the grain at each place, run.places
     alike: bool = False  # radii, masses, materials are equal and stay so: one set of constants for all contacts
 
+    def __post_init__(self) -> None:
+        self.grains.arrays = all_aligned(self.grains.arrays)
+        for group in ("contacts", "near", "far", "stages"):
+            setattr(self, group, all_aligned(getattr(self, group)))
+
     @property
     def time(self) -> float:
         """[s]"""
@@ -210,7 +214,9 @@ class World:
 
     def copy(self) -> World:
         """An independent copy: a snapshot."""
-        return copy.deepcopy(self)
+        twin = copy.deepcopy(self)
+        twin.__post_init__()
+        return twin
 
     def _for_all(self) -> tuple[str, ...]:
         return FOR_ALL if self.alike else ()

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.aligned import LANES
 from ..core.box import nearest_image
 from ..core.jit import kernel, loop, rare
 from ..core.vec import dot, load, put, sub
-from ..core.world import CELLS_PER_GRAIN, LANES, LISTED
+from ..core.world import CELLS_PER_GRAIN, LISTED
 
 FULL = -1
 """Answer of the makers of lists when the arrays are too short."""

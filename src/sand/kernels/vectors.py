@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..core.aligned import LANES
 from ..core.jit import loop
-from ..core.world import LANES
 
 
 @loop

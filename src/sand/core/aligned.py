@@ -1,0 +1,33 @@
+"""Arrays that begin with a line of the cache: the longest vectors fill one, and cost two where they straddle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+LINE = 64
+"""Bytes of a line."""
+LANES = 8
+"""Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
+
+
+def whole(number: int) -> int:
+    """So many columns, rounded up to whole vectors."""
+    return (number + LANES - 1) // LANES * LANES
+
+
+def aligned(array: np.ndarray) -> np.ndarray:
+    """The array, or a contiguous copy of it that begins with a line; an empty one as it is."""
+    if array.size == 0 or (array.ctypes.data % LINE == 0 and array.flags.c_contiguous):
+        return array
+    raw = np.empty(array.nbytes + LINE, np.uint8)
+    first = -raw.ctypes.data % LINE
+    copy = raw[first : first + array.nbytes].view(array.dtype).reshape(array.shape)
+    copy[...] = array
+    return copy
+
+
+def all_aligned(arrays: Any) -> Any:
+    """The same for each field of a NamedTuple of arrays."""
+    return type(arrays)(*map(aligned, arrays))
