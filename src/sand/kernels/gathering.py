@@ -35,6 +35,13 @@ def _gather_at(grains, contacts, g):
 
 
 @loop
+def gather_by_number(grains, contacts, first, last):
+    """`gather` where grains take no turns: in small worlds."""
+    for k in range(last - first):
+        _gather_at(grains, contacts, first + k)
+
+
+@loop
 def gather(grains, contacts, first, last):
     """Set force and torque of the grains first…last − 1 (uint64) to the sum over their contacts, in a fixed order.
 
@@ -44,8 +51,7 @@ def gather(grains, contacts, first, last):
         for k in range(last - first):
             _gather_at(grains, contacts, contacts.turn[first + k])
     else:
-        for k in range(last - first):
-            _gather_at(grains, contacts, first + k)
+        gather_by_number(grains, contacts, first, last)
 
 
 @rare

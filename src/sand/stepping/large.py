@@ -8,7 +8,7 @@ import numpy as np
 from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.world import CONTACTS, STEP
-from ..kernels.gathering import gather
+from ..kernels.gathering import gather_by_number
 from ..kernels.motion import gather_and_kick
 from ..kernels.moving import book_passed, contact_pass, kept_passed
 from .crew import CONTACTS_AT_ONCE, FAR, GATHER, GATHER_AND_KICK, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
@@ -25,7 +25,7 @@ def _pass_alone(grains, contacts, far, clock, count, lost, rules):
 
 @loop
 def _gather_alone(grains, contacts, far, count, rules):
-    gather(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
+    gather_by_number(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
 
 
 @loop
