@@ -230,7 +230,7 @@ def test_steps_are_counted_through_growing_arrays():
     ],
 )
 def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
-    """Far arrays have columns where the plan needs them; contacts begin with a tenth more than touch, in vectors of 8."""
+    """Far arrays have columns where the plan needs them; contacts begin with a tenth more than touch, in eights."""
     place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
     grains = sand.Grains(place, 1e-8, sand.SILICA, moment="1 A m^2/kg")
     forces, search = [sand.Contact(), sand.Dipoles(cutoff="none")], sand.Neighbours(search="all pairs")

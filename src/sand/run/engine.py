@@ -86,7 +86,7 @@ class Engine:
         self._world, self._away = other, False
 
     def come_home(self) -> None:
-        """Every grain gets the number back that the user knows it by; while it is looked at, it keeps that."""
+        """Give every grain the number back that the user knows it by, until the next step is taken."""
         if self._away:
             rearrange(self._world, inverse(self._world.order))
             self._away = False
