@@ -53,10 +53,11 @@ def _own_compilers() -> list[dict[str, Any]]:
     if not TRIED[0] <= numba.version_info.short <= TRIED[1]:
         return [{}, {}, {}, {}]
     try:
-        from .lowering import ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
+        from .lowering import FAST_WHEN_WIDE, ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
     except (ImportError, AttributeError):
         return [{}, {}, {}, {}]
-    return [{"pipeline_class": each} for each in (KernelCompiler, WideCompiler, InnerCompiler, ApartCompiler)]
+    wide = WideCompiler if FAST_WHEN_WIDE else KernelCompiler
+    return [{"pipeline_class": each} for each in (KernelCompiler, wide, InnerCompiler, ApartCompiler)]
 
 
 # nobody calls these from Python once compiled: without their wrappers the first compile is shorter
@@ -174,7 +175,7 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False, wide: 
         alone: True for code that other Python threads may run beside.
         wide: True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
     """
-    if wide:  # what is kept is found by its name
+    if wide and _WIDE != _KERNEL:  # what is kept is found by its name; where both are the same, it is compiled once
         name = f"{function.__qualname__}_wide"
         function = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
         function.__qualname__ = name

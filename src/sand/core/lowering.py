@@ -26,7 +26,7 @@ from numba.core.lowering import Lower
 
 from .convention import Builder, Context, ours_alone, take_apart
 
-__all__ = ["ApartCompiler", "InnerCompiler", "KernelCompiler", "WideCompiler"]
+__all__ = ["FAST_WHEN_WIDE", "ApartCompiler", "InnerCompiler", "KernelCompiler", "WideCompiler"]
 
 
 def _below(library: Any) -> list[Any]:
@@ -135,7 +135,7 @@ def _drop_unused(function: Any) -> None:
 _SLOW_TO_GATHER = get_host_cpu_name().startswith("znver")
 """AMD's Zen: takes numbers from many places faster one by one than by its instruction for it (measured on Zen 4)."""
 
-_FAST_WHEN_WIDE = get_host_cpu_features().get("avx512fp16", False)
+FAST_WHEN_WIDE = get_host_cpu_features().get("avx512fp16", False)
 """Processors, Intel's since Sapphire Rapids, that do not slow down for 512 bits, of which LLVM uses half by itself."""
 
 
@@ -145,7 +145,7 @@ class _Lower(Lower):
     def __init__(self, context: Any, place: Any, *given: Any, **options: Any):
         super().__init__(context, place, *given, **options)
         self._inner, self._apart = type(place) is Lowered, isinstance(place, Apart)
-        self._wide = place.wide and _FAST_WHEN_WIDE
+        self._wide = place.wide and FAST_WHEN_WIDE
 
     def setup_function(self, fndesc: Any) -> None:
         """Begin."""

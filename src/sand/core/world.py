@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -214,9 +214,7 @@ class World:
 
     def copy(self) -> World:
         """An independent copy: a snapshot."""
-        twin = copy.deepcopy(self)
-        twin.__post_init__()
-        return twin
+        return replace(copy.deepcopy(self))  # made anew, so that its arrays begin with a line
 
     def _for_all(self) -> tuple[str, ...]:
         return FOR_ALL if self.alike else ()

@@ -10,6 +10,7 @@ from ..core.box import Box
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.material import SILICA
+from ..core.stages import stage_arrays
 from ..core.world import (
     ALWAYS,
     FOR_IMPULSES,
@@ -20,7 +21,6 @@ from ..core.world import (
     contact_arrays,
     far_arrays,
     near_pairs,
-    stage_arrays,
 )
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact

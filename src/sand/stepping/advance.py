@@ -115,7 +115,7 @@ def _no_change(grains, contacts, count, far, span, numbers):
 
 
 @loop
-def no_cycle(grains, contacts, far, clock, count, rules):
+def _no_cycle(grains, contacts, far, clock, count, rules):
     """A cycle of one step needs no cutting."""
 
 
@@ -197,7 +197,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
             change_sides(grains, contacts, count, far, rules.span, rules.far)
             clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
-    cut_short = no_cycle if plan.bare else cut_cycle
+    cut_short = _no_cycle if plan.bare else cut_cycle
 
     @loop
     def first_half(grains, contacts, near, far, clock, count, lost, rules):
