@@ -13,7 +13,7 @@ from ..kernels.gathering import resort_sides
 from ..setup.order import places_on_curve
 
 RENEWED_EVERY = 2000
-"""Steps after which the order is made anew: even fast grains pass few others meanwhile; it takes as long as 10 to 20."""
+"""Steps after which the order is made anew: even fast grains pass few others meanwhile; it takes 10 to 20 of them."""
 OF_GRAINS = (*KEPT_FAR, *FOR_RATES[:2])
 """The far arrays with a column for each grain that outlast a sum."""
 NOT_OF_PAIRS = ("side", "start", "anchor", *PICKED)
