@@ -22,7 +22,8 @@ import numba
 from numba.core import event
 from numba.extending import register_jitable
 
-__all__ = ["CAN_SHARE", "COMPILED", "cache_folder", "compiling", "formula", "kernel", "loop", "rare", "shared"]
+_NAMES = "CAN_SHARE COMPILED LONG_VECTORS cache_folder compiling formula kernel loop rare shared"
+__all__ = _NAMES.split()
 
 # As fast as fastmath=True, but NaN and infinity stay what they are, so that guards can see them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -67,6 +68,8 @@ _INNER = _BARE | _LOWERED
 
 COMPILED = not numba.config.DISABLE_JIT
 """False where numba is told to leave everything to Python."""
+LONG_VECTORS = _WIDE != _KERNEL
+"""Are there kernels with vectors of 512 bits, on processors that LLVM would use half of?"""
 CAN_SHARE = bool(_APART)
 """Can `shared` loops be kept apart, so that all threads get the same bits from them?"""
 
@@ -175,7 +178,7 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False, wide: 
         alone: True for code that other Python threads may run beside.
         wide: True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
     """
-    if wide and _WIDE != _KERNEL:  # what is kept is found by its name; where both are the same, it is compiled once
+    if wide and LONG_VECTORS:  # what is kept is found by its name; where both are the same, it is compiled once
         name = f"{function.__qualname__}_wide"
         function = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
         function.__qualname__ = name

@@ -13,8 +13,9 @@ import numpy as np
 
 from ..core.box import nearest_image
 from ..core.jit import formula, loop
-from ..core.vec import accrue, add, cross, load, put, sub
-from ..physics.dipole import pair_load, pair_load_cut
+from ..core.roots import inverse_root
+from ..core.vec import accrue, add, cross, dot, load, put, sub
+from ..physics.dipole import pair_load_at, pair_load_cut
 from ..physics.dipole_rates import pair_rates
 from .sums import FarSums, Parts, all_blocks
 from .vectors import filled_up
@@ -25,8 +26,8 @@ ROWS_AT_ONCE = 256
 
 FEW = 3
 """Pairs that are faster done one by one than as a vector."""
-NOWHERE = 1.4e154
-"""A distance [m] whose square is infinite: 1/r² is 0, with nothing in between that underflows, which is slow."""
+NOWHERE = 1.0
+"""A distance [m] of what is no pair, and has loads of 0 times something."""
 
 
 class DipoleRules(NamedTuple):
@@ -166,23 +167,23 @@ def loads_of_pair(grains, span, rules, i, j):
 
 
 @formula
-def moment_if(real, moment):
-    """No moment where there is no pair, so that no product of two overflows."""
-    return moment[0] if real else 0.0, moment[1] if real else 0.0, moment[2] if real else 0.0
+def apart_if(real, apart):
+    """What lies between the two of a pair; where there is no pair, something of which 1/r² is a number."""
+    return apart[0] if real else NOWHERE, apart[1], apart[2]
 
 
 @loop
 def bare_pair(here, there, span, mine, other, rules, real):
     """Loads of a pair in an open box without a cut-off; none if it is not `real`."""
-    apart, other = sub(here, there), moment_if(real, other)
-    return pair_load((apart[0] if real else NOWHERE, apart[1], apart[2]), mine, other, rules.k)
+    apart = apart_if(real, sub(here, there))
+    return pair_load_at(apart, inverse_root(dot(apart, apart)), mine, other, rules.k if real else 0.0)
 
 
 @loop
 def cut_pair(here, there, span, mine, other, rules, real):
     """The same with nearest images and a cut-off."""
-    apart, other = nearest_image(sub(here, there), span), moment_if(real, other)
-    return pair_load_cut((apart[0] if real else NOWHERE, apart[1], apart[2]), mine, other, rules.k, rules.cutoff)
+    apart, k = apart_if(real, nearest_image(sub(here, there), span)), rules.k if real else 0.0
+    return pair_load_cut(apart, mine, other, k, rules.cutoff)
 
 
 @loop

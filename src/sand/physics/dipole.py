@@ -7,6 +7,7 @@ import math
 from typing import NamedTuple
 
 from ..core.jit import formula
+from ..core.roots import exact_inverse_root
 from ..core.vec import add, axpy, dot, scale, sub
 
 
@@ -18,9 +19,9 @@ class Cutoff(NamedTuple):
 
 
 @formula
-def invariants(apart, moment1, moment2):
-    """1/r², μ1·r, μ2·r, μ1·μ2 and (μ1·r)(μ2·r)/r² of a pair."""
-    inverse2 = 1.0 / dot(apart, apart)
+def invariants(apart, inverse, moment1, moment2):
+    """1/r², μ1·r, μ2·r, μ1·μ2 and (μ1·r)(μ2·r)/r² of a pair; `inverse` is 1/r."""
+    inverse2 = inverse * inverse
     along1, along2 = dot(moment1, apart), dot(moment2, apart)
     return inverse2, along1, along2, dot(moment1, moment2), along1 * along2 * inverse2
 
@@ -44,8 +45,14 @@ def pair_load(apart, moment1, moment2, k):
 
     Also the energy U = −μ1·B1 [J].
     """
-    inverse2, along1, along2, both, product = invariants(apart, moment1, moment2)
-    inverse3 = k * inverse2 * math.sqrt(inverse2)
+    return pair_load_at(apart, exact_inverse_root(dot(apart, apart)), moment1, moment2, k)
+
+
+@formula
+def pair_load_at(apart, inverse, moment1, moment2, k):
+    """The same of a pair whose `inverse` = 1/r [1/m] is known."""
+    inverse2, along1, along2, both, product = invariants(apart, inverse, moment1, moment2)
+    inverse3 = k * inverse2 * inverse
     three = 3.0 * inverse3 * inverse2
     inward = three * (both - 5.0 * product)
     force, field1, field2 = loads_of(apart, moment1, moment2, inverse3, three * along1, three * along2, inward)
@@ -67,8 +74,9 @@ def pair_load_cut(apart, moment1, moment2, k, cutoff):
     F = S F_dipole − U ∇S and B → S B; torques and r×F still cancel, since ∇S points along r.
     """
     weight, slope = cut_weight(dot(apart, apart), cutoff)
-    inverse2, along1, along2, both, product = invariants(apart, moment1, moment2)
-    bare3 = k * inverse2 * math.sqrt(inverse2)
+    inverse = exact_inverse_root(dot(apart, apart))
+    inverse2, along1, along2, both, product = invariants(apart, inverse, moment1, moment2)
+    bare3 = k * inverse2 * inverse
     energy = bare3 * (both - 3.0 * product)
     inverse3 = weight * bare3
     three = 3.0 * inverse3 * inverse2
