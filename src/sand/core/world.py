@@ -56,7 +56,7 @@ class ContactArrays(NamedTuple):
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) 0.0, or what became of it where a limit was passed in this step: kernels.contacts.WAITS …
+    flag: np.ndarray  # (C,) uint8: 0, or what became of it where a limit was passed in this step: kernels.contacts.WAITS …
     bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
     side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
@@ -146,10 +146,11 @@ def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = Fals
     """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
     c = whole(max(int(room), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
-    numbers = {k: np.zeros(c) for k in ("twist", "formed", "flag", "damped")}
+    numbers = {k: np.zeros(c) for k in ("twist", "formed", "damped")}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         bond=np.zeros((constants, BLOCK if alike else c)),
+        flag=np.zeros(c, np.uint8),
         bonded=np.zeros(c, np.uint8),
         lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),

@@ -16,7 +16,7 @@ from .vectors import filled_up
 
 FEW = 4
 """Contacts that are faster done one by one than as a vector."""
-WAITS, BROKE, YIELDED = 1.0, 2.0, 3.0
+WAITS, BROKE, YIELDED = 1, 2, 3
 """Flags of a contact that passed a limit: to be settled; broken in this step; moved in the pass over all contacts."""
 
 
@@ -112,8 +112,8 @@ def quiet_pass(grains, contacts, first, last, used, column, span, law, dt):
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if beyond else 0.0
-        waiting += contacts.flag[c] if c < used else 0.0
+        contacts.flag[c] = WAITS if beyond else 0
+        waiting += 1.0 if beyond & (c < used) else 0.0
     return waiting
 
 

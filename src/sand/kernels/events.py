@@ -225,7 +225,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n))
     contacts.twist[c] = 0.0
     contacts.formed[c] = formed
-    contacts.flag[c] = 0.0
+    contacts.flag[c] = 0
     contacts.bonded[c] = 0
     contacts.damped[c] = 0.0
     for row in range(contacts.lost.shape[0]):

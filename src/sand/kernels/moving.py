@@ -109,7 +109,7 @@ def _busy_pass(grains, contacts, first, last, column, span, law, dt):
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if odd else YIELDED if moves else 0.0
+        contacts.flag[c] = WAITS if odd else YIELDED if moves else 0
         _keep_record(contacts.lost, c, lost[0], lost[1], lost[2])
         waiting += 1.0 if odd else 0.0
         moved += 1.0 if moves else 0.0
@@ -132,7 +132,7 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
         column = np.uint64(0) if alike(contacts) else begin
         busy = 0.0
         for k in range(end - begin):
-            busy += 1.0 if contacts.flag[begin + k] > 0.0 else 0.0
+            busy += 1.0 if contacts.flag[begin + k] > 0 else 0.0
         if busy > BUSY * (end - begin) and not law.follow:
             part = _busy_pass(grains, contacts, begin, end, column, span, law, dt)
             waiting += part.waiting
