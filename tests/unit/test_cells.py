@@ -219,6 +219,48 @@ def test_a_listed_run_is_the_run_of_all_pairs():
     assert np.abs(ends[2] - ends[0]).max() < 1e-9 * 1e-8
 
 
+SEARCHES = {"cells": Neighbours("cells"), "list": Neighbours("cells", "2 nm"), "all pairs": Neighbours("all pairs")}
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+@pytest.mark.parametrize(
+    "lengths", [(None, None, None), (0.3e-6, 0.3e-6, 0.3e-6), (0.3e-6, None, 0.09e-6), (0.07e-6, 0.3e-6, 0.3e-6)]
+)
+def test_near_pairs_are_those_with_a_small_gap(search, lengths):
+    """Pairs with a gap below the smallest radius, each once, by brute force: of three radii, anywhere in the box."""
+    rng, box = np.random.default_rng(6), Box(lengths)
+    position = (rng.random((400, 3)) - 0.5) * [0.3e-6 if length is None else length for length in lengths]
+    radius = rng.choice([5e-9, 3.5e-9, 1e-8], 400)
+    chosen = [0]
+    for k in range(1, 400):  # none overlaps with one before it
+        gap = np.linalg.norm(box.nearest(position[chosen] - position[k]), axis=1) - radius[chosen] - radius[k]
+        chosen += [k] if gap.min() > 0.0 else []
+    grains = sand.Grains(position[chosen], radius[chosen], sand.SILICA)
+    sim = sand.Simulation(grains, [sand.Contact()], box=box, neighbours=SEARCHES[search])
+    sim.run(steps=1)
+    near, found = sim.world.near, int(sim.world.count[PAIRS])
+    apart = np.linalg.norm(box.nearest(grains.position[:, None] - grains.position[None]), axis=2)
+    close = apart < grains.radius[:, None] + grains.radius[None] + 3.5e-9
+    expected = {(i, j) for i, j in zip(*np.nonzero(close), strict=True) if j < i}
+    assert found == len(expected) > 10
+    assert {(i, j) for i, j in near.pair[:, :found].T.tolist()} == expected
+    assert (sim.world.far.mate.size > 1000) == (search == "list")
+
+
+def test_a_row_of_cells_may_need_more_room_than_there_is():
+    """Room for 16 neighbours of one grain is found to be too little, and grows: the same pairs."""
+    grains = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
+    once, short = (sand.Simulation(grains, [sand.Contact()], neighbours=Neighbours("cells")) for _ in range(2))
+    short.world.far = short.world.far._replace(mate=np.zeros(16, np.uint32))
+    for sim in (once, short):
+        sim.world.near.anchor[:] = np.inf
+        sim.run(steps=2)
+    assert short.world.far.mate.size > 16 and once.world.count[PAIRS] > 216
+    assert (
+        short.world.near.pair[:, : short.world.count[PAIRS]] == once.world.near.pair[:, : once.world.count[PAIRS]]
+    ).all()
+
+
 def test_near_pairs_have_the_step_of_their_own_contact():
     """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair are those of its bond, 1e-14."""
     rng = np.random.default_rng(4)
@@ -284,8 +326,11 @@ def test_an_aggregate_within_reach_of_itself_has_no_list(box):
 
 
 def test_a_margin_of_contacts_alone():
-    """Without a cut-off the list reaches r1 + r2 + r_min and the margin given, or r_min/2."""
-    for margin, said in (("auto", "margin 5 nm"), ("3 nm", "margin 3 nm")):
+    """Without a cut-off pairs are near up to r1 + r2 + r_min; a margin that is given makes a list that reaches it."""
+    for margin, said in (
+        ("auto", "cells, for pairs closer than 30 nm"),
+        ("3 nm", "closer than 33 nm (contacts 30 nm,"),
+    ):
         grains = sand.setup.gas(120, "1 um", radius="10 nm", material=sand.IRON, seed=1)
         sim = sand.Simulation(grains, [sand.Contact()], box="1 um", neighbours=Neighbours(margin=margin))
         assert said in sim.choices["neighbours"]

@@ -10,17 +10,18 @@ from sand.stepping.parts import SOON_PART
 from sand.stepping.rules import Stop
 
 
-def crowd(forces=None, **options):
-    """Sixty grains in a periodic box, listed, fast enough to make lists anew every few dozen steps."""
+def crowd(forces=None, margin="auto", **options):
+    """Sixty grains in a periodic box, in cells or listed, fast enough to make lists anew every few dozen steps."""
     box = sand.Box.periodic("0.16 um")
     moment = "100 A m^2/kg"
     grains = sand.setup.gas(60, box, radius=1e-8, material=sand.SILICA, temperature="3e4 K", seed=5, moment=moment)
     forces = forces or [sand.Contact()]
-    return sand.Simulation(grains, forces, box=box, neighbours=sand.Neighbours(search="cells"), seed=6, **options)
+    return sand.Simulation(grains, forces, box=box, neighbours=sand.Neighbours("cells", margin), seed=6, **options)
 
 
 WAYS = {
     "contacts": {},
+    "contacts, listed": {"margin": "5 nm"},
     "cycles and gas": {"forces": (sand.Contact(), sand.Dipoles(), sand.Gas("3e4 K", pressure="1 bar"))},
     "flights": {"stepping": sand.Adaptive()},
 }
@@ -45,7 +46,7 @@ def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(
 
 def test_no_grain_is_farther_than_its_leeway_allows():
     """Leeway + the largest displacement ≤ the limit of each list, after any number of steps; both speeds are exact."""
-    sim = crowd()
+    sim = crowd(margin="5 nm")
     control, search = sim._engine.rules.control, sim._engine.rules.search
     limits = {
         FAR_LEEWAY: ("far", "anchor", 0.5 * search.margin),

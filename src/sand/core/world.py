@@ -52,11 +52,11 @@ class ContactArrays(NamedTuple):
     formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
     bond: np.ndarray  # (K, C) constants of the contact law; where all contacts are alike (K, BLOCK), all the same
     lost: np.ndarray  # (L, C) energy it dissipated so far [J], the first 5 or all 7 channels of LOST_IN_CONTACTS
-    damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1
+    damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1; (0,) where nothing damps
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) uint8: 0, or what became of it where a limit was passed in this step: kernels.contacts.WAITS …
+    flag: np.ndarray  # (C,) uint8: 0, or what became of it where a limit was passed in this step: kernels.contacts
     bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
     side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
@@ -90,7 +90,7 @@ class FarArrays(NamedTuple):
     home: np.ndarray  # (N,) uint32: cell of each grain
     cell: np.ndarray  # (M+1,) uint32: first place of each cell
     here: np.ndarray  # (3, V) positions by place [m]; by grain where there is no list
-    source: np.ndarray  # (3, V) moments, or charges in the first row
+    source: np.ndarray  # (3, V) moments, or charges in the first row; (1, V) for cells alone
     force: np.ndarray  # (3, N) far forces [N]
     torque: np.ndarray  # (3, N) far torques [N m]
     held_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
@@ -105,10 +105,12 @@ class FarArrays(NamedTuple):
 
 KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
-FOR_LIST = ("anchor", "order", "start", "home", "cell", "here", "source")
+FOR_FORCES = ("force", "torque")
+FOR_CELLS = ("order", "home", "cell", "here", "source")
+FOR_LIST = ("anchor", "start", *FOR_CELLS)
 FOR_IMPULSES = ("held_force", "held_torque", "past_position", "path")
 FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
-"""The far arrays that only a list, or cycles of either kind, read and write."""
+"""The far arrays that only long-range forces, cells, a list, or cycles of either kind, read and write."""
 FOR_ALL = ("bond", "step", "length")
 """Numbers of contacts and near pairs that are the same for all where grains are equal."""
 PICKED = ("soon", "mark", "watch", "turn")
@@ -135,7 +137,8 @@ def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collect
     vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
     v = whole(grains)
-    vectors |= {"here": np.zeros((3, v)), "source": np.zeros((3, v)), "share": np.zeros((2 * blocks, 3, v))}
+    sources = 1 if "force" in needless else 3  # cells keep one number there
+    vectors |= {"here": np.zeros((3, v)), "source": np.zeros((sources, v)), "share": np.zeros((2 * blocks, 3, v))}
     sizes = {"order": grains, "start": grains + 1, "mate": max(int(capacity), 16), "home": grains}
     sizes["cell"] = CELLS_PER_GRAIN * grains + 28
     arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
@@ -146,7 +149,7 @@ def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = Fals
     """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
     c = whole(max(int(room), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
-    numbers = {k: np.zeros(c) for k in ("twist", "formed", "damped")}
+    numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS else 0)}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         bond=np.zeros((constants, BLOCK if alike else c)),
@@ -162,8 +165,7 @@ def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = Fals
 
 def near_pairs(grains: int, capacity: int, *, alike: bool = False) -> NearPairs:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
-    p = whole(max(int(capacity), 16))
-    nowhere = np.full((3, grains), np.inf)
+    p, nowhere = whole(max(int(capacity), 16)), np.full((3, grains), np.inf)
     pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p, np.uint32)
     kind = np.zeros((2, 1 if alike else p))
     return NearPairs(pair, touching, kind[0], kind[1], nowhere, soon, nowhere.copy(), np.full(6, -1.0))
@@ -270,7 +272,7 @@ class World:
             _take(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "near"):
             for name, array in getattr(self, group)._asdict().items():
-                if name in PICKED:
+                if name in PICKED or (name == "damped" and not array.size):
                     continue
                 key, n = f"{group}/{name}", self._columns(group, name)
                 if name in self._for_all() and key in saved:  # format 1 has the same numbers for each, if any

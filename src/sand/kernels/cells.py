@@ -26,9 +26,10 @@ ROUNDING = 1e-6
 class Search(NamedTuple):
     """How neighbours are found."""
 
-    listed: bool  # False: all pairs, no list
+    listed: bool  # is there a list for long-range forces? The near pairs are picked out of it
     reach: float  # pairs closer than this are listed [m]
     margin: float  # part of the reach that grains may move before the list is made anew, Δr [m]
+    celled: bool = False  # near pairs come from cells, without any other list; neither: out of all pairs
 
 
 class Grid(NamedTuple):
@@ -102,25 +103,25 @@ def cell_at(x, number):
 
 
 @loop
-def sort_into_cells(far, span, grid):
+def sort_into_cells(far, anchor, span, grid):
     """Fill `home`, `cell`, `order` and `here`: grains by cell, in each cell by number."""
     nx, ny, nz = grid.counts
     total = nx * ny * nz
     for c in range(total + 1):
         far.cell[c] = 0
-    for i in range(far.anchor.shape[1]):
-        x = in_cells(grid, nearest_image(load(far.anchor, i), span))
+    for i in range(anchor.shape[1]):
+        x = in_cells(grid, nearest_image(load(anchor, i), span))
         home = (cell_at(x[2], nz) * ny + cell_at(x[1], ny)) * nx + cell_at(x[0], nx)
         far.home[i] = home
         far.cell[home + 1] += 1
     for c in range(total):
         far.cell[c + 1] += far.cell[c]
     # each `cell[c]` serves as the place of its next grain, and is put back afterwards
-    for i in range(far.anchor.shape[1]):
+    for i in range(anchor.shape[1]):
         home = far.home[i]
         s = far.cell[home]
         far.order[s] = i
-        put(far.here, s, nearest_image(load(far.anchor, i), span))
+        put(far.here, s, nearest_image(load(anchor, i), span))
         far.cell[home] += 1
     for k in range(total):
         c = total - k
@@ -195,33 +196,51 @@ def list_row(far, grid, span, limit, s, x, row, left, found):
 
 
 @rare
+def grid_of(far, anchor, span, reach):
+    """Cells for these anchors, and the grains sorted into them."""
+    grid = grid_for(anchor, span, reach)
+    sort_into_cells(far, anchor, span, grid)
+    return grid
+
+
+@rare
+def list_place(far, grid, span, reach, s, found):
+    """Append the places closer than the reach to place s, from mate[found] on; where they end, or FULL.
+
+    `here` and the first row of `source` serve meanwhile: anchors by place, and distances.
+    """
+    nx, ny, nz = grid.counts
+    widest = (1.0 + SLACK) * reach * reach
+    x = in_cells(grid, load(far.here, s))
+    cy, cz = cell_at(x[1], ny), cell_at(x[2], nz)
+    for step in range(9):
+        dy, dz = step % 3 - 1, step // 3 - 1
+        ty = neighbour_on_axis(cy, dy, ny, span.y > 0.0)
+        tz = neighbour_on_axis(cz, dz, nz, span.z > 0.0)
+        gap_y, gap_z = gap_on_axis(x[1], cy, dy, grid.width_y), gap_on_axis(x[2], cz, dz, grid.width_z)
+        left = widest - gap_y * gap_y - gap_z * gap_z
+        if ty >= 0 and tz >= 0 and left > 0.0:
+            row = (tz * ny + ty) * nx
+            found = list_row(far, grid, span, reach * reach, s, x[0], row, left, found)
+            if found == FULL:
+                return FULL
+    return found
+
+
+@rare
 def rows_from_anchors(far, span, reach):
     """Order, rows and mates from the anchors alone; the number of entries, or FULL.
 
-    `here` and the first row of `source` serve meanwhile: anchors by place, and distances.  A row of `mate` needs
-    nothing of the rows before it but the place where it begins: blocks of places can be listed apart, each with
-    room for distances of its own, and be put together in their order.
+    A row of `mate` needs nothing of the rows before it but the place where it begins: blocks of places can be listed
+    apart, each with room for distances of its own, and be put together in their order.
     """
-    grid = grid_for(far.anchor, span, reach)
-    sort_into_cells(far, span, grid)
-    nx, ny, nz = grid.counts
-    widest = (1.0 + SLACK) * reach * reach
+    grid = grid_of(far, far.anchor, span, reach)
     found = 0
     far.start[0] = 0
     for s in range(far.anchor.shape[1]):
-        x = in_cells(grid, load(far.here, s))
-        cy, cz = cell_at(x[1], ny), cell_at(x[2], nz)
-        for step in range(9):
-            dy, dz = step % 3 - 1, step // 3 - 1
-            ty = neighbour_on_axis(cy, dy, ny, span.y > 0.0)
-            tz = neighbour_on_axis(cz, dz, nz, span.z > 0.0)
-            gap_y, gap_z = gap_on_axis(x[1], cy, dy, grid.width_y), gap_on_axis(x[2], cz, dz, grid.width_z)
-            left = widest - gap_y * gap_y - gap_z * gap_z
-            if ty >= 0 and tz >= 0 and left > 0.0:
-                row = (tz * ny + ty) * nx
-                found = list_row(far, grid, span, reach * reach, s, x[0], row, left, found)
-                if found == FULL:
-                    return FULL
+        found = list_place(far, grid, span, reach, s, found)
+        if found == FULL:
+            return FULL
         far.start[s + 1] = found
     return found
 

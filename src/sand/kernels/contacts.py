@@ -33,6 +33,12 @@ def bond_at(contacts, c):
 
 
 @loop
+def damping_at(contacts, c):
+    """The damping force [N] of contact c, along n on grain 1."""
+    return contacts.damped[c] if contacts.damped.size > 0 else 0.0
+
+
+@loop
 def bond_in(b, c):
     """Column c of a (K, …) array of constants."""
     return law_of.Bond(

@@ -25,7 +25,7 @@ from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.impact import speed_gained
 from ..physics.rotation import turned_back
-from .contacts import BROKE, WAITS, alike, bond_at, pose_at, write_loads
+from .contacts import BROKE, WAITS, alike, bond_at, damping_at, pose_at, write_loads
 from .moving import strain_before
 from .neighbours import bond_of, forget_touch
 
@@ -44,6 +44,13 @@ def book_yielding(own, lost, c, energies):
     book(own, lost, c, SLIDING, energies[0])
     book(own, lost, c, ROLLING, energies[1])
     book(own, lost, c, TWISTING, energies[2])
+
+
+@loop
+def keep_damping(contacts, c, force):
+    """Remember the damping force [N] of contact c, where there is any."""
+    if contacts.damped.size > 0:
+        contacts.damped[c] = force
 
 
 @rare
@@ -66,8 +73,8 @@ def damp(grains, contacts, span, c, dt):
     force = law_of.damping_force(overlap, y, closing, bond)
     accrue(contacts.push, c, scale(force, n))
     earlier = axpy(-dt, moving, apart)
-    before = contacts.damped[c] / math.sqrt(dot(earlier, earlier))
-    contacts.damped[c] = force
+    before = damping_at(contacts, c) / math.sqrt(dot(earlier, earlier))
+    keep_damping(contacts, c, force)
     return -0.5 * dt * (before * dot(earlier, moving) + force * dot(n, moving))
 
 
@@ -118,16 +125,16 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     late = -bond.break_overlap - overlap
     since = min(late / opening, dt) if opening > 0.0 else 0.0
     energy, force = law_of.breaking(bond)
-    knock(grains, i, j, pose.n, (force + contacts.damped[c]) * (0.5 * dt - since))
+    knock(grains, i, j, pose.n, (force + damping_at(contacts, c)) * (0.5 * dt - since))
     book(contacts.lost, lost, c, BREAKING, energy)
     # the damping force acted until the break: half a step by Verlet, the rest by the impulse
-    book(contacts.lost, lost, c, DAMPING, -contacts.damped[c] * opening * (dt - since))
+    book(contacts.lost, lost, c, DAMPING, -damping_at(contacts, c) * opening * (dt - since))
     count[BROKEN] += 1
     contacts.flag[c] = BROKE
     put(contacts.push, c, (0.0, 0.0, 0.0))
     put(contacts.torque1, c, (0.0, 0.0, 0.0))
     put(contacts.torque2, c, (0.0, 0.0, 0.0))
-    contacts.damped[c] = 0.0
+    keep_damping(contacts, c, 0.0)
     forget_touch(near, count, i, j)
 
 
@@ -189,7 +196,7 @@ def drop_broken(contacts, count):
                     contacts.bond[row, kept] = contacts.bond[row, c]
             for row in range(contacts.lost.shape[0]):
                 contacts.lost[row, kept] = contacts.lost[row, c]
-            contacts.damped[kept] = contacts.damped[c]
+            keep_damping(contacts, kept, damping_at(contacts, c))
             contacts.twist[kept] = contacts.twist[c]
             contacts.formed[kept] = contacts.formed[c]
             contacts.flag[kept] = contacts.flag[c]
@@ -227,7 +234,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     contacts.formed[c] = formed
     contacts.flag[c] = 0
     contacts.bonded[c] = 0
-    contacts.damped[c] = 0.0
+    keep_damping(contacts, c, 0.0)
     for row in range(contacts.lost.shape[0]):
         contacts.lost[row, c] = 0.0
     bond = bond_of(grains, law.pairings, i, j)
@@ -262,11 +269,11 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
         c = add_contact(grains, contacts, count, span, law, i, j, clock[TIME] + dt - since)
         if law.damped:
             damp(grains, contacts, span, c, 0.0)
-            book(contacts.lost, lost, c, DAMPING, contacts.damped[c] * closing * since)
+            book(contacts.lost, lost, c, DAMPING, damping_at(contacts, c) * closing * since)
         reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
         # a step of 0 s finds what touches already
         gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts, c), dt) if dt > 0.0 else 0.0
-        owed = contacts.damped[c] * since - reduced * gain
+        owed = damping_at(contacts, c) * since - reduced * gain
         knock(grains, i, j, n, owed - 0.5 * dt * dot(load(contacts.push, c), n))
         book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts, c)))
         near.touching[p] = 1

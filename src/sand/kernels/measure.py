@@ -5,7 +5,7 @@ from ..core.vec import across, axpy, dot, load, norm
 from ..core.world import CONTACTS
 from ..physics import adhesion
 from ..physics import contact as law_of
-from .contacts import bond_at, pose_at
+from .contacts import bond_at, damping_at, pose_at
 
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
 
@@ -85,14 +85,14 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         out[6, c] = slide / bond.slide_limit if bond.slide_limit > 0.0 else 0.0
         out[7, c] = roll / bond.roll_limit
         out[8, c] = abs(strain.twist) / bond.twist_limit
-        out[9, c] = law_of.normal_force(overlap, y, bond) + contacts.damped[c]
+        out[9, c] = law_of.normal_force(overlap, y, bond) + damping_at(contacts, c)
         out[10, c] = bond.slide_stiffness * slide
         out[11, c] = bond.reduced_radius * bond.roll_stiffness * roll
         out[12, c] = -bond.twist_stiffness * strain.twist
         for mode in range(4):
             out[13 + mode, c] = stored[mode]
         push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, bond)
-        push = axpy(contacts.damped[c], pose.n, push)
+        push = axpy(damping_at(contacts, c), pose.n, push)
         for axis in range(3):
             out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = push[axis], torque1[axis], torque2[axis]
             out[17 + axis, c] = strain.slide[axis]

@@ -10,7 +10,7 @@ from ..core.jit import loop, rare
 from ..core.vec import dot, load, put, sub
 from ..core.world import PAIRS, REBUILT, SOON, SOON_LEEWAY
 from ..physics.contact import Pairing, bond_between
-from .cells import FULL
+from .cells import FULL, Grid, grid_of, list_place
 from .kinds import kind_at
 
 
@@ -56,6 +56,9 @@ class Kind(NamedTuple):
     length: Any  # δ at which it breaks [m]
 
 
+ROW_FULL = -2
+"""Answer of the maker of the list of near pairs when there is no room for the neighbours of one grain."""
+NO_GRID = Grid((0, 0, 0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 0.0, 0.0)
 NO_GRAIN = (np.uint32(0), -1.0, -1.0)
 NO_KIND = Kind((NO_GRAIN, NO_GRAIN), 0.0, 0.0)
 
@@ -84,18 +87,33 @@ def are_near(grains, span, reach, i, j):
     return dot(apart, apart) < limit * limit
 
 
-@rare
-def make_near_list(grains, contacts, near, far, count, span, reach, law, listed):
-    """List the pairs with a gap below `reach` [m], out of all pairs or out of those listed already (`far`).
+@loop
+def candidates(far, grid, span, search, k):
+    """Where in `mate` the places stand that may be near place k; the numbers themselves where there are no places."""
+    if search.celled:
+        end = list_place(far, grid, span, search.reach, k, 0)
+        return np.int64(0), np.int64(end)
+    if search.listed:
+        return np.int64(far.start[k]), np.int64(far.start[k + 1])
+    return np.int64(0), np.int64(k)
 
-    FULL if there is no room.
+
+@rare
+def make_near_list(grains, contacts, near, far, count, span, reach, law, search):
+    """List the pairs with a gap below `reach` [m], out of all pairs, of those listed already (`far`), or from cells.
+
+    FULL if there is no room; ROW_FULL if the neighbours of one grain need more.
     """
     found, kind = 0, NO_KIND
+    placed = search.celled or search.listed
+    grid = grid_of(far, grains.position, span, search.reach) if search.celled and law.on else NO_GRID
     for k in range(grains.mass.size if law.on else 0):
-        first, last = (far.start[k], far.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
-        i = far.order[k] if listed else np.uint32(k)
+        first, last = candidates(far, grid, span, search, k)
+        if last == FULL:
+            return ROW_FULL
+        i = far.order[k] if placed else np.uint32(k)
         for m in range(first, last):
-            j = far.order[far.mate[m]] if listed else np.uint32(m)
+            j = far.order[far.mate[m]] if placed else np.uint32(m)
             if j < i and are_near(grains, span, reach, i, j):
                 if found == near.pair.shape[1]:
                     return FULL

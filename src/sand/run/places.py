@@ -53,7 +53,7 @@ def sort_columns(world: World) -> None:
         pair = arrays.pair[:, : world.count[used]]
         by = np.lexsort((pair[1], pair[0]))
         for name, columns in arrays._asdict().items():
-            if name not in NOT_OF_PAIRS and not (world.alike and name in FOR_ALL):
+            if columns.size and name not in NOT_OF_PAIRS and not (world.alike and name in FOR_ALL):
                 columns[..., : by.size] = columns[..., by]
     resort_sides(world.contacts, world.count, len(world.grains))
     world.near.mark[0, 0] = np.inf  # those that may touch soon are picked anew

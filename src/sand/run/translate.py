@@ -13,6 +13,8 @@ from ..core.material import SILICA
 from ..core.stages import stage_arrays
 from ..core.world import (
     ALWAYS,
+    FOR_CELLS,
+    FOR_FORCES,
     FOR_IMPULSES,
     FOR_LIST,
     FOR_RATES,
@@ -43,6 +45,8 @@ SPARE = 1.1
 """Room for contacts and near pairs to begin with, in pairs that touch at the start; it grows when needed."""
 MATES = 4
 """Room per grain for neighbours in the list, likewise."""
+IN_REACH = 1000
+"""Room for the neighbours of one grain, where they are forgotten once those that may touch are picked."""
 WIDE_FROM = 64
 """Fewest grains for the longest vectors: of less, much is left over that fills none."""
 IDLE = 1e5
@@ -162,9 +166,11 @@ def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all
     count, listed, alike = len(grains), rules.search.listed, rules.contact.alike
     channels = len(LOST_IN_CONTACTS) if rules.contact.damped or rules.contact.follow else ALWAYS
     blocks = all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0
-    needed = {*(FOR_LIST if listed else ()), *(FOR_IMPULSES if plan.impulse else ())}
+    needed = set(FOR_LIST if listed else FOR_CELLS if rules.search.celled else ())
+    needed |= set(FOR_IMPULSES if plan.impulse else ())
     needed |= set(FOR_RATES if plan.foretell else ())
     needed |= {"here", "source"} if blocks else set()
+    needed |= set(FOR_FORCES if plan.far is not NO_FAR_FORCE or plan.adaptive else ())
     return World(
         grains,
         box,
@@ -172,9 +178,9 @@ def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all
         near_pairs(count, room, alike=alike),
         far_arrays(
             count,
-            MATES * count if listed else 0,
+            MATES * count if listed else IN_REACH if rules.search.celled else 0,
             blocks,
-            needless={*FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
+            needless={*FOR_FORCES, *FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
         ),
         stages=stage_arrays(count if plan.adaptive else 0),
         alike=alike,

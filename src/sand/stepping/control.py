@@ -93,7 +93,9 @@ def grain_step(grains, far, start, control, i):
     spin = SPIN_ANGLE / turning if turning > 0.0 else math.inf
     inertia = grains.inertia[i]
     swing = field_step(load(grains.moment, i), load(grains.field, i), control.outer_field, inertia)
-    own = load_step(load(far.force, i), load(far.torque, i), grains.mass[i], inertia, control)
+    own = math.inf
+    if far.force.shape[1] > 0:  # else there is no such force
+        own = load_step(load(far.force, i), load(far.torque, i), grains.mass[i], inertia, control)
     bound = start[i + 1] != start[i]
     own = math.inf if bound else own
     cycle = min(min(spin, swing), own)

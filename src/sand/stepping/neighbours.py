@@ -58,8 +58,9 @@ class Neighbours:
             "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if at the start no
             more than 0.4 of the others are within reach of a grain, on average.
         margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
-            the list limits the steps (Runge–Kutta), or half the smallest radius where no force has one. The list is
-            made anew when a grain is more than Δr/2 from where it was; a wide margin makes long but lasting lists.
+            the list limits the steps (Runge–Kutta). The list is made anew when a grain is more than Δr/2 from where
+            it was; a wide margin makes long but lasting lists. Where no force has a cut-off, "auto" makes none but
+            that of the pairs that may touch soon, straight from the cells.
         order: where grains stand in memory while steps are taken; "curve": along one that fills space, made anew every
             2000 steps, so that neighbours are close; "as given": by their numbers; "auto": along a curve from
             10,000 grains on. All that is looked at or written has the numbers of the start.
@@ -101,7 +102,7 @@ class Neighbours:
     def settled(self, search: Search, count: int) -> Neighbours:
         """What was chosen, so that a run that goes on from elsewhere chooses the same."""
         order = "curve" if self.along_curve(count) else "as given"
-        return Neighbours("cells" if search.listed else "all pairs", search.margin, order)
+        return Neighbours("cells" if search.listed or search.celled else "all pairs", search.margin, order)
 
     def choose(
         self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, flights: bool = False
@@ -119,7 +120,8 @@ class Neighbours:
         margin = self.margin
         if margin == "auto":
             margin = (MARGIN_OF_FLIGHTS if flights else MARGIN) * widest if widest > 0.0 else 0.5 * reach
-        whole = max(widest, touch) + margin
+        celled = widest == 0.0 and self.margin == "auto" and not flights
+        whole = touch if celled else max(widest, touch) + margin
         nothing = Search(False, whole, margin)
         if self.search == "all pairs":
             return Found(nothing, "all pairs, asked for")
@@ -130,6 +132,9 @@ class Neighbours:
             if share > LIST_UP_TO:
                 held = f"a grain has {share:.2g} of the others within {spoken(whole, 'm')}, more than {LIST_UP_TO}"
                 return Found(nothing, f"all pairs: {held}")
+        if celled:
+            near = spoken(whole, "m")
+            return Found(Search(False, whole, margin, True), f"cells, for pairs closer than {near} (contacts)")
         purpose = f"cut-off {spoken(widest, 'm')}" if widest > touch else f"contacts {spoken(touch, 'm')}"
         return Found(
             Search(True, whole, margin),

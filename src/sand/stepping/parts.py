@@ -32,7 +32,7 @@ from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
 from ..kernels.gathering import sort_sides
 from ..kernels.motion import kick_and_drift_for
-from ..kernels.neighbours import list_soon, make_near_list
+from ..kernels.neighbours import ROW_FULL, list_soon, make_near_list
 from ..kernels.outside import outside_energy, outside_loads, outside_wrap
 from ..kernels.watch import is_stale, look_up_harmless, look_up_speeds
 from .control import CHECK_EVERY, choose_step, name_culprits
@@ -109,9 +109,11 @@ def update_lists(grains, contacts, near, far, count, rules):
     if old and make_far_list(grains, far, count, span, search) == FULL:
         return Stop.LIST_FULL, stale
     if stale:
-        made = make_near_list(grains, contacts, near, far, count, span, reach, rules.contact, search.listed)
+        made = make_near_list(grains, contacts, near, far, count, span, reach, rules.contact, search)
         if made == FULL:
             return Stop.PAIRS_FULL, stale
+        if made == ROW_FULL:
+            return Stop.LIST_FULL, stale
         look_up_harmless(near, count)
     if rules.contact.on and (stale or is_stale(grains, near.mark, span, SOON_PART * reach, near.watch, SOON_LEEWAY)):
         list_soon(grains, near, count, span, 2.0 * SOON_PART * reach)
