@@ -261,6 +261,18 @@ def test_a_row_of_cells_may_need_more_room_than_there_is():
     ).all()
 
 
+@pytest.mark.parametrize("search", SEARCHES)
+def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
+    """A lattice whose grains touch nothing has room for 16 pairs; its 540 are counted, and get a tenth to spare."""
+    block = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
+    grains = sand.Grains(1.2 * block.position, 1e-8, sand.SILICA)
+    sim = sand.Simulation(grains, [sand.Contact()], neighbours=SEARCHES[search])
+    assert sim.world.near.pair.shape[1] == 16
+    sim.run(steps=1)
+    assert sim.world.count[PAIRS] == 3 * 6 * 6 * 5  # a gap of 4 nm along the edges of the cubes, 14 nm across
+    assert 540 * 1.1 <= sim.world.near.pair.shape[1] < 540 * 1.12
+
+
 def test_near_pairs_have_the_step_of_their_own_contact():
     """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair are those of its bond, 1e-14."""
     rng = np.random.default_rng(4)

@@ -121,8 +121,8 @@ TURNS_FROM = 4000
 """Fewest grains for which the gathering has an order of its own; what fewer have, the branch predictor learns."""
 BLOCK = 128
 """Contacts that are passed over together, whole vectors of them."""
-GROWTH = 1.25
-"""Longer arrays are longer by this factor."""
+SPARE, GROWTH = 1.1, 1.25
+"""Room for what is known to come, contacts at the start or pairs of a list; longer arrays are longer by the second."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 

@@ -102,9 +102,10 @@ def candidates(far, grid, span, search, k):
 def make_near_list(grains, contacts, near, far, count, span, reach, law, search):
     """List the pairs with a gap below `reach` [m], out of all pairs, of those listed already (`far`), or from cells.
 
-    FULL if there is no room; ROW_FULL if the neighbours of one grain need more.
+    FULL if there is no room: then count[PAIRS] says for how many there should be.  ROW_FULL if the neighbours of one
+    grain need more.
     """
-    found, kind = 0, NO_KIND
+    found, kind, room = 0, NO_KIND, near.pair.shape[1]
     placed = search.celled or search.listed
     grid = grid_of(far, grains.position, span, search.reach) if search.celled and law.on else NO_GRID
     for k in range(grains.mass.size if law.on else 0):
@@ -115,17 +116,18 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, search)
         for m in range(first, last):
             j = far.order[far.mate[m]] if placed else np.uint32(m)
             if j < i and are_near(grains, span, reach, i, j):
-                if found == near.pair.shape[1]:
-                    return FULL
-                kind = kind_of(grains, law, i, j, kind)
-                near.pair[0, found], near.pair[1, found] = i, j
-                near.touching[found] = 1 if in_contact(contacts, i, j) else 0
-                own = kind_at(near, found)
-                near.step[own], near.length[own] = kind.step, kind.length
+                if found < room:
+                    kind = kind_of(grains, law, i, j, kind)
+                    near.pair[0, found], near.pair[1, found] = i, j
+                    near.touching[found] = 1 if in_contact(contacts, i, j) else 0
+                    own = kind_at(near, found)
+                    near.step[own], near.length[own] = kind.step, kind.length
                 found += 1
+    count[PAIRS] = found
+    if found > room:
+        return FULL
     for i in range(grains.mass.size):
         put(near.anchor, i, load(grains.position, i))
-    count[PAIRS] = found
     count[REBUILT] += 1
     return found
 

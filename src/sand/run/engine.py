@@ -20,6 +20,8 @@ from ..core.world import (
     MADE,
     MOVED,
     ORDERED,
+    PAIRS,
+    SPARE,
     STAGE,
     STEPS,
     World,
@@ -142,7 +144,7 @@ class Engine:
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
-                w.grow_pairs()
+                w.grow_pairs(int(SPARE * w.count[PAIRS]))
             elif stop is Stop.LIST_FULL:
                 w.grow_rows()
             else:

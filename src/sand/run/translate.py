@@ -19,6 +19,7 @@ from ..core.world import (
     FOR_LIST,
     FOR_RATES,
     LOST_IN_CONTACTS,
+    SPARE,
     World,
     contact_arrays,
     far_arrays,
@@ -41,8 +42,6 @@ from ..stepping.verlet import Verlet
 from .engine import Engine
 from .first_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
 
-SPARE = 1.1
-"""Room for contacts and near pairs to begin with, in pairs that touch at the start; it grows when needed."""
 MATES = 4
 """Room per grain for neighbours in the list, likewise."""
 IN_REACH = 1000
