@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .jit import LONG_VECTORS, formula
+from .jit import formula
 
 _SINGLE = np.float32
 _ONE = np.float32(1.0)
@@ -18,7 +18,7 @@ def exact_inverse_root(x):
 
 @formula
 def seeded_inverse_root(x):
-    """1/√x to rounding for 1e-37 < x < 1e37; what is farther out comes to nothing useful.
+    """1/√x to rounding for 1e-37 < x < 1e37, and nothing useful farther out; faster in loops of 512-bit vectors.
 
     Single precision has 1/√x to 1e-6 at least, without the divider.  With e = 1 − x y², 1/√x = y (1 − e)^(−1/2), of
     which three terms leave 5/16 e³.
@@ -26,7 +26,3 @@ def seeded_inverse_root(x):
     y = float(_ONE / math.sqrt(_SINGLE(x)))
     e = 1.0 - x * y * y
     return y + y * e * (0.5 + 0.375 * e)
-
-
-inverse_root = seeded_inverse_root if LONG_VECTORS else exact_inverse_root
-"""The one that is faster in loops that are done as vectors; alone, the exact one is faster everywhere."""

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.box import nearest_image
-from ..core.jit import formula, loop
-from ..core.roots import inverse_root
+from ..core.jit import LONG_VECTORS, formula, loop
+from ..core.roots import seeded_inverse_root
 from ..core.vec import accrue, add, cross, dot, load, put, sub
-from ..physics.dipole import pair_load_at, pair_load_cut
+from ..physics.dipole import pair_load, pair_load_at, pair_load_cut
 from ..physics.dipole_rates import pair_rates
 from .sums import FarSums, Parts, all_blocks
 from .vectors import filled_up
@@ -175,8 +175,14 @@ def apart_if(real, apart):
 @loop
 def bare_pair(here, there, span, mine, other, rules, real):
     """Loads of a pair in an open box without a cut-off; none if it is not `real`."""
+    return pair_load(apart_if(real, sub(here, there)), mine, other, rules.k if real else 0.0)
+
+
+@loop
+def seeded_pair(here, there, span, mine, other, rules, real):
+    """The same, with 1/r from a seed."""
     apart = apart_if(real, sub(here, there))
-    return pair_load_at(apart, inverse_root(dot(apart, apart)), mine, other, rules.k if real else 0.0)
+    return pair_load_at(apart, seeded_inverse_root(dot(apart, apart)), mine, other, rules.k if real else 0.0)
 
 
 @loop
@@ -269,7 +275,7 @@ def all_pairs(pair_loads: Callable) -> FarSums:
     return FarSums(loads, cut_rates, energy_shares, loads_of_pair, parts)
 
 
-BARE = all_pairs(bare_pair)
+BARE = all_pairs(bare_pair)._replace(many=all_pairs(seeded_pair) if LONG_VECTORS else None)
 CUT = all_pairs(cut_pair)
 LISTED = FarSums(
     listed_loads,

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..core.jit import kernel, loop
 from ..core.vec import add
@@ -52,6 +52,7 @@ class FarSums(NamedTuple):
     energies: Callable  # adds half the energy of each pair to each grain's entry of a fifth argument, (N,)
     pair: Callable  # (grains, span, numbers, i, j): force on i, torques on i and on j, of one pair
     shared: Parts | None = None  # for threads; None: `loads` is done by one
+    many: Any = None  # the same sums by loops that are faster for many grains; None: by these
 
     @property
     def parts(self) -> Parts:

@@ -129,7 +129,10 @@ def build_engine(
 
 def _far(given: Given, grains: Grains, box: Box, listed: Sequence[bool]) -> list[tuple[FarForce, FarSums, Any]]:
     """Each long-range force with its loops and numbers."""
-    return [(f, f.sums(box, own), f.numbers(grains, box)) for f, own in zip(given.distant, listed, strict=True)]
+    sums = [force.sums(box, own) for force, own in zip(given.distant, listed, strict=True)]
+    if len(grains) >= WIDE_FROM:
+        sums = [own.many or own for own in sums]
+    return [(f, own, f.numbers(grains, box)) for f, own in zip(given.distant, sums, strict=True)]
 
 
 def _given(forces: Sequence[Force], grains: Grains) -> Given:
