@@ -11,7 +11,7 @@ from sand.core import threads
 from sand.core.errors import BadInput
 from sand.core.world import CONTACTS, MOVED
 from sand.run import engine, translate
-from sand.stepping.crew import INSIDE, LEAVE, WORD, crew_for, is_large, new_crew
+from sand.stepping.crew import INSIDE, LEAVE, TASK, WORD, crew_for, is_large, new_crew
 
 pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
 
@@ -80,7 +80,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     sim.run(steps=1)
     before, world = state(sim), sim.world
     crew = new_crew(len(world.grains), world.contacts.flag.size)
-    crew.board[WORD] = LEAVE << 48
+    crew.board[WORD] = LEAVE << TASK
     rules = sim._engine.rules._replace(crew=crew)
     crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)
     assert crew.board[INSIDE] == 0
@@ -106,7 +106,7 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     sim._engine._advance = fails
     with pytest.raises(RuntimeError, match="broken"):
         sim._engine.advance(1.0, 1)
-    assert boards[-1].board[WORD] == LEAVE << 48
+    assert boards[-1].board[WORD] == LEAVE << TASK
     assert boards[-1].board[INSIDE] == 0
     sim._engine._advance = works
     sim.run(steps=1)

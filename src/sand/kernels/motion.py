@@ -6,13 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..core.box import nearest_image
+from ..core.box import Span, nearest_image
 from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.vec import axpy, dot, load, load4, put, put4, scale
 from ..physics.rotation import turn, turned
 from .gathering import BLOCK, gather
 
+OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A box without walls, for moves that are wrapped later."""
 AT_ONCE = np.uint64(4 * BLOCK)
 """Grains whose loads are gathered before they are kicked, whole blocks; their forces stay in the first cache."""
 
@@ -67,21 +69,38 @@ def _no_moment(grains, i, q):
 
 
 @functools.cache
-def kick_and_drift_for(magnetic: bool) -> Callable:
+def drift_for(magnetic: bool) -> Callable:
     """The loop of the first half of a step, with moments that turn with their grains or without any."""
     follow = _moment_follows if magnetic else _no_moment
 
     @loop
-    def kick_and_drift(grains, span, dt):
-        """Kick for dt/2; then x += v dt, wrapped into its box, ϱ turned by ω dt; returns the longest way [m]."""
+    def drift_some(grains, first, last, span, dt):
+        """Grains first…last − 1 (uint64): kick for dt/2; x += v dt, wrapped into its box, ϱ turned by ω dt.
+
+        Returns the rank of the largest square of a speed.
+        """
         fastest = rank(0.0)
-        for i in range(grains.mass.size):
+        for k in range(last - first):
+            i = first + k
             v, w = kicked(grains, i, 0.5 * dt)
             fastest = max(fastest, rank_for_most(dot(v, v)))
             put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
             q = turn(load4(grains.orientation, i), scale(dt, w))
             put4(grains.orientation, i, q)
             follow(grains, i, q)
+        return fastest
+
+    return drift_some
+
+
+@functools.cache
+def kick_and_drift_for(magnetic: bool) -> Callable:
+    """The same for all grains; returns the longest way [m]."""
+    drift_some = drift_for(magnetic)
+
+    @loop
+    def kick_and_drift(grains, span, dt):
+        fastest = drift_some(grains, np.uint64(0), np.uint64(grains.mass.size), span, dt)
         return dt * math.sqrt(ranked(fastest))
 
     return kick_and_drift

@@ -25,6 +25,7 @@ from ..kernels.far import (
     renew_held_loads,
 )
 from ..kernels.motion import kick
+from ..kernels.outside import outside_loads
 from ..kernels.sums import NO_FAR_FORCE
 from ..kernels.watch import begin_watch, forget_speeds, spend
 from .control import cycle_steps
@@ -32,9 +33,9 @@ from .crew import dismiss, nobody_to_dismiss
 from .large import large_loops
 from .parts import (
     bury_broken,
+    drift_booked_for,
     no_gas,
     no_rates,
-    outside_loops,
     possible_step,
     rates_loop,
     stir_gas,
@@ -126,8 +127,8 @@ _NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
 @functools.cache
 def loads_loop(plan: Plan) -> Callable:
     """The loop that sums forces and torques at the end of a step: the far ones if `due`, else what stands for them."""
-    add_outside, _ = outside_loops(plan.outside, plan.magnetic)
-    _, gather_all, _, far_loads = large_loops(plan)
+    add_outside = outside_loads(plan.outside)
+    gather_all, far_loads = large_loops(plan).gather, large_loops(plan).far_loads
     between = add_foretold_loads if plan.foretell else add_held_loads if plan.impulse else _nothing_between
     take_out_bonded = bonded_loops(plan.far.pair)[1] if plan.split else _no_change
 
@@ -157,7 +158,7 @@ def loads_loop(plan: Plan) -> Callable:
 def loads_and_kick_loop(plan: Plan) -> Callable:
     """The loop for the end of a step: `loads_loop`, and the kick for its second half; returns what `kick` does."""
     sum_loads = loads_loop(plan)
-    _, _, gather_and_kick_all, _ = large_loops(plan)
+    gather_and_kick_all = large_loops(plan).gather_and_kick
 
     @loop
     def bare_loads_and_kick(grains, contacts, far, clock, count, rules, due, elapsed):
@@ -178,9 +179,9 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
 
     The second half of a step of 0 s finds the pairs and the contacts that are there and works out the loads.
     """
-    _, kick_and_drift_booked = outside_loops(plan.outside, plan.magnetic)
+    drift_booked = drift_booked_for(plan.outside, large_loops(plan).drift)
     sum_loads, loads_and_kick = loads_loop(plan), loads_and_kick_loop(plan)
-    pass_contacts, _, _, _ = large_loops(plan)
+    pass_contacts = large_loops(plan).pass_contacts
     set_rates = rates_loop(plan.far.rates) if plan.foretell else no_rates
     add_bonded, _, change_sides = bonded_loops(plan.far.pair) if plan.split else (_no_bonded, None, _no_change)
     begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
@@ -213,7 +214,7 @@ def halves_for(plan: Plan) -> tuple[Callable, Callable]:
             begin(grains, far, clock, dt)
         else:
             inside(grains, far, rules.span, clock, dt)
-        spend(near, kick_and_drift_booked(grains, clock, lost, rules, dt))
+        spend(near, drift_booked(grains, contacts, far, clock, count, lost, rules, dt))
         clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
         clock[STEP] = dt
         count[STAGE] = 1

@@ -1,8 +1,9 @@
 """A crew: threads that take parts of a step's large loops; who takes which changes no bit of the result.
 
-A loop is cut into blocks, by the size of the problem alone.  Whoever is free takes the next block from the board,
-the driver's own thread like all others, and each block is done by the same compiled function.  A helper that comes
-late, or that the system puts aside, only does less.
+A loop is cut into blocks, by the size of the problem alone, and each block is done by the same compiled function.  The
+driver's own thread takes them from the front, helpers from the back, until they meet: so most blocks are done by the
+same thread in each step, which has them in its cache.  A helper that comes late, or that the system puts aside, only
+does less.
 """
 
 import functools
@@ -17,7 +18,7 @@ from ..core.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..core.least import ranked
 from ..core.world import CONTACTS
 from ..kernels.gathering import gather
-from ..kernels.motion import AT_ONCE, gather_and_kick
+from ..kernels.motion import AT_ONCE, OPEN, drift_for, gather_and_kick
 from ..kernels.moving import contact_pass, keep_passed
 from ..kernels.sums import CREW_FROM
 from .rules import Plan
@@ -28,12 +29,15 @@ PLACES = 24
 PATIENCE = 4000
 """Looks at the board before a waiting thread lets others run on its core."""
 CONTACTS_AT_ONCE = 512
-GRAINS_AT_ONCE = 8 * int(AT_ONCE)
+GRAINS_AT_ONCE = 2 * int(AT_ONCE)
 """Contacts and grains in a block: some 10 µs of work, whole vectors, and whole blocks of the gathering."""
 HELP_FROM = 8 * CONTACTS_AT_ONCE
 """Contacts from which a helper saves more time than handing it work takes, where nothing else can be shared."""
-_BITS = 24
+_BITS = 20
 _MASK = (1 << _BITS) - 1
+"""A word is the task, the number of blocks, and how many were taken from the back and from the front, so long each."""
+FRONT, BACK, BLOCKS, TASK = 0, _BITS, 2 * _BITS, 3 * _BITS
+"""Where they begin."""
 
 
 def is_large(grains: int) -> bool:
@@ -46,8 +50,8 @@ def wants_help(plan: Plan, grains: GrainArrays, contacts: int) -> bool:
     return plan.far.parts.blocks(grains) > 0 or contacts >= HELP_FROM
 
 
-PASS, GATHER, GATHER_AND_KICK, FAR, LEAVE = range(1, 6)
-"""What a word on the board asks for: contacts, their loads at grains, these and a kick, long-range loads, the end."""
+PASS, GATHER, GATHER_AND_KICK, FAR, DRIFT, LEAVE = range(1, 7)
+"""What a word asks for: contacts, their loads at grains, these and a kick, long-range loads, a drift, the end."""
 
 
 class Crew(NamedTuple):
@@ -67,7 +71,7 @@ def new_crew(grains: int, contacts: int) -> Crew:
 
 def send_away(crew: Crew) -> None:
     """Let the helpers of a driver that did not come to its end leave, and wait until they have."""
-    crew.board[WORD] = LEAVE << 2 * _BITS
+    crew.board[WORD] = LEAVE << TASK
     while crew.board[INSIDE] > 0:
         give_way()
 
@@ -78,10 +82,22 @@ def blocks_of(number, at_once):
     return (number + at_once - 1) // at_once
 
 
+@loop
+def part_of(word, place):
+    """What a word says at this place."""
+    return (word >> place) & _MASK
+
+
+@loop
+def is_left(word):
+    """Is there a block that nobody has taken?"""
+    return part_of(word, FRONT) + part_of(word, BACK) < part_of(word, BLOCKS)
+
+
 @functools.cache
 def crew_for(plan: Plan) -> tuple[Callable, Callable]:
     """The function that shares a task among all threads, and the kernel that a helper runs meanwhile."""
-    far_block = plan.far.parts.block
+    far_block, drift_some = plan.far.parts.block, drift_for(plan.magnetic)
 
     @shared
     def do_block(task, b, grains, contacts, far, count, rules):
@@ -102,18 +118,23 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
             rules.crew.speeds[b, 0], rules.crew.speeds[b, 1] = ranked(v), ranked(w)
         elif task == FAR:
             far_block(grains, far, rules.span, rules.far, b)
+        elif task == DRIFT:
+            first = b * GRAINS_AT_ONCE
+            last = min(first + GRAINS_AT_ONCE, grains.mass.size)
+            span = OPEN if rules.books.moored else rules.span
+            v = drift_some(grains, np.uint64(first), np.uint64(last), span, rules.crew.step[0])
+            rules.crew.speeds[b, 0] = ranked(v)
 
     @shared
     def share(task, blocks, grains, contacts, far, count, rules):
         board = rules.crew.board
         write(board, DONE, 0)
-        write(board, WORD, (task << 2 * _BITS) | (blocks << _BITS))
-        while True:
-            b = fetch_add(board, WORD, 1) & _MASK
-            if b >= blocks:
-                break
-            do_block(task, b, grains, contacts, far, count, rules)
+        write(board, WORD, (task << TASK) | (blocks << BLOCKS))
+        word = fetch_add(board, WORD, 1 << FRONT)
+        while is_left(word):
+            do_block(task, part_of(word, FRONT), grains, contacts, far, count, rules)
             fetch_add(board, DONE, 1)
+            word = fetch_add(board, WORD, 1 << FRONT)
         looks = 0
         while read(board, DONE) < blocks:
             looks += 1
@@ -126,14 +147,14 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
         fetch_add(board, INSIDE, 1)
         looks = 0
         word = read(board, WORD)
-        while word >> 2 * _BITS != LEAVE:
+        while word >> TASK != LEAVE:
             looks += 1
-            if word & _MASK < (word >> _BITS) & _MASK:
+            if is_left(word):
                 # what is at hand may have changed since the look: what was taken is what this says
-                word = fetch_add(board, WORD, 1)
-                task, blocks, b = word >> 2 * _BITS, (word >> _BITS) & _MASK, word & _MASK
-                if task != LEAVE and b < blocks:
-                    do_block(task, b, grains, contacts, far, count, rules)
+                word = fetch_add(board, WORD, 1 << BACK)
+                if is_left(word):
+                    b = part_of(word, BLOCKS) - 1 - part_of(word, BACK)
+                    do_block(word >> TASK, b, grains, contacts, far, count, rules)
                     fetch_add(board, DONE, 1)
                 looks = 0
             elif looks > PATIENCE:
@@ -153,6 +174,6 @@ def nobody_to_dismiss(rules):
 def dismiss(rules):
     """Send the helpers away, and wait until the last has left: then the arrays are the driver's alone."""
     board = rules.crew.board
-    write(board, WORD, LEAVE << 2 * _BITS)
+    write(board, WORD, LEAVE << TASK)
     while read(board, INSIDE) > 0:
         give_way()

@@ -1,7 +1,9 @@
 """The large loops of a step, by one thread or by a crew."""
 
 import functools
+import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,9 +11,9 @@ from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.world import CONTACTS, STEP
 from ..kernels.gathering import gather_by_number
-from ..kernels.motion import gather_and_kick
+from ..kernels.motion import OPEN, gather_and_kick, kick_and_drift_for
 from ..kernels.moving import book_passed, contact_pass, kept_passed
-from .crew import CONTACTS_AT_ONCE, FAR, GATHER, GATHER_AND_KICK, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
+from .crew import CONTACTS_AT_ONCE, DRIFT, FAR, GATHER, GATHER_AND_KICK, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
 from .rules import Plan
 
 
@@ -34,23 +36,37 @@ def _gather_and_kick_alone(grains, contacts, far, count, rules, dt):
     return ranked(fastest), ranked(quickest)
 
 
+class Large(NamedTuple):
+    """The large loops of a step."""
+
+    pass_contacts: Callable  # over all contacts; True if any wait
+    gather: Callable  # their loads at grains
+    gather_and_kick: Callable  # these, and a kick
+    far_loads: Callable
+    drift: Callable  # (grains, far …, dt): half a kick and a drift; the longest way [m]
+
+
 @functools.cache
-def large_loops(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
-    """Pass over all contacts (True if any wait), gathering of their loads, this and a kick, the long-range loads."""
+def large_loops(plan: Plan) -> Large:
+    """The large loops for one plan."""
     return _by_a_crew(plan) if plan.crew else _alone(plan)
 
 
-def _alone(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
-    sum_far = plan.far.loads
+def _alone(plan: Plan) -> Large:
+    sum_far, kick_and_drift = plan.far.loads, kick_and_drift_for(plan.magnetic)
 
     @loop
     def far_alone(grains, contacts, far, count, rules):
         sum_far(grains, far, rules.span, rules.far)
 
-    return _pass_alone, _gather_alone, _gather_and_kick_alone, far_alone
+    @loop
+    def drift_alone(grains, contacts, far, count, rules, dt):
+        return kick_and_drift(grains, OPEN if rules.books.moored else rules.span, dt)
+
+    return Large(_pass_alone, _gather_alone, _gather_and_kick_alone, far_alone, drift_alone)
 
 
-def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
+def _by_a_crew(plan: Plan) -> Large:
     share, _ = crew_for(plan)
     begin, _, end, far_blocks = plan.far.parts
 
@@ -88,4 +104,14 @@ def _by_a_crew(plan: Plan) -> tuple[Callable, Callable, Callable, Callable]:
         share(FAR, far_blocks(grains), grains, contacts, far, count, rules)
         end(grains, far, rules.span, rules.far)
 
-    return pass_together, gather_together, gather_and_kick_together, far_together
+    @loop
+    def drift_together(grains, contacts, far, count, rules, dt):
+        rules.crew.step[0] = dt
+        blocks = blocks_of(grains.mass.size, GRAINS_AT_ONCE)
+        share(DRIFT, blocks, grains, contacts, far, count, rules)
+        fastest = rank(0.0)
+        for b in range(blocks):
+            fastest = max(fastest, rank_for_most(rules.crew.speeds[b, 0]))
+        return dt * math.sqrt(ranked(fastest))
+
+    return Large(pass_together, gather_together, gather_and_kick_together, far_together, drift_together)

@@ -4,7 +4,7 @@ import functools
 import math
 from collections.abc import Callable
 
-from ..core.box import Span, nearest_image
+from ..core.box import nearest_image
 from ..core.jit import loop, rare
 from ..core.vec import dot, load, sub
 from ..core.world import (
@@ -31,9 +31,8 @@ from ..kernels.events import book_stiffness, damp_contacts, drop_broken, make_co
 from ..kernels.far import clear_rates, remember, set_paces
 from ..kernels.gas import gas_kick
 from ..kernels.gathering import sort_sides
-from ..kernels.motion import kick_and_drift_for
 from ..kernels.neighbours import ROW_FULL, list_soon, make_near_list
-from ..kernels.outside import outside_energy, outside_loads, outside_wrap
+from ..kernels.outside import outside_energy, outside_wrap
 from ..kernels.watch import is_stale, look_up_harmless, look_up_speeds
 from .control import CHECK_EVERY, choose_step, name_culprits
 from .rules import Stop
@@ -42,8 +41,6 @@ LONGEST_TURN = 0.5
 """Largest turn in one step [rad] for which `rotation.turn` is sound."""
 SOON_PART = 0.05
 """Displacement, in the reach of the list of near pairs, after which those that may touch soon are picked out anew."""
-OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""A box without walls, for moves that are wrapped later."""
 
 
 @loop
@@ -147,18 +144,17 @@ def bury_broken(grains, contacts, near, clock, count, rules):
 
 
 @functools.cache
-def outside_loops(outside: Callable, magnetic: bool) -> tuple[Callable, Callable]:
-    """Loads of the per-grain forces; half a kick and a drift, with what time and boundaries do to their energy."""
-    kick_and_drift = kick_and_drift_for(magnetic)
-    add_loads, energy, wrap = outside_loads(outside), outside_energy(outside), outside_wrap(outside)
+def drift_booked_for(outside: Callable, drift: Callable) -> Callable:
+    """Half a kick and a drift, with what time and boundaries do to the energy of the per-grain forces."""
+    energy, wrap = outside_energy(outside), outside_wrap(outside)
 
     @loop
-    def kick_and_drift_booked(grains, clock, lost, rules, dt):
+    def drift_booked(grains, contacts, far, clock, count, lost, rules, dt):
         now, then = clock[TIME], clock[TIME] + dt
         gained = 0.0
         if rules.books.timed:
             gained += 0.5 * (energy(grains, then, rules.outside) - energy(grains, now, rules.outside))
-        way = kick_and_drift(grains, OPEN if rules.books.moored else rules.span, dt)
+        way = drift(grains, contacts, far, count, rules, dt)
         if rules.books.timed:
             gained += 0.5 * (energy(grains, then, rules.outside) - energy(grains, now, rules.outside))
         if rules.books.moored:
@@ -166,7 +162,7 @@ def outside_loops(outside: Callable, magnetic: bool) -> tuple[Callable, Callable
         lost[OUTSIDE] -= gained
         return way
 
-    return add_loads, kick_and_drift_booked
+    return drift_booked
 
 
 @loop
