@@ -83,6 +83,12 @@ def blocks_of(number, at_once):
 
 
 @loop
+def span_of_drift(rules):
+    """The box in which grains drift: without walls where what the walls cost is booked afterwards."""
+    return OPEN if rules.books.moored else rules.span
+
+
+@loop
 def part_of(word, place):
     """What a word says at this place."""
     return (word >> place) & _MASK
@@ -121,8 +127,7 @@ def crew_for(plan: Plan) -> tuple[Callable, Callable]:
         elif task == DRIFT:
             first = b * GRAINS_AT_ONCE
             last = min(first + GRAINS_AT_ONCE, grains.mass.size)
-            span = OPEN if rules.books.moored else rules.span
-            v = drift_some(grains, np.uint64(first), np.uint64(last), span, rules.crew.step[0])
+            v = drift_some(grains, np.uint64(first), np.uint64(last), span_of_drift(rules), rules.crew.step[0])
             rules.crew.speeds[b, 0] = ranked(v)
 
     @shared

@@ -11,9 +11,20 @@ from ..core.jit import loop
 from ..core.least import rank, rank_for_most, ranked
 from ..core.world import CONTACTS, STEP
 from ..kernels.gathering import gather_by_number
-from ..kernels.motion import OPEN, gather_and_kick, kick_and_drift_for
+from ..kernels.motion import gather_and_kick, kick_and_drift_for
 from ..kernels.moving import book_passed, contact_pass, kept_passed
-from .crew import CONTACTS_AT_ONCE, DRIFT, FAR, GATHER, GATHER_AND_KICK, GRAINS_AT_ONCE, PASS, blocks_of, crew_for
+from .crew import (
+    CONTACTS_AT_ONCE,
+    DRIFT,
+    FAR,
+    GATHER,
+    GATHER_AND_KICK,
+    GRAINS_AT_ONCE,
+    PASS,
+    blocks_of,
+    crew_for,
+    span_of_drift,
+)
 from .rules import Plan
 
 
@@ -43,7 +54,7 @@ class Large(NamedTuple):
     gather: Callable  # their loads at grains
     gather_and_kick: Callable  # these, and a kick
     far_loads: Callable
-    drift: Callable  # (grains, far …, dt): half a kick and a drift; the longest way [m]
+    drift: Callable  # half a kick and a drift; the longest way [m]
 
 
 @functools.cache
@@ -61,7 +72,7 @@ def _alone(plan: Plan) -> Large:
 
     @loop
     def drift_alone(grains, contacts, far, count, rules, dt):
-        return kick_and_drift(grains, OPEN if rules.books.moored else rules.span, dt)
+        return kick_and_drift(grains, span_of_drift(rules), dt)
 
     return Large(_pass_alone, _gather_alone, _gather_and_kick_alone, far_alone, drift_alone)
 
