@@ -6,6 +6,7 @@ import pytest
 import sand
 from sand.core.world import FAR_LEEWAY, FASTEST, MADE, NEAR_LEEWAY, QUICKEST, REBUILT, SOON_LEEWAY
 from sand.kernels.watch import farthest, largest_speeds
+from sand.run import translate
 from sand.stepping.parts import SOON_PART
 from sand.stepping.rules import Stop
 
@@ -44,8 +45,13 @@ def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(
     assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
-def test_no_grain_is_farther_than_its_leeway_allows():
-    """Leeway + the largest displacement ≤ the limit of each list, after any number of steps; both speeds are exact."""
+@pytest.mark.parametrize("blocks", [False, True])
+def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
+    """Leeway + the largest displacement ≤ the limit of each list, after any number of steps; both speeds are exact.
+
+    Also where loops are cut into blocks for threads.
+    """
+    monkeypatch.setattr(translate, "is_large", lambda grains: blocks)
     sim = crowd(margin="5 nm")
     control, search = sim._engine.rules.control, sim._engine.rules.search
     limits = {
