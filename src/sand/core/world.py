@@ -52,7 +52,7 @@ class ContactArrays(NamedTuple):
     formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
     bond: np.ndarray  # (K, C) constants of the contact law; where all contacts are alike (K, BLOCK), all the same
     lost: np.ndarray  # (L, C) energy it dissipated so far [J], the first 5 or all 7 channels of LOST_IN_CONTACTS
-    damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1; (0,) where nothing damps
+    damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1; (0,) in the plain law
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
@@ -89,10 +89,10 @@ class FarArrays(NamedTuple):
     mate: np.ndarray  # (P,) uint32: places of the neighbours
     home: np.ndarray  # (N,) uint32: cell of each grain
     cell: np.ndarray  # (M+1,) uint32: first place of each cell
-    here: np.ndarray  # (3, V) positions by place [m]; by grain where there is no list
-    source: np.ndarray  # (3, V) moments, or charges in the first row; (1, V) for cells alone
-    force: np.ndarray  # (3, N) far forces [N]
-    torque: np.ndarray  # (3, N) far torques [N m]
+    here: np.ndarray  # (3, V) positions by place [m]; by grain in sums over all pairs
+    source: np.ndarray  # (3, V) moments, or charges in the first row; (1, V) where no force needs it
+    force: np.ndarray  # (3, N) far forces [N]; (3, 0) without any
+    torque: np.ndarray  # (3, N) far torques [N m]; likewise
     held_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
     held_torque: np.ndarray  # (3, N) [N m]
     force_rate: np.ndarray  # (3, N) their rates of change [N/s]
@@ -122,7 +122,7 @@ TURNS_FROM = 4000
 BLOCK = 128
 """Contacts that are passed over together, whole vectors of them."""
 SPARE, GROWTH = 1.1, 1.25
-"""Room for what is known to come, contacts at the start or pairs of a list; longer arrays are longer by the second."""
+"""Room for what is known to come, contacts at the start or pairs of a list; what is full grows by the second factor."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 

@@ -26,9 +26,9 @@ ROUNDING = 1e-6
 class Search(NamedTuple):
     """How neighbours are found."""
 
-    listed: bool  # is there a list for long-range forces? The near pairs are picked out of it
+    listed: bool  # is there a list that outlasts a step? The near pairs are picked out of it
     reach: float  # pairs closer than this are listed [m]
-    margin: float  # part of the reach that grains may move before the list is made anew, Δr [m]
+    margin: float  # part of the reach that grains may move before the list is made anew, Δr [m]; 0 without a list
     celled: bool = False  # near pairs come from cells, without any other list; neither: out of all pairs
 
 

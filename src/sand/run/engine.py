@@ -144,7 +144,8 @@ class Engine:
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
-                w.grow_pairs(int(SPARE * w.count[PAIRS]))
+                found, w.count[PAIRS] = int(w.count[PAIRS]), 0  # none of the list holds
+                w.grow_pairs(int(SPARE * found))
             elif stop is Stop.LIST_FULL:
                 w.grow_rows()
             else:

@@ -43,7 +43,7 @@ from .engine import Engine
 from .first_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
 
 MATES = 4
-"""Room per grain for neighbours in the list, likewise."""
+"""Room per grain for neighbours in the list to begin with; it grows when needed."""
 IN_REACH = 1000
 """Room for the neighbours of one grain, where they are forgotten once those that may touch are picked."""
 WIDE_FROM = 64

@@ -102,7 +102,8 @@ class Neighbours:
     def settled(self, search: Search, count: int) -> Neighbours:
         """What was chosen, so that a run that goes on from elsewhere chooses the same."""
         order = "curve" if self.along_curve(count) else "as given"
-        return Neighbours("cells" if search.listed or search.celled else "all pairs", search.margin, order)
+        how = "cells" if search.listed or search.celled else "all pairs"
+        return Neighbours(how, search.margin or "auto", order)  # any margin would ask for a list
 
     def choose(
         self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, flights: bool = False
@@ -116,12 +117,12 @@ class Neighbours:
         """
         touch = 2.0 * float(grains.radius.max()) + reach
         widest = max(cutoffs, default=0.0)
-        # the list of near pairs is made out of this one, and its own margin is half its reach
-        margin = self.margin
+        # near pairs come straight from cells, or out of a list; their own margin is half their reach
+        celled = widest == 0.0 and self.margin == "auto" and not flights
+        margin = 0.0 if celled else self.margin
         if margin == "auto":
             margin = (MARGIN_OF_FLIGHTS if flights else MARGIN) * widest if widest > 0.0 else 0.5 * reach
-        celled = widest == 0.0 and self.margin == "auto" and not flights
-        whole = touch if celled else max(widest, touch) + margin
+        whole = max(widest, touch) + margin
         nothing = Search(False, whole, margin)
         if self.search == "all pairs":
             return Found(nothing, "all pairs, asked for")
