@@ -24,8 +24,11 @@ LIST_FROM = 64
 """Fewest grains for which "auto" makes a list."""
 LIST_UP_TO = 0.4
 """Largest part of the other grains within the list's reach for which "auto" makes one: each pair is in two rows."""
-CURVE_FROM = 10_000
-"""Fewest grains for which "auto" keeps an order of its own: fewer fit into the caches, however they are numbered."""
+CURVE_FROM = 4000
+"""Fewest grains for which "auto" keeps an order of its own: fewer fit into the caches, however they are numbered.
+
+Of 4000 it saves a tenth of a step, and from there on helpers find in their caches what they need.
+"""
 SAMPLES = 64, 4096
 """Grains, and others, that are looked at for it."""
 
@@ -63,7 +66,7 @@ class Neighbours:
             that of the pairs that may touch soon, straight from the cells.
         order: where grains stand in memory while steps are taken; "curve": along one that fills space, made anew every
             2000 steps, so that neighbours are close; "as given": by their numbers; "auto": along a curve from
-            10,000 grains on. All that is looked at or written has the numbers of the start.
+            4000 grains on. All that is looked at or written has the numbers of the start.
 
     No choice changes a result by more than rounding.
 
