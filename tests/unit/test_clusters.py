@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from sand.analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size, unwrapped
+from sand.analysis.clusters import FEW, cluster_labels, cluster_sizes, mean_cluster_size, unwrapped
 from sand.core.box import Box
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_labels_are_those_of_a_flood(seed):
-    """Each grain floods its neighbours; clusters are numbered by their lowest grain."""
+@pytest.mark.parametrize(("n", "contacts"), [(200, 90), (3, 2), (40, 12), (40, 35), (110, FEW - 110), (110, FEW - 109)])
+def test_labels_are_those_of_a_flood(seed, n, contacts):
+    """Each grain floods its neighbours; clusters are numbered by their lowest grain.  Few are followed one by one."""
     rng = np.random.default_rng(seed)
-    n, pairs = 200, rng.integers(0, 200, size=(90, 2))
+    pairs = rng.integers(0, n, size=(contacts, 2))
     labels, number = np.full(n, -1), 0
     for start in range(n):
         if labels[start] < 0:

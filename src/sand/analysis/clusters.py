@@ -6,6 +6,9 @@ import numpy as np
 
 from ..core.box import Box
 
+FEW = 200
+"""Grains and contacts together that are followed one by one sooner than SciPy makes its graph, an eighth of a millisecond."""
+
 
 def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     """The cluster each grain belongs to, numbered by their lowest grain.
@@ -20,12 +23,30 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
     if not len(ends):
         return np.arange(count)  # a gas need not wait for SciPy's graphs, which take long to load
+    if count + len(ends) <= FEW:
+        return _followed(count, ends)
 
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _followed(count: int, ends: np.ndarray) -> np.ndarray:
+    """The same, contact by contact: two clusters that meet go by the lowest grain of both."""
+    lower = list(range(count))
+
+    def lowest(grain: int) -> int:
+        while lower[grain] != grain:
+            grain = lower[grain]
+        return grain
+
+    for one, other in ends.tolist():
+        a, b = lowest(one), lowest(other)
+        lower[max(a, b)] = min(a, b)
+    numbers: dict[int, int] = {}
+    return np.array([numbers.setdefault(lowest(grain), len(numbers)) for grain in range(count)], dtype=np.int64)
 
 
 def cluster_sizes(labels: np.ndarray) -> np.ndarray:
