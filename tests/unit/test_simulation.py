@@ -241,6 +241,20 @@ def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
     assert sim.world.contacts.pair.shape[1] == -8 * (-int(1.1 * 3 * 4 * 4 * 3) // 8) == 160
 
 
+def test_contacts_alone_have_no_room_for_other_forces():
+    """No far loads and no list, one row for the cells; damping has its column only where something damps."""
+    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(place, 1e-8, sand.SILICA)
+    for damping in ("none", "viscoelastic"):
+        forces, search = [sand.Contact(damping=damping)], sand.Neighbours(search="cells")
+        sim = sand.Simulation(grains, forces, neighbours=search)
+        sim.run(steps=2)
+        far, contacts = sim.world.far, sim.world.contacts
+        assert far.force.size == far.torque.size == far.anchor.size == far.start.size == 0
+        assert far.source.shape == (1, 64) and far.order.size == 64
+        assert contacts.damped.size == (contacts.twist.size if damping == "viscoelastic" else 0)
+
+
 def test_a_row_is_written_once(tmp_path):
     """Asking again for a time that is reached adds no row and no frame."""
     seen = []

@@ -30,7 +30,7 @@ PATIENCE = 4000
 """Looks at the board before a waiting thread lets others run on its core."""
 CONTACTS_AT_ONCE = 512
 GRAINS_AT_ONCE = 2 * int(AT_ONCE)
-"""Contacts and grains in a block: some 10 µs of work, whole vectors, and whole blocks of the gathering."""
+"""Contacts and grains in a block: 3 to 10 µs of work, whole vectors, and whole blocks of the gathering."""
 HELP_FROM = 8 * CONTACTS_AT_ONCE
 """Contacts from which a helper saves more time than handing it work takes, where nothing else can be shared."""
 _BITS = 20
