@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import sand
+from sand.core.arrays import far_arrays
 from sand.core.jit import kernel
-from sand.core.world import far_arrays
 from sand.kernels.cells import remake_far_list
 from sand.kernels.motion import kick_and_drift_for
 

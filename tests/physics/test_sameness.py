@@ -90,7 +90,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
-    from sand.core.world import FOR_ALL, contact_arrays, near_pairs
+    from sand.core.arrays import FOR_ALL, contact_arrays, near_pairs
     from sand.physics.contact import Bond
 
     ends = []

@@ -8,8 +8,8 @@ import pytest
 import sand
 from sand.core.jit import kernel
 from sand.core.least import rank, ranked
-from sand.core.world import PAIRS, SOON
-from sand.kernels.neighbours import list_soon
+from sand.core.world import PAIRS, SOON, SOON_LEEWAY
+from sand.kernels.neighbours import list_soon, pair_soon
 from sand.stepping.control import calm_steps, closing_step, grain_step, pair_step
 from sand.stepping.parts import SOON_PART
 
@@ -55,12 +55,22 @@ def test_choices_are_the_least_of_all():
 
 
 def test_what_may_touch_soon_is_what_is_close():
-    """All pairs of grains apart by less than twice the displacement that makes the pick stale, and no others."""
+    """All pairs of grains apart by less than twice the way that makes the pick stale, and no others.
+
+    Where they have no room (an array has one place more than that), all near pairs are looked at.
+    """
     sim = crowd()
     w, reach = sim.world, sim._engine.rules.control.reach
     gap = 2.0 * SOON_PART * reach
-    list_soon(w.grains.arrays, w.near, w.count, sim._engine.rules.span, gap)
-    picked = {tuple(sorted(w.near.pair[:, p].tolist())) for p in w.near.soon[: w.count[SOON]].tolist()}
+
+    def picked(room):
+        near = w.near._replace(soon=np.zeros(room, np.uint32), watch=w.near.watch.copy())
+        list_soon(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
+        assert 0.49 * gap < near.watch[SOON_LEEWAY] < 0.5 * gap
+        soon = [int(pair_soon(near, w.count, k)) for k in range(int(near.watch[SOON]))]
+        assert len(set(soon)) == len(soon)
+        return {tuple(sorted(near.pair[:, p].tolist())) for p in soon}
+
     position, radius = sim.grains.position, sim.grains.radius
     bound = {tuple(sorted(pair)) for pair in sim.contacts["pair"].tolist()}
     close = set()
@@ -70,4 +80,6 @@ def test_what_may_touch_soon_is_what_is_close():
             if apart < radius[i] + radius[j] + gap and (j, i) not in bound:
                 close.add((j, i))
     assert len(close) > 3
-    assert picked == close
+    assert picked(w.near.soon.size) == picked(len(close) + 1) == close
+    every = {tuple(sorted(pair)) for pair in w.near.pair[:, : w.count[PAIRS]].T.tolist()}
+    assert picked(len(close)) == picked(1) == every > close

@@ -60,8 +60,8 @@ def test_taylor_torque_is_the_whole_product_rule():
         spin=1e8 * rng.normal(size=(3, 3)),
         moment=6e-18 * rng.normal(size=(3, 3)),
     )
+    from sand.core.arrays import far_arrays
     from sand.core.jit import kernel
-    from sand.core.world import far_arrays
     from sand.kernels.dipoles import CUT
     from sand.kernels.far import clear_rates, set_paces
 

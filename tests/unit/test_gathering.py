@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import sand
+from sand.core.arrays import KINDS, TURNS_FROM, contact_arrays
 from sand.core.jit import kernel
-from sand.core.world import CONTACTS, COUNT, FASTEST, KINDS, QUICKEST, TURNS_FROM, contact_arrays
+from sand.core.world import CONTACTS, COUNT, FASTEST, QUICKEST
 from sand.kernels.gathering import BLOCK, DENSE, MOST, gather, resort_sides
 from sand.kernels.motion import gather_and_kick, kick, kick_and_drift_for
 from sand.stepping.crew import GRAINS_AT_ONCE

@@ -5,12 +5,13 @@ import copy
 import numpy as np
 import pytest
 
+from sand.core.arrays import contact_arrays, near_pairs
 from sand.core.box import Box
 from sand.core.grains import GrainArrays, Grains
 from sand.core.jit import kernel
 from sand.core.material import SILICA
 from sand.core.vec import axpy, load4, put, scale
-from sand.core.world import BROKEN, CONTACTS, COUNT, LOST, MOVED, ROLLING, SLIDING, TWISTING, contact_arrays, near_pairs
+from sand.core.world import BROKEN, CONTACTS, COUNT, LOST, MOVED, ROLLING, SLIDING, TWISTING
 from sand.forces.contact import Contact
 from sand.kernels.contacts import BROKE, WAITS, YIELDED, pose_at, quiet_pass, twist_gain
 from sand.kernels.events import settle_flagged

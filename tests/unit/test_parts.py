@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.core.arrays import far_arrays
 from sand.core.jit import formula, kernel
-from sand.core.world import far_arrays
 from sand.forces.base import compose_far
 from sand.kernels import central, dipoles
 from sand.kernels.cells import make_far_list

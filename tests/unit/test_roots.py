@@ -5,9 +5,9 @@ import pytest
 
 import sand
 from sand.core import roots
+from sand.core.arrays import far_arrays
 from sand.core.constants import MAGNETIC
 from sand.core.jit import COMPILED, LONG_VECTORS, kernel
-from sand.core.world import far_arrays
 from sand.kernels import dipoles
 from sand.run.translate import WIDE_FROM
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import FAR_LEEWAY, FASTEST, MADE, NEAR_LEEWAY, QUICKEST, REBUILT, SOON_LEEWAY
+from sand.core.world import BROKEN, FAR_LEEWAY, FASTEST, MADE, NEAR_LEEWAY, QUICKEST, REBUILT, SOON_LEEWAY
 from sand.kernels.watch import farthest, largest_speeds
 from sand.run import translate
 from sand.stepping.parts import SOON_PART
@@ -57,7 +57,6 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     limits = {
         FAR_LEEWAY: ("far", "anchor", 0.5 * search.margin),
         NEAR_LEEWAY: ("near", "anchor", 0.25 * control.reach),
-        SOON_LEEWAY: ("near", "mark", SOON_PART * control.reach),
     }
     sim.run(steps=1)
     spared = 0
@@ -72,6 +71,37 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
         assert np.sqrt(w.near.watch[[FASTEST, QUICKEST]]) == pytest.approx(speeds, rel=1e-14)
         assert np.sqrt(largest_speeds(w.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
     assert spared > 10
+
+
+def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
+    """Leeway + the largest displacement since the pick, in the first step of a call, ≤ SOON_PART of the reach.
+
+    A contact that forms ends the leeway, and so does one that breaks: 2000 steps are as many calls of one step, which
+    pick in each.
+    """
+    sim, twin = crowd(), crowd()
+    limit, span = SOON_PART * sim._engine.rules.control.reach, sim._engine.rules.span
+    for each in (sim, twin):
+        each.run(steps=1)
+    looked_at = 0
+    for steps in (2, 3, 4, 5, 6) * 5:
+        twin._engine.advance(np.inf, 1)
+        picked = twin.world.grains.arrays.position.copy()
+        twin._engine.advance(np.inf, steps - 1)
+        events = sim.world.count[[MADE, BROKEN, REBUILT]]
+        sim._engine.advance(np.inf, steps)
+        if np.array_equal(sim.world.count[[MADE, BROKEN, REBUILT]], events):  # else they are picked once more
+            strayed = farthest(sim.world.grains.arrays, picked, span)
+            assert 0.0 < strayed < limit
+            assert 0.0 < sim.world.near.watch[SOON_LEEWAY] <= limit - strayed
+            looked_at += 1
+    assert looked_at > 10
+    sim.run(steps=2000)
+    while twin.world.steps < sim.world.steps:
+        twin._engine.advance(np.inf, 1)
+    assert sim.world.count[MADE] > 10 and sim.world.count[BROKEN] > 3
+    a, b = sim.world.to_arrays(), twin.world.to_arrays()
+    assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
 @pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.FLEW_TOO_FAR, 2), (0.0, Stop.SPUN_TOO_FAR, 0)])

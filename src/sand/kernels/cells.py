@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.aligned import LANES
+from ..core.arrays import CELLS_PER_GRAIN
 from ..core.box import nearest_image
 from ..core.jit import kernel, loop, rare
 from ..core.vec import dot, load, put, sub
-from ..core.world import CELLS_PER_GRAIN, LISTED
+from ..core.world import LISTED
 
 FULL = -1
 """Answer of the makers of lists when the arrays are too short."""
@@ -103,8 +104,8 @@ def cell_at(x, number):
 
 
 @loop
-def sort_into_cells(far, anchor, span, grid):
-    """Fill `home`, `cell`, `order` and `here`: grains by cell, in each cell by number."""
+def sort_into_cells(far, here, anchor, span, grid):
+    """Fill `home`, `cell`, `order` and `here` (anchors by place): grains by cell, in each cell by number."""
     nx, ny, nz = grid.counts
     total = nx * ny * nz
     for c in range(total + 1):
@@ -121,7 +122,7 @@ def sort_into_cells(far, anchor, span, grid):
         home = far.home[i]
         s = far.cell[home]
         far.order[s] = i
-        put(far.here, s, nearest_image(load(anchor, i), span))
+        put(here, s, nearest_image(load(anchor, i), span))
         far.cell[home] += 1
     for k in range(total):
         c = total - k
@@ -148,17 +149,17 @@ def gap_on_axis(x, c, step, width):
 
 
 @loop
-def list_stretch(far, span, limit, s, first, last, found):
+def list_stretch(far, here, span, limit, s, first, last, found):
     """Append those of the places first…last − 1 that are close to place s; FULL if there is no room for all.
 
     Distances first, in a loop that vectorises; then each place is written down, and kept if it is close: no branch
     has to be guessed.  The distance is odd in its two grains to the last bit, so that both have the pair or neither.
     """
-    here, length = load(far.here, s), last - first
+    own, length = load(here, s), last - first
     if found + np.int64(length) + LANES > far.mate.size:  # whole vectors are read
         return FULL
     for k in range(length):
-        apart = nearest_image(sub(here, load(far.here, first + k)), span)
+        apart = nearest_image(sub(own, load(here, first + k)), span)
         far.source[0, k] = dot(apart, apart)
     if first <= s < last:
         far.source[0, s - first] = math.inf
@@ -170,7 +171,7 @@ def list_stretch(far, span, limit, s, first, last, found):
 
 
 @loop
-def list_row(far, grid, span, limit, s, x, row, left, found):
+def list_row(far, here, grid, span, limit, s, x, row, left, found):
     """Append the neighbours of place s in the row of cells from `row` on; FULL if there is no room.
 
     Those within ±√left [m] along x are looked at.  Beyond a periodic wall they are a stretch of their own.  All are
@@ -179,7 +180,7 @@ def list_row(far, grid, span, limit, s, x, row, left, found):
     nx = grid.counts[0]
     if span.x > 0.0 and nx == grid.fine:
         begin, end = np.uint64(far.cell[row]), np.uint64(far.cell[row + nx])
-        return list_stretch(far, span, limit, np.uint64(s), begin, end, found)
+        return list_stretch(far, here, span, limit, np.uint64(s), begin, end, found)
     wide, home = math.sqrt(left) * grid.per_length[0] + ROUNDING, cell_at(x, nx)
     # never more cells than hold the reach: in a box of three, one more would be met from both sides;
     # never fewer than one, should a coordinate be no number
@@ -188,7 +189,7 @@ def list_row(far, grid, span, limit, s, x, row, left, found):
     first, last = max(low, 0), min(high, nx - 1) + 1
     for _ in range(2):
         begin, end = np.uint64(far.cell[row + first]), np.uint64(far.cell[row + last])
-        found = list_stretch(far, span, limit, np.uint64(s), begin, end, found)
+        found = list_stretch(far, here, span, limit, np.uint64(s), begin, end, found)
         if found == FULL or not (span.x > 0.0 and (low < 0 or high >= nx)):
             break
         first, last = (low + nx, nx) if low < 0 else (0, high - nx + 1)
@@ -196,22 +197,25 @@ def list_row(far, grid, span, limit, s, x, row, left, found):
 
 
 @rare
-def grid_of(far, anchor, span, reach):
+def grid_of(far, here, anchor, span, reach):
     """Cells for these anchors, and the grains sorted into them."""
     grid = grid_for(anchor, span, reach)
-    sort_into_cells(far, anchor, span, grid)
+    sort_into_cells(far, here, anchor, span, grid)
     return grid
 
 
 @rare
-def list_place(far, grid, span, reach, s, found):
+def list_place(far, here, grid, span, reach, s, found):
     """Append the places closer than the reach to place s, from mate[found] on; where they end, or FULL.
 
-    `here` and the first row of `source` serve meanwhile: anchors by place, and distances.
+    The first row of `source` serves meanwhile, for distances.
+
+    Args:
+        here: (3, N) the anchors by place [m], from `grid_of`.
     """
     nx, ny, nz = grid.counts
     widest = (1.0 + SLACK) * reach * reach
-    x = in_cells(grid, load(far.here, s))
+    x = in_cells(grid, load(here, s))
     cy, cz = cell_at(x[1], ny), cell_at(x[2], nz)
     for step in range(9):
         dy, dz = step % 3 - 1, step // 3 - 1
@@ -221,7 +225,7 @@ def list_place(far, grid, span, reach, s, found):
         left = widest - gap_y * gap_y - gap_z * gap_z
         if ty >= 0 and tz >= 0 and left > 0.0:
             row = (tz * ny + ty) * nx
-            found = list_row(far, grid, span, reach * reach, s, x[0], row, left, found)
+            found = list_row(far, here, grid, span, reach * reach, s, x[0], row, left, found)
             if found == FULL:
                 return FULL
     return found
@@ -234,11 +238,11 @@ def rows_from_anchors(far, span, reach):
     A row of `mate` needs nothing of the rows before it but the place where it begins: blocks of places can be listed
     apart, each with room for distances of its own, and be put together in their order.
     """
-    grid = grid_of(far, far.anchor, span, reach)
+    grid = grid_of(far, far.here, far.anchor, span, reach)
     found = 0
     far.start[0] = 0
     for s in range(far.anchor.shape[1]):
-        found = list_place(far, grid, span, reach, s, found)
+        found = list_place(far, far.here, grid, span, reach, s, found)
         if found == FULL:
             return FULL
         far.start[s + 1] = found

@@ -26,16 +26,17 @@ from ..physics import contact as law_of
 from ..physics.impact import speed_gained
 from ..physics.rotation import turned_back
 from .contacts import BROKE, WAITS, alike, bond_at, damping_at, pose_at, write_loads
-from .moving import strain_before
-from .neighbours import bond_of, forget_touch
+from .moving import record_of, strain_before
+from .neighbours import bond_of, forget_touch, pair_soon
 
 
 @loop
 def book(own, lost, c, channel, energy):
     """Add an energy [J] lost by contact c to the books and to its own record, `own` (L, C), if that has room."""
     lost[channel] += energy
-    if channel < own.shape[0]:
-        own[channel, c] += energy
+    row = record_of(channel)
+    if channel != BREAKING and row < own.shape[0]:
+        own[row, c] += energy
 
 
 @loop
@@ -209,8 +210,8 @@ def drop_broken(contacts, count):
 def new_touches(grains, near, count, span):
     """How many pairs have come to touch (D ≤ r1 + r2), out of those that may."""
     found = 0
-    for k in range(count[SOON]):
-        p = near.soon[k]
+    for k in range(int(near.watch[SOON])):
+        p = pair_soon(near, count, k)
         i, j = near.pair[0, p], near.pair[1, p]
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         reach = grains.radius[i] + grains.radius[j]

@@ -7,9 +7,10 @@ many come in a row.
 
 import math
 
+from ..core.arrays import KINDS
 from ..core.jit import kernel, loop, rare
 from ..core.vec import add, load, put, sub
-from ..core.world import CONTACTS, KINDS
+from ..core.world import CONTACTS
 
 BLOCK = 64
 """Grains in a block; their contacts stay in the first cache."""

@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import world
+from ..core.arrays import BLOCK as JUDGED_TOGETHER
 from ..core.jit import formula, loop
 from ..core.vec import axpy, dot, load, load4, put, scale, sub
-from ..core.world import MOVED, ROLLING, SLIDING, TWISTING
+from ..core.world import BREAKING, MOVED, ROLLING, SLIDING, TWISTING
 from ..physics import adhesion, tangential
 from ..physics import contact as law_of
 from ..physics.rotation import turned_back, turned_by
 from .contacts import WAITS, YIELDED, alike, bond_in, pose_after, quiet_pass, twist_gain, whole_vectors
 
-BLOCK = np.uint64(world.BLOCK)
+BLOCK = np.uint64(JUDGED_TOGETHER)
 """Contacts that are judged together."""
 BUSY = 0.1
 """Share of a block's contacts that passed a limit in the step before, from which it gets the longer pass."""
@@ -65,12 +65,18 @@ def _chosen(first, u, v):
     return u[0] if first else v[0], u[1] if first else v[1], u[2] if first else v[2]
 
 
+@formula
+def record_of(channel):
+    """The row of a contact's own record for a channel of losses, but for breaking, which has none."""
+    return channel - 1 if channel > BREAKING else channel
+
+
 @loop
 def _keep_record(own, c, slid, rolled, twisted):
     """Add what contact c lost [J] to its own record."""
-    own[SLIDING, c] += slid
-    own[ROLLING, c] += rolled
-    own[TWISTING, c] += twisted
+    own[record_of(SLIDING), c] += slid
+    own[record_of(ROLLING), c] += rolled
+    own[record_of(TWISTING), c] += twisted
 
 
 @loop

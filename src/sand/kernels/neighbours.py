@@ -12,6 +12,7 @@ from ..core.world import PAIRS, REBUILT, SOON, SOON_LEEWAY
 from ..physics.contact import Pairing, bond_between
 from .cells import FULL, Grid, grid_of, list_place
 from .kinds import kind_at
+from .watch import SPARED
 
 
 @loop
@@ -88,10 +89,10 @@ def are_near(grains, span, reach, i, j):
 
 
 @loop
-def candidates(far, grid, span, search, k):
+def candidates(near, far, grid, span, search, k):
     """Where in `mate` the places stand that may be near place k; the numbers themselves where there are no places."""
     if search.celled:
-        end = list_place(far, grid, span, search.reach, k, 0)
+        end = list_place(far, near.anchor, grid, span, search.reach, k, 0)
         return np.int64(0), np.int64(end)
     if search.listed:
         return np.int64(far.start[k]), np.int64(far.start[k + 1])
@@ -107,10 +108,13 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, search)
     """
     found, kind, room = 0, NO_KIND, near.pair.shape[1]
     placed = search.celled or search.listed
-    grid = grid_of(far, grains.position, span, search.reach) if search.celled and law.on else NO_GRID
+    grid = NO_GRID
+    if search.celled and law.on:  # until they are set at the end, the anchors are positions by place
+        grid = grid_of(far, near.anchor, grains.position, span, search.reach)
     for k in range(grains.mass.size if law.on else 0):
-        first, last = candidates(far, grid, span, search, k)
+        first, last = candidates(near, far, grid, span, search, k)
         if last == FULL:
+            near.anchor[0, 0] = math.inf
             return ROW_FULL
         i = far.order[k] if placed else np.uint32(k)
         for m in range(first, last):
@@ -125,6 +129,7 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, search)
                 found += 1
     count[PAIRS] = found
     if found > room:
+        near.anchor[0, 0] = math.inf
         return FULL
     for i in range(grains.mass.size):
         put(near.anchor, i, load(grains.position, i))
@@ -136,24 +141,30 @@ def make_near_list(grains, contacts, near, far, count, span, reach, law, search)
 def list_soon(grains, near, count, span, gap):
     """Pick the pairs that are apart by less than `gap` [m] out of the near ones: only they can touch for a while.
 
-    A grain that is less than half the gap from where it is now cannot bring another pair to touch.
+    Until a grain has gone half the gap from where it is now, it cannot bring another pair to touch.  If there is no
+    room for so many, all are looked at.
     """
-    found = 0
+    found, room = 0, near.soon.size - 1
     for p in range(count[PAIRS]):
         i, j = near.pair[0, p], near.pair[1, p]
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         limit = grains.radius[i] + grains.radius[j] + gap
-        near.soon[found] = p
+        near.soon[min(found, room)] = p
         found += 1 if (near.touching[p] == 0) & (dot(apart, apart) < limit * limit) else 0
-    count[SOON] = found
-    for i in range(grains.mass.size):
-        put(near.mark, i, load(grains.position, i))
+    near.watch[SOON] = found if found <= room else count[PAIRS]
+    near.watch[SOON_LEEWAY] = SPARED * 0.5 * gap
+
+
+@loop
+def pair_soon(near, count, k):
+    """The k-th of the watch[SOON] pairs that may touch soon."""
+    return np.uint32(k) if near.watch[SOON] == count[PAIRS] else near.soon[k]
 
 
 @rare
 def forget_touch(near, count, i, j):
     """Mark the pair (i, j) of the list as no longer in contact; it may touch again soon."""
-    near.mark[0, 0], near.watch[SOON_LEEWAY] = math.inf, 0.0
+    near.watch[SOON_LEEWAY] = 0.0
     for p in range(count[PAIRS]):
         a, b = near.pair[0, p], near.pair[1, p]
         if (a == i and b == j) or (a == j and b == i):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.world import CONTACTS, LOST_IN_CONTACTS, World
+from ..core.world import CONTACTS, RECORDED, World
 from ..kernels.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
 
 COLUMNS = (
@@ -18,7 +18,7 @@ COLUMNS = (
     ("force", "N", "force on the first grain; the second one's is the opposite"),
     ("torque1", "N m", "torque on the first grain"),
     ("torque2", "N m", "torque on the second grain"),
-    *((f"lost_{name}", "J", f"dissipated so far: {name}") for name in LOST_IN_CONTACTS if name != "breaking"),
+    *((f"lost_{name}", "J", f"dissipated so far: {name}") for name in RECORDED),
 )
 """Name, unit and meaning of every column."""
 
@@ -43,10 +43,9 @@ class ContactTable(Mapping[str, np.ndarray]):
         self._columns |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
         vectors = rows[scalars:].reshape(len(names), 3, used)
         self._columns |= {name: vectors[k].T.copy() for k, name in enumerate(names)}
-        for k, name in enumerate(LOST_IN_CONTACTS):
-            if name != "breaking":
-                there = k < len(contacts.lost)
-                self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if there else np.zeros(used)
+        for k, name in enumerate(RECORDED):
+            there = k < len(contacts.lost)
+            self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if there else np.zeros(used)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._columns[name]

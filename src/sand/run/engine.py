@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arrays import SPARE
 from ..core.world import (
     CONTACT_STEP,
     CONTACTS,
@@ -21,7 +22,6 @@ from ..core.world import (
     MOVED,
     ORDERED,
     PAIRS,
-    SPARE,
     STAGE,
     STEPS,
     World,

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.world import CONTACTS, FOR_ALL, FOR_RATES, GRAIN1, GRAIN2, KEPT_FAR, PAIRS, PICKED, World
+from ..core.arrays import FOR_ALL, FOR_RATES, KEPT_FAR, PICKED
+from ..core.world import CONTACTS, GRAIN1, GRAIN2, PAIRS, World
 from ..kernels.gathering import resort_sides
 from ..setup.order import places_on_curve
 
@@ -36,7 +37,7 @@ def rearrange(world: World, rows: np.ndarray) -> None:
     """Let grain k become what grain rows[k] was, wherever it is named; contacts and pairs stay where they stand."""
     number = inverse(rows)  # the new one of each
     near, far, contacts, count = world.near, world.far, world.contacts, world.count
-    for array in [*world.grains.arrays, near.anchor, near.mark, *(getattr(far, name) for name in OF_GRAINS)]:
+    for array in [*world.grains.arrays, near.anchor, *(getattr(far, name) for name in OF_GRAINS)]:
         if array.shape[-1]:
             array[...] = array[..., rows]
     for array in [contacts.pair[:, : count[CONTACTS]], near.pair[:, : count[PAIRS]], far.order]:
@@ -56,4 +57,3 @@ def sort_columns(world: World) -> None:
             if columns.size and name not in NOT_OF_PAIRS and not (world.alike and name in FOR_ALL):
                 columns[..., : by.size] = columns[..., by]
     resort_sides(world.contacts, world.count, len(world.grains))
-    world.near.mark[0, 0] = np.inf  # those that may touch soon are picked anew

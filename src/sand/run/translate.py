@@ -6,25 +6,24 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from ..core.box import Box
-from ..core.errors import BadInput
-from ..core.grains import Grains
-from ..core.material import SILICA
-from ..core.stages import stage_arrays
-from ..core.world import (
+from ..core.arrays import (
     ALWAYS,
     FOR_CELLS,
     FOR_FORCES,
     FOR_IMPULSES,
     FOR_LIST,
     FOR_RATES,
-    LOST_IN_CONTACTS,
     SPARE,
-    World,
     contact_arrays,
     far_arrays,
     near_pairs,
 )
+from ..core.box import Box
+from ..core.errors import BadInput
+from ..core.grains import Grains
+from ..core.material import SILICA
+from ..core.stages import stage_arrays
+from ..core.world import RECORDED, World
 from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
 from ..forces.contact import Contact
 from ..forces.gas import Gas
@@ -166,7 +165,7 @@ def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet
 def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all_pairs: bool) -> World:
     """The grains in their box, with `room` for contacts and pairs, and for whatever else plan and rules need."""
     count, listed, alike = len(grains), rules.search.listed, rules.contact.alike
-    channels = len(LOST_IN_CONTACTS) if rules.contact.damped or rules.contact.follow else ALWAYS
+    channels = len(RECORDED) if rules.contact.damped or rules.contact.follow else ALWAYS
     blocks = all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0
     needed = set(FOR_LIST if listed else FOR_CELLS if rules.search.celled else ())
     needed |= set(FOR_IMPULSES if plan.impulse else ())

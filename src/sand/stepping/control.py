@@ -107,7 +107,7 @@ def grain_step(grains, far, start, control, i):
 def calm_steps(grains, far, start, count, control):
     """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
 
-    GRAIN1 becomes a grain that is not finite. `start` (N + 1,) tells who has contacts (core.world.ContactArrays).
+    GRAIN1 becomes a grain that is not finite. `start` (N + 1,) tells who has contacts (core.arrays.ContactArrays).
     """
     step = cycle = rank(control.longest)
     lost = 0.0

@@ -40,7 +40,7 @@ from .rules import Stop
 LONGEST_TURN = 0.5
 """Largest turn in one step [rad] for which `rotation.turn` is sound."""
 SOON_PART = 0.05
-"""Displacement, in the reach of the list of near pairs, after which those that may touch soon are picked out anew."""
+"""Way, in the reach of the list of near pairs, after which those that may touch soon are picked out anew."""
 
 
 @loop
@@ -112,7 +112,8 @@ def update_lists(grains, contacts, near, far, count, rules):
         if made == ROW_FULL:
             return Stop.LIST_FULL, stale
         look_up_harmless(near, count)
-    if rules.contact.on and (stale or is_stale(grains, near.mark, span, SOON_PART * reach, near.watch, SOON_LEEWAY)):
+    # written so that what is no number is spent
+    if rules.contact.on and (stale or not near.watch[SOON_LEEWAY] > 0.0):
         list_soon(grains, near, count, span, 2.0 * SOON_PART * reach)
     return Stop.STEPS_DONE, stale
 
@@ -128,6 +129,7 @@ def update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fr
         damp_contacts(grains, contacts, count, lost, span, dt)
     if fresh > 0:
         make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
+        near.watch[SOON_LEEWAY] = 0.0  # these touch, and need not be looked at any more
     if fresh > 0:
         sort_sides(contacts, count, grains.mass.size)
     if fresh > 0 or stale:
