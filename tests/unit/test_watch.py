@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import BROKEN, FAR_LEEWAY, FASTEST, MADE, NEAR_LEEWAY, QUICKEST, REBUILT, SOON_LEEWAY
+from sand.core.world import (
+    BROKEN,
+    FAR_LEEWAY,
+    FASTEST,
+    LOST_IN_CONTACTS,
+    MADE,
+    NEAR_LEEWAY,
+    QUICKEST,
+    REBUILT,
+    SOON_LEEWAY,
+)
 from sand.kernels.watch import farthest, largest_speeds
 from sand.run import translate
 from sand.stepping.parts import SOON_PART
@@ -125,6 +135,22 @@ def test_what_is_no_number_is_the_largest(sign):
     arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
     assert np.isnan(largest_speeds(arrays)[0]) and np.isfinite(largest_speeds(arrays)[1])
     assert np.isnan(farthest(arrays, anchor, span))
+
+
+@pytest.mark.parametrize("damping", ["none", "viscoelastic"])
+@pytest.mark.parametrize("channels", ["one row for each", "as many as this law has"])
+def test_what_contacts_lost_is_read_from_every_format(damping, channels):
+    """Formats 1 to 3 have a row for breaking among what each contact lost; format 1 has all seven in every law."""
+    place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [3.996e-8, 0, 0]])
+    sim = sand.Simulation(sand.Grains(place, 1e-8, sand.SILICA), [sand.Contact(damping=damping)])
+    sim.run(steps=1)
+    saved = sim.world.to_arrays()
+    seven = np.arange(14.0).reshape(7, 2)
+    law = 5 if damping == "none" else 7
+    sim.world.from_arrays(saved | {"contacts/lost": seven if channels == "one row for each" else seven[:law]})
+    for row, name in enumerate(LOST_IN_CONTACTS):
+        if name != "breaking":
+            assert sim.contacts[f"lost_{name}"].tolist() == (seven[row].tolist() if row < law else [0.0, 0.0])
 
 
 @pytest.mark.parametrize("name", ["contacts/twist", "contacts/side", "contacts/bond", "near/pair", "near/step"])

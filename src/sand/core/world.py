@@ -25,7 +25,7 @@ _NAMES = (
 )
 COUNT = tuple(_NAMES.split())
 (STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, MOVED, REBUILT, GRAIN1, GRAIN2, LISTED, FAR_SUMS) = range(12)
-LOOKED, GROWN, REJECTED, NEEDED, _UNUSED, ORDERED = range(12, 18)
+LOOKED, GROWN, REJECTED, NEEDED, _UNUSED, ORDERED = range(12, 18)  # checkpoints of old have a number there
 
 # --- places in NearPairs.watch (float64) -----------------------------------------------------------------
 FAR_LEEWAY, NEAR_LEEWAY, SOON_LEEWAY, FASTEST, QUICKEST, HARMLESS, SOON = range(7)

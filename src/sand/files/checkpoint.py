@@ -34,11 +34,12 @@ import numpy as np
 from ..core.errors import BadInput
 from .folder import replace_file
 
-VERSION = 3
+VERSION = 4
 """Of the file format; a newer program reads older versions, an older one refuses newer files.
 
 Since 2 there is one column of constants where all grains are equal, and no row for losses that a contact cannot have;
-since 3 there are no columns for far loads where there is no such force, and for damping where there is none.
+since 3 there are no columns for far loads where there is no such force, and for damping where there is none; since 4
+contacts keep no record of what they lost by breaking, as they are no more.
 """
 KEPT = 2
 _META = "meta.json"
