@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.core.world import PAIRS, SOON
 from sand.run.observers import Schedule
 
 from ..physics.setups import rest_distance, struck_chain
@@ -254,6 +255,9 @@ def test_contacts_alone_have_no_room_for_other_forces():
         assert far.here.size == 0 and far.source.shape == (1, far.mate.size) and far.order.size == 64
         assert contacts.damped.size == (contacts.twist.size if damping == "viscoelastic" else 0)
         assert len(contacts.lost) == (6 if damping == "viscoelastic" else 4)
+        near = sim.world.near
+        assert near.pair.shape[1] >= sim.world.count[PAIRS] >= 144 and near.soon.size == near.pair.shape[1] // 8
+        assert near.watch[SOON] == 0  # those in contact need not be looked at, and all others are farther
 
 
 def test_a_row_is_written_once(tmp_path):
