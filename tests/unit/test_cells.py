@@ -299,6 +299,28 @@ def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
     assert 540 * 1.1 <= sim.world.near.pair.shape[1] < 540 * 1.12
 
 
+def test_rows_that_are_too_long_are_listed_with_more_room():
+    """Thirty grains in a row, in the order of their cells, beside one that makes cells 0.5 µm wide: 29 pairs are near.
+
+    Neither room for 9 neighbours nor for 16 pairs is enough.  Until a list is made, its anchors are scratch.
+    """
+    position = np.zeros((31, 3))
+    position[:, 0] = 2.5e-8 * np.arange(31)
+    position[30, 0] += 4e-7
+    radius = np.full(31, 1e-8)
+    radius[30] = 2e-7
+    sim = sand.Simulation(sand.Grains(position, radius, sand.SILICA), [sand.Contact()], neighbours=Neighbours("cells"))
+    world = sim.world
+    world.far = world.far._replace(mate=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
+    assert world.near.pair.shape[1] == 16
+    sim.run(steps=1)
+    world = sim.world
+    assert world.far.source.shape == (1, world.far.mate.size) and world.far.mate.size > 29
+    assert world.count[REBUILT] == 1 and world.count[PAIRS] == 29
+    assert {tuple(sorted(pair)) for pair in world.near.pair[:, :29].T.tolist()} == {(k, k + 1) for k in range(29)}
+    assert np.array_equal(world.near.anchor.T, position)
+
+
 def test_near_pairs_have_the_step_of_their_own_contact():
     """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair are those of its bond, 1e-14."""
     rng = np.random.default_rng(4)

@@ -114,6 +114,28 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
+def test_a_pair_that_parts_and_comes_back_at_once_is_seen():
+    """Charges draw two grains together again that have just parted: one call of the driver, and one for each step.
+
+    The pair was in contact when those that may touch soon were picked, and meets again before any grain is too far.
+    """
+    seen, every_step = 0, sand.Verlet(far="every step")
+    for speed in np.linspace(5.25, 8.25, 13):
+        ends = []
+        for calls in ("one", "many"):
+            place = np.array([[-9.9999e-9, 0.0, 0.0], [9.9999e-9, 0.0, 0.0]])
+            velocity = 0.5 * speed * np.sign(place)
+            grains = sand.Grains(place, 1e-8, sand.SILICA, velocity=velocity, charge=[6e-18, -6e-18])
+            sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], stepping=every_step)
+            sim.run(steps=1)
+            while sim.world.steps < 400:
+                sim._engine.advance(np.inf, 399 if calls == "one" else 1)
+            ends.append(sim.world.to_arrays())
+        seen += bool(sim.world.count[BROKEN] > 0 and sim.world.count[MADE] > 0)
+        assert all(np.array_equal(ends[0][name], ends[1][name]) for name in ends[0])
+    assert seen > 3
+
+
 @pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.FLEW_TOO_FAR, 2), (0.0, Stop.SPUN_TOO_FAR, 0)])
 def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
     """Grain 0 spins too fast for the user's step, grain 2 flies too fast or rests."""
