@@ -129,7 +129,6 @@ def update_contacts(grains, contacts, near, clock, count, lost, rules, stale, fr
         damp_contacts(grains, contacts, count, lost, span, dt)
     if fresh > 0:
         make_contacts(grains, contacts, near, count, lost, clock, span, law, dt)
-        near.watch[SOON_LEEWAY] = 0.0  # these touch, and need not be looked at any more
     if fresh > 0:
         sort_sides(contacts, count, grains.mass.size)
     if fresh > 0 or stale:
