@@ -44,7 +44,7 @@ class NearPairs(NamedTuple):
     touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
     step: np.ndarray  # (P,) the step their contact needs [s]; (1,) where all are alike
     length: np.ndarray  # (P,) δ_c of their contact [m]; (1,) likewise
-    anchor: np.ndarray  # (3, N) positions when the list was made [m]
+    anchor: np.ndarray  # (3, N) positions when the list was made [m]; scratch while cells make it
     soon: np.ndarray  # (P/8,) uint32: the pairs that may touch next, the first watch[SOON]; all if there are too many
     watch: np.ndarray  # (7,) what spares looking at all grains or pairs in every step: kernels.watch
 
@@ -97,7 +97,7 @@ BLOCK = 128
 SPARE, GROWTH = 1.1, 1.25
 """Room for what is known to come, contacts at the start or pairs of a list; what is full grows by the second factor."""
 PAIRS_PER_SOON = 8
-"""Near pairs for each of those that may touch soon and have room; grains in contact are not among them."""
+"""Near pairs for each of those that may touch soon and have room; where more are that close, all are looked at."""
 CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 

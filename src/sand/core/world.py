@@ -134,7 +134,7 @@ class World:
                     saved = saved | {key: np.repeat(saved[key][..., :1], array.shape[-1], axis=-1)}
                     n = saved[key].shape[-1]
                 if name == "lost" and key in saved:  # up to format 3 also by breaking, in format 1 what nothing fills
-                    kept = np.delete(saved[key], BREAKING, 0) if len(saved[key]) % 2 else saved[key]
+                    kept = np.delete(saved[key], BREAKING, 0) if len(saved[key]) in (5, 7) else saved[key]
                     saved = saved | {key: kept[: len(array)]}
                 _take(array[..., :n], saved, key)
         for name in KEPT_FAR:  # format 1 may hold columns that nothing touches; without a list nothing is anchored

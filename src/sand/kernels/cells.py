@@ -105,7 +105,10 @@ def cell_at(x, number):
 
 @loop
 def sort_into_cells(far, here, anchor, span, grid):
-    """Fill `home`, `cell`, `order` and `here` (anchors by place): grains by cell, in each cell by number."""
+    """Fill `home`, `cell`, `order` and `here` (anchors by place): grains by cell, in each cell by number.
+
+    Here and in `list_stretch`, `here` may be far.here, which is not to be touched by its other name.
+    """
     nx, ny, nz = grid.counts
     total = nx * ny * nz
     for c in range(total + 1):

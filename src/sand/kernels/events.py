@@ -27,7 +27,7 @@ from ..physics.impact import speed_gained
 from ..physics.rotation import turned_back
 from .contacts import BROKE, WAITS, alike, bond_at, damping_at, pose_at, write_loads
 from .moving import record_of, strain_before
-from .neighbours import bond_of, forget_touch, pair_soon
+from .neighbours import all_may_touch, bond_of, forget_touch
 
 
 @loop
@@ -207,16 +207,24 @@ def drop_broken(contacts, count):
 
 
 @loop
+def _touches(grains, near, span, p):
+    """1 if pair p has come to touch (D ≤ r1 + r2), else 0."""
+    i, j = near.pair[0, p], near.pair[1, p]
+    apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+    reach = grains.radius[i] + grains.radius[j]
+    return 1 if (near.touching[p] == 0) & (dot(apart, apart) <= reach * reach) else 0
+
+
+@loop
 def new_touches(grains, near, count, span):
-    """How many pairs have come to touch (D ≤ r1 + r2), out of those that may."""
+    """How many pairs have come to touch, out of those that may."""
     found = 0
-    for k in range(int(near.watch[SOON])):
-        p = pair_soon(near, count, k)
-        i, j = near.pair[0, p], near.pair[1, p]
-        apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        reach = grains.radius[i] + grains.radius[j]
-        if near.touching[p] == 0 and dot(apart, apart) <= reach * reach:
-            found += 1
+    if all_may_touch(near, count):
+        for p in range(count[PAIRS]):
+            found += _touches(grains, near, span, p)
+    else:
+        for k in range(int(near.watch[SOON])):
+            found += _touches(grains, near, span, near.soon[k])
     return found
 
 

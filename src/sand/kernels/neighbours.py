@@ -156,9 +156,9 @@ def list_soon(grains, near, count, span, gap):
 
 
 @loop
-def pair_soon(near, count, k):
-    """The k-th of the watch[SOON] pairs that may touch soon."""
-    return np.uint32(k) if near.watch[SOON] == count[PAIRS] else near.soon[k]
+def all_may_touch(near, count):
+    """Are all near pairs to be looked at, instead of the first watch[SOON] of `soon`?"""
+    return near.watch[SOON] == count[PAIRS]
 
 
 @rare
