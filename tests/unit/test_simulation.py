@@ -202,6 +202,21 @@ def test_no_false_alarm_where_there_was_no_energy():
     assert sim.ledger.rows[-1]["translation"] > 0.0
 
 
+def test_what_is_rounding_is_no_drift():
+    """A lattice at rest: its energy changes in the last digit, over a kinetic energy of next to nothing.
+
+    A change of 1e-12 of the total is none of rounding, and counts.
+    """
+    sim = sand.Simulation(sand.setup.lattice(6, radius="10 nm", material=sand.SILICA), [sand.Contact()])
+    sim.run(until="0.5 ns")
+    first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
+    assert 0.0 < last["translation"] < 1e-20 * abs(last["total"])
+    assert sim.ledger.drift == 0.0
+    last["total"] = (1.0 + 1e-12) * first["total"]
+    kinetic = max(row["translation"] + row["rotation"] for row in sim.ledger.rows)
+    assert sim.ledger.drift == pytest.approx(1e-12 * abs(first["total"]) / kinetic, rel=1e-3)
+
+
 def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
     """6 radians in a step: the rotation parameters would be destroyed; the run stops and names the grain."""
     sim = sand.Simulation(pair(spin=[[0, 0, 0], [0, 0, 6e9]]), [sand.Contact()], stepping=sand.Verlet(step="1 ns"))

@@ -10,6 +10,8 @@ import numpy as np
 from ..core.world import LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
+ROUNDING = 1e-13
+"""Part of the total below which a change of it is what its sums are rounded by: nothing is left of it but digits."""
 
 
 def dissipated_in(row: Mapping[str, float]) -> float:
@@ -51,7 +53,12 @@ class Books:
         return np.array([row[column] for row in self.rows])
 
     def _change(self) -> float:
-        return abs(self.rows[-1]["total"] - self.rows[0]["total"]) if self.rows else 0.0
+        """|change of the total| [J]; 0 where it is rounding."""
+        if not self.rows:
+            return 0.0
+        first, last = self.rows[0]["total"], self.rows[-1]["total"]
+        change = abs(last - first)
+        return 0.0 if change <= ROUNDING * max(abs(first), abs(last)) else change
 
     @property
     def dissipated(self) -> float:
@@ -60,7 +67,10 @@ class Books:
 
     @property
     def drift(self) -> float:
-        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy of any row)."""
+        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy of any row).
+
+        0 where the change is within the rounding of the total, as in a body at rest.
+        """
         largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
         scale = self.dissipated + largest
         return self._change() / scale if scale > 0.0 else 0.0
