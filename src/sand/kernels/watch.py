@@ -2,7 +2,8 @@
 
 A list is sound as long as no grain is farther than some limit from where it was when the list was made.  Its leeway is
 how far grains may still fly before one of them can be: the fastest grain spends it, and all are looked at only when
-it is spent.  So lists are made anew in the very steps in which they would be if all were looked at in each.
+it is spent.  So lists are made anew in the very steps in which they would be if all were looked at in each.  What
+may touch soon is picked anew without a look, which would save few picks and need positions of its own.
 """
 
 import math
