@@ -1,28 +1,165 @@
-"""What all tests share."""
+"""Settings for all tests: tiers, groups for parallel workers, and fixtures without side effects.
+
+Tiers (the last line of a run says which were left out and how to run them):
+
+* ``quick``      everything that compiles nothing; ``pytest -m quick``
+* ``compiled``   runs numba kernels; the argument names a kernel specification (see ``tests/specs.py``)
+* ``validate``   long statistical checks; ``pytest --validate``
+* ``browser``    ``tests/browser``, the page in Chromium; ``pytest tests/browser``
+* ``peers``      ``tests/peers``, other programs; ``pytest tests/peers``
+"""
 
 from __future__ import annotations
 
 import signal
 import warnings
+from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
+from numba.core.config import DISABLE_JIT
+from numba.core.event import Event, Listener, register
+
+from .specs import SPECS, watched
+from .validation import Recorder, parse_part, part_of
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+TESTS = Path(__file__).parent
+FOLDERS = ("browser", "peers")
+"""Folders under tests/ that run only when their path is given."""
+HOW = {
+    "validate": "{} long statistical checks: pytest --validate",
+    "browser": "{} of the page in a browser: pytest tests/browser",
+    "peers": "{} against other programs: pytest tests/peers",
+}
+left_out: Counter[str] = Counter()
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--validate", action="store_true", help="also run the long statistical checks")
+    parser.addoption(
+        "--validate-part",
+        metavar="K/N",
+        type=parse_part,
+        help="run only the long checks of part K (0 … N-1) of N, and no other tests",
+    )
+    parser.addoption("--record", action="store_true", help="write tests/validated.md if every test passes")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--record") and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Recorder())
+
+
+def _tier(item: pytest.Item) -> str | None:
+    """The tier that a test belongs to beyond the default ones."""
+    if "validate" in item.keywords:
+        return "validate"
+    folder = item.path.relative_to(TESTS).parts[0] if item.path.is_relative_to(TESTS) else ""
+    return folder if folder in FOLDERS else None
+
+
+def _chosen(config: pytest.Config) -> set[str]:
+    """The tiers that this run was asked for."""
+    roots = [Path(str(word).split("::")[0]).resolve() for word in config.args]
+    chosen = {name for name in FOLDERS if any(root.is_relative_to(TESTS / name) for root in roots)}
+    if config.getoption("--validate") or config.getoption("--validate-part"):
+        chosen.add("validate")
+    return chosen
+
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` and pytest-xdist look at the marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if config.getoption("--validate"):
-        return
-    skip = pytest.mark.skip(reason="long statistical check; run with --validate")
+    chosen, part = _chosen(config), config.getoption("--validate-part")
+    kept, dropped = [], []
     for item in items:
-        if "validate" in item.keywords:
-            item.add_marker(skip)
+        tier = _tier(item)
+        wanted = tier is None or tier in chosen
+        if part:
+            wanted = tier == "validate" and part_of(item.nodeid, part)
+        if wanted:
+            kept.append(item)
+        else:
+            dropped.append(item)
+            left_out[tier or "default"] += 1
+        _mark(item, tier)
+    if dropped:
+        config.hook.pytest_deselected(items=dropped)
+        items[:] = kept
+
+
+def _mark(item: pytest.Item, tier: str | None) -> None:
+    """Add `quick` or the group of the worker that compiles the test's kernels."""
+    mark = item.get_closest_marker("compiled")
+    if mark is None and tier is None:
+        item.add_marker(pytest.mark.quick)
+    if mark is not None:
+        if not mark.args or not set(mark.args) <= set(SPECS):
+            raise pytest.UsageError(f"{item.nodeid}: compiled{mark.args} must name some of {', '.join(SPECS)}")
+        item.add_marker(pytest.mark.xdist_group(mark.args[0]))
+
+
+# ---- what a test may compile -------------------------------------------------------------------------
+class CompilationGuard(Listener):
+    """Fails a test that compiles a kernel, or takes steps with a driver, that its mark `compiled` does not name."""
+
+    def __init__(self) -> None:
+        self.allowed: tuple[str, ...] | None = None  # None: everything
+
+    def on_start(self, event: Event) -> None:
+        """Called by numba before it compiles a function."""
+        if self.allowed == ():
+            function = getattr(event.data.get("dispatcher"), "py_func", None)
+            raise AssertionError(f"this test compiles {getattr(function, '__qualname__', function)}: {ADVICE}")
+
+    def on_end(self, event: Event) -> None:
+        """Called by numba afterwards."""
+
+    def use(self, name: str | None, plan: Any) -> None:
+        """Called before a driver takes steps; `name` is its specification, None for one that is not canonical."""
+        if self.allowed is not None and name not in self.allowed:
+            what = f"the driver {name!r}" if name else f"a driver that is none of tests/specs.py ({plan})"
+            raise AssertionError(f"this test takes steps with {what}: {ADVICE}")
+
+
+ADVICE = "mark it with pytest.mark.compiled(specifications), or as a long check (see tests/specs.py)"
+guard = CompilationGuard()
+register("numba:compile", guard)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    mark = item.get_closest_marker("compiled")
+    if _tier(item) is None and not DISABLE_JIT:
+        guard.allowed = mark.args if mark else ()
+    with watched(guard.use):
+        result = yield
+    guard.allowed = None
+    return result
+
+
+# ---- the last line -----------------------------------------------------------------------------------
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    output = getattr(session.config, "workeroutput", None)
+    if output is not None:  # a worker of pytest-xdist tells the process that reports
+        output["left_out"] = dict(left_out)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    left_out.clear()  # every worker collects the same tests
+    left_out.update(getattr(node, "workeroutput", {}).get("left_out", {}))
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    reporter = config.pluginmanager.getplugin("terminalreporter")
+    told = [HOW[name].format(left_out[name]) for name in HOW if left_out[name]]
+    if told and reporter is not None and not hasattr(config, "workerinput"):
+        reporter.write_line("not run: " + "; ".join(told))
 
 
 @pytest.fixture(autouse=True)

@@ -70,6 +70,7 @@ def exact(grains, end):
     return done.y[:, -1].reshape(4, 2, 3)
 
 
+@pytest.mark.compiled("adaptive")
 def test_the_error_follows_the_tolerance_over_six_decades():
     """Steps h ∝ tol^(1/5) with errors h⁶ each: in all h⁵ ∝ tol.  Error < 4 tol, falling by 10 (5 … 20) per decade.
 
@@ -88,6 +89,7 @@ def test_the_error_follows_the_tolerance_over_six_decades():
     assert (ratios[1:] < 20).all()
 
 
+@pytest.mark.compiled("adaptive")
 def test_each_error_is_prescribed_by_itself():
     """Three errors out of reach, one tight: the steps are those of the tight one, and shorter for a tighter one."""
     loose = {"position_error": 1.0, "velocity_error": 1e9, "turn_error": 1e9, "spin_error": 1e30}
@@ -103,6 +105,7 @@ def test_each_error_is_prescribed_by_itself():
         assert 2.5 < steps[1] / steps[0] < 5
 
 
+@pytest.mark.compiled("adaptive")
 def test_scattering_run_back_comes_home():
     """Velocities and spins reversed at the end, the same time back: the start to 1e-6, of r, speed, μ, ω.
 
@@ -119,6 +122,7 @@ def test_scattering_run_back_comes_home():
     assert np.abs(state_of(g)[0] - start[0]).max() > 10
 
 
+@pytest.mark.compiled("adaptive")
 def test_verlet_converges_to_it_with_order_two():
     """The error of Verlet with steps of 1/8, 1/16, 1/32 of 0.2 ns against the adaptive run falls by 4 each: 1.9 … 2.1.
 
@@ -143,6 +147,7 @@ def approaching(offset, *, radii=(1e-8, 1.7e-8), way=1.3e-6, speed=SPEED):
     )  # fmt: skip
 
 
+@pytest.mark.compiled("adaptive")
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.9, 1 - 1e-4])
 def test_touch_comes_at_the_analytic_time(part):
     """Impact parameter b = part (r1 + r2): touch at t = (L − √((r1 + r2)² − b²))/v to 1e-9.
@@ -156,6 +161,7 @@ def test_touch_comes_at_the_analytic_time(part):
     assert sim.world.contacts.formed[0] == pytest.approx((1.3e-6 - reach * math.sqrt(1 - part**2)) / SPEED, rel=1e-9)
 
 
+@pytest.mark.compiled("adaptive")
 def test_a_grazing_pass_is_seen_and_a_miss_is_none():
     """b = (1 ∓ 1e-6)(r1 + r2), all of it within one step: a touch, none.  Dipoles this small turn nothing by 1e-6."""
     for side, made in ((-1, 1), (1, 0)):
@@ -167,6 +173,7 @@ def test_a_grazing_pass_is_seen_and_a_miss_is_none():
             assert sim.world.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
 
 
+@pytest.mark.compiled("adaptive")
 def test_after_the_touch_the_books_close_as_with_verlet():
     """Two iron grains stick at 10 m/s: change of the total at most that of a run by Verlet alone, plus the tolerance.
 
@@ -184,6 +191,7 @@ def test_after_the_touch_the_books_close_as_with_verlet():
     assert drifts[0] < 1.5 * drifts[1] + 1e-8
 
 
+@pytest.mark.compiled("adaptive")
 def test_a_contact_that_breaks_gives_the_world_back():
     """Silica at 20 m/s touches, bounces off, and flies on in long steps; made = broken = 1."""
     moment = 1e-28 * np.eye(3)[:2]
@@ -196,6 +204,7 @@ def test_a_contact_that_breaks_gives_the_world_back():
     assert sim.ledger.drift < 1e-3
 
 
+@pytest.mark.compiled("adaptive")
 def test_momenta():
     """P to rounding of its parts; L, a quadratic invariant, to the errors of all steps; so E, and with the tolerance.
 
@@ -234,6 +243,7 @@ def in_a_field(grains, stepping=None, margin="auto", **options):
     )  # fmt: skip
 
 
+@pytest.mark.validate
 def test_the_work_of_a_turning_field():
     """One grain: I ω̇ = μ×B, μ̇ = ω×μ, Ẇ = −μ·Ḃ by DOP853: W = −lost_outside, and the total stays, to 1e-7 of μB.
 
@@ -263,6 +273,7 @@ def hot_gas():
     return sand.setup.gas(64, BOX, radius=R, material=sand.IRON, moment="200 A m^2/kg", temperature="3e5 K", seed=3)
 
 
+@pytest.mark.validate
 def test_no_pair_is_missed_by_a_list():
     """64 fast grains with a margin of 20 and of 60 nm: the same first touch, the same places to 1e-6 r.
 
@@ -301,6 +312,7 @@ def bits(sim):
     return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("lengths", [(3e-7, 3e-7, 3e-7), (3e-7, None, None)])
 @pytest.mark.parametrize("margin", ["auto", "1 um"])
 def test_images_are_not_flown_through(lengths, margin):
@@ -322,6 +334,7 @@ def test_images_are_not_flown_through(lengths, margin):
     assert sim.world.contacts.formed[0] == pytest.approx(first, abs=2e-11)
 
 
+@pytest.mark.compiled("adaptive")
 def test_pieces_and_cadence_change_no_bit():
     """Whole, in pieces, watched often: the same state; grains fly, touch, and go on with Verlet."""
     ends = []
@@ -334,6 +347,7 @@ def test_pieces_and_cadence_change_no_bit():
     assert ends[0] == ends[1] == ends[2]
 
 
+@pytest.mark.compiled("adaptive")
 @pytest.mark.parametrize("stop", [20, 400])
 def test_resume_is_bit_for_bit(tmp_path, stop):
     """Stopped in free flight, and with a contact: the resumed run ends as the whole one, with the same errors."""
@@ -347,6 +361,7 @@ def test_resume_is_bit_for_bit(tmp_path, stop):
     assert bits(rest) == bits(whole)
 
 
+@pytest.mark.compiled("adaptive")
 def test_rejected_steps_are_counted_and_change_nothing_else():
     """A first step far too long is rejected until it fits; the end differs by no more than the tolerance does."""
     sim = flight(scattering())
@@ -359,6 +374,7 @@ def test_rejected_steps_are_counted_and_change_nothing_else():
     assert np.abs(state_of(sim.grains) - exact(sim.start, 2e-8)).max() < 4e-9
 
 
+@pytest.mark.compiled("adaptive")
 def test_what_no_step_can_follow_stops_the_run():
     """Opposite dipoles without contacts fall through each other, ∝ 1/r³: an outcome, and finite numbers."""
     along = SIZE * np.array([[1.0, 0, 0], [1.0, 0, 0]])

@@ -15,7 +15,10 @@ from sand.physics import contact as law_of
 from .setups import Imposed, random_aggregate, rest_distance, struck_chain
 
 
-@pytest.mark.parametrize(("far", "bound"), [("every step", 1e-12), ("impulse", 1e-11)])
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize(
+    ("far", "bound"), [pytest.param("every step", 1e-12, marks=pytest.mark.validate), ("impulse", 1e-11)]
+)
 @pytest.mark.parametrize(("seed", "radii"), [(1, (1e-8, 1e-8)), (2, (4e-9, 1.2e-8)), (3, (2e-9, 2e-8))])
 def test_momenta_are_kept(seed, radii, far, bound):
     """P and L = Σ x×mv + Iω of a random aggregate with dipoles, open box, 1e5 steps: to rounding.
@@ -27,7 +30,7 @@ def test_momenta_are_kept(seed, radii, far, bound):
     """
     fast = 8.0 * np.random.default_rng(seed + 100).normal(size=(16, 3))
     grains = random_aggregate(16, seed, radii=radii, moment="300 A m^2/kg", velocity=fast)
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=sand.Verlet(far=far))
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 um")], stepping=sand.Verlet(far=far))
     sim.run(steps=100_000)
     momenta = np.array(
         [
@@ -45,6 +48,7 @@ def test_momenta_are_kept(seed, radii, far, bound):
     assert sim.ledger.rows[-1]["moved"] > 100  # contacts did slide and roll
 
 
+@pytest.mark.compiled("dipoles")
 def test_magnetic_gas_before_its_first_touch():
     """The ledger of the magnetics alone: ≤ 1e-6 of |U_min| = 2kμ²/d³ until the first contact of a periodic gas.
 
@@ -80,6 +84,7 @@ def chain_errors(steps_per_period):
     return np.sqrt(np.mean(np.square(errors)))
 
 
+@pytest.mark.compiled("contacts")
 def test_a_struck_chain_closes_its_books():
     """Chain of 7 iron grains (20 nm) hit at 100 m/s: rms over nine hits ≤ 3e-3 of the impact energy at T/20.
 
@@ -93,6 +98,7 @@ def test_a_struck_chain_closes_its_books():
     assert errors[-1] < 1.5e-5
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("beyond", ["clamp", "release"])
 def test_unequal_grains_of_two_materials_close_their_books(beyond):
     """Two aggregates of unequal silica and ice grains collide at 20 m/s; error ≤ 1e-3 of the impact energy."""
@@ -113,6 +119,7 @@ def test_unequal_grains_of_two_materials_close_their_books(beyond):
     assert sim.ledger.drift < 1e-3
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("offset", [0.0, 0.3, 0.7])
 def test_small_grains_touch_at_their_own_step_beside_large_ones(offset):
     """Two 10 nm iron grains meet at 10 m/s while two 1 µm grains rest in contact elsewhere.
@@ -132,6 +139,7 @@ def test_small_grains_touch_at_their_own_step_beside_large_ones(offset):
     assert abs(last["total"] - first["total"]) < 1e-2 * last["lost_forming"]
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("r2", [1e-8, 5e-9])
 def test_rolling_far_against_the_grain_size_closes_its_books(r2):
     """ξ_c = 1 nm on grains of 5 nm: the normal part of n1 + n2 takes part; the error falls with the step.
@@ -153,6 +161,7 @@ def test_rolling_far_against_the_grain_size_closes_its_books(r2):
     assert errors[1] < 3e-4
 
 
+@pytest.mark.compiled("contacts")
 def test_nothing_is_booked_for_grains_that_touch_at_the_start():
     """A relaxed pair: no losses, no motion but rounding, and the energy of its contact is in the books."""
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)
@@ -167,6 +176,7 @@ def test_nothing_is_booked_for_grains_that_touch_at_the_start():
     assert last["normal"] < 0.0
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("speed", [0.5, 20.0])
 @pytest.mark.parametrize("side", [0.0, 0.7])
 def test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls(speed, side):
@@ -206,6 +216,7 @@ def beyond_energy(sim):
     return stiffness * w * w / 12.0 - force(overlap) ** 2 / (12.0 * sim.grains.mass[0])
 
 
+@pytest.mark.compiled("contacts")
 def test_the_ringing_after_a_touch_has_the_energy_of_before():
     """Mean of the total over twelve periods: at most (ω_n dt)²/12 of the ringing under the energy before the touch.
 
@@ -230,6 +241,7 @@ def test_the_ringing_after_a_touch_has_the_energy_of_before():
         assert abs(offset) < (2 * math.pi / period * sim.world.clock[CONTACT_STEP]) ** 2 / 12.0
 
 
+@pytest.mark.compiled("contacts")
 def test_two_grains_that_bounce():
     """Head-on above the sticking speed: rebound √(v² − v_s²), loss E_cycle = 0.935503 Fcδc exactly booked.
 
@@ -256,6 +268,7 @@ def test_two_grains_that_bounce():
     assert sim.ledger.rows[-1]["contacts"] == 1
 
 
+@pytest.mark.compiled("contacts")
 def test_twist_is_integrated_to_second_order():
     """dφ/dt = (ω1 − ω2)·n with n turning in the plane: φ = Δω sin(Ωt)/Ω; halving the step quarters the error.
 
@@ -275,6 +288,7 @@ def test_twist_is_integrated_to_second_order():
     assert 3.5 < errors[0] / errors[1] < 4.5
 
 
+@pytest.mark.compiled("contacts", "small")
 @pytest.mark.parametrize("speed", [1.0, 5.0, 20.0])
 @pytest.mark.parametrize("kind", ["lattice", "pca"])
 def test_aggregate_collisions_close_their_books(kind, speed):

@@ -47,6 +47,7 @@ def sticking_speed(material, r1, r2):
     return math.sqrt(2 * 0.935503 * bond.pull_off_force * bond.pull_off_overlap / reduced_mass)
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("r", [1e-8, 1e-7, 1e-6])
 @pytest.mark.parametrize("name", list(MATERIALS))
 def test_the_sticking_speed_of_equal_grains(name, r):
@@ -59,6 +60,7 @@ def test_the_sticking_speed_of_equal_grains(name, r):
     assert head_on(m, r, r, 1.005 * speed) > 0.0
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("factor", [1.05, 1.5, 4.0, 20.0])
 @pytest.mark.parametrize("name", list(MATERIALS))
 @pytest.mark.parametrize(("r1", "r2"), [(1e-8, 1e-8), (1e-6, 1e-6), (1e-7, 4e-7)])
@@ -108,6 +110,7 @@ MODES = {
 }
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("mode", list(MODES))
 def test_periods_of_the_four_modes(mode):
     """ω² = 2k_n/m, 7k_s/m, 2R²k_r/I, 2k_t/I to 1e-3 at T/100 of the fastest (Verlet: 1.6e-4).
@@ -135,6 +138,7 @@ def test_limits_of_force_and_torque():
     )
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("beyond", "share"), [("clamp", 1.0), ("release", 0.5)])
 def test_a_grain_rolled_round_another_by_90_degrees(beyond, share):
     """Dissipates k_r ξ_c (πr/2 − ξ_c) clamped (→ 12π²γRξ_c for ξ_c ≪ r), half of it released; 1 % at r = 0.1 µm.
@@ -157,6 +161,7 @@ def test_a_grain_rolled_round_another_by_90_degrees(beyond, share):
     assert expected == pytest.approx(rough, rel=0.01, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_grain_twisted_by_a_full_turn():
     """Dissipates k_t φ_c (2π − φ_c) clamped, k_t φ_c 2π for small φ_c; both directions."""
     for sign in (1.0, -1.0):
@@ -169,6 +174,7 @@ def test_a_grain_twisted_by_a_full_turn():
         assert expected == pytest.approx(BOND.twist_stiffness * tangential.TWIST_LIMIT * 2 * math.pi, rel=0.01, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("steps", [5_000])
 def test_rigid_motion_strains_nothing(steps):
     """An aggregate of unequal grains turned ten times about an odd axis while it flies: every displacement stays

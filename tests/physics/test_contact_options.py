@@ -25,6 +25,7 @@ def bond_of(contact, material=sand.SILICA, r=R):
     return bond_between(contact.pairing(material, material), r, r, mass, mass), mass
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
 def test_ringing_decays_as_the_oscillator_does(kind):
     """m̄ x¨ = −k_n x − c ẋ: energy falls as exp(−c t/m̄), c constant or (2 T_vis E*/ν²) a0; small amplitude, 2 %."""
@@ -41,6 +42,7 @@ def test_ringing_decays_as_the_oscillator_does(kind):
     assert sim.ledger.drift < 1e-4
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
 def test_the_books_of_damped_impacts_close_with_the_square_of_the_step(kind):
     """Aggregates of unequal grains collide with damping: the error falls ≥ 3× per halving (rms of twelve)."""
@@ -70,6 +72,7 @@ def test_the_books_of_damped_impacts_close_with_the_square_of_the_step(kind):
     assert errors[2] < errors[0] / 9
 
 
+@pytest.mark.compiled("contacts")
 def test_stiffnesses_that_follow_are_booked():
     """ "dt97" does not conserve: its springs make or destroy `lost_stiffness`, and with it the ledger closes."""
     rng = np.random.default_rng(3)
@@ -85,6 +88,7 @@ def test_stiffnesses_that_follow_are_booked():
     assert totals[1] < totals[0] / 2.5
 
 
+@pytest.mark.compiled("contacts")
 def test_each_contact_keeps_its_own_books():
     """The sum over contacts that never broke equals the ledger's channels, to rounding."""
     rng = np.random.default_rng(8)
@@ -122,6 +126,7 @@ def test_mixing_rules(rule):
     assert 0.1 <= mix(0.1, 0.4) <= 0.4
 
 
+@pytest.mark.compiled("contacts")
 def test_without_adhesion_grains_bounce_like_hertz():
     """γ = 0: no sticking, no loss; contact time 2.868 (m̄²/(R E*² v))^(1/5), seen to within the two steps around it."""
     bare = sand.SILICA.but(name="bare", surface_energy=0.0)

@@ -23,7 +23,7 @@ def chain(ringing, far="impulse", far_steps=70, length=20, seed=3, step="auto", 
     mass = sand.Grains(position, 1e-8, sand.IRON).mass
     grains = sand.Grains(position, 1e-8, sand.IRON, moment=MOMENT * mass[:, None] * direction)
     stepping = sand.Verlet(far=far, far_steps=far_steps, step=step)
-    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(), *others], stepping=stepping)
+    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="10 um"), *others], stepping=stepping)
 
 
 def energy_error(sim, steps=100_000, looks=20):
@@ -35,6 +35,7 @@ def energy_error(sim, steps=100_000, looks=20):
     return np.abs(total - total[0]).max()
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("ringing", [True, False])
 def test_cycles_cost_little_energy(ringing):
     """A freshly stuck chain and a calm one, 1e5 steps: energy error with k_max = 70 and 12 at most 10 × that of k = 1.
@@ -59,12 +60,14 @@ def test_the_usual_cycle_stays_below_half_a_period():
     assert sand.Verlet(far="every step", far_steps=9).most_steps == 1
 
 
+@pytest.mark.compiled("dipoles", "taylor")
 def test_taylor_series_drift():
     """The literal Taylor series of a ringing chain misplaces its loads: its energy error is far above the default's."""
     errors = {far: energy_error(chain(True, far), 20_000, 4) for far in ("impulse", "taylor", "taylor-literal")}
     assert errors["impulse"] < 0.3 * errors["taylor"] < 0.3 * errors["taylor-literal"]
 
 
+@pytest.mark.validate
 def test_a_cycle_of_one_step_is_every_step():
     """k_max = 1: the same bits as summing in every step, whichever way."""
     ends = [chain(True, far, 1, length=5) for far in ("every step", "impulse", "taylor-literal")]
@@ -76,6 +79,7 @@ def test_a_cycle_of_one_step_is_every_step():
         assert (sim.grains.spin == ends[0].grains.spin).all()
 
 
+@pytest.mark.validate
 def test_cycles_converge():
     """Positions of a ringing chain after 20 ps × 70 against k = 1: the difference falls as the square of k."""
     ends = {}
@@ -91,6 +95,7 @@ def test_cycles_converge():
     assert 2.5 < far / near < 6.0
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(("longer", "sums"), [(1.0, 1 / 12), (3.0, 1 / 4), (0.5, 1 / 12)])
 def test_a_fixed_step_makes_no_longer_cycles(longer, sums):
     """12 steps per cycle count in the contacts' own steps: with a step three times that, 4; with half of it, 12."""
@@ -101,6 +106,7 @@ def test_a_fixed_step_makes_no_longer_cycles(longer, sums):
     assert sim.world.count[FAR_SUMS] / sim.world.steps == pytest.approx(sums, rel=0.01, abs=0.0)
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize(("far", "steps"), [("impulse", 2105.5), ("taylor", 2101.5)])
 def test_a_stop_within_a_cycle_leaves_whole_books(far, steps):
     """A chain falls so fast that the run must end, near the end of a cycle: the last total is as good as the others.

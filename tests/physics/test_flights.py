@@ -40,6 +40,7 @@ def bodies_of(flying):
     ]
 
 
+@pytest.mark.compiled("scattering")
 def test_against_scipy():
     """SciPy's DOP853 at 1e-12 with matrices K and vectors of two bodies in the laboratory: same place to 1e-6 of R.
 
@@ -88,6 +89,7 @@ def test_against_scipy():
         assert np.abs(mine - theirs).max() < 1e-6 * size
 
 
+@pytest.mark.compiled("scattering")
 def test_against_the_simulation():
     """The same pair in `Simulation` with `Adaptive` steps, quaternions and all: same place to 1e-5 of R."""
     flying = unequal(field=None)
@@ -107,6 +109,7 @@ def test_against_the_simulation():
     assert np.abs(sim.grains.position[1] - target[0]).max() < 1e-5 * 1e-8
 
 
+@pytest.mark.compiled("scattering")
 def test_momenta_and_energy():
     """E, and without a field L = m̄ r×u + I1ω1 + I2ω2, at every step to 1e-7: the tolerance times some hundred steps."""
     flying = unequal(field=None, spin="kT/2", temperature="100 K", orientation="random")
@@ -123,6 +126,7 @@ def test_momenta_and_energy():
         assert np.abs(np.linalg.norm(one.moment_target, axis=1) - 1.0).max() < 1e-12
 
 
+@pytest.mark.compiled("scattering")
 def test_aggregates_of_one_grain_are_spheres():
     """The rigid-body kernel with one grain each: the same flights as the kernel of spheres, 1e-6 of R at the end."""
     from sand.experiments.encounters import body_of
@@ -149,6 +153,7 @@ def test_aggregates_of_one_grain_are_spheres():
     assert np.abs(ends[0, :3] - moved).max() < 1e-4 * 1e-8
 
 
+@pytest.mark.compiled("scattering")
 def test_aggregates_keep_energy_and_touch_where_grains_do():
     """A chain of 3 against one of 2, tumbling: energy to 1e-6 of |U_min|, and the first touch is one of grains."""
     distance = 2e-8
@@ -166,6 +171,7 @@ def test_aggregates_keep_energy_and_touch_where_grains_do():
     assert np.abs(rows[hit, COLUMNS.index("closest")]).max() < 1e-6 * flying.scales.touch
 
 
+@pytest.mark.compiled("scattering")
 def test_without_moments_it_is_geometry():
     """σ = π(r1 + r2)²: all flights below b = r1 + r2 hit, none above; grazes are seen to 1e-4 of it."""
     flying = scattering.flight(
@@ -182,6 +188,7 @@ def test_without_moments_it_is_geometry():
     assert np.isnan(found.c)
 
 
+@pytest.mark.compiled("scattering")
 def test_cold_grains_stop_at_b_max():
     """No spin, v_th, from 10 b_max: none of 600 hits at b ≥ 1.03 b_max, all of 200 below 0.7; c = 0.990 ± 0.01."""
     flying = scattering.flight(**THERMAL)
@@ -195,12 +202,14 @@ def test_cold_grains_stop_at_b_max():
     assert found.drift < 1e-6
 
 
+@pytest.mark.compiled("scattering")
 def test_aligned_and_cold_is_eq_14():
     """Moments along the line of centres from the start: the central potential of Eqs. 7–14, c = 1.00 ± 0.01."""
     found = scattering.cross_section(**THERMAL, orientation="aligned", relative_error=0.004)
     assert found.c == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.compiled("scattering")
 def test_the_trajectories_of_figure_2():
     """At v_th/16 from 10 b_max: 0.95 b_max meets, 1.0 hands over nearly all energy, 1.025 and 1.05 miss.
 
@@ -218,6 +227,7 @@ def test_the_trajectories_of_figure_2():
     assert (rows[:, END] == MISS).all()
 
 
+@pytest.mark.compiled("scattering")
 def test_the_tolerance_does_not_matter():
     """1e-7, 1e-8 and 1e-9: of 400 cold flights the same ones hit but for one in 200 at the rim, with spin σ agrees."""
     tasks = [Task(k, 0, 25) for k in range(16)]
@@ -232,6 +242,7 @@ def test_the_tolerance_does_not_matter():
     assert abs(found[0].sigma - found[1].sigma) < 3.0 * math.hypot(found[0].sigma_error, found[1].sigma_error)
 
 
+@pytest.mark.compiled("scattering")
 def test_only_the_relative_motion_counts():
     """A target that comes towards the projectile: the same flights as one at rest at the sum of the speeds."""
     still = scattering.flight(**IRON, speed=0.3, start="2 um")
@@ -243,6 +254,7 @@ def test_only_the_relative_motion_counts():
     assert rows[0][:, COLUMNS.index("time")] == pytest.approx(rows[1][:, COLUMNS.index("time")], rel=1e-6, abs=0.0)
 
 
+@pytest.mark.compiled("scattering")
 def test_a_target_that_moves():
     """Given: σ is that of the relative motion.  By chance: ⟨σ(u) u⟩/v∞, for Eq. 14 ⟨(u/v)^(−1/3)⟩ of it, 5 %.
 
@@ -262,6 +274,7 @@ def test_a_target_that_moves():
     assert np.isnan(path.exchanged)
 
 
+@pytest.mark.compiled("scattering")
 @pytest.mark.parametrize(("radius", "part"), [(1e-4, 0.98), (1e-4, 1.03), (1e-6, 1.5)])
 def test_large_grains_stick_below_their_own_speed(radius, part):
     """Silica of 100 µm and 1 µm: the contact is slow against the sound in it; a grain of 20 nm rides on the second."""
@@ -278,6 +291,7 @@ def test_large_grains_stick_below_their_own_speed(radius, part):
     assert (rows[:, END] == (HIT if part < 1.0 else BOUNCE)).all()
 
 
+@pytest.mark.compiled("scattering")
 @pytest.mark.parametrize(("speed", "outcome"), [(76.0, HIT), (82.0, BOUNCE)])
 def test_sticking_through_the_real_contact(speed, outcome):
     """Head-on and without moments, iron of 10 nm sticks below v_s = 78.9 m/s (theory.contact) and bounces above."""

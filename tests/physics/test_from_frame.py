@@ -31,6 +31,7 @@ def crash(tmp_path_factory):
     return folder, read_frames(folder / "trajectory.gsd"), sim
 
 
+@pytest.mark.compiled("small")
 def test_the_run_is_worth_it(crash):
     """There are stretched contacts, strained ones, some at a limit, and contacts across the faces."""
     _, frames, _ = crash

@@ -70,6 +70,7 @@ def gone_on(whole, folder):
     assert content(folder) == content(whole[1])
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.skipif(sys.platform != "linux", reason="relies on Linux's limits for files")
 @pytest.mark.parametrize("limit", [0, 700, 3000, 20_000, 50_000, 90_000, 120_000])
 def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
@@ -85,6 +86,7 @@ def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
     gone_on(whole, folder)
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.skipif(sys.platform != "linux", reason="relies on Linux's limits for files")
 @pytest.mark.parametrize("limit", [120_000, 150_000, 165_000, 180_000])
 def test_many_small_frames(tmp_path, limit):

@@ -16,10 +16,14 @@ def passing(cut, step):
         [[0, 0, 0], [1.2e-7, 3e-8, 0]], 1e-8, sand.IRON, moment=moment, velocity=[[0, 0, 0], [-40.0, 0, 0]]
     )
     return sand.Simulation(
-        grains, [sand.Dipoles(cutoff="0.1 um", cut=cut)], stepping=sand.Verlet(step=step), frame_every="5 ps"
+        grains,
+        [sand.Contact(), sand.Dipoles(cutoff="0.1 um", cut=cut)],
+        stepping=sand.Verlet(step=step),
+        frame_every="5 ps",
     )
 
 
+@pytest.mark.compiled("dipoles")
 def test_the_smooth_cut_keeps_the_energy_and_the_sharp_one_jumps():
     """Smooth: the drift falls as dt² and is the integrator's.  Sharp: E jumps by U(r_c) at each crossing, at any dt.
 
@@ -47,9 +51,12 @@ def swinging(field, step, **options):
     grains = sand.Grains(
         2e-7 * rng.normal(size=(3, 3)), 1e-8, sand.IRON, moment=6.6e-18 * rng.normal(size=(3, 3)), **options
     )
-    return sand.Simulation(grains, [field, sand.Dipoles()], stepping=sand.Verlet(step=step))
+    return sand.Simulation(
+        grains, [sand.Contact(), sand.Dipoles(cutoff="1 mm"), field], stepping=sand.Verlet(step=step)
+    )
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
     "field",
     [
@@ -75,6 +82,7 @@ def test_work_of_a_changing_field_is_booked(field):
     assert 3.0 < left[0] / left[1] < 5.0
 
 
+@pytest.mark.validate
 def test_falling_and_drifting_through_periodic_walls():
     """Gravity and an electric field in a periodic box: each crossing is booked, E + lost stays to rounding.
 
@@ -93,6 +101,7 @@ def test_falling_and_drifting_through_periodic_walls():
     assert sim.grains.velocity[3, 2] == pytest.approx(-1e9 * sim.time, rel=1e-10, abs=0.0)
 
 
+@pytest.mark.validate
 def test_charges_meet_as_kepler_says():
     """Two opposite charges on a circle about their middle, m v²/(r/2) = k q²/r²: ten turns, radius to 1e-4, E to 1e-6.
 
@@ -121,6 +130,7 @@ def brownian(count, temperature="300 K", seed=1, **options):
     return sim, gas, gas.shortest_time(sim.grains)
 
 
+@pytest.mark.validate
 def test_brownian_grains():
     """⟨x²⟩ = 2 (kT/m) τ² (t/τ − 1 + e^(−t/τ)) per axis, ⟨v(0)v(t)⟩ = (kT/m) e^(−t/τ), ½mv² and ½Iω² each (3/2)kT.
 
@@ -151,6 +161,7 @@ def test_brownian_grains():
         assert spun == pytest.approx(np.exp(-t * tau / tau_spin), abs=3 / np.sqrt(3 * count))
 
 
+@pytest.mark.validate
 def test_kicks_come_in_time():
     """Kicks of the gas are 2/3 to 4/3 of the period apart, on average less than half a step from it.
 
@@ -170,6 +181,7 @@ def test_kicks_come_in_time():
     assert abs(apart.mean() - 1.0) < 0.5 * sim.world.clock[STEP] / period + 1e-9
 
 
+@pytest.mark.validate
 def test_heat_of_the_gas_is_booked():
     """Kinetic energy + lost_gas is constant to rounding: the gas heats grains at rest, and brakes fast ones."""
     cold, _, tau = brownian(50)
@@ -183,6 +195,7 @@ def test_heat_of_the_gas_is_booked():
         assert np.abs(total - total[0]).max() < 1e-11 * np.abs(lost).max()
 
 
+@pytest.mark.validate
 def test_gas_runs_are_the_same_bits():
     """Same seed: the same bits, in one run or in pieces; another seed: others."""
     ends = []
@@ -195,6 +208,7 @@ def test_gas_runs_are_the_same_bits():
     assert not (ends[0] == ends[2]).any()
 
 
+@pytest.mark.validate
 def test_momentum_and_books_with_charged_clusters():
     """Dipoles and charges of 16 grains that stick: P kept to rounding × steps, total to 1e-3 of what is lost."""
     rng = np.random.default_rng(2)

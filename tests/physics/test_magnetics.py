@@ -11,6 +11,11 @@ from sand.core.constants import MAGNETIC
 from .setups import rest_distance
 
 
+def constant(flux_density):
+    """A field that stays as it is, by the formula of fields that change."""
+    return sand.Field(flux_density, shape="ramp", final=flux_density, end="1 s")
+
+
 def period_of(signal, time):
     """Mean time between downward zero crossings, each by linear interpolation."""
     down = np.flatnonzero((signal[:-1] > 0) & (signal[1:] <= 0))
@@ -38,6 +43,7 @@ def swing(grains, forces, what, period, periods=6.2, **options):
     return period_of(np.array(watch.value), np.array(watch.time)), sim
 
 
+@pytest.mark.validate
 def test_a_single_grain_swings_about_the_field():
     """ω = √(μB/I) for small angles; the pendulum's θ²/16 (1e-5 here) and Verlet's (ω dt)²/24 stay below 1e-4."""
     tilt = 0.01
@@ -50,6 +56,7 @@ def test_a_single_grain_swings_about_the_field():
     assert sim.ledger.drift < 1e-4
 
 
+@pytest.mark.compiled("dipoles")
 def test_two_far_grains_swing_in_each_others_field():
     """Head to tail, both tilted alike: I θ¨ = −3 (kμ²/D³) θ; tilted oppositely −1; D = 1e4 r holds them still."""
     r, tilt = 1e-8, 0.01
@@ -59,10 +66,17 @@ def test_two_far_grains_swing_in_each_others_field():
         moment = size * np.array([[math.cos(tilt), math.sin(tilt), 0], [math.cos(tilt), sign * math.sin(tilt), 0]])
         grains = sand.Grains([[0, 0, 0], [apart, 0, 0]], r, sand.IRON, moment=moment)
         expected = 2 * math.pi / math.sqrt(factor * MAGNETIC * size**2 / apart**3 / grains.inertia[0])
-        found, _ = swing(grains, [sand.Dipoles()], lambda s: s.grains.moment[0, 1], expected, periods=4.2)
+        found, _ = swing(
+            grains,
+            [sand.Contact(), sand.Dipoles(cutoff="1 cm")],
+            lambda s: s.grains.moment[0, 1],
+            expected,
+            periods=4.2,
+        )
         assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
 
 
+@pytest.mark.compiled("fields")
 def test_a_quiet_bound_pair_turns_about_the_field():
     """Two touching grains, moments along their axis, as one body: ω = √(2μB/I), I = 2 (2/5 m r² + m (D/2)²).
 
@@ -83,7 +97,9 @@ def test_a_quiet_bound_pair_turns_about_the_field():
         x = sim.grains.position
         return math.atan2(x[1, 1] - x[0, 1], x[1, 0] - x[0, 0])
 
-    found, _ = swing(grains, [sand.Contact(), sand.Dipoles(), sand.Field([field, 0, 0])], angle, expected, periods=4.2)
+    found, _ = swing(
+        grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), constant([field, 0, 0])], angle, expected, periods=4.2
+    )
     # the pull of the dipoles shortens D by ~1e-5 of itself; pendulum: tilt²/16 = 2.5e-5
     assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
 
@@ -105,7 +121,7 @@ def free_pair():
         moment=6.6e-18 * np.eye(3)[:2],
         spin=1e7 * rng.normal(size=(2, 3)),
     )
-    return grains, [sand.Dipoles(), sand.Field("10 mT")], 3.2e-8
+    return grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), constant([0, 0, 0.01])], 3.2e-8
 
 
 def ringing_pair():
@@ -117,6 +133,7 @@ def ringing_pair():
     return grains, [sand.Contact()], 6.4e-9
 
 
+@pytest.mark.compiled("fields", "contacts")
 @pytest.mark.parametrize(("world", "step"), [(free_pair, 8e-11), (ringing_pair, 2e-12)])
 def test_the_integrator_is_of_order_two(world, step):
     """Halving a fixed step quarters the error against a step 16 times finer: order 1.8 … 2.2."""
@@ -126,6 +143,7 @@ def test_the_integrator_is_of_order_two(world, step):
     assert 1.8 < math.log2(errors[0] / errors[1]) < 2.2
 
 
+@pytest.mark.compiled("dipoles", "small")
 def test_loads_against_brute_force_with_images():
     """Periodic box with a cut-off: forces, torques, energy against a plain double loop in NumPy."""
     box = sand.Box.periodic("0.3 um", "0.25 um", None)
@@ -133,7 +151,7 @@ def test_loads_against_brute_force_with_images():
     position = rng.uniform(-0.12e-6, 0.12e-6, size=(25, 3))
     moment = 6e-18 * rng.normal(size=(25, 3))
     grains = sand.Grains(position, 1e-10, sand.IRON, moment=moment)
-    sim = sand.Simulation(grains, [sand.Dipoles(cutoff="0.1 um")], box=box)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="0.1 um")], box=box)
     loads = sim.loads()
     rc, rs = 1e-7, 0.8e-7
     force, torque, energy = np.zeros((25, 3)), np.zeros((25, 3)), 0.0

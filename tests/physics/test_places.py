@@ -34,7 +34,12 @@ def stirred(order="curve", **options):
     grains = sand.Grains(
         even.position, radius, sand.IRON, velocity=even.velocity, spin=even.spin, moment=even.moment, charge=1e-19
     )
-    forces = [sand.Contact(), sand.Dipoles(cutoff="0.08 um"), sand.Gas(pressure="1 mbar", temperature="300 K")]
+    forces = [
+        sand.Contact(),
+        sand.Dipoles(cutoff="0.08 um"),
+        sand.Charges(cutoff="0.08 um"),
+        sand.Gas(pressure="1 mbar", temperature="300 K"),
+    ]
     options |= {"neighbours": sand.Neighbours(margin="20 nm", order=order)}
     return sand.Simulation(grains, forces, box=box, seed=2, **options)
 
@@ -68,6 +73,7 @@ def sides(world):
     return [sorted(side[start[g] : start[g + 1]]) for g in range(len(world.grains))]
 
 
+@pytest.mark.compiled("listed")
 def test_there_and_back():
     """Grain k becomes grain rows[k], and the inverse order undoes it: every number, list and bit is as it was.
 
@@ -100,6 +106,7 @@ def test_there_and_back():
     assert state(sim) == before and listed(world) == pairs
 
 
+@pytest.mark.compiled("listed")
 def test_everybody_sees_the_numbers_of_the_start():
     """Radii, masses and ids never change their row; contacts are between grains that overlap; losses add up.
 
@@ -119,6 +126,7 @@ def test_everybody_sees_the_numbers_of_the_start():
     assert abs(sim.ledger.drift) < 1e-3
 
 
+@pytest.mark.compiled("listed")
 def test_watching_and_cutting_up_change_nothing():
     """Orders are made at steps that depend on the number of steps alone: the same bits however often grains go home."""
 
@@ -136,6 +144,7 @@ def test_watching_and_cutting_up_change_nothing():
     assert state(whole) == state(pieces) == state(watched)
 
 
+@pytest.mark.compiled("listed")
 @pytest.mark.parametrize("cut", (EVERY + 10, EVERY + 300))
 def test_going_on_from_a_checkpoint_changes_nothing(tmp_path, cut):
     """The order is in the saved state, and the lists are made from it as they were: the same bits as in one run.
@@ -162,17 +171,22 @@ class Heavy(sand.Attraction):
     constant = 1e18 * sand.Attraction.constant
 
 
+@pytest.mark.compiled("contacts", "small")
 @pytest.mark.parametrize(
     "far",
     [
-        [],
-        [sand.Charges()],
-        [sand.Charges(cutoff="1 um")],
-        [Heavy()],
-        [sand.Dipoles()],
-        [sand.Dipoles(cutoff="1 um"), sand.Field("1 mT")],
+        pytest.param([], id="contacts"),
+        *(
+            pytest.param(forces, id=name, marks=pytest.mark.validate)
+            for name, forces in {
+                "charges": [sand.Charges()],
+                "listed charges": [sand.Charges(cutoff="1 um")],
+                "masses": [Heavy()],
+                "dipoles": [sand.Dipoles()],
+                "listed dipoles": [sand.Dipoles(cutoff="1 um"), sand.Field("1 mT")],
+            }.items()
+        ),
     ],
-    ids=["contacts", "charges", "listed charges", "masses", "dipoles", "listed dipoles"],
 )
 def test_only_rounding_tells_the_orders_apart(far):
     """Steps of a loose, shaken aggregate in both orders: sums are the same but for the order of their terms.
@@ -194,6 +208,7 @@ def test_only_rounding_tells_the_orders_apart(far):
     assert not far or np.abs(ends[1][0] - ends[2][0]).max() > 1e-6 * 1e-7
 
 
+@pytest.mark.compiled("contacts", "small")
 def test_who_may_touch_soon_is_known_in_the_new_order():
     """In the step after an order was made, every near pair that is closer than SOON_PART of the reach is picked.
 
@@ -213,6 +228,7 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
     assert set(np.flatnonzero(close)) <= set(w.near.soon[: int(w.near.watch[SOON])].tolist())
 
 
+@pytest.mark.validate
 def test_kicks_of_a_gas_go_to_the_grain_not_to_the_place():
     """Random numbers have the grain's id for an address: without other forces, each goes the same way in any order."""
     ends = []
@@ -225,6 +241,7 @@ def test_kicks_of_a_gas_go_to_the_grain_not_to_the_place():
     assert np.abs(ends[0] - ends[1]).max() < 1e-12 * np.abs(ends[0]).max()
 
 
+@pytest.mark.compiled("listed")
 def test_the_grain_that_stops_a_run_is_named_by_its_own_number():
     """Faster than a step of this length bears: the culprit is the grain that was pushed, wherever it stood."""
     sim = stirred(stepping=sand.Verlet(step="0.2 ps"))
@@ -236,6 +253,7 @@ def test_the_grain_that_stops_a_run_is_named_by_its_own_number():
     assert result.outcome is sand.Outcome.FLEW_TOO_FAR and result.grains == (guilty,)
 
 
+@pytest.mark.validate
 def test_runge_kutta_steps_in_an_order_of_their_own():
     """Adaptive steps, with contacts on the way: cut up, the same bits; seen by their numbers."""
     whole, pieces = stirred(stepping=sand.Adaptive()), stirred(stepping=sand.Adaptive())
@@ -247,6 +265,7 @@ def test_runge_kutta_steps_in_an_order_of_their_own():
     assert state(whole) == state(pieces)
 
 
+@pytest.mark.compiled("listed")
 def test_whoever_kept_the_grains_finds_them_at_their_rows():
     """An observer that asks for them once and reads them ten times a second; and after an error in a run."""
 
@@ -270,6 +289,7 @@ def test_whoever_kept_the_grains_finds_them_at_their_rows():
     assert 0 < sim.steps < 1000 and sim.world.order.size == 80
 
 
+@pytest.mark.compiled("listed")
 def test_a_run_that_is_broken_off_leaves_grains_at_home():
     """Also where nobody looked: the progress bar says that it does not."""
 

@@ -27,6 +27,7 @@ def state(sim):
     return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
 
 
+@pytest.mark.compiled("dipoles")
 def test_output_cadence_changes_nothing():
     """Frames each 0.1 ns, each 7 ns, or none: the same bits after 20,000 steps, contacts included."""
     ends = []
@@ -38,6 +39,7 @@ def test_output_cadence_changes_nothing():
     assert ends[0] == ends[1] == ends[2]
 
 
+@pytest.mark.compiled("dipoles")
 def test_running_in_pieces_changes_nothing():
     """One run equals many short ones; an observer that reads everything in between changes nothing.
 
@@ -59,6 +61,7 @@ def test_running_in_pieces_changes_nothing():
     assert state(whole) == state(pieces)
 
 
+@pytest.mark.compiled("listed")
 def test_a_listed_run_goes_on_from_its_saved_state():
     """The list is made from the anchors in the saved state: cut where it is old, and the same bits come out.
 
@@ -69,7 +72,13 @@ def test_a_listed_run_goes_on_from_its_saved_state():
         grains = sand.setup.gas(
             80, "1.2 um", radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="3e5 K", seed=2
         )
-        forces = [sand.Contact(), sand.Dipoles(cutoff="0.25 um")]
+        grains.arrays.charge[...] = 1e-19
+        forces = [
+            sand.Contact(),
+            sand.Dipoles(cutoff="0.25 um"),
+            sand.Charges(cutoff="0.25 um"),
+            sand.Gas("3e5 K", pressure="1 mbar"),
+        ]
         options |= {"neighbours": sand.Neighbours(margin="20 nm")}
         return sand.Simulation(grains, forces, box="1.2 um", seed=2, **options)
 
@@ -88,6 +97,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
     assert state(whole) == state(cramped)
 
 
+@pytest.mark.compiled("contacts")
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
     from sand.core.arrays import FOR_ALL, contact_arrays, near_pairs
@@ -107,6 +117,7 @@ def test_growing_arrays_changes_nothing():
     assert all(end == ends[0] for end in ends)
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_frame_is_the_first_step_at_or_after_its_time():
     """Steps are never bent: frames come late by less than one step, or cycle of steps, and carry their true time."""
     seen = []
@@ -121,6 +132,7 @@ def test_a_frame_is_the_first_step_at_or_after_its_time():
         assert k * 1e-9 <= time < k * 1e-9 + cycle or k == 0
 
 
+@pytest.mark.compiled("dipoles")
 def test_resume_is_bit_for_bit(tmp_path):
     """A run stopped at 7,000 steps and resumed equals the uninterrupted one: state, ledger, trajectory."""
     whole = gas_simulation(out=tmp_path / "whole", frame_every="5 ns")
@@ -165,6 +177,7 @@ def test_the_compiler_changes_nothing_but_rounding(tmp_path):
     assert ends[0]["lost"].sum() > 0
 
 
+@pytest.mark.compiled("contacts")
 def test_kernels_against_plain_python_loops():
     """Pair list, contacts and gather of a random aggregate against double loops written out in NumPy."""
     from sand.physics import adhesion
@@ -204,6 +217,7 @@ def test_kernels_against_plain_python_loops():
     assert g.torque == pytest.approx(torque, abs=1e-9 * np.abs(torque).max())
 
 
+@pytest.mark.validate
 def test_the_number_of_threads_changes_nothing():
     """A lattice of 1000 grains that spin: most contacts move in each step, some break. The same for 1, 2, 3 threads."""
     radius, rng = 1e-8, np.random.default_rng(5)

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 import sand
 from sand.stepping.control import calm_steps
@@ -29,6 +30,7 @@ def _steps_of(sim, number):
     return np.array(out)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_spinning_pair_does_not_ring_up():
     """A free pair spins about a transverse axis and slides to and fro at 0.8 ζ_c: no loss, so E must stay.
 
@@ -58,6 +60,7 @@ def test_a_spinning_pair_does_not_ring_up():
         assert np.ptp(total) < 1.1 * 0.25 * (2.0 * math.pi / 25.0) ** 2 * stake
 
 
+@pytest.mark.compiled("contacts")
 def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
     """A grain about to touch needs no shorter a step than its contact will: the contacts' own, to the bit."""
     bond, distance, step = _pair()
@@ -72,6 +75,7 @@ def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
     assert np.ptp(lengths) < 1e-6 * step
 
 
+@pytest.mark.compiled("contacts")
 def test_a_shorter_step_is_held_for_ten_periods():
     """Two grains bounce beside a ringing pair: the step falls at once, and grows only HOLD steps after that."""
     from sand.stepping.control import HOLD

@@ -39,7 +39,15 @@ def state(sim):
     return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
 
 
-@pytest.mark.parametrize(("cutoff", "size"), [(None, (11, 10, 10)), ("0.05 um", (11, 10, 10)), ("bare", (17, 16, 16))])
+@pytest.mark.compiled("threads")
+@pytest.mark.parametrize(
+    ("cutoff", "size"),
+    [
+        (None, (11, 10, 10)),
+        pytest.param("0.05 um", (11, 10, 10), marks=pytest.mark.validate),
+        pytest.param("bare", (17, 16, 16), marks=pytest.mark.validate),
+    ],
+)
 def test_threads_change_no_bit(cutoff, size):
     """60 steps, run in two pieces, with 1, 2 and 3 threads; contacts move and break.
 
@@ -58,6 +66,7 @@ def test_threads_change_no_bit(cutoff, size):
     assert ends[0] == ends[1] == ends[2]
 
 
+@pytest.mark.compiled("threads")
 def test_blocks_change_only_rounding(monkeypatch):
     """One step in blocks and one without part by less than 1e-12 of what they changed.
 
@@ -74,6 +83,7 @@ def test_blocks_change_only_rounding(monkeypatch):
         assert np.abs(one - other).max() < 1e-12 * np.abs(one).max(), name
 
 
+@pytest.mark.validate
 def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
     """Gravity in a periodic box, whose jumps of energy are booked by one thread after the drift that all share.
 
@@ -93,6 +103,7 @@ def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
     assert found[0][2][OUTSIDE] != 0.0
 
 
+@pytest.mark.compiled("threads")
 def test_a_helper_that_comes_too_late_touches_nothing():
     """It finds LEAVE on its board and goes, with nobody counted inside."""
     sim = shaken_lattice(None)
@@ -106,6 +117,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     assert state(sim) == before
 
 
+@pytest.mark.compiled("threads")
 def test_helpers_leave_a_driver_that_fails(monkeypatch):
     """Ctrl-C while it compiles, or an error in a formula: nobody is left at work; copies have their own."""
     boards = []

@@ -25,7 +25,9 @@ def looked_at(tmp_path_factory):
 
 
 def _run(grains, field, folder):
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(), field], out=folder, frame_every="10 ps")
+    sim = sand.Simulation(
+        grains, [sand.Contact(), sand.Dipoles(cutoff="10 um"), field], out=folder, frame_every="10 ps"
+    )
     sim.run(until="50 ps")
     return sim
 
@@ -43,7 +45,7 @@ def in_a_field(tmp_path_factory):
     grains.arrays.velocity[0] = np.arange(8) * 0.1
     sim = sand.Simulation(
         grains,
-        [sand.Contact(), sand.Dipoles(), sand.Field(flux_density="1 mT")],
+        [sand.Contact(), sand.Dipoles(), sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")],
         box="400 nm",
         out=str(place),
         frame_every="1 ns",

@@ -32,6 +32,7 @@ def test_a_lattice():
     assert d.min() == pytest.approx(rest_distance(M, R), rel=1e-6, abs=0.0)
 
 
+@pytest.mark.compiled("small")
 def test_ballistic_particle_cluster_aggregates():
     """N − 1 contacts at rest distance (each newcomer touches one), no overlap, one cluster, seeded, compact-ish."""
     body = pca(200, radius=R, material=M, seed=4)
@@ -45,6 +46,7 @@ def test_ballistic_particle_cluster_aggregates():
     assert 4 * R < gyration < 14 * R
 
 
+@pytest.mark.compiled("small")
 def test_they_rest():
     """A simulation of a lattice and an aggregate stays at rest: contacts as many as counted, no force but rounding."""
     for body, contacts in ((lattice(3, radius=R, material=M), 54), (pca(50, radius=R, material=M, seed=1), 49)):
@@ -53,6 +55,7 @@ def test_they_rest():
         assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("b", ["0 b", "0.5 b", "0.9 b"])
 def test_an_encounter(b):
     """Centre of mass at rest, relative speed as asked, offset as asked, no contact at the start, then it meets."""

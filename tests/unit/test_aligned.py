@@ -1,6 +1,7 @@
 """Arrays that begin with a line of the cache."""
 
 import numpy as np
+import pytest
 
 import sand
 from sand.core.aligned import LANES, LINE, aligned, whole
@@ -21,6 +22,7 @@ def test_what_is_aligned_stays_and_what_is_not_is_copied():
         assert begins(straight) and straight.shape == crooked.shape
 
 
+@pytest.mark.compiled("small")
 def test_all_arrays_of_a_world_begin_with_a_line():
     """When it is made, copied, and after arrays have grown; contacts and pairs have room for whole vectors."""
     body = sand.setup.bpca(37, radius="0.1 um", material=sand.SILICA, seed=1)

@@ -70,6 +70,7 @@ def test_filling_factor():
     assert filling_factor(ROD, 1.0) == pytest.approx(9 / (5 / 3 * (80 / 3 + 0.6)) ** 1.5, rel=1e-13, abs=0)
 
 
+@pytest.mark.compiled("small")
 def test_projected_area_of_exact_shapes():
     """πa² of a sphere; two discs a distance d apart cover 2πa² − lens; far ones add; a hidden one adds nothing."""
     assert projected_area(np.zeros((1, 3)), 1.0)[0] == pytest.approx(math.pi, rel=1e-14, abs=0)
@@ -82,6 +83,7 @@ def test_projected_area_of_exact_shapes():
     assert projected_area(nested, np.array([1.0, 0.5, 1.0, 1.0]), axis)[0] == pytest.approx(math.pi, rel=1e-13, abs=0)
 
 
+@pytest.mark.compiled("small")
 def test_projected_area_against_darts():
     """300 discs of several sizes: 4e5 darts agree within four of their standard deviations, √(p(1−p)/n)."""
     place, radius = RNG.uniform(-5, 5, (300, 3)), RNG.uniform(0.1, 0.8, 300)
@@ -94,6 +96,7 @@ def test_projected_area_against_darts():
     assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(darts))
 
 
+@pytest.mark.compiled("small")
 def test_projected_area_of_a_long_rod():
     """Mean shadow of a convex body is a quarter of its surface (Cauchy); spheres 0.02 apart are nearly a capsule.
 

@@ -33,6 +33,7 @@ def test_in_turns_takes_the_median_of_paired_ratios():
     assert timing.in_turns(lambda: next(mine), lambda: next(other), 3) == (1.0, 4.0, 2.0)
 
 
+@pytest.mark.compiled("contacts", "small")
 @pytest.mark.parametrize(("kind", "contacts"), [("loose", 12), ("fcc", 36), ("gas", 0)])
 def test_worlds_have_the_contacts_that_are_counted(kind, contacts):
     """BPCA: N − 1. A grain with its 12 neighbours, which touch along the 24 edges of a cuboctahedron. A gas: none."""
@@ -44,6 +45,7 @@ def test_worlds_have_the_contacts_that_are_counted(kind, contacts):
     assert len(sim.contacts["pair"]) == touching
 
 
+@pytest.mark.compiled("small")
 def test_clusters_side_by_side_do_not_touch():
     """25 grains in clusters of 10: 9 + 9 + 4 contacts."""
     sim = sand.Simulation(worlds.shaken(worlds.loose(25, whole=10)), [sand.Contact()])
@@ -68,6 +70,7 @@ def test_bytes_of_counts_every_array_of_a_world():
     assert pieces.bytes_of(world) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_replay_takes_the_same_steps():
     """Each call ends in the same state, to the bit, after a tenth to warm up and the steps asked for."""
     sim = worlds.lattice(3)
@@ -81,6 +84,7 @@ def test_a_replay_takes_the_same_steps():
     assert np.array_equal(*ends)
 
 
+@pytest.mark.compiled("small")
 def test_scaling_leaves_out_what_does_not_fit(monkeypatch):
     """A row says so, in place of numbers."""
     monkeypatch.setattr(scaling, "available", lambda: 0.0)

@@ -50,6 +50,7 @@ def size_of(body):
     return float(np.sqrt(np.average((body.position**2).sum(axis=1), weights=body.mass)))
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("what", [{"radius": R, "material": M}, {"radius": "12 nm", "material": "iron"}, MIXED])
 @pytest.mark.parametrize("kind", list(GROWN))
 def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
@@ -66,6 +67,7 @@ def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
     assert (other.position != body.position).any()
 
 
+@pytest.mark.compiled("small")
 def test_a_simulation_finds_the_contacts_that_were_made():
     """N − 1 contacts, forces below 1e-9 of what a contact bears, in a simulation of its own."""
     sim = sand.Simulation(bcca(80, radius=R, material=M, seed=2), [sand.Contact()])
@@ -73,6 +75,7 @@ def test_a_simulation_finds_the_contacts_that_were_made():
     assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("make", [bpca, rbd])
 def test_spheres_are_cut_in_one_piece(make):
     """From a heap of 400 grains any number: so many, one cluster, and compact: r_g at most twice that of a ball which
@@ -85,6 +88,7 @@ def test_spheres_are_cut_in_one_piece(make):
         assert size_of(body) < 2.0 * np.sqrt(0.6) * R * (count / 0.1) ** (1 / 3)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 @pytest.mark.parametrize("kind", list(GROWN))
 def test_few_grains(kind, count):
@@ -122,6 +126,7 @@ def dimension(make, few, many, count):
     return np.log(many / few) / step, np.log(many / few) / step * wrong
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize(
     ("make", "count", "expected", "bound"), [(bpca, 60, 2.95, 0.2), (bcca, 150, 1.9, 0.15), (dla, 20, 2.5, 0.2)]
 )
@@ -133,6 +138,7 @@ def test_fractal_dimensions(make, count, expected, bound):
     assert found == pytest.approx(expected, abs=bound)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("asked", [1.6, 2.0, 2.4])
 def test_a_chosen_dimension(asked):
     """N = k_f (r_g/a)^D_f by definition: r_g within 5 % at the end as promised, D_f between 100 and 800 grains within
@@ -158,6 +164,7 @@ def test_walkers_come_back_as_brownian_motion_does():
     assert np.mean(cosines) == pytest.approx(0.5, abs=4 * np.std(cosines) / np.sqrt(len(cosines)))
 
 
+@pytest.mark.compiled("small")
 def test_gaps_are_never_overrated():
     """Against all grains: `gap_at` is at most the gap of surfaces, and just that where it names a grain."""
     body, rng, named = dla(60, seed=1, **MIXED), np.random.default_rng(2), 0
@@ -196,6 +203,7 @@ def test_radii_follow_their_laws():
     assert np.log(flat).mean() == pytest.approx(np.log(10) / 2, abs=5 * np.log(10) / np.sqrt(12 * count))
 
 
+@pytest.mark.compiled("small")
 def test_populations():
     """Parts of materials and of magnetic grains to within one grain; sizes of moments by the material."""
     body = bpca(200, radius=R, material={"silica": 0.7, "iron": 0.3}, moment="material", seed=1)
@@ -215,6 +223,7 @@ def flux_densities(body):
     return 1e-7 * ((3.0 * along[..., None] * apart - body.moment[None]) / distance[..., None] ** 3).sum(axis=1)
 
 
+@pytest.mark.compiled("small")
 def test_relaxed_moments():
     """U is below that of random and of aligned moments, it falls with every sweep, and no torque is left: |μ × B| is
     below 1e-5 of |μ||B|, ten times the angle at which sweeps end.  k is 1e-7 to nine digits here.
@@ -236,6 +245,7 @@ def test_relaxed_moments():
     assert magnetic_energy(pair) == pytest.approx(deepest, rel=1e-8, abs=0.0)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("ending", ["xyz", "extxyz", "gsd"])
 def test_bodies_come_back_from_files(tmp_path, ending):
     """Places, radii, moments and materials to rounding (twelve ulps through ångström); contacts are still at rest."""
@@ -254,6 +264,7 @@ def test_bodies_come_back_from_files(tmp_path, ending):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
+@pytest.mark.compiled("small")
 def test_other_programs_read_bodies(tmp_path):
     """ASE and gsd itself: as many grains, radii, places."""
     body = bpca(20, radius=R, material=M)
@@ -316,6 +327,7 @@ def test_only_ten_grains_are_named(tmp_path):
     assert len(caught.value.problems) == 11
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -348,6 +360,7 @@ def test_impossible_requests(make, message):
         make()
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - {"grain"}))
 def test_the_command(tmp_path, capsys, monkeypatch, kind):
     """`sand build KIND` writes a body and says what it is; the dimension of a chain is 1."""
@@ -386,6 +399,7 @@ def test_mistakes_on_the_command_line(tmp_path, capsys, monkeypatch, words, mess
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.compiled("small")
 def test_what_is_built_collides_and_runs(tmp_path, capsys, monkeypatch):
     """A body from a file, one by its kind and one with laws and moments, in `sand collide` and `sand run`."""
     monkeypatch.chdir(tmp_path)

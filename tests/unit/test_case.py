@@ -185,6 +185,7 @@ def test_numbers_are_si_and_text_has_units():
     assert check_case(content, "some.toml") == text
 
 
+@pytest.mark.compiled("contacts", "dipoles", "fields")
 @pytest.mark.parametrize(
     "changes",
     [
@@ -217,6 +218,7 @@ def same_bits(one, other):
     return a.keys() == b.keys() and all(a[name].tobytes() == b[name].tobytes() for name in a)
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_case_and_script_are_the_same_physics():
     """The same numbers given to the constructors in a script move the grains to the same bits."""

@@ -41,6 +41,7 @@ def rows(position, box, reach):
     return found
 
 
+@pytest.mark.compiled("small")
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -60,6 +61,7 @@ def test_each_pair_within_reach_is_listed_once(seed, count, periodic, shape, rea
     assert (rows(position, box, reach) == close).all()
 
 
+@pytest.mark.compiled("small")
 def test_grains_on_the_walls_and_in_one_place():
     """Coordinates of exactly ±L/2, cell borders, and all grains in one cell of an open box."""
     box = Box.periodic(1.0)
@@ -75,6 +77,7 @@ def test_grains_on_the_walls_and_in_one_place():
 BOXES = [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.3), (None, 0.7, None), (0.5, 0.5, 4.0), (4.0, 0.5, 0.5)]
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", BOXES)
 @pytest.mark.parametrize("reach", [0.02, 0.1, 0.166])
 def test_many_grains_in_thin_cells(lengths, reach):
@@ -90,6 +93,7 @@ def test_many_grains_in_thin_cells(lengths, reach):
     assert (rows(position, box, reach) == theirs).all()
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.0)])
 @pytest.mark.parametrize("cells_across", [3, 4, 11])
 def test_both_grains_have_a_pair_or_neither(lengths, cells_across):
@@ -112,6 +116,7 @@ def test_both_grains_have_a_pair_or_neither(lengths, cells_across):
     assert doubtful > 5
 
 
+@pytest.mark.compiled("small")
 def test_grains_outside_a_periodic_box_are_where_their_images_are():
     """Moved by whole lengths of the box: the same rows, as no pair is as near the reach as rounding moves it."""
     rng = np.random.default_rng(3)
@@ -120,6 +125,7 @@ def test_grains_outside_a_periodic_box_are_where_their_images_are():
     assert (rows(moved, box, 0.21) == rows(position, box, 0.21)).all()
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0)])
 @pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf, 1e300])
 def test_a_grain_that_is_nowhere_is_listed_nowhere(lengths, odd):
@@ -133,6 +139,7 @@ def test_a_grain_that_is_nowhere_is_listed_nowhere(lengths, odd):
         assert found[40].sum() == found[:, 40].sum() == 0 or np.isfinite(odd)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (1.0, 3.0, 0.6), (0.7, None, 1.0), (None, 1.0, 2.1)])
 @pytest.mark.parametrize("reach", [0.34, 0.49, 0.7])
 def test_boxes_that_are_not_three_cells_wide(lengths, reach):
@@ -166,6 +173,7 @@ def referee(sim):
     return far.force, far.torque, world.grains.arrays.field
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("lengths", "margin", "contacts"),
     [
@@ -209,6 +217,7 @@ def no_touch_is_missed(sim):
     return (bound | ~touching).all()
 
 
+@pytest.mark.validate
 def test_a_listed_run_is_the_run_of_all_pairs():
     """The same gas with a list, a wide one and over all pairs: positions after 300 steps agree to 1e-9 of a radius."""
     ends = []
@@ -223,6 +232,7 @@ def test_a_listed_run_is_the_run_of_all_pairs():
 SEARCHES = {"cells": Neighbours("cells"), "list": Neighbours("cells", "2 nm"), "all pairs": Neighbours("all pairs")}
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
 @pytest.mark.parametrize(
     "lengths", [(None, None, None), (0.3e-6, 0.3e-6, 0.3e-6), (0.3e-6, None, 0.09e-6), (0.07e-6, 0.3e-6, 0.3e-6)]
@@ -248,6 +258,7 @@ def test_near_pairs_are_those_with_a_small_gap(search, lengths):
     assert (sim.world.far.mate.size > 1000) == (search == "list")
 
 
+@pytest.mark.compiled("contacts")
 def test_a_row_of_cells_may_need_more_room_than_there_is():
     """Room for 16 neighbours of one grain is found to be too little, and grows: the same pairs."""
     grains = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
@@ -262,6 +273,7 @@ def test_a_row_of_cells_may_need_more_room_than_there_is():
     ).all()
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
 def test_a_resumed_run_looks_for_neighbours_as_before(tmp_path, search):
     """A lattice that collapses, resumed before its contacts form: the same search, and all arrays bit for bit.
@@ -287,6 +299,7 @@ def test_a_resumed_run_looks_for_neighbours_as_before(tmp_path, search):
     assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
 def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
     """A lattice whose grains touch nothing has room for 16 pairs; its 540 are counted, and get a tenth to spare."""
@@ -299,6 +312,7 @@ def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
     assert 540 * 1.1 <= sim.world.near.pair.shape[1] < 540 * 1.12
 
 
+@pytest.mark.compiled("contacts")
 def test_rows_that_are_too_long_are_listed_with_more_room():
     """Thirty grains in a row, in the order of their cells, beside one that makes cells 0.5 µm wide: 29 pairs are near.
 
@@ -321,6 +335,7 @@ def test_rows_that_are_too_long_are_listed_with_more_room():
     assert np.array_equal(world.near.anchor.T, position)
 
 
+@pytest.mark.compiled("contacts")
 def test_near_pairs_have_the_step_of_their_own_contact():
     """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair are those of its bond, 1e-14."""
     rng = np.random.default_rng(4)
@@ -338,6 +353,7 @@ def test_near_pairs_have_the_step_of_their_own_contact():
         assert near.length[p] == pytest.approx(bond.break_overlap, rel=1e-14)
 
 
+@pytest.mark.compiled("dipoles")
 def test_ringing_does_not_make_lists():
     """What counts is the displacement: 30,000 steps of a ringing cluster that goes nowhere need the first lists only.
 
@@ -419,6 +435,7 @@ def test_wrong_settings_have_a_line_each():
     assert "margin" in caught.value.problems[1]
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("earlier", [Neighbours("all pairs"), Neighbours("cells", "150 nm")])
 @pytest.mark.parametrize("far", ["impulse", "taylor"])
 def test_a_state_without_a_list_or_with_a_wide_one_goes_on(earlier, far):

@@ -41,6 +41,7 @@ def test_a_broken_chain():
     assert chain_impact.shape(position, links([0, 1], [1, 2], [3, 4]), 4).name == "broken"
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("place", [-0.65, -0.6, -0.55])
 def test_the_papers_figure_4(place):
     """20 nm iron, released rolling as in SAND, 240 m/s: a T, crossbar within 30° of perpendicular, end grain rolled.
@@ -57,6 +58,7 @@ def test_the_papers_figure_4(place):
     assert chain_impact.shape_of(clamped).name != "T"
 
 
+@pytest.mark.compiled("contacts")
 def test_a_slow_grain_leaves_the_chain_straight():
     """20 m/s on the end grain: it sticks, nothing rolls far."""
     hit = chain_impact.strike(sand.IRON, "10 nm", speed=20.0, place=0.3)

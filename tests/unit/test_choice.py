@@ -34,6 +34,7 @@ def test_ranks_are_ordered_as_numbers():
     assert rank(math.nan) > rank(math.inf)
 
 
+@pytest.mark.compiled("contacts")
 def test_choices_are_the_least_of_all():
     """The loops that vectorise give the least of what grains and pairs allow one by one in Python, to rounding."""
     sim = crowd()
@@ -54,6 +55,7 @@ def test_choices_are_the_least_of_all():
     assert closing == pytest.approx(min(pairs), rel=1e-13)
 
 
+@pytest.mark.compiled("contacts")
 def test_what_may_touch_soon_is_what_is_close():
     """All pairs of grains apart by less than twice the way that makes the pick stale, and no others.
 

@@ -72,11 +72,13 @@ def test_light_commands_import_nothing_heavy(words):
     assert heavy_modules(*words) == "[]"
 
 
+@pytest.mark.compiled("dipoles")
 def test_info_of_a_run_needs_no_compiler(done):
     """What a folder holds is read from its small files; neither numba nor the case reader is loaded."""
     assert heavy_modules("info", str(done)) == "['numpy']"
 
 
+@pytest.mark.compiled("dipoles")
 def test_run_tells_what_it_does_and_what_came_of_it(place, capsys):
     """Grains, box, cut-off with its reason at the start; outcome and the files, the figure too, at the end."""
     assert main(["run", "small.toml"]) == 0
@@ -98,6 +100,7 @@ def test_settings_that_differ_are_told(place, capsys):
     assert "contact (beyond = release), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
 
 
+@pytest.mark.compiled("dipoles")
 def test_run_as_json_prints_the_summary_alone(place, capsys):
     """--json: one object, the content of summary.json and the folder."""
     assert main(["run", "small.toml", "--json", "--out", "there"]) == 0
@@ -106,6 +109,7 @@ def test_run_as_json_prints_the_summary_alone(place, capsys):
     assert printed["outcome"] == "finished"
 
 
+@pytest.mark.compiled("dipoles")
 def test_quiet_run_prints_nothing_to_stdout(place, capsys):
     """--quiet leaves notes on stderr, nothing else."""
     assert main(["run", "small.toml", "--quiet"]) == 0
@@ -114,6 +118,7 @@ def test_quiet_run_prints_nothing_to_stdout(place, capsys):
     assert all(line.startswith("sand: note: ") for line in err.splitlines())
 
 
+@pytest.mark.compiled("dipoles")
 def test_options_replace_what_the_case_says(place, capsys):
     """--until takes text with a unit or SI seconds, as a case does; --seed and --out replace the case's own."""
     assert main(["run", "small.toml", "--until", "6 ns", "--seed", "7", "--json"]) == 0
@@ -126,6 +131,7 @@ def test_options_replace_what_the_case_says(place, capsys):
     assert (case.run.until, case.run.seed) == (6e-9, 7)
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_case_may_end_at_a_number_of_steps(place, capsys):
     """[run] steps: the run takes that many, and is then at its end for `sand resume`, too."""
     (place / "small.toml").write_text(CASE.replace('until = "20 ns"', "steps = 500"))
@@ -202,6 +208,7 @@ def test_what_shows_only_together_names_the_file_too(place, capsys):
     assert not (place / "small").exists()
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_used_folder_is_refused_and_untouched(done, capsys):
     """An earlier run is never replaced unasked; the line says how to go on with it."""
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in done.iterdir()}
@@ -212,6 +219,7 @@ def test_a_used_folder_is_refused_and_untouched(done, capsys):
     assert {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in done.iterdir()} == before
 
 
+@pytest.mark.compiled("dipoles")
 def test_overwrite_replaces_the_run_and_nothing_else(done, capsys):
     """--overwrite removes the files of the earlier run, keeps what others put there."""
     (done / "thoughts.txt").write_text("mine")
@@ -220,6 +228,7 @@ def test_overwrite_replaces_the_run_and_nothing_else(done, capsys):
     assert (done / "thoughts.txt").read_text() == "mine"
 
 
+@pytest.mark.compiled("dipoles")
 def test_overwrite_never_replaces_the_case_it_reads(done, capsys):
     """`sand run small/case.toml --out small --overwrite` would delete its own input: refused."""
     text = (done / "case.toml").read_text()
@@ -236,6 +245,7 @@ def test_a_folder_without_permission(place, capsys):
     assert "no permission in" in capsys.readouterr().err
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_full_disk_is_a_line(place, capsys, monkeypatch):
     """Files that cannot be written: exit 2, one line, no traceback."""
 
@@ -277,6 +287,7 @@ def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
     assert capsys.readouterr().err == "sand: interrupted\n"
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
     """Ctrl-C or SIGTERM while kernels are compiled: 130, and the same command works afterwards."""
@@ -292,6 +303,7 @@ def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
     assert main(["run", "small.toml", "--quiet"]) == 0
 
 
+@pytest.mark.compiled("dipoles")
 def test_an_interrupt_lost_in_the_compiler_is_found_again(place, capsys, monkeypatch):
     """Ctrl-C while the compiler calls back into Python: the exception gets lost there, the run ends all the same."""
     real = Simulation.run
@@ -316,6 +328,7 @@ def test_a_reader_that_goes_away_is_no_fault(place):
         assert started.wait() == 0
 
 
+@pytest.mark.compiled("dipoles")
 def test_stopped_by_physics(place, capsys):
     """A fixed step that is much too long: exit 3, the sentence, the grains, a checkpoint that can be read."""
     (place / "small.toml").write_text(CASE + '[stepping]\nstep = "10 ns"\n')
@@ -374,6 +387,7 @@ def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number
 # --- resume and info -------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled("dipoles")
 def test_resume_of_a_finished_run(done, capsys):
     """Nothing to do is said, with exit 0 and no file changed; a later end goes on; an earlier one is a mistake."""
     before = (done / "summary.json").read_bytes()
@@ -388,6 +402,7 @@ def test_resume_of_a_finished_run(done, capsys):
     assert " to 30 ns, a frame every 5 ns" in capsys.readouterr().out
 
 
+@pytest.mark.compiled("dipoles")
 def test_resume_after_damage(done, capsys):
     """A damaged checkpoint is passed over; with none left that is whole, each is named."""
     newest = max(done.glob("checkpoint-*.npz"))
@@ -400,6 +415,7 @@ def test_resume_after_damage(done, capsys):
     assert len(capsys.readouterr().err.splitlines()) >= 2
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(
     ("name", "kind", "part"),
     [
@@ -419,6 +435,7 @@ def test_info_knows_every_file_of_a_run(done, capsys, name, kind, part):
     assert json.loads(capsys.readouterr().out)["kind"] == kind
 
 
+@pytest.mark.compiled("dipoles")
 def test_info_of_a_run_that_was_killed(done, capsys):
     """Without a summary the ledger says how far it came."""
     (done / "summary.json").unlink()
@@ -462,6 +479,7 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("by", ["until", "steps"])
 def test_progress_shows_time_and_numbers(place, by):
     """Physical time, rate, clusters, S and drift, whether the run goes to a time or to a number of steps."""
@@ -481,6 +499,7 @@ def test_progress_shows_time_and_numbers(place, by):
         assert part in drawn
 
 
+@pytest.mark.compiled("dipoles")
 def test_progress_of_a_resumed_run_has_numbers_from_the_start(done):
     """Between two frames the last row of the ledger serves."""
     from sand.run.build import resume

@@ -9,6 +9,7 @@ from sand.cli.main import main
 from sand.view.plots import HISTORY
 
 
+@pytest.mark.compiled("fields")
 def test_everything_by_default(in_a_field, tmp_path, capsys):
     """Five figures over time and a still picture, in DIR/plots, and what was written is told."""
     assert main(["plot", str(in_a_field), "--json"]) == 0

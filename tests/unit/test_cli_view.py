@@ -18,6 +18,7 @@ from .reels import reel
 pytestmark = pytest.mark.usefixtures("bundle")
 
 
+@pytest.mark.compiled("fields")
 def test_the_command_writes_a_file(looked_at, tmp_path, capsys):
     """Not over what is there, without leave; says how large it is; slices and thinning go in."""
     target = tmp_path / "out.html"

@@ -23,6 +23,7 @@ def two(seed):
     return grain(radius=R, material="silica"), grain(radius=R, material="silica")
 
 
+@pytest.mark.compiled("contacts")
 def test_two_grains_stick_or_bounce():
     """Below v_s one body is left; above it two that part at √(v² − v_s²) (1 %), and E_cycle is lost."""
     numbers = contact("silica", R)
@@ -37,6 +38,7 @@ def test_two_grains_stick_or_bounce():
     assert fast.quiet
 
 
+@pytest.mark.compiled("contacts")
 def test_a_fast_grain_breaks_a_chain():
     """100 m/s against 7 grains of 0.2 µm: more than two pieces, every grain accounted for."""
     result, sim = collide(
@@ -50,6 +52,7 @@ def test_a_fast_grain_breaks_a_chain():
     assert result.gyration_before[0] == pytest.approx(chain_gyration, rel=1e-6, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_miss():
     """An offset beyond the reach: two bodies as before, nothing lost."""
     result, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b")
@@ -62,6 +65,7 @@ def aggregates(seed):
     return (pca(8, radius=R, material="silica", seed=2 * seed), pca(8, radius=R, material="silica", seed=2 * seed + 1))
 
 
+@pytest.mark.compiled("small")
 def test_any_executor_gives_the_same_numbers():
     """Here, in threads, in processes: the same results in the order of the seeds."""
     here = collide_many(aggregates, [3, 1, 2], speed=2.0)
@@ -86,6 +90,7 @@ seeds = [1, 2]
 """
 
 
+@pytest.mark.compiled("small")
 def test_a_case_in_processes(tmp_path):
     """Workers read the case themselves and give what the parent would."""
     path = tmp_path / "hit.toml"
@@ -98,6 +103,7 @@ def test_a_case_in_processes(tmp_path):
         assert run_seeds(read_toml(path), [1, 2], pool) == here
 
 
+@pytest.mark.compiled("small")
 def test_the_command(tmp_path, capsys, monkeypatch):
     """Many seeds: collision.json and a figure; one seed: a whole run's folder; an old folder is refused."""
     monkeypatch.chdir(tmp_path)
@@ -153,6 +159,7 @@ def test_bad_seeds(tmp_path, capsys, seeds):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.compiled("small")
 def test_bodies_from_files(tmp_path):
     """Plain columns in nanometres, and the last frame of a trajectory, collide like built bodies."""
     built = pca(8, radius=R, material="silica", seed=3)

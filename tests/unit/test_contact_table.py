@@ -21,6 +21,7 @@ def busy(**options):
     return sim
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("stiffness", ["frozen", "dt97"])
 def test_every_column_row_by_row(stiffness):
     """Displacements, shares, loads and energies of each contact from its pose; forces add up to the grains'."""
@@ -62,6 +63,7 @@ def test_every_column_row_by_row(stiffness):
         assert table[f"energy_{mode}"].sum() == pytest.approx(energies[mode], rel=1e-9, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
 def test_as_a_data_frame_and_a_dataset():
     """One row per contact, vectors split into components, units where the format has room for them."""
     pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
@@ -75,6 +77,7 @@ def test_as_a_data_frame_and_a_dataset():
     assert dataset.sizes["contact"] == len(table["pair"])
 
 
+@pytest.mark.compiled("contacts")
 def test_no_contacts():
     """An empty table has all columns and no rows."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.SILICA), [sand.Contact()])

@@ -46,6 +46,7 @@ def test_taylor_rates_are_finite_differences(name, seed):
     assert np.abs(ours - slope).max() < 1e-6 * np.abs(slope).max()
 
 
+@pytest.mark.validate
 def test_taylor_torque_is_the_whole_product_rule():
     """Ṁ = μ̇×B + μ×Ḃ, as the run keeps it, = difference quotient of μ×B along a real flight, first order in its time.
 
@@ -126,6 +127,7 @@ def test_bare_rates_repeat_the_loads():
         assert mine == pytest.approx(theirs, rel=1e-13, abs=0.0)
 
 
+@pytest.mark.validate
 def test_two_charges_and_two_masses():
     """F = q1 q2/(4πε₀ r²) apart, G m1 m2/r² together; energies of the ledger; a fall of two masses keeps the total."""
     q, r = 1.6e-19, 1e-7
@@ -146,6 +148,7 @@ def test_two_charges_and_two_masses():
     assert math.isclose(COULOMB, 8.9875517923e9, rel_tol=1e-10)
 
 
+@pytest.mark.validate
 def test_listed_charges_are_all_charges():
     """Coulomb forces, energies and their shares over a list and over all pairs agree to 1e-12."""
     rng = np.random.default_rng(5)
@@ -195,6 +198,7 @@ def test_nothing_charged_is_a_warning():
         sand.Simulation(grains, [sand.Charges()])
 
 
+@pytest.mark.validate
 def test_energies_at_grains_add_up():
     """Shares of pairs and of per-grain forces sum to the ledger's columns; −½ μ·B of two dipoles is half of U each."""
     u = MAGNETIC * 2 * (6e-18) ** 2 / (3e-8) ** 3

@@ -331,6 +331,7 @@ def test_thousand_grains_stay_small(tmp_path):
 # --- the rest ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled("contacts")
 def test_a_real_run_has_its_figure():
     """A simulation's `figure` returns the figure, which notebooks show as a PNG, even before the first step."""
     grains = sand.Grains([[0.0, 0.0, 0.0], [2.5e-8, 0.0, 0.0]], "10 nm", sand.SILICA)

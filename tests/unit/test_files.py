@@ -109,6 +109,7 @@ def test_the_ledger_file_begins_with_the_rows_it_is_given(tmp_path):
     assert read_ledger(path) == [{"step": 0, "x": 0.0}, {"step": 5, "x": 0.5}]
 
 
+@pytest.mark.validate
 def test_the_trajectory_holds_what_the_world_held(tmp_path):
     """Positions to float32 of a radius, moments and times to the last bit, contacts as bonds; GSD reads it."""
     sim = struck_chain(moment="200 A m^2/kg")
@@ -146,6 +147,7 @@ def test_foreign_files_are_named(tmp_path):
         assert str(told.value).count(str(path)) == 1
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("version", range(1, VERSION + 1))
 def test_checkpoints_of_every_version_go_on(tmp_path, version):
     """Folders made by tests/reference/make_checkpoint.py with each format: read, and run to their end."""
@@ -159,6 +161,7 @@ def test_checkpoints_of_every_version_go_on(tmp_path, version):
     assert result.drift < 1e-3
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("version", range(1, VERSION + 1))
 def test_an_old_run_that_is_killed_before_its_first_new_checkpoint_goes_on(tmp_path, monkeypatch, version):
     """Its case.toml has settings by then that are newer than the checkpoint: they mean what was meant without them."""
@@ -175,6 +178,7 @@ def test_an_old_run_that_is_killed_before_its_first_new_checkpoint_goes_on(tmp_p
     assert sand.resume(folder).run(until="80 ps").outcome is sand.Outcome.FINISHED
 
 
+@pytest.mark.compiled("contacts")
 def test_the_checkpoint_knows_case_and_ledger(tmp_path):
     """Without case.toml and ledger.csv a run goes on and both come back; a case that was changed is refused."""
     folder = tmp_path / "run"
@@ -206,6 +210,7 @@ def test_the_checkpoint_knows_case_and_ledger(tmp_path):
         sand.resume(folder)
 
 
+@pytest.mark.validate
 def test_forces_and_columns_keep_the_order_of_the_script(tmp_path):
     """Whatever order the forces were given in, a resumed ledger has each energy in its own column."""
     grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", charge=1e-17)
@@ -223,6 +228,7 @@ def test_forces_and_columns_keep_the_order_of_the_script(tmp_path):
     assert again.ledger["electric"].tolist() == whole.ledger["electric"].tolist()
 
 
+@pytest.mark.compiled("contacts")
 def test_frames_of_another_history_are_replaced(tmp_path):
     """Frames after the checkpoint that are not the same bits (another machine, a damaged file) are written anew."""
     sim = struck_chain()
@@ -246,6 +252,7 @@ def test_frames_of_another_history_are_replaced(tmp_path):
     assert ours == theirs
 
 
+@pytest.mark.compiled("contacts")
 def test_a_trajectory_beyond_mending_is_moved_aside(tmp_path):
     """The checkpoint is what counts: told, kept under another name, a new file begun."""
     sim = struck_chain()

@@ -46,6 +46,7 @@ class Gravity:
         return 0.0
 
 
+@pytest.mark.validate
 def test_a_force_of_the_user():
     """Free fall, z = z0 − g t²/2 exactly (Verlet is exact for it); its energy has its own column and closes."""
     grains = sand.Grains([[0, 0, 1e-3], [1e-6, 0, 0]], 1e-8, sand.SILICA)

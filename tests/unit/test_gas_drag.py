@@ -202,6 +202,7 @@ def still_gas(**changes):
     return Gas(**({"temperature": TEMPERATURE, "pressure": PRESSURE} | changes))
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("accommodation", [0.0, 0.4, 1.0])
 def test_drag_alone_is_an_exponential(accommodation):
     """v − u = (v0 − u) e^(−t/τ_t), ω = ω0 e^(−t/τ_r), each with its own τ; 10 kicks, rounding 1e-13."""
@@ -219,6 +220,7 @@ def test_drag_alone_is_an_exponential(accommodation):
         assert (grains.spin == before.spin).all()
 
 
+@pytest.mark.compiled("small")
 @compiled
 @pytest.mark.parametrize(("count", "part", "start"), [(1, 20.0, 0.0), (200, 0.1, 0.0), (200, 0.1, 3.0)])
 @pytest.mark.parametrize("accommodation", [0.2, 1.0])
@@ -235,6 +237,7 @@ def test_equipartition(count, part, start, accommodation):
         assert np.abs(squares.mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_mirrors_heat_no_spin():
     """α = 0: translation comes to k_B T, spins stay at rest exactly; N = 20,000, within 3 σ = 3 √(2/N)."""
@@ -245,6 +248,7 @@ def test_mirrors_heat_no_spin():
     assert not grains.spin.any()
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_velocities_and_spins_are_kicked_apart():
     """In equilibrium the correlation of any two of v_k, ω_l is 0 ± 1/√N, N = 20,000; 15 numbers, within 4 σ."""
@@ -256,6 +260,7 @@ def test_velocities_and_spins_are_kicked_apart():
     assert np.abs(both - np.eye(6)).max() < 4.0 / math.sqrt(n)
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_grains_follow_the_wind():
     """Mean of √(m/k_B T)(v − u) is 0 ± 1/√N, and its square 1 ± √(2/N), N = 20,000; within 3 σ."""
@@ -267,6 +272,7 @@ def test_grains_follow_the_wind():
     assert np.abs((slow**2).mean(axis=0) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
 
 
+@pytest.mark.compiled("small")
 @compiled
 @pytest.mark.parametrize("pieces", [1, 2, 16])
 def test_spread_from_rest_whatever_the_pieces(pieces):
@@ -283,6 +289,7 @@ def test_spread_from_rest_whatever_the_pieces(pieces):
         assert np.abs(ratio.mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_velocities_are_forgotten_at_the_rate_of_the_drag():
     """⟨v(0)·v(t)⟩ = e^(−t/τ)⟨v²⟩, spins with τ_r, in equilibrium: what is left is noise of variance 1 − e^(−2t/τ).
@@ -305,6 +312,7 @@ def test_velocities_are_forgotten_at_the_rate_of_the_drag():
             assert abs((x0 * (x1 - kept * x0)).sum()) < 3.0 * spread
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("brownian", [True, False])
 def test_what_is_given_to_the_gas_is_what_the_grains_lost(brownian):
     """Sum over kicks of ½m(v² − v'²) + ½I(ω² − ω'²) = −ΔK, rounding 1e-12; drag alone only takes, kicks heat."""
@@ -321,6 +329,7 @@ def test_what_is_given_to_the_gas_is_what_the_grains_lost(brownian):
             assert 0.0 < given < before
 
 
+@pytest.mark.compiled("small")
 def test_same_address_same_bits():
     """Same seed and numbers: the same bits; another seed, number or id: every component is another."""
     gas = still_gas().rules()
@@ -337,6 +346,7 @@ def test_same_address_same_bits():
         assert (after() != other).all()
 
 
+@pytest.mark.compiled("small")
 def test_order_and_pieces_change_no_bit():
     """Grains one by one, in sevens or backwards: each gets the same bits, for the deviates belong to its id."""
     gas, n = still_gas().rules(), 101
@@ -354,6 +364,7 @@ def test_order_and_pieces_change_no_bit():
     assert np.ascontiguousarray(part(np.arange(n)[::-1])[:, ::-1]).tobytes() == whole.tobytes()
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.interpreted
 def test_no_time_and_no_gas_change_nothing():
     """A kick over 0 s, or in vacuum, leaves every bit and books nothing; position and orientation are never touched."""
@@ -368,6 +379,7 @@ def test_no_time_and_no_gas_change_nothing():
     assert moved == {"velocity", "spin"}
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.interpreted
 def test_the_compiler_changes_nothing_but_rounding():
     """Three kicks of 20 grains in plain Python and compiled: 1e-13 of the largest component."""

@@ -50,6 +50,7 @@ def some(per_grain, count=GRAINS):
     return grains, contacts, pair
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize(("per_grain", "count"), [(1.0, GRAINS), (4.0, GRAINS), (1.0, 500)])
 def test_sums_are_those_of_brute_force(per_grain, count):
     """F = Σ ±push, M = Σ torque of each end; terms of 1e-9, at most some 30, rounded to 1e-16 each: 1e-23."""
@@ -65,6 +66,7 @@ def test_sums_are_those_of_brute_force(per_grain, count):
     assert np.abs(grains.force - force).max() < 1e-23 and np.abs(grains.torque - torque).max() < 1e-23
 
 
+@pytest.mark.compiled("small")
 def test_each_row_has_its_contacts_in_a_fixed_order():
     """First those that the grain is the first of, then the others, each in the order of the contacts."""
     _, contacts, pair = some(2.0)
@@ -74,6 +76,7 @@ def test_each_row_has_its_contacts_in_a_fixed_order():
         assert row == expected
 
 
+@pytest.mark.compiled("small")
 def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     """Each block has its own grains, each once; those with as many contacts of either end come in a row, by number.
 
@@ -91,6 +94,7 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     assert crowded.turn[:GRAINS].tolist() == list(range(GRAINS))
 
 
+@pytest.mark.compiled("small")
 def test_gathering_and_kicking_at_once_is_one_after_the_other():
     """The same loads, v + F dt/m, ω + M dt/I and largest squares of both: the same formulas, so to rounding, 1e-14."""
     grains, contacts, _ = some(1.0)
@@ -105,6 +109,7 @@ def test_gathering_and_kicking_at_once_is_one_after_the_other():
     assert quickest == pytest.approx((grains.spin**2).sum(axis=0).max(), rel=1e-14)
 
 
+@pytest.mark.compiled("small")
 def test_grains_without_moments_drift_as_those_with():
     """Positions and orientations do not depend on moments; those that are there turn with their grains."""
     grains, _, _ = some(1.0, 300)
@@ -130,6 +135,7 @@ def large(moved=5):
     return sand.Grains(place * (1.0, 1.0, 1.2), 1e-7, sand.SILICA, velocity=speed)
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("moved", [5, GRAINS - 5])
 def test_the_fastest_grain_of_all_blocks_is_known(moved):
     """What the step is limited by are the largest squares of speed and spin among all grains."""
@@ -141,6 +147,7 @@ def test_the_fastest_grain_of_all_blocks_is_known(moved):
     assert watch[QUICKEST] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[QUICKEST] > 0.0
 
 
+@pytest.mark.validate
 def test_a_resumed_world_takes_its_turns(tmp_path):
     """A checkpoint leaves them out; they are there again, and the run goes on with the same bits."""
     sim = sand.Simulation(large(), [sand.Contact()], out=tmp_path / "run")

@@ -40,6 +40,7 @@ def ensembles(tmp_path_factory):
     return top
 
 
+@pytest.mark.compiled("dipoles")
 def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
     """The same bits as a simulation of that seed by itself, in a process of its own, too."""
     alone = tmp_path / "alone"
@@ -51,6 +52,7 @@ def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
         assert ours.case["run"]["seed"] == seed
 
 
+@pytest.mark.compiled("dipoles")
 def test_called_again_it_goes_on(tmp_path):
     """To a later end, with the bits of a run that never stopped; a finished one is left as it is."""
     short = CASE | {"run": {"until": "10 ns", "frame_every": "1 ns"}}

@@ -44,6 +44,7 @@ def root_of(x):
     return positive(x) ** 0.5
 
 
+@pytest.mark.compiled("small")
 def test_an_error_in_an_inner_function_reaches_python():
     """Raised two calls below a kernel; and what is not raised is right."""
 
@@ -68,6 +69,7 @@ def test_bounds_that_are_checked_are_told(tmp_path):
     assert done.stdout.startswith("told")
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 def test_who_passes_arguments_otherwise_is_told():
     """Numba's own functions take named tuples apart, ours do not: a call across says so instead of reading rubbish."""
@@ -81,6 +83,7 @@ def test_who_passes_arguments_otherwise_is_told():
         numba.njit(speed)(grains)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 def test_numbers_are_gathered_by_no_instruction_where_that_is_slow():
     """LLVM is told so on AMD's Zen, and nowhere else."""
@@ -90,6 +93,7 @@ def test_numbers_are_gathered_by_no_instruction_where_that_is_slow():
     assert ("+prefer-no-gather" in code) == get_host_cpu_name().startswith("znver")
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 def test_vectors_are_as_long_as_pays():
     """Kernels with long loops use all 512 bits where a processor has them without slowing down, others what LLVM takes.
@@ -112,6 +116,7 @@ def test_vectors_are_as_long_as_pays():
         assert code.py_func.__qualname__.endswith("doubled_wide" if wide and fast else "doubled")
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
 def test_rubbish_is_collected_again_after_compiling():
     """As before the first call, whether that was on or off."""

@@ -100,6 +100,7 @@ OPTIONS = {
 }
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("option", OPTIONS)
 def test_contacts_moved_in_the_pass_are_as_if_moved_one_by_one(option):
     """Same pointers, twists, loads, losses, to rounding: 1e-12 of the largest of each kind.
@@ -150,6 +151,7 @@ def test_the_strain_before_a_step_is_that_of_grains_put_back():
     assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
 
 
+@pytest.mark.compiled("small")
 def test_what_a_contact_does_not_lose_stays_in_its_record():
     """Contacts that do not move keep pointers and records bit by bit, whatever their neighbours in a block do."""
     world = some_contacts(SILICA, Box.open(), seed=2)
@@ -160,6 +162,7 @@ def test_what_a_contact_does_not_lose_stays_in_its_record():
         assert (getattr(world[1], name)[:, :PAIRS][:, still] == getattr(before, name)[:, :PAIRS][:, still]).all()
 
 
+@pytest.mark.compiled("small")
 def test_a_quiet_block_waits_to_be_settled():
     """Where nothing moved in the step before, the pass moves nothing; contacts are settled one by one."""
     world = some_contacts(SILICA, Box.open())

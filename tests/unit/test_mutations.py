@@ -65,10 +65,13 @@ def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mutated") / "run"
     position = [[(2e-8 - 1e-10) * k, 0, 0] for k in range(5)] + [[0, 2e-7, 0]]
     grains = sand.Grains(position, 1e-8, sand.IRON, moment="200 A m^2/kg", velocity=np.eye(6, 3) * 0.1)
-    sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], out=folder, frame_every="10 ps").run(until="50 ps")
+    sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 um")], out=folder, frame_every="10 ps").run(
+        until="50 ps"
+    )
     return folder
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("count", [300, pytest.param(2000, marks=pytest.mark.validate)])
 @pytest.mark.parametrize(("pattern", "read"), [("checkpoint-*.npz", read_checkpoint), ("trajectory.gsd", read_frames)])
 def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, count):

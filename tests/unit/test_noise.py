@@ -55,6 +55,7 @@ def test_philox_gives_the_published_words(counter, key, result):
     assert philox(words_of(counter), words_of(key)) == words_of(result)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.interpreted
 @pytest.mark.parametrize(("counter", "key", "result"), KNOWN)
 def test_an_address_is_counter_and_key(counter, key, result):
@@ -65,6 +66,7 @@ def test_an_address_is_counter_and_key(counter, key, result):
     assert random_words(*(a[0] for a in address)) == words_of(result)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.interpreted
 def test_the_compiler_and_the_type_of_an_address_change_nothing():
     """Plain int, int64, uint32 and uint64 give the same words, exactly, and no type but uint64 ever comes out.
@@ -99,6 +101,7 @@ def test_a_uniform_is_never_0_or_1():
     assert math.sqrt(-2.0 * math.log(uniform(np.uint64(0)))) < 6.8
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_words_are_evenly_spread():
     """1e6 addresses, counted up as a run counts them: each of 128 bits is set in half of the words.
@@ -112,6 +115,7 @@ def test_words_are_evenly_spread():
     assert np.unique(words[0] + (words[1] << np.uint64(32))).size == n
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_moments_of_the_normals():
     """Mean 0, ⟨ξ²⟩ = 1, ⟨ξ³⟩ = 0, ⟨ξ⁴⟩ = 3 for each component, with σ² = 1, 2, 15, 96 over n = 1e6; within 4 σ."""
@@ -121,6 +125,7 @@ def test_moments_of_the_normals():
         assert np.abs((x**power).mean(axis=1) - mean).max() < 4.0 * math.sqrt(variance / n)
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_the_normals_are_normal():
     """Kolmogorov–Smirnov on each component, n = 2e5: p > 1e-3.  A χ² of |ξ|² (3 degrees of freedom) likewise."""
@@ -131,6 +136,7 @@ def test_the_normals_are_normal():
     assert stats.kstest((x**2).sum(axis=0), stats.chi2(3).cdf).pvalue > 1e-3
 
 
+@pytest.mark.compiled("small")
 @compiled
 @pytest.mark.parametrize("power", [1, 2])
 def test_neighbouring_addresses_know_nothing_of_each_other(power):
@@ -157,6 +163,7 @@ def test_neighbouring_addresses_know_nothing_of_each_other(power):
         assert np.abs(np.corrcoef(here, there)[:3, 3:]).max() < limit, name
 
 
+@pytest.mark.compiled("small")
 @compiled
 def test_sums_over_kicks_and_over_grains_are_normal():
     """Σ ξ over 500 kicks of a grain, or over 500 grains of a kick, has variance 500 (1 ± √(2/m)), m sums; within 4 σ.

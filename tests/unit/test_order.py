@@ -1,6 +1,7 @@
 """Numbering along a space-filling curve."""
 
 import numpy as np
+import pytest
 
 import sand
 from sand.setup.order import places_on_curve
@@ -15,6 +16,7 @@ def test_places_interleave_the_bits():
     assert places_on_curve(corners).tolist() == expected
 
 
+@pytest.mark.compiled("small")
 def test_the_same_grains_in_another_order():
     """Every quantity goes along; contacts of an aggregate are nearer in memory than in the order of its growth."""
     grains = sand.setup.bpca(2000, radius="0.1 um", material=sand.SILICA, seed=3)

@@ -59,18 +59,20 @@ def test_blocks_of_forces_together_are_their_sum(order):
         assert np.abs(once - blocks).max() < 1e-12 * np.abs(once).max()
 
 
+@pytest.mark.compiled("dipoles")
 def test_forces_of_contacts_are_those_of_the_contact_law():
     """Two magnetic grains head to tail in contact: the table has F = F_JKR n, without the dipoles' attraction.
 
     That acts along n as well, and is a thousandth of it and more: it would be seen at 1e-9.
     """
     grains = sand.Grains([[0, 0, 0], [1.985e-8, 0, 0]], 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * 2)
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()])
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 mm")])
     sim.run(steps=30)
     force, normal = sim.contacts["force"][0], sim.contacts["normal_force"][0]
     assert abs(np.linalg.norm(force) - abs(normal)) < 1e-9 * abs(normal)
 
 
+@pytest.mark.compiled("small")
 def test_a_formula_from_outside_may_print(capfd):
     """What a user registers is compiled by numba as always: it may do what needs numba's environment."""
 

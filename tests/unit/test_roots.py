@@ -23,6 +23,7 @@ def filled_by(function):
     return kernel(fill, keep=False, wide=True)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("name", ["exact_inverse_root", "seeded_inverse_root"])
 @pytest.mark.parametrize("together", [4096, 1])
 def test_inverse_roots_are_right_to_rounding(name, together):
@@ -39,6 +40,7 @@ def test_inverse_roots_are_right_to_rounding(name, together):
     np.testing.assert_array_less(np.abs(found / true - 1).astype(float), 3e-16)
 
 
+@pytest.mark.compiled("small")
 def test_no_root_of_a_distance_that_is_none():
     """Grains on top of each other, x = 0, give no number, by either road: what stops a run sees it."""
     with np.errstate(all="ignore"):
@@ -52,6 +54,7 @@ def test_no_root_of_a_distance_that_is_none():
             assert not np.isfinite(found).any()
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("count", [2, 77, 1001])
 def test_sums_with_seeds_are_those_without(count):
     """Forces and fields of all pairs, with either root: ten roundings in each of 1000 terms, 1e-13 of the largest.

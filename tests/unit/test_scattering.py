@@ -68,6 +68,7 @@ def here():
     )
 
 
+@pytest.mark.compiled("scattering")
 def test_a_flight_of_a_batch_can_be_flown_alone(here):
     """A row of 200 and its replay: the same end, time and distance, to the bit."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
@@ -82,6 +83,7 @@ def test_a_flight_of_a_batch_can_be_flown_alone(here):
         assert ("hit", "miss").index(alone.end) == row["end"]
 
 
+@pytest.mark.compiled("scattering")
 def test_any_split_gives_the_same_numbers(here, monkeypatch):
     """Pieces of 64 in two processes, or backwards here: the bits of one process."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
@@ -94,6 +96,7 @@ def test_any_split_gives_the_same_numbers(here, monkeypatch):
     assert numbers(other) != numbers(here)
 
 
+@pytest.mark.compiled("scattering")
 def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
     """dask.distributed with two workers, one of which is killed after the first piece: the same numbers."""
     distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
@@ -116,6 +119,7 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
     assert numbers(found) == numbers(here)
 
 
+@pytest.mark.compiled("scattering")
 def test_what_is_known_is_not_flown_again(here):
     """With the rows of half the flights the other half is flown, and the result is the same."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
@@ -128,6 +132,7 @@ def test_what_is_known_is_not_flown_again(here):
     assert len(later) == len(rows) - len(rows[::2])
 
 
+@pytest.mark.compiled("scattering")
 def test_a_map():
     """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all flights are told."""
     flights = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
@@ -141,6 +146,7 @@ def test_a_map():
     assert found.edges[:, -1] == pytest.approx(1.2 * found.capture, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.compiled("scattering")
 def test_the_command(tmp_path, capsys):
     """Two speeds: files, figure, JSON; the folder is not overwritten; a resume finds all flights and flies none."""
     case, out = tmp_path / "case.toml", tmp_path / "out"
@@ -171,6 +177,7 @@ def test_the_command(tmp_path, capsys):
     assert "another case" in capsys.readouterr().err
 
 
+@pytest.mark.compiled("scattering")
 def test_a_killed_job_goes_on(tmp_path):
     """Killed while it flies, a torn line at the end: resumed, its files are those of one that was left alone."""
     case = tmp_path / "case.toml"
@@ -194,6 +201,7 @@ def test_a_killed_job_goes_on(tmp_path):
         assert (cut / name).read_bytes() == (whole / name).read_bytes()
 
 
+@pytest.mark.compiled("scattering")
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -308,6 +316,7 @@ class Done(Future):
         self.set_result(None)
 
 
+@pytest.mark.compiled("scattering")
 def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
     """One line with the way to go on, exit 2; then the rest is flown."""
     from concurrent.futures import process

@@ -37,6 +37,7 @@ def test_a_simulation_shows_its_run(looked_at, opened, tmp_path):
         sim.view(tmp_path / "none" / "b.html")
 
 
+@pytest.mark.compiled("contacts")
 def test_a_simulation_without_files_shows_its_state(opened):
     """One frame, that of now, and the ledger's rows; before the first step, too."""
     grains = sand.Grains([[0.0, 0.0, 0.0], [2.5e-8, 0.0, 0.0]], "10 nm", sand.SILICA, velocity=np.eye(2, 3))
@@ -57,6 +58,7 @@ def test_too_much_is_thinned(looked_at, opened, tmp_path, monkeypatch):
     assert 1 <= len(packets) < 6 and "too much room" in manifest["note"]
 
 
+@pytest.mark.compiled("contacts")
 def test_the_figure_where_there_is_no_page(bundle, opened):
     """With one warning that says why; nothing is written or opened."""
     from matplotlib.figure import Figure

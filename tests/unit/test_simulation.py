@@ -60,6 +60,7 @@ def test_overlaps_name_ten_pairs_and_count_the_rest():
     assert "180 more" in caught.value.problems[-1]
 
 
+@pytest.mark.compiled("small")
 def test_contacts_that_are_held_may_overlap_by_more():
     """A row of 31 pairs too close together: those given as contacts, in whatever order, are not among the complaints.
 
@@ -113,6 +114,7 @@ def test_the_cutoff_is_stated_with_its_reason():
     assert "1.5 b_max" in large
 
 
+@pytest.mark.compiled("contacts")
 def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
     """A fixed step in which a grain flies more than half its radius: an Outcome and a checkpoint."""
     grains = pair(velocity=[[0, 0, 0], [0, 100.0, 0]])
@@ -124,6 +126,7 @@ def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
     assert "grains 1" in str(result)
 
 
+@pytest.mark.compiled("contacts")
 def test_crushed_grains_end_the_run():
     """An impact so fast that a centre enters the other grain: JKR has nothing to say."""
     grains = pair(velocity=[[0, 0, 0], [-2e5, 0, 0]], material=sand.SILICA)
@@ -132,6 +135,7 @@ def test_crushed_grains_end_the_run():
     assert result.grains == (0, 1)
 
 
+@pytest.mark.compiled("contacts")
 def test_numbers_that_are_not_finite_end_the_run():
     """A spin driven to NaN from outside is seen within 16 steps, and its grain is named."""
     sim = sand.Simulation(sand.Grains(1e-6 * np.arange(15).reshape(5, 3), 1e-8, sand.IRON), [sand.Contact()])
@@ -158,6 +162,7 @@ def too_long_steps(out):
     return sand.Simulation(grains, [sand.Contact()], stepping=stepping, out=out, frame_every="1 s")
 
 
+@pytest.mark.compiled("contacts")
 def test_a_runaway_energy_ends_the_run(tmp_path):
     """Seen within 1e4 steps; the state from before is kept, and going on from it ends at the same step."""
     sim = too_long_steps(tmp_path / "run")
@@ -173,6 +178,7 @@ def test_a_runaway_energy_ends_the_run(tmp_path):
     assert go_on.world.steps == result.steps
 
 
+@pytest.mark.compiled("contacts")
 def test_a_short_run_cannot_finish_with_energy_from_nowhere(tmp_path):
     """The end is looked at, too, and its state is not written over a good one."""
     result = too_long_steps(tmp_path / "run").run(steps=9_000)
@@ -182,11 +188,12 @@ def test_a_short_run_cannot_finish_with_energy_from_nowhere(tmp_path):
     assert len(list((tmp_path / "run").glob("checkpoint-*.npz"))) == 1
 
 
+@pytest.mark.compiled("dipoles")
 def test_no_false_alarm_in_a_cold_start_without_frames():
     """Two cold magnetic grains far apart fall together: 1e4 times the energy of the start, booked once, at the end."""
     moment = [[6.6e-18, 0, 0]] * 2
     grains = sand.Grains([[0, 0, 0], [1.2e-7, 1e-9, 0]], 1e-8, sand.IRON, moment=moment)
-    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], frame_every="1 s")
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 mm")], frame_every="1 s")
     result = sim.run(steps=60_000)
     first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
     assert result.outcome is sand.Outcome.FINISHED
@@ -195,6 +202,7 @@ def test_no_false_alarm_in_a_cold_start_without_frames():
     assert sim.ledger.dissipated > 1e3 * abs(first["total"])
 
 
+@pytest.mark.validate
 def test_no_false_alarm_where_there_was_no_energy():
     """A grain that falls from rest at the origin, 3e4 steps: all energy comes later, the total stays 0 to rounding."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.IRON), [sand.Gravity("9.81 m/s^2")])
@@ -202,6 +210,7 @@ def test_no_false_alarm_where_there_was_no_energy():
     assert sim.ledger.rows[-1]["translation"] > 0.0
 
 
+@pytest.mark.compiled("contacts")
 def test_what_is_rounding_is_no_drift():
     """A lattice at rest: its energy changes in the last digit, over a kinetic energy of next to nothing.
 
@@ -217,6 +226,7 @@ def test_what_is_rounding_is_no_drift():
     assert sim.ledger.drift == pytest.approx(10.0 * abs(np.spacing(first["total"])) / kinetic, rel=1e-12)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
     """6 radians in a step: the rotation parameters would be destroyed; the run stops and names the grain."""
     sim = sand.Simulation(pair(spin=[[0, 0, 0], [0, 0, 6e9]]), [sand.Contact()], stepping=sand.Verlet(step="1 ns"))
@@ -226,6 +236,7 @@ def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
     assert np.linalg.norm(sim.grains.orientation[1]) == pytest.approx(1.0, rel=1e-6, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
 def test_steps_are_counted_through_growing_arrays():
     """run(steps=N) takes N steps, also when the list of pairs outgrows its arrays on the way."""
     sim = struck_chain(length=30)
@@ -257,6 +268,7 @@ def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
     assert sim.world.contacts.pair.shape[1] == -8 * (-int(1.1 * 3 * 4 * 4 * 3) // 8) == 160
 
 
+@pytest.mark.compiled("contacts")
 def test_contacts_alone_have_no_room_for_other_forces():
     """No far loads and no list, one row for the cells; damping has its column only where something damps."""
     place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
@@ -275,6 +287,7 @@ def test_contacts_alone_have_no_room_for_other_forces():
         assert near.watch[SOON] == 0  # those in contact need not be looked at, and all others are farther
 
 
+@pytest.mark.compiled("contacts")
 def test_a_row_is_written_once(tmp_path):
     """Asking again for a time that is reached adds no row and no frame."""
     seen = []
@@ -292,6 +305,7 @@ def test_a_row_is_written_once(tmp_path):
     assert seen == [0, 10]
 
 
+@pytest.mark.compiled("contacts")
 def test_a_torn_ledger_does_not_stop_a_resume(tmp_path):
     """A kill in the middle of a row: the row is dropped, the run goes on."""
     sim = sand.Simulation(pair(), [sand.Contact()], out=tmp_path / "run")
@@ -304,6 +318,7 @@ def test_a_torn_ledger_does_not_stop_a_resume(tmp_path):
     assert [line.split(",")[0] for line in lines[1:]] == ["0", "1234", "1244"]
 
 
+@pytest.mark.compiled("contacts")
 def test_moments_that_are_not_there_do_not_make_a_cutoff_of_nothing(tmp_path):
     """Thermal grains without moments in a periodic box: the cut-off is half the box, and a resume works."""
     grains = pair(velocity=[[1, 0, 0], [-1, 0, 0]])
@@ -314,10 +329,11 @@ def test_moments_that_are_not_there_do_not_make_a_cutoff_of_nothing(tmp_path):
         sand.resume(tmp_path / "run").run(steps=10)
 
 
+@pytest.mark.validate
 def test_magnetite_flies_without_a_surface_energy(tmp_path):
     """Where grains never touch, no surface energy is needed, and a resume works too."""
     grains = pair(distance=1e-7, material=sand.MAGNETITE, moment="material")
-    sand.Simulation(grains, [sand.Dipoles()], out=tmp_path / "run").run(steps=10)
+    sand.Simulation(grains, [sand.Dipoles(cutoff="1 um")], out=tmp_path / "run").run(steps=10)
     assert sand.resume(tmp_path / "run").run(steps=10).steps == 20
 
 
@@ -331,6 +347,7 @@ def test_grains_do_not_share_memory_with_their_maker():
     assert not np.shares_memory(sand.Grains(grains.position, 1e-8, sand.IRON).position, grains.position)
 
 
+@pytest.mark.compiled("contacts")
 def test_nothing_happens_in_an_empty_world():
     """One grain at rest: the run ends at its time, in steps of at most 1e5 sound-crossing times r √(ρ/E)."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.IRON), [sand.Contact()])
@@ -340,6 +357,7 @@ def test_nothing_happens_in_an_empty_world():
     assert result.drift == 0.0
 
 
+@pytest.mark.compiled("contacts")
 def test_without_contact_grains_pass_through_each_other():
     """No Contact in the list: no contact forms."""
     sim = sand.Simulation(pair(velocity=[[0, 0, 0], [-1.0, 0, 0]]), [])
@@ -348,6 +366,7 @@ def test_without_contact_grains_pass_through_each_other():
     assert sim.grains.position[1, 0] == pytest.approx(3e-8 - sim.time, rel=1e-12, abs=0.0)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_pair_that_touches_across_the_faces():
     """Periodic images: a pair through the boundary sticks as it does in the middle, to rounding."""
     ends = []
@@ -361,6 +380,7 @@ def test_a_pair_that_touches_across_the_faces():
     assert ends[0][0] == pytest.approx(ends[1][0], abs=1e-6 * np.abs(ends[0][0]).max())
 
 
+@pytest.mark.compiled("contacts")
 def test_the_starting_objects_are_untouched():
     """The simulation works on a copy, and shows views nobody can write to."""
     grains = pair(velocity=[[0, 0, 0], [-1.0, 0, 0]])
@@ -371,6 +391,7 @@ def test_the_starting_objects_are_untouched():
         sim.grains.position[0] = 0.0
 
 
+@pytest.mark.compiled("contacts")
 def test_an_interrupt_stops_between_two_steps(tmp_path):
     """SIGINT: the run raises Interrupted, a checkpoint is there, and a resumed run reaches the end."""
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)
@@ -397,6 +418,7 @@ def test_when_frames_are_due():
     assert Schedule(math.inf, 0.0).due == math.inf
 
 
+@pytest.mark.compiled("contacts")
 def test_bound_grains_take_the_whole_step_of_their_contact():
     """A ringing pair steps by its fastest period / 25, not by a power of two below it; unless it is struck hard.
 

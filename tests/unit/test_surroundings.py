@@ -95,6 +95,7 @@ def test_torque_is_the_slope_of_the_energy(field, moment, time):
     assert force == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.compiled("small")
 @pytest.mark.parametrize("force", FORCES)
 def test_compiled_formulas_compute_the_same(force):
     """Force, torque and energy of the compiled formula and of plain Python; rounding of sin and of a few sums."""

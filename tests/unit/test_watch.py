@@ -38,6 +38,7 @@ WAYS = {
 }
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("way", WAYS)
 def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(way):
     """A call of the driver begins with a look at all grains: 600 calls of one step, and one call of 600, same bits.
@@ -55,6 +56,7 @@ def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(
     assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("blocks", [False, True])
 def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     """Leeway + the largest displacement ≤ the limit of each list, after any number of steps; both speeds are exact.
@@ -83,6 +85,7 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     assert spared > 10
 
 
+@pytest.mark.validate
 def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     """Leeway + the largest displacement since the pick, in the first step of a call, ≤ SOON_PART of the reach.
 
@@ -114,6 +117,7 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
+@pytest.mark.validate
 def test_a_pair_that_parts_and_comes_back_at_once_is_seen():
     """Charges draw two grains together again that have just parted: one call of the driver, and one for each step.
 
@@ -136,6 +140,7 @@ def test_a_pair_that_parts_and_comes_back_at_once_is_seen():
     assert seen > 3
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.FLEW_TOO_FAR, 2), (0.0, Stop.SPUN_TOO_FAR, 0)])
 def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
     """Grain 0 spins too fast for the user's step, grain 2 flies too fast or rests."""
@@ -159,6 +164,7 @@ def test_what_is_no_number_is_the_largest(sign):
     assert np.isnan(farthest(arrays, anchor, span))
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("damping", ["none", "viscoelastic"])
 @pytest.mark.parametrize("channels", ["one row for each", "as many as this law has"])
 def test_what_contacts_lost_is_read_from_every_format(damping, channels):
@@ -175,6 +181,7 @@ def test_what_contacts_lost_is_read_from_every_format(damping, channels):
             assert sim.contacts[f"lost_{name}"].tolist() == (seven[row].tolist() if row < law else [0.0, 0.0])
 
 
+@pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("name", ["contacts/twist", "contacts/side", "contacts/bond", "near/pair", "near/step"])
 @pytest.mark.parametrize("radius", [[1e-8, 1e-8, 1e-8], [1e-8, 1e-8, 9e-9]], ids=["alike", "unlike"])
 def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
