@@ -19,10 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 from numba.core.config import DISABLE_JIT
 from numba.core.event import Event, Listener, register
 
-from .specs import SPECS, watched
+from .specs import SPECS, parts_of, watched
 from .validation import Recorder, parse_part, part_of
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
@@ -122,7 +123,7 @@ class CompilationGuard(Listener):
     def use(self, name: str | None, plan: Any) -> None:
         """Called before a driver takes steps; `name` is its specification, None for one that is not canonical."""
         if self.allowed is not None and name not in self.allowed:
-            what = f"the driver {name!r}" if name else f"a driver that is none of tests/specs.py ({plan})"
+            what = f"the driver {name!r}" if name else f"a driver that is none of tests/specs.py ({parts_of(plan)})"
             raise AssertionError(f"this test takes steps with {what}: {ADVICE}")
 
 
@@ -166,6 +167,13 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def _no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tests open no windows."""
     monkeypatch.setenv("SAND_NO_BROWSER", "1")
+
+
+@pytest.fixture(autouse=True)
+def _empty_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs end with an empty figure, which costs a second less than a real one, except in tests marked `draws`."""
+    if "draws" not in request.keywords:
+        monkeypatch.setattr("sand.view.figure.run_figure", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
 
 
 @pytest.fixture(autouse=True)

@@ -88,6 +88,12 @@ def name_of(plan: Plan) -> str | None:
     return _plans().get(_key(plan))
 
 
+def parts_of(plan: Plan) -> str:
+    """What a driver is made of, in a few words."""
+    forces = [getattr(each, "__qualname__", str(each)) for each in (plan.far.loads, plan.outside)]
+    return ", ".join([*(name for name, value in plan._asdict().items() if value is True), *forces])
+
+
 @contextmanager
 def watched(use: Callable[[str | None, Plan], None]) -> Iterator[None]:
     """Call `use(name, plan)` before a compiled driver takes steps."""

@@ -72,7 +72,9 @@ def gone_on(whole, folder):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.skipif(sys.platform != "linux", reason="relies on Linux's limits for files")
-@pytest.mark.parametrize("limit", [0, 700, 3000, 20_000, 50_000, 90_000, 120_000])
+@pytest.mark.parametrize(
+    "limit", [0, 700, 3000, 20_000, 50_000, *(pytest.param(n, marks=pytest.mark.draws) for n in (90_000, 120_000))]
+)
 def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
     """Limits hit the case, the ledger, the trajectory, checkpoints and the figure: one line, nothing half written."""
     folder = tmp_path / "run"
@@ -86,19 +88,31 @@ def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
     gone_on(whole, folder)
 
 
+def flying(out):
+    """Two grains that fly past each other, with a frame in every step."""
+    grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", velocity=[[1.0, 0, 0], [0, 0, 2.0]])
+    return sand.Simulation(grains, [sand.Contact()], out=out, stepping=sand.Verlet(step=1e-11), frame_every=1e-11)
+
+
+@pytest.fixture(scope="module")
+def many_frames(tmp_path_factory):
+    """The folder of a run of 200 frames with room enough."""
+    folder = tmp_path_factory.mktemp("frames") / "whole"
+    flying(folder).run(steps=200)
+    return folder
+
+
 @pytest.mark.compiled("contacts")
 @pytest.mark.skipif(sys.platform != "linux", reason="relies on Linux's limits for files")
-@pytest.mark.parametrize("limit", [120_000, 150_000, 165_000, 180_000])
-def test_many_small_frames(tmp_path, limit):
+@pytest.mark.parametrize(
+    "limit", [120_000, 165_000, *(pytest.param(n, marks=pytest.mark.validate) for n in (150_000, 180_000))]
+)
+def test_many_small_frames(many_frames, tmp_path, limit):
     """Two grains, 200 frames before the first flush: the index must be lengthened several times over.
 
     GSD goes on where it cannot lengthen its index, and writes entries over the first frames; it is not let.
     """
-    grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", velocity=[[1.0, 0, 0], [0, 0, 2.0]])
-    settings = {"stepping": sand.Verlet(step=1e-11), "frame_every": 1e-11}
-    whole = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "whole", **settings)
-    whole.run(steps=200)
-    sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run", **settings)
+    whole, sim = many_frames, flying(tmp_path / "run")
     with no_file_longer_than(limit), pytest.raises(sand.FilesFailed, match="File too large"):
         sim.run(steps=200)
     with pytest.raises(sand.BadInput, match=r"cannot go on.*sand\.resume"):
@@ -106,7 +120,7 @@ def test_many_small_frames(tmp_path, limit):
     before = len(read_frames(tmp_path / "run" / "trajectory.gsd"))
     assert before >= 1
     sand.resume(tmp_path / "run").run()
-    assert content(tmp_path / "run") == content(tmp_path / "whole")
+    assert content(tmp_path / "run") == content(whole)
 
 
 def test_a_folder_that_vanishes(whole, tmp_path):

@@ -16,8 +16,8 @@ from sand.files.trajectory import read_frames
 
 CASE = """
 [run]
-until = "60 ns"
-frame_every = "0.5 ns"
+until = "20 ns"
+frame_every = "0.2 ns"
 seed = 3
 
 [box]
@@ -30,10 +30,14 @@ radius = "10 nm"
 material = "iron"
 moment = "200 A m^2/kg"
 temperature = "3000 K"
+charge = 1e-19
 
 [forces.contact]
 
 [forces.dipoles]
+cutoff = "0.15 um"
+
+[forces.charges]
 cutoff = "0.15 um"
 
 [forces.gas]
@@ -108,14 +112,16 @@ def same_as_whole(whole, folder):
     assert different == []
 
 
-def test_killed_three_times(whole, tmp_path):
+@pytest.mark.compiled("listed")
+def test_killed_once(whole, tmp_path):
     """Contacts, a list, cycles and a gas; killed while it runs: the same bits in checkpoint, ledger and frames."""
     arrays, _ = newest_checkpoint(whole[1])
     assert arrays["contacts/pair"].shape[1] > 5  # there is something to lose
     assert np.isfinite(arrays["far/anchor"]).all()
-    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(1), 3))
+    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(1), 1))
 
 
+@pytest.mark.validate
 def test_asked_to_stop_twice(whole, tmp_path):
     """The same for SIGTERM, which ends a run at the next step with a checkpoint."""
     same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(2), 2, signal.SIGTERM))
