@@ -25,6 +25,7 @@ def test_case_files_are_without_mistakes(path):
     reads[command](path)
 
 
+@pytest.mark.validate
 def test_figure_4(tmp_path, monkeypatch, capsys):
     """The script draws its figure and finds a T where hit-and-stick has none."""
     monkeypatch.setattr(sys, "argv", ["figure4.py", str(tmp_path / "figure4.png")])
@@ -50,6 +51,7 @@ def test_cross_sections(monkeypatch, capsys):
         assert abs(float(made[name][0]) - float(kept[name][0])) < 4.0 * error, name
 
 
+@pytest.mark.validate
 def test_growth_variants(tmp_path, monkeypatch, capsys):
     """Two variants for a nanosecond: a row each, what is not known is a dash."""
     words = ["growth_variants.py", "--boxes", "1", "--until", "1 ns", "--only", "cold", "--only", "field"]

@@ -31,7 +31,7 @@ def crash(tmp_path_factory):
     return folder, read_frames(folder / "trajectory.gsd"), sim
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("dipoles", "small")
 def test_the_run_is_worth_it(crash):
     """There are stretched contacts, strained ones, some at a limit, and contacts across the faces."""
     _, frames, _ = crash
@@ -43,6 +43,7 @@ def test_the_run_is_worth_it(crash):
     assert (np.abs(apart) > 1e-7).any()
 
 
+@pytest.mark.compiled("dipoles")
 def test_every_frame_starts_a_run_with_its_contacts(crash):
     """Pairs are the same, overlaps to rounding (64 ε of the coordinates in radii), strains to single precision.
 
@@ -67,6 +68,7 @@ def test_every_frame_starts_a_run_with_its_contacts(crash):
         assert sim.ledger["made"][-1] == sim.ledger["broken"][-1] == 0
 
 
+@pytest.mark.compiled("dipoles")
 def test_the_books_begin_where_they_were(crash):
     """All energies of the new run's first row are those of the old ledger's row, to single precision."""
     _, frames, old = crash
@@ -79,6 +81,7 @@ def test_the_books_begin_where_they_were(crash):
         assert sim.ledger[name][0] == pytest.approx(was, rel=3e-6, abs=3e-6 * abs(old.ledger["translation"][k])), name
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_frame_as_a_simulation(crash):
     """`sand.open(DIR).at(k)`: energies at grains sum to those of the old ledger's row, to single precision."""
     folder, frames, old = crash
@@ -90,6 +93,7 @@ def test_a_frame_as_a_simulation(crash):
     assert at["magnetic"].sum() == pytest.approx(old.ledger["magnetic"][k], rel=3e-6, abs=3e-6 * scale)
 
 
+@pytest.mark.compiled("dipoles")
 def test_it_goes_on_as_the_old_run_did(crash):
     """After the time between two frames positions agree with the old run's next frame.
 
@@ -150,6 +154,7 @@ def test_a_rigid_packing_that_hardly_touches():
         assert np.abs(found - rounded).max() < 1e-3 * RADIUS + 64 * SINGLE * away
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_frame_without_numbers(crash):
     """The last frame of a run that ended in numbers that are not finite is refused with its step."""
     _, frames, _ = crash
@@ -174,6 +179,7 @@ def said(capsys):
     return capsys.readouterr()
 
 
+@pytest.mark.compiled("dipoles")
 def test_the_command(crash, tmp_path, monkeypatch, capsys):
     """`sand run --from`: the earlier run's case, a frame of it, said so; a case file can ask for it; resume goes on."""
     folder, frames, _ = crash
@@ -203,6 +209,7 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
     assert (sand.open("x").frames[-1].position == sand.open("mine").frames[-1].position).all()
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
@@ -250,6 +257,7 @@ def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.compiled("dipoles")
 def test_a_frame_that_does_not_fit_itself(crash):
     """An overlap that the positions cannot have is refused, not forced."""
     _, frames, _ = crash

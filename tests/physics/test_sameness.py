@@ -156,7 +156,8 @@ from tests.physics.setups import random_aggregate
 import sand
 fast = 8.0 * np.random.default_rng(3).normal(size=(5, 3))
 grains = random_aggregate(5, 7, radii=(5e-9, 1e-8), moment="300 A m^2/kg", velocity=fast)
-sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(), sand.Field("1 mT")])
+field = sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")
+sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), field])
 sim.run(steps=120)
 np.savez(sys.argv[1], position=sim.grains.position, spin=sim.grains.spin, lost=sim.world.lost, time=sim.time)
 """

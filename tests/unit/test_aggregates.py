@@ -46,7 +46,7 @@ def test_ballistic_particle_cluster_aggregates():
     assert 4 * R < gyration < 14 * R
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_they_rest():
     """A simulation of a lattice and an aggregate stays at rest: contacts as many as counted, no force but rounding."""
     for body, contacts in ((lattice(3, radius=R, material=M), 54), (pca(50, radius=R, material=M, seed=1), 49)):

@@ -45,7 +45,7 @@ def test_worlds_have_the_contacts_that_are_counted(kind, contacts):
     assert len(sim.contacts["pair"]) == touching
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_clusters_side_by_side_do_not_touch():
     """25 grains in clusters of 10: 9 + 9 + 4 contacts."""
     sim = sand.Simulation(worlds.shaken(worlds.loose(25, whole=10)), [sand.Contact()])
@@ -84,7 +84,7 @@ def test_a_replay_takes_the_same_steps():
     assert np.array_equal(*ends)
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_scaling_leaves_out_what_does_not_fit(monkeypatch):
     """A row says so, in place of numbers."""
     monkeypatch.setattr(scaling, "available", lambda: 0.0)

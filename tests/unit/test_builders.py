@@ -67,7 +67,7 @@ def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
     assert (other.position != body.position).any()
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_a_simulation_finds_the_contacts_that_were_made():
     """N − 1 contacts, forces below 1e-9 of what a contact bears, in a simulation of its own."""
     sim = sand.Simulation(bcca(80, radius=R, material=M, seed=2), [sand.Contact()])
@@ -399,7 +399,7 @@ def test_mistakes_on_the_command_line(tmp_path, capsys, monkeypatch, words, mess
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_what_is_built_collides_and_runs(tmp_path, capsys, monkeypatch):
     """A body from a file, one by its kind and one with laws and moments, in `sand collide` and `sand run`."""
     monkeypatch.chdir(tmp_path)

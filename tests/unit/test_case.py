@@ -185,14 +185,14 @@ def test_numbers_are_si_and_text_has_units():
     assert check_case(content, "some.toml") == text
 
 
-@pytest.mark.compiled("contacts", "dipoles", "fields")
+@pytest.mark.compiled("dipoles", "contacts")
 @pytest.mark.parametrize(
     "changes",
     [
         {},
         {"forces__dipoles__cutoff": "none"},
         {"forces__dipoles": None, "grains__moment": None},
-        {"forces__field__flux_density": "1 mT", "stepping__step": "1 ps"},
+        pytest.param({"forces__field__flux_density": "1 mT", "stepping__step": "1 ps"}, marks=pytest.mark.validate),
         {"run__frame_every": "1 ns", "run__until": None, "run__steps": 50},
         {"grains__material": "mine", "materials__mine": {"like": "silica", "surface_energy": "50 mJ/m^2"}},
     ],

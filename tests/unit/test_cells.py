@@ -353,7 +353,7 @@ def test_near_pairs_have_the_step_of_their_own_contact():
         assert near.length[p] == pytest.approx(bond.break_overlap, rel=1e-14)
 
 
-@pytest.mark.compiled("dipoles")
+@pytest.mark.validate
 def test_ringing_does_not_make_lists():
     """What counts is the displacement: 30,000 steps of a ringing cluster that goes nowhere need the first lists only.
 

@@ -354,7 +354,8 @@ def same_state(one, other):
     return all(a[name].tobytes() == b[name].tobytes() for name in a)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.validate)])
 def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number):
     """Exit 130 with the time and what to type; then `sand resume` ends in the same bits as one run without a stop."""
     words = [*SAND, "run", "small.toml", "--until", "1 s"]

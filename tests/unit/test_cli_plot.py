@@ -22,6 +22,7 @@ def test_everything_by_default(in_a_field, tmp_path, capsys):
     assert main(["info", str(in_a_field)]) == 0  # a run's folder is one still
 
 
+@pytest.mark.compiled("fields")
 def test_chosen_ones_as_other_formats(in_a_field, tmp_path, capsys):
     """Histograms of quantities, a still of a frame in a size of one's own; PDF and SVG are what they are called."""
     out = str(tmp_path / "there")
@@ -34,6 +35,7 @@ def test_chosen_ones_as_other_formats(in_a_field, tmp_path, capsys):
     assert Image.open(tmp_path / "there" / "still.png").getpixel((298, 2))[3] == 0
 
 
+@pytest.mark.compiled("fields")
 def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
     """A .gsd has no ledger: a still picture by default, beside it."""
     alone = tmp_path / "alone.gsd"
@@ -44,6 +46,7 @@ def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
     assert "has no ledger; give a run's folder" in capsys.readouterr().err
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -69,12 +72,14 @@ def test_mistakes_are_told_and_nothing_is_written(in_a_field, tmp_path, capsys, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.compiled("fields")
 def test_several_mistakes_have_a_line_each(in_a_field, tmp_path, capsys):
     """All at once, not one after the other."""
     assert main(["plot", str(in_a_field), "--what", "sise", "--view", "botom", "--size", "1x1", "--colour", "x"]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 4
 
 
+@pytest.mark.compiled("fields")
 def test_what_is_not_there(in_a_field, tmp_path, capsys):
     """No run, no ledger, a ledger without rows, no frame: told, and nothing is written."""
     assert main(["plot", str(tmp_path)]) == 2

@@ -35,6 +35,7 @@ def test_the_command_writes_a_file(looked_at, tmp_path, capsys):
     assert "one frame of 2" in manifest["note"] and manifest["field"]["directions"]
 
 
+@pytest.mark.compiled("fields")
 def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
     """Above 100 MB it says what to do."""
     monkeypatch.setattr(view_command, "LARGE", 1e3)
@@ -43,6 +44,7 @@ def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
     assert "--every" in told.err and told.out == ""
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -65,6 +67,7 @@ def test_mistakes(looked_at, capsys, words, said):
     assert len(lines) == 1 and said in lines[0]
 
 
+@pytest.mark.compiled("fields")
 def test_without_the_page(looked_at, bundle, capsys):
     """An installation that lacks the bundle says so, in one line."""
     (bundle / "grainview.js").unlink()
@@ -72,6 +75,7 @@ def test_without_the_page(looked_at, bundle, capsys):
     assert "not part of this installation" in capsys.readouterr().err
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize("form", [[], ["--json"], ["--quiet"]])
 def test_the_command_serves(looked_at, capsys, monkeypatch, form):
     """It prints the address, answers there while it waits, and Ctrl-C ends it with 0."""
@@ -98,6 +102,7 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
         assert list(json.loads(got["out"])) == ["url"]
 
 
+@pytest.mark.compiled("fields")
 def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
     """An empty folder, as while a run is compiled; then a case, then a trajectory: the page has its frames."""
     run = tmp_path / "run"

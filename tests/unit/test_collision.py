@@ -65,7 +65,7 @@ def aggregates(seed):
     return (pca(8, radius=R, material="silica", seed=2 * seed), pca(8, radius=R, material="silica", seed=2 * seed + 1))
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_any_executor_gives_the_same_numbers():
     """Here, in threads, in processes: the same results in the order of the seeds."""
     here = collide_many(aggregates, [3, 1, 2], speed=2.0)
@@ -90,7 +90,7 @@ seeds = [1, 2]
 """
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_a_case_in_processes(tmp_path):
     """Workers read the case themselves and give what the parent would."""
     path = tmp_path / "hit.toml"
@@ -103,7 +103,7 @@ def test_a_case_in_processes(tmp_path):
         assert run_seeds(read_toml(path), [1, 2], pool) == here
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_the_command(tmp_path, capsys, monkeypatch):
     """Many seeds: collision.json and a figure; one seed: a whole run's folder; an old folder is refused."""
     monkeypatch.chdir(tmp_path)
@@ -159,7 +159,7 @@ def test_bad_seeds(tmp_path, capsys, seeds):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.compiled("contacts", "small")
 def test_bodies_from_files(tmp_path):
     """Plain columns in nanometres, and the last frame of a trajectory, collide like built bodies."""
     built = pca(8, radius=R, material="silica", seed=3)

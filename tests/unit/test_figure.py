@@ -331,6 +331,7 @@ def test_thousand_grains_stay_small(tmp_path):
 # --- the rest ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.draws
 @pytest.mark.compiled("contacts")
 def test_a_real_run_has_its_figure():
     """A simulation's `figure` returns the figure, which notebooks show as a PNG, even before the first step."""

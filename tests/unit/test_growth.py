@@ -40,7 +40,7 @@ def ensembles(tmp_path_factory):
     return top
 
 
-@pytest.mark.compiled("dipoles")
+@pytest.mark.compiled("dipoles", "contacts")
 def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
     """The same bits as a simulation of that seed by itself, in a process of its own, too."""
     alone = tmp_path / "alone"
@@ -72,6 +72,7 @@ def test_called_again_it_goes_on(tmp_path):
         grow(other, [2], tmp_path)
 
 
+@pytest.mark.compiled("dipoles")
 def test_what_is_read_of_a_box(ensembles):
     """S(t) is the ledger's; the census of the last look is that of the last frame."""
     box = read_box(ensembles / "magnetic" / "seed-1", looks=5)
@@ -122,6 +123,7 @@ def test_laws_that_were_put_in_come_out():
     assert growth.error[-1] == pytest.approx(growth.sizes[:, -1].std(ddof=1) / math.sqrt(8), rel=1e-12)
 
 
+@pytest.mark.compiled("dipoles")
 def test_what_cannot_be_told_says_why(ensembles):
     """Boxes without moments, and ones that hardly grew."""
     growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
@@ -131,6 +133,7 @@ def test_what_cannot_be_told_says_why(ensembles):
         growth_of([made_up(2, 0.6, 1.4, 1), made_up(2, 0.6, 1.4, 2, grains=10)])
 
 
+@pytest.mark.compiled("dipoles")
 def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     """`sand grow` leaves what `grow` does; `sand analyse` tells, compares, writes tables and a figure, once."""
     monkeypatch.chdir(tmp_path)
@@ -153,6 +156,7 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
     assert "1 of 30 grains" in shown and "nan" not in shown
 
 
+@pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(
     ("words", "part"),
     [

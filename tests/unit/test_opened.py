@@ -10,6 +10,7 @@ from sand.cli.main import main
 from sand.files.trajectory import Frames
 
 
+@pytest.mark.compiled("fields")
 def test_everything_is_there(looked_at):
     """Frames one by one, ledger columns, contacts with forces, case and summary."""
     folder, sim = looked_at
@@ -28,6 +29,7 @@ def test_everything_is_there(looked_at):
         opened.frames[6]
 
 
+@pytest.mark.compiled("fields")
 def test_tables_for_others(looked_at):
     """xarray: dimensions, coordinates, units; pandas: the ledger."""
     pytest.importorskip("xarray", reason="xarray is in the test extra")
@@ -41,6 +43,7 @@ def test_tables_for_others(looked_at):
     assert list(opened.to_pandas()["total"]) == list(sim.ledger["total"])
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize(("form", "files"), [("xyz", 1), ("lammps-dump", 1), ("lammps-data", 6), ("vtk", 7)])
 def test_the_export_command(looked_at, tmp_path, capsys, form, files):
     """As many files as promised, not overwritten without leave; slices choose frames."""
@@ -53,6 +56,7 @@ def test_the_export_command(looked_at, tmp_path, capsys, form, files):
     assert main(["export", str(folder), "--to", form, "--out", stem, "--overwrite", "--frames", "-1"]) == 0
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -80,6 +84,7 @@ def test_no_run_there(tmp_path):
         sand.open(tmp_path)
 
 
+@pytest.mark.compiled("fields")
 def test_an_old_trajectory_without_forces_and_check_sum(looked_at, tmp_path):
     """Files of before are read: forces are NaN."""
     import gsd.hoomd
@@ -94,6 +99,7 @@ def test_an_old_trajectory_without_forces_and_check_sum(looked_at, tmp_path):
     assert old.force.shape == (len(old.pair), 3)
 
 
+@pytest.mark.compiled("fields")
 def test_a_picture_from_a_script(in_a_field):
     """`sand.open(DIR).picture()` is the still of a frame, with the field of the case."""
     opened = sand.open(in_a_field)

@@ -21,6 +21,7 @@ from .reels import reel
 pytestmark = pytest.mark.usefixtures("bundle")
 
 
+@pytest.mark.compiled("fields")
 def test_a_file_holds_the_run(looked_at, tmp_path):
     """Frames decode back: positions to the last bit of single precision, others within 2⁻¹¹; manifest and series."""
     story = story_of(looked_at[0])
@@ -42,6 +43,7 @@ def test_a_file_holds_the_run(looked_at, tmp_path):
     assert radius == pytest.approx(1.0, rel=1e-6, abs=0)
 
 
+@pytest.mark.compiled("fields")
 def test_a_file_needs_nothing_else(looked_at, tmp_path):
     """Its script cannot end its own element, is the only one allowed to run, and no address is in the page."""
     write_page(story_of(looked_at[0]), tmp_path / "a.html")
@@ -66,6 +68,7 @@ def test_names_cannot_break_the_page(tmp_path):
     assert "<script>alert" not in (tmp_path / "a.html").read_text() and "<b>" not in (tmp_path / "a.html").read_text()
 
 
+@pytest.mark.compiled("fields")
 def test_the_same_run_gives_the_same_file(looked_at, tmp_path):
     """Byte for byte."""
     for name in ("a.html", "b.html"):
@@ -73,6 +76,7 @@ def test_the_same_run_gives_the_same_file(looked_at, tmp_path):
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
 
 
+@pytest.mark.compiled("fields")
 def test_a_file_that_fails_leaves_the_old_one(looked_at, tmp_path, monkeypatch):
     """A frame that cannot be read in the middle: what was there stays, and nothing lies beside it."""
     (tmp_path / "a.html").write_text("old")

@@ -10,6 +10,7 @@ from sand.files.folder import read_ledger
 from sand.view.plots import HISTORY, grains_figure, history_figure
 
 
+@pytest.mark.compiled("fields")
 def test_books_that_are_read_are_those_that_were_written(in_a_field):
     """Drift and columns of ledger.csv are the summary's; curves drawn are the ledger's columns."""
     rows = read_ledger(in_a_field / "ledger.csv")
@@ -22,6 +23,7 @@ def test_books_that_are_read_are_those_that_were_written(in_a_field):
         np.testing.assert_array_equal(line.get_ydata(), books[column])
 
 
+@pytest.mark.compiled("fields")
 def test_histograms_count_every_grain(in_a_field):
     """Bars add up to the grains, or clusters, that there are; each lies where its numbers are."""
     frame = sand.open(in_a_field).frames[0]

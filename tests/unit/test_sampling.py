@@ -118,6 +118,7 @@ def test_pieces_hold_all_flights_once():
     assert got == [address for t in tasks for address in t.addresses()]
 
 
+@pytest.mark.validate
 def test_a_soft_rim_is_not_lost():
     """P = 0.6 (1.3 − b) up to 1.3: flights must not follow an annulus's own luck; bias of 300 below 0.7 %.
 

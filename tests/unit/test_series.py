@@ -11,6 +11,7 @@ from sand.view.story import story_of
 from .reels import reel
 
 
+@pytest.mark.compiled("fields")
 def test_series_are_the_ledgers(looked_at):
     """Plots hold the ledger's columns; total − start is worked out before numbers are shortened; counts of events."""
     folder, sim = looked_at
@@ -30,6 +31,7 @@ def test_series_are_the_ledgers(looked_at):
         assert all(line[ground].startswith("#") for line in plot["lines"] for ground in ("light", "dark"))
 
 
+@pytest.mark.compiled("fields")
 def test_long_and_broken_ledgers(looked_at):
     """At most 2000 points, the last among them; no event is lost; what is not a number is null."""
     row = dict(looked_at[1].ledger.rows[-1])

@@ -22,6 +22,7 @@ def opened(monkeypatch):
     return seen
 
 
+@pytest.mark.compiled("fields")
 def test_a_simulation_shows_its_run(looked_at, opened, tmp_path):
     """`view` writes view.html in the run's folder, or where it is told, opens it, and gives its path."""
     folder, sim = looked_at
@@ -51,6 +52,7 @@ def test_a_simulation_without_files_shows_its_state(opened):
     assert "keeps no files" in manifest["note"]
 
 
+@pytest.mark.compiled("fields")
 def test_too_much_is_thinned(looked_at, opened, tmp_path, monkeypatch):
     """Where all frames would take too much room, fewer are in the page, and it says so."""
     monkeypatch.setattr(show, "LARGEST", 5000.0)

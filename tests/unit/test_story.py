@@ -44,6 +44,7 @@ KEYS = [
 ]
 
 
+@pytest.mark.compiled("fields")
 def test_the_manifest_of_a_run(looked_at):
     """All keys of the contract, the run's own numbers, nothing that JSON cannot hold."""
     folder, sim = looked_at
@@ -66,6 +67,7 @@ def test_the_manifest_of_a_run(looked_at):
     assert kinetic / 6 <= 1.01 * told["ranges"]["kinetic_energy"][1] <= 10 * (sim.ledger["translation"] + 1e-15).max()
 
 
+@pytest.mark.compiled("fields")
 def test_times_are_told_from_a_frame_on(looked_at):
     """`since` leaves out earlier ones and nothing else, and may be beyond the end."""
     story = story_of(looked_at[0])

@@ -8,6 +8,7 @@ from sand.run.told import field_in, field_of
 from sand.view.story import story_of
 
 
+@pytest.mark.compiled("fields")
 def test_a_field_is_told(looked_at):
     """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
     folder, sim = looked_at
@@ -47,6 +48,7 @@ def test_fields_add_up():
     np.testing.assert_allclose(at(0.5), [1e-3, 1e-3, 0.0])
 
 
+@pytest.mark.compiled("fields")
 def test_pictures_and_pages_have_the_same_field(looked_at):
     """`flux_density` of an opened run is the field that the page is told; None where no case says so."""
     folder, sim = looked_at

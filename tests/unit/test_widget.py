@@ -15,6 +15,7 @@ from .pages import SCRIPT
 pytestmark = pytest.mark.usefixtures("bundle")
 
 
+@pytest.mark.compiled("fields")
 def test_messages_of_the_widget(looked_at):
     """Each kind is answered with what the story tells, echoed so that the page knows what it asked for."""
     story = story_of(looked_at[0])
@@ -26,6 +27,7 @@ def test_messages_of_the_widget(looked_at):
     assert "reason" in answered(story, {"kind": "dimension", "k": 5, "grain": 0})[0]
 
 
+@pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
     "content",
     [
@@ -55,6 +57,7 @@ def test_what_nobody_thought_of(looked_at, monkeypatch):
     assert told["id"] == 3 and "ZeroDivisionError" in told["error"] and buffers == []
 
 
+@pytest.mark.compiled("fields")
 def test_the_widget(looked_at, monkeypatch):
     """It holds nothing that would be saved with the notebook, runs the bundle, and answers through its own channel."""
     pytest.importorskip("anywidget", reason="anywidget is in the test extra")
