@@ -36,6 +36,7 @@ def test_figure_4(tmp_path, monkeypatch, capsys):
     assert 10_000 < (tmp_path / "figure4.png").stat().st_size < 300_000
 
 
+@pytest.mark.validate
 def test_cross_sections(monkeypatch, capsys):
     """The table of docs/physics/cross-sections.csv at an error of 50 %: all rows, none far from the file's."""
     monkeypatch.setattr(sampling, "PILOT", 4)
@@ -62,6 +63,7 @@ def test_growth_variants(tmp_path, monkeypatch, capsys):
     assert all(row.split()[1] == "1.00" for row in rows)
 
 
+@pytest.mark.validate
 def test_measured_kernel(tmp_path, monkeypatch, capsys):
     """Six pairs at an error of 50 %: σv is of the order of Eq. 14 with μ ∝ N; the table of DustPy is symmetric."""
     monkeypatch.setattr(sampling, "PILOT", 4)

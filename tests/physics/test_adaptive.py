@@ -122,7 +122,7 @@ def test_scattering_run_back_comes_home():
     assert np.abs(state_of(g)[0] - start[0]).max() > 10
 
 
-@pytest.mark.compiled("adaptive")
+@pytest.mark.validate
 def test_verlet_converges_to_it_with_order_two():
     """The error of Verlet with steps of 1/8, 1/16, 1/32 of 0.2 ns against the adaptive run falls by 4 each: 1.9 … 2.1.
 
@@ -173,7 +173,7 @@ def test_a_grazing_pass_is_seen_and_a_miss_is_none():
             assert sim.world.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
 
 
-@pytest.mark.compiled("adaptive")
+@pytest.mark.validate
 def test_after_the_touch_the_books_close_as_with_verlet():
     """Two iron grains stick at 10 m/s: change of the total at most that of a run by Verlet alone, plus the tolerance.
 

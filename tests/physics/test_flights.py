@@ -89,7 +89,7 @@ def test_against_scipy():
         assert np.abs(mine - theirs).max() < 1e-6 * size
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.compiled("scattering", "adaptive")
 def test_against_the_simulation():
     """The same pair in `Simulation` with `Adaptive` steps, quaternions and all: same place to 1e-5 of R."""
     flying = unequal(field=None)
@@ -274,7 +274,7 @@ def test_a_target_that_moves():
     assert np.isnan(path.exchanged)
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.compiled("scattering", "contacts")
 @pytest.mark.parametrize(("radius", "part"), [(1e-4, 0.98), (1e-4, 1.03), (1e-6, 1.5)])
 def test_large_grains_stick_below_their_own_speed(radius, part):
     """Silica of 100 µm and 1 µm: the contact is slow against the sound in it; a grain of 20 nm rides on the second."""
@@ -291,7 +291,7 @@ def test_large_grains_stick_below_their_own_speed(radius, part):
     assert (rows[:, END] == (HIT if part < 1.0 else BOUNCE)).all()
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.compiled("scattering", "contacts")
 @pytest.mark.parametrize(("speed", "outcome"), [(76.0, HIT), (82.0, BOUNCE)])
 def test_sticking_through_the_real_contact(speed, outcome):
     """Head-on and without moments, iron of 10 nm sticks below v_s = 78.9 m/s (theory.contact) and bounces above."""

@@ -123,6 +123,7 @@ def test_many_small_frames(many_frames, tmp_path, limit):
     assert content(tmp_path / "run") == content(whole)
 
 
+@pytest.mark.compiled("contacts")
 def test_a_folder_that_vanishes(whole, tmp_path):
     """Removed while the run goes on: told, with the folder's name, exit code 2; no traceback."""
     script = (

@@ -16,8 +16,8 @@ from sand.files.trajectory import read_frames
 
 CASE = """
 [run]
-until = "20 ns"
-frame_every = "0.2 ns"
+until = "30 ns"
+frame_every = "0.3 ns"
 seed = 3
 
 [box]

@@ -55,7 +55,7 @@ def shaken(order, far=()):
         sand.SILICA,
         velocity=speed,
         charge=1e-16 * rng.normal(size=300),
-        moment=1e-15 * rng.normal(size=(300, 3)),
+        moment=1e-15 * rng.normal(size=(300, 3)) if far else 0.0,
         mass=1e-17 * rng.uniform(0.5, 1.5, 300),
     )
     return sand.Simulation(grains, [sand.Contact(), *far], neighbours=sand.Neighbours(order=order))

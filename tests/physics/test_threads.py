@@ -66,7 +66,7 @@ def test_threads_change_no_bit(cutoff, size):
     assert ends[0] == ends[1] == ends[2]
 
 
-@pytest.mark.compiled("threads")
+@pytest.mark.validate
 def test_blocks_change_only_rounding(monkeypatch):
     """One step in blocks and one without part by less than 1e-12 of what they changed.
 
@@ -144,6 +144,7 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     assert copy.deepcopy(sim._engine._hands) is not sim._engine._hands
 
 
+@pytest.mark.compiled("threads")
 def test_helpers_go_home_with_their_simulation():
     """No thread of a crew outlives its simulation by more than a moment."""
     import threading
@@ -164,6 +165,7 @@ def test_helpers_go_home_with_their_simulation():
     assert not crew()
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("number", "forces", "helpers"),
     [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 0), (1000, [sand.Dipoles("0.1 um")], 1)],

@@ -49,6 +49,7 @@ def test_wrong_messages(looked_at, content):
     assert isinstance(told["error"], str) and buffers == []
 
 
+@pytest.mark.compiled("fields")
 def test_what_nobody_thought_of(looked_at, monkeypatch):
     """An error of any kind is answered with a sentence, so that the page does not wait for ever."""
     story = story_of(looked_at[0])
