@@ -2,7 +2,7 @@
 
 Tiers (the last line of a run says which were left out and how to run them):
 
-* ``quick``      everything that compiles nothing; ``pytest -m quick``
+* ``quick``      everything that compiles nothing and is not marked ``slow``; ``pytest -m quick``
 * ``compiled``   runs numba kernels; the argument names a kernel specification (see ``tests/specs.py``)
 * ``validate``   long statistical checks; ``pytest --validate``
 * ``browser``    ``tests/browser``, the page in Chromium; ``pytest tests/browser``
@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from numba.core.config import DISABLE_JIT
 from numba.core.event import Event, Listener, register
 
-from .specs import SPECS, parts_of, watched
+from .specs import FIXTURES, SPECS, parts_of, watched
 from .validation import Recorder, parse_part, part_of
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
@@ -95,8 +95,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _mark(item: pytest.Item, tier: str | None) -> None:
     """Add `quick` or the group of the worker that compiles the test's kernels."""
+    for name in FIXTURES.keys() & set(getattr(item, "fixturenames", ())):
+        if item.get_closest_marker("compiled") is None:
+            item.add_marker(pytest.mark.compiled(FIXTURES[name]))
     mark = item.get_closest_marker("compiled")
-    if mark is None and tier is None:
+    if mark is None and tier is None and "slow" not in item.keywords:
         item.add_marker(pytest.mark.quick)
     if mark is not None:
         if not mark.args or not set(mark.args) <= set(SPECS):

@@ -72,6 +72,9 @@ DRIVERS: dict[str, Callable[[], sand.Simulation]] = {
 SPECS = (*DRIVERS, "scattering", "small")
 """Drivers by name; flights of two bodies; whatever compiles in a second or two."""
 
+FIXTURES = {"looked_at": "fields", "in_a_field": "fields"}
+"""Fixtures shared by many tests that run a simulation, and its driver."""
+
 
 def _key(plan: Plan) -> Plan:
     """The plan without `wide`, which chooses longer vectors on few processors only."""

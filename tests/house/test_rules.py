@@ -62,6 +62,7 @@ def imports(path: Path) -> list[tuple[str, bool]]:
     return found
 
 
+@pytest.mark.slow
 def test_nobody_imports_upstairs():
     """Rooms import only what ARCHITECTURE.md allows."""
     wrong = [
@@ -86,6 +87,7 @@ def test_every_room_is_on_the_plan():
     assert all(f"{room}/" in plan for room in rooms)
 
 
+@pytest.mark.slow
 def test_files_and_functions_stay_short():
     """Under 300 lines, under 60 lines."""
     long = [str(p.relative_to(TOP)) for p in SOURCES if len(p.read_text().splitlines()) >= 300]
@@ -100,6 +102,7 @@ def test_files_and_functions_stay_short():
                 assert length < 60, f"{path.relative_to(TOP)}: {node.name} has {length} lines"
 
 
+@pytest.mark.slow
 def test_public_names_have_docstrings():
     """Modules, and public classes, functions and methods with more than one statement."""
     silent = []
@@ -128,6 +131,7 @@ def test_the_compiler_is_one_that_was_tried():
     assert CAN_SHARE
 
 
+@pytest.mark.slow
 def test_only_the_door_names_the_compiler():
     """numba is imported in core/jit, lowering, convention and atomics, and in kernels/gpu, alone."""
     core = HOUSE / "core"
@@ -137,6 +141,7 @@ def test_only_the_door_names_the_compiler():
     assert not wrong, wrong
 
 
+@pytest.mark.slow
 def test_only_files_opens_files_and_only_cli_prints():
     """`open`, `read_text`, `write_text` and friends live in files/ (and the compiler's digest); print in cli/."""
     for path in SOURCES:
@@ -154,6 +159,7 @@ def test_only_files_opens_files_and_only_cli_prints():
                 assert room == "files" or path == HOUSE / "core" / "jit.py", where
 
 
+@pytest.mark.slow
 def test_no_pickle_no_network():
     """Neither pickle nor sockets anywhere but in the server of `sand view`; NumPy files with allow_pickle=False."""
     server = HOUSE / "view" / "server.py"
@@ -188,6 +194,7 @@ def test_help_is_light():
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_a_gas_is_built_light():
     """Nothing is loaded that takes long and is not needed before the first step."""
     program = (

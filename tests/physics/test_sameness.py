@@ -163,6 +163,7 @@ np.savez(sys.argv[1], position=sim.grains.position, spin=sim.grains.spin, lost=s
 """
 
 
+@pytest.mark.slow
 @pytest.mark.interpreted
 def test_the_compiler_changes_nothing_but_rounding(tmp_path):
     """120 steps of a breaking, rolling aggregate with the compiler off: equal to 1e-10 (rounding, amplified)."""

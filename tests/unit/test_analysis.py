@@ -179,6 +179,7 @@ EXACT = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(EXACT))
 def test_dimensions_of_exact_shapes(name):
     """Correlation integral within 0.06 (0.3 for a ball 24 grains across), box counting 0.5 below to 0.05 above.
@@ -193,6 +194,7 @@ def test_dimensions_of_exact_shapes(name):
     assert 0.0 <= by_pairs.error < 0.5 and 0.0 < by_boxes.error < 0.5
 
 
+@pytest.mark.slow
 def test_larger_bodies_are_nearer_their_dimension():
     """A gasket of 16384 corners against one of 1024, both methods."""
     for method in (correlation_dimension, box_dimension):

@@ -412,6 +412,7 @@ def test_a_margin_of_contacts_alone():
         assert said in sim.choices["neighbours"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (1.0, None, None), (None, None, None)])
 @pytest.mark.parametrize("count", [2, 64, 5000])
 def test_the_share_within_reach(lengths, count):

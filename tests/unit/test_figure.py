@@ -271,6 +271,7 @@ def test_scale_bar_is_as_long_as_it_says(figure):
     assert pretty(length, "m") in [text.get_text() for text in axes.texts]
 
 
+@pytest.mark.slow
 def test_box_has_twelve_edges(figure):
     """A periodic box is outlined; open space is not."""
     edges = [line for line in figure.axes[4].get_lines() if line.get_gid() == "box"]
@@ -301,6 +302,7 @@ def odd_runs():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", odd_runs())
 def test_odd_runs_have_a_figure(name):
     """A PNG of 1600 × 1000 pixels below 300 kB comes of every run, and no warning."""
@@ -308,6 +310,7 @@ def test_odd_runs_have_a_figure(name):
     assert picture.size == (1600, 1000)
 
 
+@pytest.mark.slow
 def test_grains_without_a_place_are_left_out():
     """After a run that blew up, what still has a position is drawn, and the rest is mentioned."""
     run = run_of([[0.0, 0.0, 0.0], [3e-8, 0.0, 0.0]])
@@ -318,6 +321,7 @@ def test_grains_without_a_place_are_left_out():
     assert len(run_figure(run).axes) == 4
 
 
+@pytest.mark.slow
 def test_thousand_grains_stay_small(tmp_path):
     """A thousand grains in one crowd are drawn, and their PNG is below 300 kB."""
     rng = np.random.default_rng(7)
@@ -341,6 +345,7 @@ def test_a_real_run_has_its_figure():
     assert figure._repr_png_()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_nothing_global_changes(grown):
     """Neither the settings of matplotlib nor the list of open figures knows that a figure was made."""
     from matplotlib import pyplot
@@ -356,6 +361,7 @@ def test_nothing_global_changes(grown):
     assert show(figure) is figure
 
 
+@pytest.mark.slow
 def test_same_run_same_picture(grown):
     """Two figures of one run agree byte for byte."""
     assert png(run_figure(grown)) == png(run_figure(grown))

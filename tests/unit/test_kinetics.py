@@ -73,6 +73,7 @@ def test_product_kernel_is_stopped_at_its_gel():
     assert grown.mean_size == pytest.approx(1 / (1 - scaled), rel=1e-3, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [all_sizes(60), log_sizes(1e4, 7), np.array([1.0, 3.5, 4.0, 9.0, 40.0, 1e3])])
 def test_mass_is_kept_to_rounding(sizes):
     """Σ x_k n_k + what left = n0, whatever the grid: each pair gives what it takes (1e-13: 1e3 steps of rounding)."""
@@ -92,6 +93,7 @@ def test_numbers_are_kept_by_sharing():
     assert grown.numbers.sum(axis=1) / DENSITY == pytest.approx(1 / (1 + scaled), rel=1e-6, abs=0.0)
 
 
+@pytest.mark.slow
 def test_the_grid_errs_by_the_square_of_its_spacing():
     """S on a logarithmic grid is too large, by a factor of 4 less on one twice as fine (2.6 % at 10 per decade)."""
     off = []
@@ -102,6 +104,7 @@ def test_the_grid_errs_by_the_square_of_its_spacing():
     assert 3.0 < off[0] / off[1] < 5.0 and 3.0 < off[1] / off[2] < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("eta", "nu"), [(0.0, -0.5), (0.5, -0.5), (0.8, -0.5), (1.0, -0.5), (0.5, 0.0)])
 def test_z_from_the_exponents(eta, nu):
     """z = 1/(1 − η − ν) (Eq. 20) to 1 %, which is asked for, at λ = −0.5, 0, 0.3, 0.5, 0.5.

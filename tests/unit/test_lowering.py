@@ -59,6 +59,7 @@ def test_an_error_in_an_inner_function_reaches_python():
         roots(np.array([4.0, -9.0]))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="Python checks bounds by itself")
 def test_bounds_that_are_checked_are_told(tmp_path):
     """With NUMBA_BOUNDSCHECK=1, which one turns on to find a wrong index, one in our own functions is an IndexError."""

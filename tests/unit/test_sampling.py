@@ -43,6 +43,7 @@ def test_wilson_against_its_definition():
     assert (low[0], high[0]) == (0.0, 1.0)
 
 
+@pytest.mark.slow
 def test_a_known_cross_section_is_found_within_its_error():
     """σ of a ramp P(b): unbiased, and the interval of one sigma holds it in 60 to 85 % of 80 samplings (Wilson is wide
     where P is 0 or 1), that of 95 % in at least 75 of them.

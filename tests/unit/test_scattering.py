@@ -337,6 +337,7 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
     assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
 
 
+@pytest.mark.compiled("scattering")
 def test_sigterm_says_how_to_go_on(tmp_path):
     """SIGTERM while it flies: exit 130 and one line with --resume."""
     case, out = tmp_path / "case.toml", tmp_path / "out"

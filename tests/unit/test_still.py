@@ -43,6 +43,7 @@ def camera_of(view):
     return still_picture(frame_of([[0, 0, 0]]), view=view, size=(200, 200)).rotation
 
 
+@pytest.mark.slow
 def test_views_are_what_they_are_called():
     """From the front x is to the right and z up; from the side y and z; from above x and y."""
     for view, right, up in (("front", 0, 2), ("side", 1, 2), ("top", 0, 1)):
@@ -63,6 +64,7 @@ def test_perspective_shows_what_is_nearer_larger():
     assert deep[:200].sum() > 1.5 * deep[200:].sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [20.0, 110.0, 200.0, 290.0])
 def test_an_arrow_points_along_its_moment(angle):
     """The arrow's pixels, its head being heavier, lie along the moment.
@@ -89,6 +91,7 @@ def at_pixel_of_centre(frame):
     return at_pixel(still_picture(frame, view="front", size=(400, 400)), frame.position[0])
 
 
+@pytest.mark.slow
 def test_a_contact_through_a_face_is_drawn_at_both():
     """Two grains that touch through a face of the box, cut: a collar at each face, none between the grains.
 
@@ -140,6 +143,7 @@ def test_grounds(dark):
     assert tuple(solid[5, 295, :3]) == ((16, 20, 24) if dark else (255, 255, 255))
 
 
+@pytest.mark.slow
 def test_the_same_frame_the_same_bits():
     """Two pictures of a frame agree byte for byte, as PNG, PDF and SVG."""
     from sand.view.plots import picture_bytes
@@ -150,6 +154,7 @@ def test_the_same_frame_the_same_bits():
         assert one == other
 
 
+@pytest.mark.slow
 def test_scale_bar_and_caption():
     """The bar is as long as it says; time and grains are told; the field's arrow is there if there is a field."""
     from sand.view.style import pretty

@@ -172,6 +172,7 @@ def test_the_energy_changes_though_nothing_moves(field, slope):
     assert found == pytest.approx(-moment @ slope(time), abs=2e-7 * largest)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", [*FIELDS, sand.Field("-2 mT"), sand.Field(3, shape="ramp", final=-1, end=3e-6)])
 def test_the_size_bounds_the_field_at_all_times_and_is_reached(field):
     """max |B(t)| over 20000 times of four periods or the ramp; a step of 1.3e-3 rad misses it by 2e-7 at most."""

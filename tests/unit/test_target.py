@@ -105,6 +105,7 @@ def test_features_that_are_named_count_more_than_the_name(name, features, expect
     assert lowering._fast_when_wide(name, features) is expected
 
 
+@pytest.mark.compiled("small")
 def test_long_vectors_give_the_same():
     """A long loop, told to take the longest vectors or not, on whatever processor this is."""
 

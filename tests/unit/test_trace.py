@@ -66,6 +66,7 @@ def test_rods_are_met_where_they_are(w):
     assert (facing > -0.1).all()  # nothing is seen from behind
 
 
+@pytest.mark.slow
 def test_chunks_bound_the_memory(monkeypatch):
     """Ten thousand grains: no more samples than MOST_SAMPLES are looked at in one go, and the picture is full."""
     rng = np.random.default_rng(5)

@@ -40,6 +40,7 @@ def test_decimal_prefixes_are_exact():
     assert in_unit("1.2 um", "m") == 1.2e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["m", "s", "kg", "K", "Pa", "T", "J/m^2", "A m^2/kg", "kg/m^3", "rad/s", "C", "1"])
 def test_units_that_need_no_pint_are_those_of_pint(unit):
     """Every prefix of every unit that is read without it, alone and as a factor: the same number, or refused alike."""
@@ -89,6 +90,7 @@ def test_ranges_and_numbers_that_are_none():
         si(True, "m", "radius")
 
 
+@pytest.mark.slow
 def test_quantities_of_pint():
     """Of any registry."""
     registry = pint.UnitRegistry()
