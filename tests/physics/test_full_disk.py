@@ -1,8 +1,6 @@
 """A file system that fills up at any write of a run, and folders that vanish: nothing is lost, one clear message."""
 
 import contextlib
-import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -13,6 +11,13 @@ import sand
 from sand.cli.main import main
 from sand.files.folder import read_ledger
 from sand.files.trajectory import read_frames
+
+from ..systems import IS_ROOT
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 CASE = """
 [run]
@@ -132,7 +137,7 @@ def small_disk(place, kilobytes):
     """A file system of its own, of so many kB; skips the test where that is not allowed."""
     place.mkdir(exist_ok=True)
     words = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(place)]
-    if shutil.which("mount") is None or os.geteuid() != 0 or subprocess.run(words, capture_output=True).returncode:
+    if shutil.which("mount") is None or not IS_ROOT or subprocess.run(words, capture_output=True).returncode:
         pytest.skip("no leave to mount a small file system")
 
 

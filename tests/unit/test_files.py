@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -44,7 +45,7 @@ def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage
         content[at + 7] ^= 1
     cut = {"flip": bytes(content), "truncate": bytes(content[:200]), "empty": b"", "text": b"hello"}[damage]
     path.write_bytes(cut)
-    with pytest.raises(sand.BadInput, match=str(path)):
+    with pytest.raises(sand.BadInput, match=re.escape(str(path))):
         read_checkpoint(path)
     assert newest_checkpoint(tmp_path)[1]["steps"] == 1
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
 import json
 import os
 import tomllib
@@ -25,6 +26,8 @@ CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGH
     "flights.csv",
     "view.html",
 )
+_NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
+"""Errors by which systems say that they cannot sync a folder."""
 OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW)
 
 
@@ -46,7 +49,8 @@ def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:
                     f"folder {folder} exists and is not empty; give another one, remove it, "
                     "or say that it may be overwritten"
                 )
-            for old in [*(folder / name for name in OURS), *folder.glob("checkpoint-*.npz")]:
+            # first the one file that others keep open: where that forbids removing it (Windows), nothing is removed
+            for old in [folder / TRAJECTORY, *(folder / name for name in OURS), *folder.glob("checkpoint-*.npz")]:
                 old.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".probe"
@@ -70,15 +74,29 @@ def replace_file(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(beside, path)
-        handle = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        _sync_names(path.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
         raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error
+
+
+def _sync_names(folder: Path) -> None:
+    """Write the names in a folder to the disk, so that a power cut does not undo a renaming.
+
+    Windows opens no folder, and some file systems cannot sync one: there the system decides when names are written.
+    """
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except PermissionError:
+        return
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in _NO_SYNC:
+            raise
+    finally:
+        os.close(handle)
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:

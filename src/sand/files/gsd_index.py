@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -66,21 +68,20 @@ def make_room(path: Path, wanted: int, pending: int) -> None:
     Raises:
         OSError: there is no room.
     """
-    if not hasattr(os, "posix_fallocate"):
-        return
-    file = os.open(path, os.O_RDWR)
-    try:
-        allocated = int(np.frombuffer(os.pread(file, 24, 0), np.uint64)[2])
+    with open(path, "r+b") as file:
+        allocated = int(np.frombuffer(file.read(24), np.uint64)[2])
         longer = allocated
         while longer <= wanted:
             longer *= 2
-        size = os.fstat(file).st_size
-        try:
-            os.posix_fallocate(file, size, pending + (longer > allocated) * longer * ENTRY.itemsize + SPARE)
-        finally:
-            os.ftruncate(file, size)
-    finally:
-        os.close(file)
+        needed = pending + (longer > allocated) * longer * ENTRY.itemsize + SPARE
+        if hasattr(os, "posix_fallocate"):
+            size = os.fstat(file.fileno()).st_size
+            try:
+                os.posix_fallocate(file.fileno(), size, needed)
+            finally:
+                os.ftruncate(file.fileno(), size)
+        elif shutil.disk_usage(path.parent).free < needed:  # quotas are not seen this way
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _outside(path: Path, entries: np.ndarray) -> np.ndarray:

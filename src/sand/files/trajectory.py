@@ -45,6 +45,7 @@ class TrajectoryWriter:
 
     def __init__(self, path: Path, resume_at: int | None = None):
         self.path = path
+        self._file: Any = None  # closed between runs
         self._there: dict[int, tuple[int, int]] = {}  # later frames: number and check sum by step
         self._last = self._whole_until = -1 if resume_at is None else resume_at  # steps: of the last frame, and flush
         self._lost = False  # given up after an error
@@ -58,7 +59,7 @@ class TrajectoryWriter:
                 except (BadInput, RuntimeError):
                     path.replace(path.with_name(DAMAGED))
                     warnings.warn(f"{path} is beyond mending; it is now {DAMAGED}, and a new one begins", stacklevel=2)
-            self._file = _opened(path, resume_at is not None)
+            self._file = _opened(path, resume_at is not None and path.exists())
             self._entries = len(read_index(path)[1])
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
@@ -84,6 +85,8 @@ class TrajectoryWriter:
         self._waiting, self._entries = self._waiting + 1, self._entries + CHUNKS
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
+            if self._file is None:
+                self._file = _opened(self.path, True)
             self._file.append(frame)
         except OSError as error:
             raise self._given_up(error) from error
@@ -98,9 +101,9 @@ class TrajectoryWriter:
             return True
         others = [place for place, _ in self._there.values()] + [number] * (number >= 0)
         if others:
-            self._file.close()
+            self.close()
             cut(self.path, min(others))
-            self._there, self._file = {}, _opened(self.path, True)
+            self._there = {}
         return False
 
     def flush(self, sync: bool = False) -> None:
@@ -109,11 +112,13 @@ class TrajectoryWriter:
         Raises:
             FilesFailed: frames since the last flush may be lost; earlier ones stay.
         """
+        if self._file is None:
+            return
         try:
             make_room(self.path, self._entries, self._pending)
             self._file.flush()
             if sync:
-                with open(self.path, "rb") as same:
+                with open(self.path, "r+b") as same:  # Windows syncs no file that is open for reading only
                     os.fsync(same.fileno())
         except OSError as error:
             raise self._given_up(error) from error
@@ -121,8 +126,9 @@ class TrajectoryWriter:
 
     def _given_up(self, error: OSError) -> FilesFailed:
         """Let the file go as it is on the disk."""
-        # GSD would write once more when its object dies, and spoil what is there (see `make_room`)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
+        if self._file is not None:
+            # GSD would write once more when its object dies, and spoil what is there (see `make_room`)
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
         self._lost = True
         with contextlib.suppress(OSError, RuntimeError, BadInput):
             mend(self.path, self._whole_until)
@@ -135,15 +141,19 @@ class TrajectoryWriter:
                 self.flush()
 
     def close(self) -> None:
-        """Let the file go."""
-        self._file.close()
+        """Let the file go, so that it can be moved or removed on Windows, too; a further frame opens it again."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
 
 def _opened(path: Path, go_on: bool) -> Any:
     """The file to be written, from its beginning or its end."""
     import gsd.hoomd
 
-    return gsd.hoomd.open(str(path), "r+" if go_on and path.exists() else "w")
+    if not go_on:
+        path.touch()  # GSD makes files that others cannot read, but leaves the mode of one that exists
+    return gsd.hoomd.open(str(path), "r+" if go_on else "w")
 
 
 class Frames(FrameSequence):

@@ -126,8 +126,10 @@ class Record:
             self._trajectory.rescue()
 
     def close(self, simulation: Simulation, result: Result) -> None:
-        """Checkpoint, summary and figure; the trajectory stays open for a further `run`."""
+        """Checkpoint, summary and figure; a further `run` opens the trajectory again."""
         self.save(simulation)
+        if self._trajectory is not None:
+            self._trajectory.close()
         write_json(self.folder / files.SUMMARY, summary_of(simulation, result))
         if simulation.ledger.rows:
             from ..view.figure import run_figure, save
