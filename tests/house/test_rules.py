@@ -251,3 +251,11 @@ def test_no_large_files():
     """Nothing above 300 kB in git."""
     large = [n for n in tracked_files() if (TOP / n).is_file() and (TOP / n).stat().st_size > 300_000]
     assert not large, large
+
+
+def test_the_source_archive_is_complete():
+    """What git holds is in the sdist, so that its tests can be run and its docs be built."""
+    sdist = pytest.importorskip("hatchling.builders.sdist", reason="the build backend is not installed")
+    names = {file.distribution_path for file in sdist.SdistBuilder(str(TOP)).recurse_included_files()}
+    missing = {name for name in tracked_files() if (TOP / name).is_file()} - {name.replace("\\", "/") for name in names}
+    assert not missing, sorted(missing)
