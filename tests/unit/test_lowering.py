@@ -8,7 +8,6 @@ import sys
 import numba
 import numpy as np
 import pytest
-from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
 import sand
 from sand.core.jit import COMPILED, formula, kernel
@@ -79,37 +78,6 @@ def test_who_passes_arguments_otherwise_is_told():
     assert kernel(speed, keep=False)(grains) == 3.0
     with pytest.raises(TypeError, match=r"sand\.core\.jit\.kernel"):
         numba.njit(speed)(grains)
-
-
-@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
-def test_numbers_are_gathered_by_no_instruction_where_that_is_slow():
-    """LLVM is told so on AMD's Zen, and nowhere else."""
-    root = kernel(lambda x: root_of(x), keep=False)
-    root(4.0)
-    (code,) = root.inspect_llvm().values()
-    assert ("+prefer-no-gather" in code) == get_host_cpu_name().startswith("znver")
-
-
-@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
-def test_vectors_are_as_long_as_pays():
-    """Kernels with long loops use all 512 bits where a processor has them without slowing down, others what LLVM takes.
-
-    Both give the same; only the longer ones are told to.
-    """
-
-    def doubled(x):
-        for i in range(x.size):
-            x[i] *= 2.0
-
-    fast = get_host_cpu_features().get("avx512fp16", False)
-    for wide in (False, True):
-        numbers, code = np.arange(100.0), kernel(doubled, keep=False, wide=wide)
-        code(numbers)
-        assert (numbers == 2.0 * np.arange(100)).all()
-        assert ('"prefer-vector-width"="512"' in next(iter(code.inspect_llvm().values()))) is (wide and fast)
-        if fast:
-            assert ("zmm" in next(iter(code.inspect_asm().values()))) is wide
-        assert code.py_func.__qualname__.endswith("doubled_wide" if wide and fast else "doubled")
 
 
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")

@@ -12,6 +12,10 @@ STEEPEST = 0.99
 """Degree from which on growth cannot be told from an exponential: z = 100."""
 
 
+SAME = 1e-9
+"""Difference of two logarithms below which they may be the same but for rounding."""
+
+
 class PowerLaw(NamedTuple):
     """y = prefactor · x^exponent, fitted to the logarithms by least squares."""
 
@@ -41,7 +45,7 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
     x, y = np.asarray(x, float), np.asarray(y, float)
     if x.shape != y.shape or x.ndim != 1 or not ((x > 0) & (y > 0) & np.isfinite(x) & np.isfinite(y)).all():
         raise BadInput("a power law needs as many y as x, all finite and above 0")
-    if len(np.unique(x)) < 2:
+    if np.ptp(np.log(x)) < SAME:
         raise BadInput("a power law needs at least two different x")
     group = np.arange(len(x)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
     # about the middle, so that sums of squares lose no digits
@@ -111,7 +115,8 @@ def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
         BadInput: fewer than three times, or S that does not grow.
     """
     t, s = np.asarray(time, float), np.asarray(sizes, float)
-    if t.ndim != 1 or len(t) < 3 or s.shape[1:] != t.shape or not (t > 0).all() or not (s.mean(axis=0)[-1] > 1.0):
+    fits = t.ndim == 1 and len(t) >= 3 and s.shape[1:] == t.shape
+    if not fits or not (t > 0).all() or not (s.mean(axis=0)[-1] > 1.0 + SAME):
         raise BadInput("a law of growth needs at least three times above 0, and sizes that grow beyond 1")
     degree, tau = _rate(t, s.mean(axis=0))
     if degree > STEEPEST:
@@ -130,10 +135,15 @@ def _exponent_of(degree: np.ndarray) -> np.ndarray:
 
 def _grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
     """S of dS/dt = S^degree/τ, S(0) = 1: (1 + (1 − degree) t/τ)^(1/(1 − degree)); exponential at degree 1."""
+    return np.exp(_log_grown(time, degree, tau))
+
+
+def _log_grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
+    """ln of that, to all digits near degree 1; far below 0 where S was infinite before."""
     rest = 1.0 - degree
-    if abs(rest) < 1e-9:
-        return np.exp(time / tau)
-    return np.maximum(1.0 + rest * time / tau, 1e-300) ** (1.0 / rest)
+    if abs(rest) < 1e-15:
+        return time / tau
+    return np.log1p(np.maximum(rest * time / tau, -1.0 + 1e-16)) / rest
 
 
 def _rate(time: np.ndarray, size: np.ndarray) -> tuple[float, float]:
@@ -143,7 +153,7 @@ def _rate(time: np.ndarray, size: np.ndarray) -> tuple[float, float]:
     first = time[-1] / max(float(np.log(size[-1])), 1e-3)
 
     def misses(free: np.ndarray) -> np.ndarray:
-        return np.log(_grown(time, float(free[0]), first * float(np.exp(free[1])))) - np.log(size)
+        return _log_grown(time, float(free[0]), first * float(np.exp(free[1]))) - np.log(size)
 
     found = least_squares(misses, [0.5, 0.5], bounds=([-3.0, -5.0], [1.5, 5.0]))
     return float(found.x[0]), float(first * np.exp(found.x[1]))
@@ -163,6 +173,7 @@ def separation(first: np.ndarray, second: np.ndarray) -> float:
         raise BadInput("two ensembles need at least two boxes each to be compared")
     error = np.sqrt(a.var(ddof=1) / a.size + b.var(ddof=1) / b.size)
     difference = a.mean() - b.mean()
-    if error == 0.0:
-        return 0.0 if difference == 0.0 else float(np.copysign(np.inf, difference))
-    return float(difference / error)
+    rounding = 4.0 * np.finfo(float).eps * max(np.abs(a).max(), np.abs(b).max())
+    if abs(difference) <= rounding:
+        return 0.0
+    return float(difference / error) if error > rounding else float(np.copysign(np.inf, difference))

@@ -28,6 +28,8 @@ BOXES = (2.0, 0.5)
 """Sides of boxes: from so many grain distances to so many radii of gyration."""
 RANGE = 3.0
 """Largest over smallest number of grains that an ensemble must have at least."""
+ABOVE = 1.0 + 1e-9
+"""Lengths that are the same but for rounding count as such: whole numbers of grain distances, the grains of a ring."""
 POINTS = 12
 SHIFTS = 32
 
@@ -95,8 +97,8 @@ def correlation_dimension(position: np.ndarray, window: tuple[float, float] | No
     place, unit, size = _one(position)
     low, high = window or (WINDOW[0] * unit, max(WINDOW[1] * size, 2.0 * WINDOW[0] * unit))
     # half-way between shells of neighbours: a straight chain then has dimension 1 exactly
-    radii = (np.unique((_spaced(low, high) / unit).astype(int)) + 0.5) * unit
-    core = np.linalg.norm(place - place.mean(axis=0), axis=1) <= CORE * size
+    radii = (np.unique((_spaced(low, high) / unit * ABOVE).astype(int)) + 0.5) * unit
+    core = np.linalg.norm(place - place.mean(axis=0), axis=1) <= CORE * size * ABOVE
     return _of_slopes(radii, grains_within(place[core], place, radii), unit, (low, high))
 
 

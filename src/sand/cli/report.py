@@ -8,6 +8,7 @@ import shlex
 import warnings
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,9 +30,8 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
     """Says so, once, if anything has to be compiled inside the block."""
     if quiet:
         return nullcontext()
-    from ..core.jit import compiling as watch
-
-    return watch(lambda: note("compiling (once per version of SAND), about a quarter of a minute …"))
+    jit = with_notes(lambda: import_module("sand.core.jit"))  # it may warn of the compiler or its cache
+    return jit.compiling(lambda: note("compiling (once per version of SAND), about a quarter of a minute …"))
 
 
 def emit(content: dict[str, Any]) -> None:

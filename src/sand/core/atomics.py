@@ -7,10 +7,11 @@ read that.  Without the compiler the functions do the same for a single thread.
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import Any
 
-from llvmlite import ir  # type: ignore[import-untyped]
+from llvmlite import binding, ir  # type: ignore[import-untyped]
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
@@ -73,11 +74,40 @@ def _write(context: Any, board: Any, place: Any, value: Any) -> Any:
     return types.void(board, types.intp, types.int64), generate
 
 
+_WINDOWS = "windows", "win32", "mingw"
+_POSIX = "linux", "darwin", "macosx", "freebsd", "netbsd", "openbsd", "dragonfly", "solaris", "aix"
+_YIELDS = dict.fromkeys(_WINDOWS, "SwitchToThread") | dict.fromkeys(_POSIX, "sched_yield")
+"""The system's function that lets other threads run: no arguments, returns a 32-bit integer."""
+
+
+def yield_function(triple: str) -> str | None:
+    """Name of the function by which a thread lets others run, for a target such as "x86_64-pc-windows-msvc".
+
+    Returns:
+        None for systems that we know no such function of: there a waiting thread goes on looking at the board.
+    """
+    return next((name for part in triple.split("-")[1:] for s, name in _YIELDS.items() if part.startswith(s)), None)
+
+
+def call_yield(builder: Any) -> None:
+    """Add the call to the code at hand, if the system that its module is for has such a function."""
+    name = yield_function(builder.module.triple)
+    if name is not None:
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(ir.IntType(32), []), name)
+        builder.call(function, [])
+
+
+if sys.platform == "win32":  # LLVM need not find the functions of kernel32 by itself; code from the cache neither
+    import ctypes
+
+    _address = ctypes.cast(ctypes.windll.kernel32.SwitchToThread, ctypes.c_void_p).value
+    binding.add_symbol("SwitchToThread", _address)
+
+
 @intrinsic
 def _give_way(context: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(ir.IntType(32), []), "sched_yield")
-        builder.call(function, [])
+        call_yield(builder)
         return context.get_dummy_value()
 
     return types.void(), generate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import warnings
 from collections.abc import Iterable, Sequence
 
 
@@ -38,6 +39,11 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, result: object):
         super().__init__()
         self.result = result
+
+
+def warn(text: str) -> None:
+    """A Python warning (`UserWarning`) of one line that names no place in our source; commands print it as a note."""
+    warnings.warn_explicit(text, UserWarning, "<sand>", 1)
 
 
 FORBID_EXTRA = {"extra": "forbid"}

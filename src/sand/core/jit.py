@@ -10,10 +10,9 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -21,6 +20,9 @@ from typing import Any
 import numba
 from numba.core import event
 from numba.extending import register_jitable
+
+from .cache import private_folder
+from .errors import warn
 
 _NAMES = "CAN_SHARE COMPILED LONG_VECTORS cache_folder compiling formula kernel loop rare shared"
 __all__ = _NAMES.split()
@@ -51,14 +53,21 @@ TRIED = (0, 62), (0, 68)
 
 def _own_compilers() -> list[dict[str, Any]]:
     """Options for kernels, those with long loops, inner functions and those kept apart; none for another numba."""
-    if not TRIED[0] <= numba.version_info.short <= TRIED[1]:
-        return [{}, {}, {}, {}]
-    try:
-        from .lowering import FAST_WHEN_WIDE, ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
-    except (ImportError, AttributeError):
-        return [{}, {}, {}, {}]
-    wide = WideCompiler if FAST_WHEN_WIDE else KernelCompiler
-    return [{"pipeline_class": each} for each in (KernelCompiler, wide, InnerCompiler, ApartCompiler)]
+    if TRIED[0] <= numba.version_info.short <= TRIED[1]:
+        try:
+            from .lowering import FAST_WHEN_WIDE, ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
+        except (ImportError, AttributeError):
+            pass  # numba's inside is not what it was in the versions that were tried
+        else:
+            wide = WideCompiler if FAST_WHEN_WIDE else KernelCompiler
+            return [{"pipeline_class": each} for each in (KernelCompiler, wide, InnerCompiler, ApartCompiler)]
+    if not numba.config.DISABLE_JIT:
+        first, last = (".".join(map(str, version)) for version in TRIED)
+        warn(
+            f"SAND does not know numba {numba.__version__} (tried: {first} to {last}): results are right, but "
+            "compiling takes about three times as long and every simulation uses one thread only"
+        )
+    return [{}, {}, {}, {}]
 
 
 # nobody calls these from Python once compiled: without their wrappers the first compile is shorter
@@ -133,18 +142,10 @@ def _digest() -> str:
     return digest.hexdigest()[:16]
 
 
+@cache
 def cache_folder() -> Path:
-    """Where compiled code is kept: `$SAND_CACHE`, else `~/.cache/sand`, else the temporary folder."""
-    wished = os.environ.get("SAND_CACHE") or os.path.join(os.path.expanduser("~"), ".cache", "sand")
-    for base in (Path(wished), Path(tempfile.gettempdir()) / f"sand-cache-{os.getuid()}"):
-        try:
-            folder = base / _digest()
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(folder, os.W_OK):
-            return folder
-    return Path(tempfile.mkdtemp(prefix="sand-cache-"))
+    """Where compiled code is kept: a folder named after our sources and the compiler, see `cache.private_folder`."""
+    return private_folder(_digest())
 
 
 _FOLDER = cache_folder()

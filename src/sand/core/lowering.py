@@ -13,12 +13,13 @@ import gc
 from collections import Counter
 from typing import Any
 
-from llvmlite.binding import get_host_cpu_features, get_host_cpu_name  # type: ignore[import-untyped]
+from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager  # type: ignore[import-untyped]
 from llvmlite.ir import instructions as made  # type: ignore[import-untyped]
+from numba.core import config
 from numba.core import typed_passes as typed
 from numba.core import untyped_passes as untyped
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, get_host_cpu_features
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.ir import Arg, Assign
@@ -132,10 +133,29 @@ def _drop_unused(function: Any) -> None:
         block.instructions[:] = [i for i in block.instructions if id(i) not in gone]
 
 
-_SLOW_TO_GATHER = get_host_cpu_name().startswith("znver")
+def _target() -> tuple[str, str]:
+    """Name and features ("+avx2,-avx512f,…") of the processor that numba makes code for.
+
+    These are `NUMBA_CPU_NAME` and `NUMBA_CPU_FEATURES` where they are set, else those of this machine.
+    """
+    name = get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
+    return name, get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
+
+
+_FP16 = {"sapphirerapids", "emeraldrapids", "graniterapids", "graniterapids-d", "diamondrapids"}
+"""LLVM's names of processors that have avx512fp16, for features that do not name it."""
+
+
+def _fast_when_wide(name: str, features: str) -> bool:
+    """Does the processor compute with 512 bits without slowing down?  The last word on a feature counts."""
+    said = [word[0] == "+" for word in features.split(",") if word[1:] == "avx512fp16"]
+    return said[-1] if said else name in _FP16
+
+
+_SLOW_TO_GATHER = _target()[0].startswith("znver")
 """AMD's Zen: takes numbers from many places faster one by one than by its instruction for it (measured on Zen 4)."""
 
-FAST_WHEN_WIDE = get_host_cpu_features().get("avx512fp16", False)
+FAST_WHEN_WIDE = _fast_when_wide(*_target())
 """Processors, Intel's since Sapphire Rapids, that do not slow down for 512 bits, of which LLVM uses half by itself."""
 
 

@@ -51,8 +51,11 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Ker
     centre, tilt = points.mean(axis=0), _tilt(points, values)
 
     def function(m1: np.ndarray, m2: np.ndarray) -> np.ndarray:
-        # Sorted, so that which triangle an edge belongs to cannot make K(m1, m2) another number than K(m2, m1).
-        asked = np.log(np.stack([np.minimum(m1, m2), np.maximum(m1, m2)], axis=-1)).reshape(-1, 2)
+        # Sorted, and each pair once, so that which triangle an edge belongs to, which depends on what was asked before,
+        # cannot make K(m1, m2) another number than K(m2, m1).
+        pairs = np.stack([np.minimum(m1, m2), np.maximum(m1, m2)], axis=-1).reshape(-1, 2)
+        once, where = np.unique(pairs, axis=0, return_inverse=True)
+        asked = np.log(once)
         edge = _pulled_in(asked, centre, inside)
         beyond = np.abs(edge - asked).max(axis=-1) > 1e-6
         if beyond.any() and not extrapolate:
@@ -61,7 +64,7 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Ker
                 f"masses {first:.4g} and {second:.4g} kg lie beyond those measured ({np.exp(points.min()):.4g} to "
                 f"{np.exp(points.max()):.4g} kg); measure there, or say extrapolate=True"
             )
-        return np.exp(inside(edge) + (asked - edge) @ tilt).reshape(np.shape(m1))
+        return np.exp(inside(edge) + (asked - edge) @ tilt)[where.reshape(-1)].reshape(np.shape(m1))
 
     return Kernel(f"measured, {len(table)} rows", function)
 

@@ -9,77 +9,21 @@ other grid a sum between two sizes is shared so that number and mass are kept (K
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.errors import BadInput, SandError, did_you_mean
 from ..core.units import si
 from .kinetics import Rate
+from .size_distribution import FULL, LARGE, LEFT, Growth
 
 MOST_SIZES = 3000
 """All pairs are held in memory: 4.5 million, some 300 MB."""
 METHODS = ("BDF", "DOP853")
-FULL, LARGE, LEFT = (
-    "all times are reached",
-    "the mean size that was asked for is reached",
-    "mass leaves through the top of the grid: give larger sizes, or the kernel makes a gel",
-)
-"""What can become of `coagulate`, `Growth.outcome`."""
-
-
-@dataclass(frozen=True)
-class Growth:
-    """A size distribution over time, as far as the grid holds it.
-
-    Attributes:
-        times: t (T,) [s], those of the given ones that were reached.
-        sizes: x (K,), grains per cluster.
-        numbers: n (T, K) [1/m³].
-        mean_size: S (T,), Eq. 17, of what is on the grid.
-        rate: dS/dt (T,) [1/s], from the equation itself.
-        mass: ρ (T,) [kg/m³] on the grid.
-        lost: (T,) [kg/m³] gone through the top of the grid; mass + lost is constant to rounding.
-        outcome: one of `FULL`, `LARGE`, `LEFT`; but for `FULL` there are fewer times than asked for.
-    """
-
-    times: np.ndarray
-    sizes: np.ndarray
-    numbers: np.ndarray
-    mean_size: np.ndarray
-    rate: np.ndarray
-    mass: np.ndarray
-    lost: np.ndarray
-    outcome: str
-
-    @property
-    def slope(self) -> np.ndarray:
-        """d ln S/d ln t (T,), the local z of Eq. 18; it comes to z late, as z t/(t + τ) does."""
-        return self.times * self.rate / self.mean_size
-
-    def exponent(self, decades: float = 1.0) -> float:
-        """z of S ∝ (t − t0)^z over the last decades of S: 1 − 1/z is the slope of ln(dS/dt) over ln S (Eq. 20).
-
-        No t0 has to be known, so that this comes to z much sooner than `slope` does.
-
-        Args:
-            decades: how much of S, > 0.
-
-        Raises:
-            BadInput: fewer than three outputs there, or S grows faster than any power.
-        """
-        size, faster = np.log10(self.mean_size), self.rate > 0.0
-        late = faster & (size >= size.max(initial=0.0) - si(decades, "1", "decades", above=0.0))
-        if late.sum() < 3:
-            raise BadInput(
-                f"{late.sum()} outputs in the last {decades:g} decades of S; give more times, or more decades"
-            )
-        degree = float(np.polyfit(size[late], np.log10(self.rate[late]), 1)[0])
-        if not degree < 1.0:
-            raise BadInput(f"dS/dt grows as S^{degree:.3f}: faster than any power of time")
-        return 1.0 / (1.0 - degree)
 
 
 def all_sizes(largest: int) -> np.ndarray:
@@ -138,34 +82,53 @@ def coagulate(
         BadInput: out of range, or a kernel that is not symmetric, finite and positive.
         SandError: the equation cannot be integrated.
     """
-    from scipy.integrate import solve_ivp
-
     if method not in METHODS:
         raise BadInput(f"method = {method!r}; {did_you_mean(str(method), METHODS)}")
     grain = si(mass, "kg", "mass", above=0.0)
     x, n, t = _sizes(sizes), _densities(numbers, np.size(sizes)), _times(times)
-    goal = None if until_size is None else si(until_size, "1", "until_size", above=0.0)
+    goal = math.inf if until_size is None else si(until_size, "1", "until_size", above=0.0)
     loss, tolerance = si(may_lose, "1", "may_lose", above=0.0), si(accuracy, "1", "accuracy")
     if not loss < 1.0 or not 1e-12 <= tolerance <= 1e-2:
         raise BadInput(f"may_lose = {may_lose!r} must be below 1, and accuracy = {accuracy!r} in 1e-12 … 1e-2")
-    grains = float((x * n).sum())
-    table, unit = _rates(kernel, x * grain)
+    return _solved(_Question(kernel, x, n, grain, goal, loss, tolerance, method), t)
+
+
+class _Question(NamedTuple):
+    """The arguments of `coagulate`, checked; `goal` and `loss` are where to stop, infinite for never."""
+
+    kernel: Rate
+    sizes: np.ndarray
+    numbers: np.ndarray
+    grain: float
+    goal: float
+    loss: float
+    tolerance: float
+    method: str
+
+
+def _solved(asked: _Question, t: np.ndarray) -> Growth:
+    """The answer at times t [s], as far as it goes."""
+    from scipy.integrate import solve_ivp
+
+    x, tolerance = asked.sizes, asked.tolerance
+    grains = float((x * asked.numbers).sum())
+    table, unit = _rates(asked.kernel, x * asked.grain)
     clock = 1.0 / (grains * unit)
     system = _System(x, table)
 
     def lost(_: float, y: np.ndarray) -> float:
-        return y[-1] - loss
+        return y[-1] - asked.loss
 
     def large(_: float, y: np.ndarray) -> float:
-        return -1.0 if goal is None else float(x @ y[:-1]) / goal - 1.0
+        return float(x @ y[:-1]) / asked.goal - 1.0
 
     lost.terminal = large.terminal = True  # type: ignore[attr-defined]
-    begin = np.append(x * n / grains, 0.0)
+    begin = np.append(x * asked.numbers / grains, 0.0)
     end = max(t[-1] / clock, 1e-300)
     # LSODA, SciPy's third one for this, gives up in the middle where its Adams formulas meet a stiff system.
-    options = {"jac": system.jacobian} if method == "BDF" else {}
+    options = {"jac": system.jacobian} if asked.method == "BDF" else {}
     done = solve_ivp(
-        system.change, (0.0, end), begin, method, np.minimum(t / clock, end), events=[lost, large],
+        system.change, (0.0, end), begin, asked.method, np.minimum(t / clock, end), events=[lost, large],
         rtol=tolerance, atol=1e-4 * tolerance / np.append(x, 1.0), **options,
     )  # fmt: skip
     if done.status < 0:
@@ -174,19 +137,34 @@ def coagulate(
         )
     outcome = FULL if done.status == 0 else LEFT if len(done.t_events[0]) else LARGE
     reached = np.reshape(done.y, (len(begin), -1))  # SciPy gives an empty list where no output was reached
-    return _told(system, reached, t[: reached.shape[1]], grains, clock, grain, outcome)
+    # once more it goes to the same outputs, whatever S and the loss are there
+    again = partial(_solved, asked._replace(goal=math.inf, loss=math.inf, tolerance=0.1 * tolerance))
+    return _told(system, reached, t[: reached.shape[1]], (grains, clock, asked.grain), outcome, again)
 
 
 def _told(
-    system: _System, y: np.ndarray, times: np.ndarray, grains: float, clock: float, grain: float, outcome: str
+    system: _System, y: np.ndarray, times: np.ndarray, units: tuple[float, float, float], outcome: str, again: Any
 ) -> Growth:
+    grains, clock, grain = units
     x, parts = system.sizes, y[:-1].T
-    changes = np.reshape([system.change(0.0, column)[:-1] for column in y.T], parts.shape)
+    all_changes = np.reshape([system.change(0.0, column) for column in y.T], (len(parts), len(x) + 1))
+    changes, loss = all_changes[:, :-1], all_changes[:, -1]
     held = parts.sum(axis=1)
     mean = parts @ x / held
     rate = (changes @ x - mean * changes.sum(axis=1)) / held / clock
     density = grain * grains
-    return Growth(times, x, grains * parts / x, mean, rate, density * held, density * y[-1], outcome)
+    return Growth(
+        times,
+        x,
+        grains * parts / x,
+        mean,
+        rate,
+        density * held,
+        density * y[-1],
+        density * loss / clock,
+        outcome,
+        again,
+    )
 
 
 class _System:
@@ -202,6 +180,8 @@ class _System:
         i, j = np.tril_indices(count)
         self.i, self.j = i, j
         total = sizes[i] + sizes[j]
+        # a sum that is the largest size but for rounding stays on the grid
+        total = np.where(np.isclose(total, sizes[-1], rtol=8.0 * np.finfo(float).eps, atol=0.0), sizes[-1], total)
         below = np.searchsorted(sizes, total, side="right") - 1
         gone = below == count - 1
         gone &= total > sizes[-1]
