@@ -11,7 +11,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.files.folder import read_ledger
+from sand.files.ledger import read_ledger
 from sand.files.trajectory import read_frames
 
 CASE = """

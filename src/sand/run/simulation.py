@@ -212,6 +212,9 @@ class Simulation:
                 self.record.rescue()
             self._broken = f"its files could not be written ({error}); go on with sand.resume, or start again"
             raise
+        finally:
+            if self.record:
+                self.record.release()
 
     def view(self, path: str | Path | None = None) -> Any:
         """The grains in motion: a widget in a notebook with anywidget, else a page, opened if there is a browser.
