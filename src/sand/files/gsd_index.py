@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -148,11 +149,13 @@ def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
     return whole
 
 
-def mend_or_keep(path: Path, step: int, frames: int) -> tuple[dict[int, tuple[int, int]], str]:
-    """The same, of a file that should hold so many frames up to `step`; if it lacks some, it is kept as it was.
+def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[int, tuple[int, int]], str]:
+    """The same, of a file whose run has written frames of these steps; if it lacks some, it is kept as it was.
+
+    What was written before the first frame that is there, to a file that has gone since, is not missed.
 
     Returns:
-        What `mend` does, and what is to be said, empty if no frame up to `step` is lost.
+        What `mend` gives, and what is to be said, empty if no frame up to `step` is lost.
 
     Raises:
         BadInput: it is no trajectory.
@@ -168,10 +171,12 @@ def mend_or_keep(path: Path, step: int, frames: int) -> tuple[dict[int, tuple[in
         whole = mend(path, step)
         with gsd.hoomd.open(str(path), "r") as file:
             there = _frames_until(file, step)
+            first = _step(file, 0) if there else 0 if holds_data(path) else step + 1
     except (BadInput, RuntimeError):
         if aside is not None:  # the whole file is going to be renamed
             aside.unlink()
         raise
+    frames = sum(first <= one <= step for one in written)
     if there >= frames or (kept and not bad):
         if aside is not None:
             aside.unlink()
@@ -186,13 +191,15 @@ def mend_or_keep(path: Path, step: int, frames: int) -> tuple[dict[int, tuple[in
 def _frames_until(file: Any, step: int) -> int:
     """Number of frames up to a step, looked for from the end."""
     number = len(file)
-    while number > 0:
-        chunk = "configuration/step"  # missing where it is 0
-        there = file.file.chunk_exists(number - 1, chunk)
-        if (int(file.file.read_chunk(number - 1, chunk)[0]) if there else 0) <= step:
-            break
+    while number > 0 and _step(file, number - 1) > step:
         number -= 1
     return number
+
+
+def _step(file: Any, number: int) -> int:
+    """Step of a frame."""
+    chunk = "configuration/step"  # missing where it is 0
+    return int(file.file.read_chunk(number, chunk)[0]) if file.file.chunk_exists(number, chunk) else 0
 
 
 def cut(path: Path, frame: int) -> None:

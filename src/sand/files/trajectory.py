@@ -7,7 +7,7 @@ import ctypes
 import os
 import time as wall
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ class TrajectoryWriter:
         path: of the file; made if missing.
         resume_at: number of the step from which an existing file is gone on with: later frames it holds already are not
             written twice, but those that are not whole are dropped, and so is what turns out to be of another history.
-        frames: how many an existing file should hold up to that step.
+        written: steps of the frames that the run has written up to that step.
 
     Raises:
         FilesFailed: the file cannot be written.
@@ -44,7 +44,7 @@ class TrajectoryWriter:
     are for looking, the checkpoint is what counts.
     """
 
-    def __init__(self, path: Path, resume_at: int | None = None, frames: int = 0):
+    def __init__(self, path: Path, resume_at: int | None = None, written: Sequence[float] = ()):
         self.path = path
         self._there: dict[int, tuple[int, int]] = {}  # later frames: number and check sum by step
         self._last = self._whole_until = -1 if resume_at is None else resume_at  # steps: of the last frame, and flush
@@ -55,7 +55,7 @@ class TrajectoryWriter:
         try:
             if resume_at is not None and path.exists():
                 try:
-                    self._there, lost = mend_or_keep(path, resume_at, frames)
+                    self._there, lost = mend_or_keep(path, resume_at, written)
                 except (BadInput, RuntimeError):
                     lost = f"{path} is beyond mending; it is now {set_aside(path).name}, and a new one begins"
                 if lost:

@@ -81,7 +81,9 @@ class Record:
             self._look_at_earlier(simulation)
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         steps = simulation.steps if self._resumed else None
-        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, steps, len(simulation.ledger.rows))
+        self._trajectory = TrajectoryWriter(
+            self.folder / files.TRAJECTORY, steps, [row["step"] for row in simulation.ledger.rows]
+        )
         if not self._resumed:
             self._frame(simulation)
         self.save(simulation)
