@@ -86,7 +86,7 @@ def test_an_old_trajectory_without_forces_and_check_sum(looked_at, tmp_path):
 
     with gsd.hoomd.open(str(looked_at[0] / "trajectory.gsd"), "r") as file:
         frame = file[2]
-    del frame.log["check"], frame.log["bonds/force"]
+    del frame.log["crc32"], frame.log["bonds/force"]
     with gsd.hoomd.open(str(tmp_path / "old.gsd"), "w") as file:
         file.append(frame)
     (old,) = Frames(tmp_path / "old.gsd")

@@ -20,10 +20,10 @@ SI.  Orientations are scalar first, as GSD has them.
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
 | log/bonds/share | stretch, slide, roll and twist as shares of what the contact can bear |
-| log/check | check sum over all of a frame; crc32 in files of before, where it leaves out step and types |
+| log/crc32 | check sum over all numbers of a frame but its step; a second one over step, names of materials and these |
 
-Vectors are in the laboratory frame.  Files of development versions lack some of the last rows; they are read all
-the same.
+Vectors are in the laboratory frame.  Files of development versions lack some of the last rows, and the second check
+sum; they are read all the same.
 """
 
 from __future__ import annotations
@@ -59,8 +59,6 @@ LOGGED = (
     "particles/radius",
 )
 """Logged arrays that the check sum is over, in its order."""
-CHECK, EARLY_CHECK = "check", "crc32"
-"""Names of the check sum, over all of a frame, and over all but step and types."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 
@@ -107,20 +105,19 @@ def stored_frame(
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
-    frame.log[CHECK] = np.array([_crc32(frame, _head_of(frame))], dtype=np.uint32)
+    frame.log["crc32"] = np.array([_crc32(frame, b""), _crc32(frame, _head_of(frame))], dtype=np.uint32)
     return frame
 
 
 def code_of(stored: Any) -> int:
-    """The check sum that a frame was stored with.  Raises KeyError if there is none."""
-    return int(stored.log[CHECK if CHECK in stored.log else EARLY_CHECK][0])
+    """The check sum over the numbers of a frame that it was stored with.  Raises KeyError if there is none."""
+    return int(stored.log["crc32"][0])
 
 
 def _refuse_changed(stored: Any) -> None:
     """Raises ValueError if a check sum tells that a frame is not as it was written; the first files have none."""
-    if CHECK not in stored.log and EARLY_CHECK not in stored.log:
-        return
-    if code_of(stored) != _crc32(stored, _head_of(stored) if CHECK in stored.log else b""):
+    codes = stored.log.get("crc32", ())
+    if any(int(code) != _crc32(stored, head) for code, head in zip(codes, (b"", _head_of(stored)), strict=False)):
         raise ValueError("its check sum is wrong")
 
 

@@ -158,7 +158,7 @@ def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[
         What `mend` gives, and what is to be said, empty if no frame up to `step` is lost.
 
     Raises:
-        BadInput: it is no trajectory.
+        BadInput: it is no trajectory, or holds data but no frame; it is as it was then.
         OSError: it cannot be copied or mended.
     """
     import gsd.hoomd
@@ -171,10 +171,12 @@ def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[
         whole = mend(path, step)
         with gsd.hoomd.open(str(path), "r") as file:
             there = _frames_until(file, step)
-            first = _step(file, 0) if there else 0 if holds_data(path) else step + 1
+            first = _step(file, 0) if there else step + 1
+            if not len(file) and holds_data(path):
+                raise BadInput(f"{path} has no frame that is whole")
     except (BadInput, RuntimeError):
-        if aside is not None:  # the whole file is going to be renamed
-            aside.unlink()
+        if aside is not None:
+            aside.replace(path)
         raise
     frames = sum(first <= one <= step for one in written)
     if there >= frames or (kept and not bad):
