@@ -77,16 +77,16 @@ def _refusing(plain: Callable[..., Any]) -> Callable[..., Any]:
 
 def _without_folders(plain: Callable[..., int]) -> Callable[..., int]:
     def opened(path: Any, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
-        if dir_fd is None and os.path.isdir(path) and not _by_shutil():
+        if dir_fd is None and os.path.isdir(path) and not _by_library():
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
         return plain(path, flags, mode, dir_fd=dir_fd)
 
     return opened
 
 
-def _by_shutil() -> bool:
-    """Whether `shutil.rmtree` asks, which walks through folders in another way on Windows."""
-    return sys._getframe(2).f_globals.get("__name__") == "shutil"
+def _by_library() -> bool:
+    """Whether a module of Python asks that does the same in another way on Windows."""
+    return sys._getframe(2).f_globals.get("__name__") in ("shutil", "tempfile")
 
 
 def _for_writers(plain: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -105,7 +105,7 @@ def _of_closed_files(plain: Callable[..., None]) -> Callable[..., None]:
     """Refuses files that are open here; where /proc does not tell which are (not Linux), all are taken for closed."""
 
     def changed(*paths: Any, **options: Any) -> None:
-        if not any(value is not None for value in options.values()):
+        if not any(value is not None for value in options.values()) and not _by_library():
             for path in paths:
                 if _is_open(path):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))

@@ -9,7 +9,8 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.files.folder import read_ledger
+from sand.files.ledger import read_ledger
+from sand.files.lock import LOCK
 from sand.files.trajectory import read_frames
 
 from ..systems import IS_ROOT
@@ -86,7 +87,7 @@ def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
     assert len(said) == 1
     assert "cannot write" in said[0] and "File too large" in said[0]
     assert ("sand resume" if list(folder.glob("checkpoint-*.npz")) else "--overwrite") in said[0]
-    assert not list(folder.glob(".*"))
+    assert {path.name for path in folder.glob(".*")} <= {LOCK}
     gone_on(whole, folder)
 
 
@@ -155,7 +156,7 @@ def test_a_disk_that_fills_up(whole, tmp_path, kilobytes):
             assert job.returncode == 2, job.stderr
             assert len(said) == 1, job.stderr
             assert "No space left on device" in said[0]
-            assert not [p for p in (disk / "run").glob(".*") if p.name != ".probe"]
+            assert not [p for p in (disk / "run").glob(".*") if p.name not in (".probe", LOCK)]
         subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True)
         gone_on(whole, disk / "run")
     finally:

@@ -71,11 +71,11 @@ for path in sorted(pathlib.Path("benchmarks").glob("*.py")):
 """
 
 
-def elsewhere(program: str, folder: Path) -> str:
-    """What a program prints that runs in such a Python, without the compiler."""
+def elsewhere(program: str, folder: Path, *, compiled: bool) -> str:
+    """What a program prints that runs in such a Python, with or without the compiler."""
     paths = [str(TOP), str(TOP / "src"), os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {
-        "NUMBA_DISABLE_JIT": "1",
+        "NUMBA_DISABLE_JIT": str(int(not compiled)),
         "PYTHONPATH": os.pathsep.join(filter(None, paths)),
         "LC_ALL": "C",  # text files are ASCII unless they are opened with an encoding
         "PYTHONUTF8": "0",
@@ -90,12 +90,12 @@ def elsewhere(program: str, folder: Path) -> str:
 def test_every_module_and_the_commands_work(tmp_path):
     """All modules can be imported; help, info, build, run, resume and overwriting do their work."""
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
-    elsewhere(PACKAGE + COMMANDS, tmp_path)
+    elsewhere(PACKAGE + COMMANDS, tmp_path, compiled=False)
     assert (tmp_path / "run" / "summary.json").stat().st_size > 0
 
 
 def test_every_test_can_be_imported():
     """pytest can collect all tests; only those that need other programs are skipped as a whole."""
-    told = elsewhere(TESTS, TOP)
+    told = elsewhere(TESTS, TOP, compiled=True)
     needless = [line for line in told.splitlines() if not line.startswith(("tests/peers", "tests/browser"))]
     assert not needless, needless

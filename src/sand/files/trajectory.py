@@ -7,7 +7,7 @@ import ctypes
 import os
 import time as wall
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,14 @@ import numpy as np
 from ..core.box import Box
 from ..core.errors import BadInput, FilesFailed
 from ..core.grains import Grains
-from .frame import Frame, FrameSequence, stored_frame
-from .gsd_index import CHUNKS, cut, make_room, mend, read_index, refuse_impossible_sizes
+from .damaged import set_aside
+from .frame import Frame, FrameSequence, code_of, stored_frame
+from .gsd_index import CHUNKS, cut, holds_data, make_room, mend, mend_or_keep, read_index, refuse_impossible_sizes
 
 FLUSH_EVERY = 1.0
 """Seconds of wall time between flushes; GSD buffers, and what is not flushed dies with the process."""
 MOST_WAITING = 50
 """Frames that wait for a flush at most."""
-DAMAGED = "trajectory-damaged.gsd"
-"""Where a file goes that cannot be gone on with."""
 SINGLE_PER_GRAIN = 64
 """Bytes of a grain in a frame besides what is logged."""
 
@@ -36,14 +35,16 @@ class TrajectoryWriter:
         path: of the file; made if missing.
         resume_at: number of the step from which an existing file is gone on with: later frames it holds already are not
             written twice, but those that are not whole are dropped, and so is what turns out to be of another history.
+        written: steps of the frames that the run has written up to that step.
 
     Raises:
         FilesFailed: the file cannot be written.
 
-    A file that is beyond mending is moved aside, with a warning: frames are for looking, the checkpoint is what counts.
+    A file that is beyond mending is moved aside, and of one that has lost frames a copy is kept, with a warning: frames
+    are for looking, the checkpoint is what counts.
     """
 
-    def __init__(self, path: Path, resume_at: int | None = None):
+    def __init__(self, path: Path, resume_at: int | None = None, written: Sequence[float] = ()):
         self.path = path
         self._file: Any = None  # closed between runs
         self._there: dict[int, tuple[int, int]] = {}  # later frames: number and check sum by step
@@ -55,10 +56,11 @@ class TrajectoryWriter:
         try:
             if resume_at is not None and path.exists():
                 try:
-                    self._there = mend(path, resume_at)
+                    self._there, lost = mend_or_keep(path, resume_at, written)
                 except (BadInput, RuntimeError):
-                    path.replace(path.with_name(DAMAGED))
-                    warnings.warn(f"{path} is beyond mending; it is now {DAMAGED}, and a new one begins", stacklevel=2)
+                    lost = f"{path} is beyond mending; it is now {set_aside(path).name}, and a new one begins"
+                if lost:
+                    warnings.warn(lost, stacklevel=2)
             self._file = _opened(path, resume_at is not None and path.exists())
             self._entries = len(read_index(path)[1])
         except OSError as error:
@@ -80,7 +82,7 @@ class TrajectoryWriter:
             FilesFailed: the frame could not be written; earlier ones stay.
         """
         frame = stored_frame(step, time, grains, box, contacts, exact=exact)
-        if self._is_there(step, int(frame.log["crc32"][0])):
+        if self._is_there(step, code_of(frame)):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + CHUNKS
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
@@ -179,6 +181,12 @@ class Frames(FrameSequence):
             raise
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             raise BadInput(f"{path} is not a trajectory of SAND ({error})") from error
+        if not len(self._file) and holds_data(self.path):
+            self._file.close()
+            raise BadInput(
+                f"{path} holds data but no frame: its index is damaged, or its first frame is just being written; "
+                "look again, or go on with 'sand resume'"
+            )
 
     def __len__(self) -> int:
         return len(self._file)
