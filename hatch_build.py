@@ -28,7 +28,7 @@ PLATFORMS = {
     }.items()
     for machine in machines
 }
-BUNDLE = ("grainview.js", "grainview.css")
+BUNDLE = ("grainview.js", "grainview.css", "licences.txt")
 MISSING = "missing.txt"
 PAGE = Path("src", "sand", "view", "page")
 INSTALL = (
@@ -119,6 +119,8 @@ def bundle(sources: Path, out: Path) -> None:
         with tempfile.TemporaryDirectory() as place:
             copy = Path(place, "grainview")
             shutil.copytree(sources, copy, ignore=shutil.ignore_patterns("node_modules"))
+            if (sources.parent / "LICENSE").is_file():  # the page carries it, beside those of the packages in it
+                shutil.copy(sources.parent / "LICENSE", place)
             run("npm", [node, npm, *INSTALL], copy)
             run("esbuild", [node, "build.mjs", out], copy)
     for name in BUNDLE:

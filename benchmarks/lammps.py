@@ -48,8 +48,8 @@ class Lammps:
     def __init__(self, deck: str, data: str = ""):
         self._place = tempfile.TemporaryDirectory()
         top = Path(self._place.name)
-        (top / "in.deck").write_text(deck)
-        (top / "grains.data").write_text(data)
+        (top / "in.deck").write_text(deck, "utf-8")
+        (top / "grains.data").write_text(data, "utf-8")
         self._log, self._read = top / "log.lammps", 0
         threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self._child = subprocess.Popen(
@@ -88,7 +88,7 @@ class Lammps:
         self._child.stdin.write(words + "\n")
         self._child.stdin.flush()
         self._answer()
-        text = self._log.read_text()
+        text = self._log.read_text("utf-8")
         new, self._read = text[self._read :], len(text)
         return new
 

@@ -83,7 +83,7 @@ def processor() -> str:
     """What the machine calls its processor."""
     told = Path("/proc/cpuinfo")
     if told.exists():
-        for line in told.read_text().splitlines():
+        for line in told.read_text("utf-8").splitlines():
             if line.startswith("model name"):
                 return line.split(":", 1)[1].strip()
     return platform.processor() or platform.machine()

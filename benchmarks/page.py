@@ -150,7 +150,7 @@ def _resident(browser: Any) -> int:
     """Bytes in memory of all processes that show pages; Linux."""
     told = browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
     pids = [one["id"] for one in told if one["type"] == "renderer"]
-    pages = [int(Path(f"/proc/{pid}/statm").read_text().split()[1]) for pid in pids]
+    pages = [int(Path(f"/proc/{pid}/statm").read_text("utf-8").split()[1]) for pid in pids]
     return sum(pages) * os.sysconf("SC_PAGE_SIZE")
 
 

@@ -30,7 +30,7 @@ KINDS = {"loose": "loose BPCA", "fcc": "dense fcc", "gas": "gas"}
 def available() -> float:
     """Bytes of memory that this machine has to spare; infinite where it does not tell."""
     told = Path("/proc/meminfo")
-    lines = told.read_text().splitlines() if told.exists() else []
+    lines = told.read_text("utf-8").splitlines() if told.exists() else []
     return next((1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")), np.inf)
 
 

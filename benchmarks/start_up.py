@@ -60,7 +60,7 @@ def commands() -> Iterator[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as place:
         top = Path(place)
         case, cache = top / "tiny.toml", top / "cache"
-        case.write_text(CASE)
+        case.write_text(CASE, "utf-8")
         yield row("sand --help", of_command([*SAND, "--help"]), "s", 0.3)
         first = begin(case, top / "run", cache)
         yield row("sand info DIR", of_command([*SAND, "info", str(top / "run")]), "s", 0.3)

@@ -17,7 +17,7 @@ author = "The SAND developers"
 copyright = "The SAND developers, BSD 3-clause licence"
 version = release = __version__
 
-extensions = ["myst_nb", "sphinx.ext.mathjax", "sand_reference"]
+extensions = ["myst_nb", "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sand_reference", "offline"]
 source_suffix = {".md": "myst-nb"}
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
 nitpicky = True

@@ -17,6 +17,7 @@ import numpy as np
 import sand
 from sand.core.box import Box
 from sand.files import folder as files
+from sand.files.ledger import LedgerFile
 from sand.files.trajectory import TrajectoryWriter
 
 RADIUS = 10e-9
@@ -125,10 +126,11 @@ def write(folder: Path, moments: list[Body], box: Box) -> Path:
         writer.write(1000 * k, STEP * k, body, box, table)  # type: ignore[arg-type]
         now = set(map(tuple, table["pair"].tolist()))
         made, broken, before = made + len(now - before) * (k > 0), broken + len(before - now), now
-        rows.append({"step": 1000 * k, "time": STEP * k, **_sizes(len(body), table["pair"])})
-        rows[-1] |= {"contacts": len(now), "made": made, "broken": broken, "total": 1e-18, "kinetic": 1e-18 / (k + 1)}
+        energy = 1e-18 / (k + 1)
+        rows.append({"step": 1000 * k, "time": STEP * k, "kinetic": energy, "total": energy})
+        rows[-1] |= {"contacts": len(now), "made": made, "broken": broken, **_sizes(len(body), table["pair"])}
     writer.close()
-    files.LedgerFile(folder / files.LEDGER, list(rows[0]), rows)
+    LedgerFile(folder / files.LEDGER, list(rows[0]), rows)
     end = {"steps": 1000 * (len(moments) - 1), "outcome_text": "reached the end"}
     (folder / files.SUMMARY).write_text(json.dumps(end))
     return folder

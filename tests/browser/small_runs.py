@@ -6,6 +6,7 @@ frame 4, a pair that parts in frame 6, and two single grains that move all the t
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,8 +16,9 @@ import numpy as np
 from sand.core.box import Box
 from sand.core.material import IRON, SILICA
 from sand.core.world import LOST
-from sand.files.folder import LEDGER, SUMMARY, TRAJECTORY, LedgerFile, write_json
+from sand.files.folder import LEDGER, SUMMARY, TRAJECTORY, write_json
 from sand.files.frame import MODES
+from sand.files.ledger import LedgerFile
 from sand.files.trajectory import TrajectoryWriter
 
 R = 10e-9
@@ -29,10 +31,10 @@ STEP = 1e-9
 FIELD = ("1 mT, constant", lambda time: (0.0, 0.0, 1e-3))
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting", "magnetic")
 COLUMNS = (
-    *("step", "time", "clusters", "largest_cluster", "mean_cluster_size", "contacts", "made", "broken"),
+    *("step", "time"),
     *ENERGIES,
     *(f"lost_{name}" for name in LOST),
-    "total",
+    *("total", "clusters", "largest_cluster", "mean_cluster_size", "contacts", "made", "broken"),
 )
 
 
@@ -109,7 +111,8 @@ def row(at: float) -> dict[str, float]:
     clusters = 5 - merged + parted
     told |= {"step": int(100 * at), "time": at * STEP, "clusters": clusters, "largest_cluster": 8 if merged else 4}
     told |= {"mean_cluster_size": 12 / clusters, "contacts": 7 + merged - parted}
-    return told | {"made": 7 + int(merged), "broken": int(parted), "total": 1e-17 * (1 + 1e-6 * at)}
+    total = math.fsum(told[name] for name in COLUMNS[2 : COLUMNS.index("total")])
+    return told | {"made": 7 + int(merged), "broken": int(parted), "total": total}
 
 
 class SmallRun:

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -39,7 +40,7 @@ def room_of(path: Path) -> str:
 
 def imports(path: Path) -> list[tuple[str, bool]]:
     """(room or package, at the top level of the module?) of every import; typing-only ones are left out."""
-    tree = ast.parse(path.read_text())
+    tree = ast.parse(path.read_text("utf-8"))
     typing_only = {
         id(inner)
         for node in ast.walk(tree)
@@ -83,17 +84,17 @@ def test_every_room_is_on_the_plan():
     """A new folder needs a place in the table here and in ARCHITECTURE.md."""
     rooms = {p.name for p in HOUSE.iterdir() if p.is_dir() and p.name != "__pycache__" and any(p.glob("*.py"))}
     assert rooms <= set(MAY_IMPORT), rooms - set(MAY_IMPORT)
-    plan = (TOP / "ARCHITECTURE.md").read_text()
+    plan = (TOP / "ARCHITECTURE.md").read_text("utf-8")
     assert all(f"{room}/" in plan for room in rooms)
 
 
 @pytest.mark.slow
 def test_files_and_functions_stay_short():
     """Under 300 lines, under 60 lines."""
-    long = [str(p.relative_to(TOP)) for p in SOURCES if len(p.read_text().splitlines()) >= 300]
+    long = [str(p.relative_to(TOP)) for p in SOURCES if len(p.read_text("utf-8").splitlines()) >= 300]
     assert not long, long
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             nested = isinstance(node, ast.FunctionDef) and any(
                 isinstance(inner, ast.FunctionDef) for inner in node.body
             )
@@ -107,7 +108,7 @@ def test_public_names_have_docstrings():
     """Modules, and public classes, functions and methods with more than one statement."""
     silent = []
     for path in SOURCES:
-        tree = ast.parse(path.read_text())
+        tree = ast.parse(path.read_text("utf-8"))
         if not ast.get_docstring(tree):
             silent.append(str(path.relative_to(TOP)))
         for parent in ast.walk(tree):
@@ -146,7 +147,7 @@ def test_only_files_opens_files_and_only_cli_prints():
     """`open`, `read_text`, `write_text` and friends live in files/ (and the compiler's digest); print in cli/."""
     for path in SOURCES:
         room = room_of(path)
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if not isinstance(node, ast.Call):
                 continue
             name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
@@ -168,13 +169,13 @@ def test_no_pickle_no_network():
         names = {name for name, _ in imports(path)}
         assert not names & {"pickle", "dill", "cloudpickle"}, path
         assert not names & (network - {"http", "socketserver"} if path == server else network), path
-        text = path.read_text()
+        text = path.read_text("utf-8")
         assert text.count("np.load(") == text.count("allow_pickle=False")
 
 
 def test_the_server_is_for_this_machine_alone():
     """The one address that view/server.py binds is 127.0.0.1, a literal: no setting can open it to others."""
-    text = (HOUSE / "view" / "server.py").read_text()
+    text = (HOUSE / "view" / "server.py").read_text("utf-8")
     tree = ast.parse(text)
     literals = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     assert "127.0.0.1" in literals
@@ -240,10 +241,11 @@ def test_the_page_needs_no_network():
 
 
 def tracked_files() -> list[str]:
-    tracked = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True)
-    if tracked.returncode != 0:
+    """What git holds; skips the test where this is no checkout, as in an unpacked source archive."""
+    if not (TOP / ".git").exists() or shutil.which("git") is None:
         pytest.skip("not a git checkout")
-    return tracked.stdout.splitlines()
+    words = ["git", "ls-files"]
+    return subprocess.run(words, cwd=TOP, capture_output=True, encoding="utf-8", check=True).stdout.splitlines()
 
 
 def test_nothing_built_is_in_git():
@@ -256,3 +258,11 @@ def test_no_large_files():
     """Nothing above 300 kB in git."""
     large = [n for n in tracked_files() if (TOP / n).is_file() and (TOP / n).stat().st_size > 300_000]
     assert not large, large
+
+
+def test_the_source_archive_is_complete():
+    """What git holds is in the sdist, so that its tests can be run and its docs be built."""
+    sdist = pytest.importorskip("hatchling.builders.sdist", reason="the build backend is not installed")
+    names = {file.distribution_path for file in sdist.SdistBuilder(str(TOP)).recurse_included_files()}
+    missing = {name for name in tracked_files() if (TOP / name).is_file()} - {name.replace("\\", "/") for name in names}
+    assert not missing, sorted(missing)

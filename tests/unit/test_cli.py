@@ -3,7 +3,6 @@
 import contextlib
 import io
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -18,6 +17,8 @@ from sand.files.checkpoint import newest_checkpoint, read_checkpoint
 from sand.run.build import simulation_of
 from sand.run.case import read_case
 from sand.run.simulation import Simulation
+
+from ..systems import IS_ROOT, keeps_modes, stops_others
 
 CASE = """
 [run]
@@ -237,7 +238,8 @@ def test_overwrite_never_replaces_the_case_it_reads(done, capsys):
     assert (done / "case.toml").read_text() == text
 
 
-@pytest.mark.skipif(os.getuid() == 0, reason="root may write everywhere")
+@pytest.mark.skipif(IS_ROOT, reason="root may write everywhere")
+@keeps_modes
 def test_a_folder_without_permission(place, capsys):
     """Said in one line before anything is computed."""
     (place / "locked").mkdir(mode=0o500)
@@ -293,7 +295,7 @@ def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
     """Ctrl-C or SIGTERM while kernels are compiled: 130, and the same command works afterwards."""
 
     def slow(_self, _until=None, **_):
-        os.kill(os.getpid(), number)
+        signal.raise_signal(number)
         time.sleep(5.0)
 
     with monkeypatch.context() as patch:
@@ -310,7 +312,7 @@ def test_an_interrupt_lost_in_the_compiler_is_found_again(place, capsys, monkeyp
 
     def swallow(self, *words, **options):
         with contextlib.suppress(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
             time.sleep(5.0)
         return real(self, *words, **options)
 
@@ -354,6 +356,7 @@ def same_state(one, other):
     return all(a[name].tobytes() == b[name].tobytes() for name in a)
 
 
+@stops_others
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.validate)])
 def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number):

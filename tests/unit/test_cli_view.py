@@ -50,7 +50,7 @@ def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
     [
         (["/nowhere/at/all"], "no such folder"),
         (["RUN", "--html", "/nowhere/at/all.html"], "no folder"),
-        (["RUN", "--html", "/tmp"], "is a folder"),
+        (["RUN", "--html", "."], "is a folder"),
         (["RUN", "--frames", "a"], "--frames"),
         (["RUN", "--frames", "70:"], "none of them was chosen"),
         (["RUN", "--frames", "::-1"], "in order"),

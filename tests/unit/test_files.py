@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -11,24 +12,36 @@ import pytest
 
 import sand
 from sand.core.errors import FilesFailed
+from sand.core.world import STEPS
 from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.files.folder import LedgerFile, make_folder, read_ledger, read_toml, replace_file, write_json, write_toml
+from sand.files.folder import make_folder, read_toml, replace_file, write_json, write_toml
+from sand.files.ledger import LedgerFile, read_ledger
 from sand.files.trajectory import TrajectoryWriter, read_frames
 from sand.run.record import Record
 
 from ..physics.setups import struck_chain
 
-ARRAYS = {"a/x": np.arange(6.0).reshape(2, 3), "count": np.array([3, 4])}
+REFERENCE = Path(__file__).parents[1] / "reference"
+ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))
+META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
+
+
+def write_state(folder, steps):
+    """A checkpoint of this step, its numbers those of the reference."""
+    count = ARRAYS["count"].copy()
+    count[STEPS] = steps
+    return write_checkpoint(folder, {**ARRAYS, "count": count}, {**META, "steps": steps})
 
 
 def test_a_checkpoint_comes_back_bit_for_bit(tmp_path):
     """Arrays, types and meta; two are kept."""
     for steps in (1, 2, 30):
-        write_checkpoint(tmp_path, ARRAYS, {"steps": steps})
+        write_state(tmp_path, steps)
     assert len(list(tmp_path.glob("checkpoint-*.npz"))) == 2
     arrays, meta = newest_checkpoint(tmp_path)
     assert meta["steps"] == 30
-    for name, array in ARRAYS.items():
+    for name in ARRAYS.keys() - {"count"}:
+        array = ARRAYS[name]
         assert arrays[name].tobytes() == array.tobytes()
         assert arrays[name].dtype == array.dtype
 
@@ -36,26 +49,31 @@ def test_a_checkpoint_comes_back_bit_for_bit(tmp_path):
 @pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "text"])
 def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage):
     """A flipped bit in the data, a torn file, an empty one, a foreign one: one line, never wrong numbers."""
-    write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
-    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 2})
+    write_state(tmp_path, 1)
+    path = write_state(tmp_path, 2)
     content = bytearray(path.read_bytes())
     if damage == "flip":
-        at = content.find(np.float64(3.0).tobytes())
+        at = content.find(ARRAYS["grains/radius"].tobytes())
         content[at + 7] ^= 1
     cut = {"flip": bytes(content), "truncate": bytes(content[:200]), "empty": b"", "text": b"hello"}[damage]
     path.write_bytes(cut)
-    with pytest.raises(sand.BadInput, match=str(path)):
+    with pytest.raises(sand.BadInput, match=re.escape(str(path))):
         read_checkpoint(path)
-    assert newest_checkpoint(tmp_path)[1]["steps"] == 1
+    with pytest.warns(UserWarning, match=rf"{path.name}.*now {path.name}.damaged.*goes on from .*0001.npz"):
+        assert newest_checkpoint(tmp_path)[1]["steps"] == 1
+    assert path.with_name(f"{path.name}.damaged").read_bytes() == cut
 
 
 def test_a_checkpoint_of_the_future_is_refused_politely(tmp_path, monkeypatch):
     """An older program says that it is too old."""
     monkeypatch.setattr("sand.files.checkpoint.VERSION", 99)
-    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
+    path = write_state(tmp_path, 2)
     monkeypatch.undo()
-    with pytest.raises(sand.BadInput, match=r"newer SAND.*update"):
-        read_checkpoint(path)
+    write_state(tmp_path, 1)
+    for read, place in ((read_checkpoint, path), (newest_checkpoint, tmp_path)):
+        with pytest.raises(sand.BadInput, match=r"newer SAND.*update"):
+            read(place)
+    assert path.exists()
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
@@ -273,5 +291,5 @@ def test_a_trajectory_beyond_mending_is_moved_aside(tmp_path):
     (tmp_path / "run" / "trajectory.gsd").write_bytes(b"rubbish" * 1000)
     with pytest.warns(UserWarning, match="beyond mending"):
         sand.resume(tmp_path / "run").run(until="0.5 ns")
-    assert (tmp_path / "run" / "trajectory-damaged.gsd").read_bytes().startswith(b"rubbish")
+    assert (tmp_path / "run" / "trajectory.gsd.damaged").read_bytes().startswith(b"rubbish")
     assert len(read_frames(tmp_path / "run" / "trajectory.gsd")) == 2

@@ -44,6 +44,6 @@ def test_remedy_fits_the_installation(tmp_path, monkeypatch):
 
 def test_both_sides_agree_on_the_place():
     """The hook writes where `read_bundle` reads."""
-    hook = (Path(__file__).parents[2] / "hatch_build.py").read_text()
+    hook = (Path(__file__).parents[2] / "hatch_build.py").read_text("utf-8")
     assert 'PAGE = Path("src", "sand", "view", "page")' in hook
     assert page.PAGE.parts[-3:] == ("sand", "view", "page")

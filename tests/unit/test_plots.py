@@ -6,7 +6,7 @@ import pytest
 import sand
 from sand.analysis.books import Books
 from sand.core.errors import BadInput
-from sand.files.folder import read_ledger
+from sand.files.ledger import read_ledger
 from sand.view.plots import HISTORY, grains_figure, history_figure
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -18,6 +17,8 @@ from sand.experiments.executors import executor_for
 from sand.experiments.flights import COLUMNS, fly, replay
 from sand.experiments.maps import probability_map
 from sand.experiments.sampling import Task
+
+from ..systems import KILL, stops_others
 
 GRAINS = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg", "temperature": "100 K"}
 CASE = """
@@ -111,7 +112,7 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
         def kill(rows):
             if not killed:
                 killed.append(victim.pid)
-                os.kill(victim.pid, signal.SIGKILL)
+                os.kill(victim.pid, KILL)
 
         with executor_for(scheduler=cluster.scheduler_address) as executor:
             found = scattering.measure(flying, relative_error=0.05, seed=3, executor=executor, keep=kill)
@@ -337,6 +338,7 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
     assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
 
 
+@stops_others
 @pytest.mark.compiled("scattering")
 def test_sigterm_says_how_to_go_on(tmp_path):
     """SIGTERM while it flies: exit 130 and one line with --resume."""

@@ -31,6 +31,7 @@ def command(case: str, out: str | None, seeds: str | None, workers: int, overwri
     """
     from ..experiments.collision_case import read_collision
     from ..files.folder import COLLISION, FIGURE, make_folder, write_json
+    from ..files.lock import writing
     from .launch import refuse_folder
 
     described = read_collision(case)
@@ -42,11 +43,12 @@ def command(case: str, out: str | None, seeds: str | None, workers: int, overwri
         results = [outcome.to_dict()]
     else:
         make_folder(folder, overwrite=overwrite)
-        results = _many(case, chosen, workers)
-        from ..view.collisions import collision_figure
-        from ..view.figure import save
+        with writing(folder):
+            results = _many(case, chosen, workers)
+            from ..view.collisions import collision_figure
+            from ..view.figure import save
 
-        save(collision_figure(results), folder / FIGURE)
+            save(collision_figure(results), folder / FIGURE)
     content = {"case": str(case), "folder": str(folder), "collisions": results, "counts": dict(counts(results))}
     write_json(folder / COLLISION, content)
     if as_json:

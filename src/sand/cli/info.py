@@ -11,6 +11,7 @@ import click
 
 from ..core.errors import BadInput
 from ..files import folder as files
+from ..files.ledger import read_ledger
 from . import options, report
 from .info_jobs import of_job_file, of_job_folder, of_other_case
 
@@ -29,7 +30,7 @@ def command(path: str, as_json: bool) -> int:
 
     A case file is checked as `sand run` would, without running it.
     """
-    heading, rows, content = _teller(Path(path))(Path(path))
+    heading, rows, content = report.with_notes(lambda: _teller(Path(path))(Path(path)))
     if as_json:
         report.emit(content)
     else:
@@ -53,19 +54,19 @@ def _teller(path: Path) -> Callable[[Path], Told]:
 
 def _summary(path: Path) -> dict[str, Any]:
     """A summary that holds what is told of it.  Raises BadInput."""
+    summary = files.read_json(path)
     try:
-        summary = files.read_json(path)
         report.results(summary)
         if {"outcome", "outcome_text", "grains_concerned", "choices", "grains"} <= summary.keys():
             return summary
-    except (BadInput, KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError):
         pass
     raise BadInput(f"{path} is not a summary of SAND")
 
 
 def _ledger(path: Path) -> list[dict[str, float]]:
     """The rows of a ledger.  Raises BadInput."""
-    rows = files.read_ledger(path)
+    rows = read_ledger(path)
     if not rows or not {"step", "time", "total", "clusters", "mean_cluster_size", "largest_cluster"} <= rows[0].keys():
         raise BadInput(f"{path} is not a ledger of SAND, or an empty one")
     return rows

@@ -8,6 +8,7 @@ import threading
 from typing import Any
 
 from ..run.observers import Observer
+from ..run.signals import STOPS
 
 
 class Watch(Observer):
@@ -24,7 +25,7 @@ class Watch(Observer):
 
     def __enter__(self) -> Watch:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in STOPS:
                 if signal.getsignal(number) != signal.SIG_IGN:  # a shell's `sand run … &` is not for Ctrl-C
                     self._before[number] = signal.signal(number, self._raise)
             sys.unraisablehook = self._lost

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from ..core.errors import BadInput, FilesFailed, Interrupted
 from ..core.units import spoken
-from ..files.folder import SUMMARY, read_json
+from ..files.folder import SUMMARY, is_used, read_json
+from ..files.lock import LOCK, refuse_locked
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
 from .interrupt import Watch
@@ -127,7 +128,11 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         raise BadInput(f"cannot write to folder {folder}: {ground} is a file; give another one with --out")
     if not os.access(ground, os.W_OK):
         raise BadInput(f"cannot write to folder {folder}: no permission in {ground}; give another one with --out")
-    if ground != folder or not any(folder.iterdir()):
+    if ground != folder:
+        return
+    if (folder / LOCK).exists():
+        refuse_locked(folder)
+    if not is_used(folder):
         return
     if not overwrite:
         told = "give another one with --out, or --overwrite to replace the run in it"

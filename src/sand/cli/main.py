@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _call(words: list[str]) -> int:
     """Run the command; its errors become lines and an exit code, unless --debug."""
     try:
-        with sand.make_context("sand", list(words)) as context:
+        with sand.make_context("sand", list(words)) as context, report.noting():
             return sand.invoke(context) or DONE
     except click.exceptions.Exit as stop:  # --help, --version
         return stop.exit_code

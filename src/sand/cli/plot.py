@@ -55,7 +55,7 @@ def command(
     from ..files.folder import make_folder, replace_file
 
     place, names = _asked(Path(source), what, out, form, overwrite, how)
-    drawn = _drawn(_source(Path(source)), names, frame, form, how)
+    drawn = report.with_notes(lambda: _drawn(_source(Path(source)), names, frame, form, how))
     if not place.exists():
         make_folder(place)
     for path, content in zip((place / f"{name}.{form}" for name in names), drawn, strict=True):
@@ -149,7 +149,8 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
 def _history(source: Source) -> tuple[Any, int, float]:
     """The ledger, the number of grains, and their temperature at the start [K].  Raises BadInput."""
     from ..analysis.books import Books
-    from ..files.folder import LEDGER, read_ledger
+    from ..files.folder import LEDGER
+    from ..files.ledger import read_ledger
     from ..forces.dipoles import kinetic_temperature
 
     books = Books.of(read_ledger(source.path / LEDGER))

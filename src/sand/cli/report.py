@@ -6,8 +6,8 @@ import json
 import math
 import shlex
 import warnings
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
@@ -53,6 +53,22 @@ def with_notes(make: Callable[[], T]) -> T:
     for text in dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)):
         note(f"note: {text}")
     return made
+
+
+@contextmanager
+def noting() -> Iterator[None]:
+    """Warnings of the block are printed as notes, one line each, when they come."""
+    with warnings.catch_warnings():
+        usual = warnings.showwarning
+
+        def show(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
+            if issubclass(category, UserWarning):
+                note(f"note: {message}")
+            else:
+                usual(message, category, *where, **more)
+
+        warnings.showwarning = show
+        yield
 
 
 def blame(case: Path, make: Callable[[], T]) -> T:

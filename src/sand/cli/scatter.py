@@ -40,11 +40,13 @@ def command(
     every single flight. The numbers are the same for any number of workers and after any interruption.
     """
     from concurrent.futures import BrokenExecutor
+    from contextlib import ExitStack
 
     from ..experiments.executors import executor_for
     from ..experiments.scattering_case import read_scattering
     from ..experiments.scattering_job import Job
     from ..files.folder import make_folder, read_toml
+    from ..files.lock import writing
     from .interrupt import Watch
 
     described, flights = read_scattering(case)
@@ -52,9 +54,10 @@ def command(
     if resume and overwrite:
         raise BadInput("--resume and --overwrite exclude each other")
     _refuse(folder, Path(case), resume=resume, overwrite=overwrite)
-    with executor_for(workers, scheduler) as executor:
+    with executor_for(workers, scheduler) as executor, ExitStack() as held:
         if not resume:
             make_folder(folder, overwrite=overwrite)
+        held.enter_context(writing(folder))
         job = Job(described, flights, read_toml(case), folder, resume)
         bar = _Bar(not (quiet or as_json))
         words = f"sand scatter {shlex.quote(case)} --out {shlex.quote(str(folder))} --resume"

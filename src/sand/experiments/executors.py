@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import re
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -15,6 +16,8 @@ from ..core.threads import one_thread
 
 ANSWER = 10.0
 """Seconds that a scheduler has for its first answer."""
+MOST_ON_WINDOWS = 61
+"""Processes of a pool there: the limit of `concurrent.futures`."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
@@ -28,13 +31,15 @@ def executor_for(workers: int = 1, scheduler: str | None = None) -> Iterator[Exe
             again by another.
 
     Raises:
-        BadInput: no address, no `distributed`, or no answer.
+        BadInput: no address, no `distributed`, no answer, or more workers than Windows allows.
     """
     if scheduler is not None:
         with _dask(scheduler) as executor:
             yield executor
     elif workers == 1:
         yield None
+    elif workers > MOST_ON_WINDOWS and sys.platform == "win32":
+        raise BadInput(f"workers = {workers}; on Windows Python starts at most {MOST_ON_WINDOWS} processes")
     else:
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_signals_to_parent) as pool:

@@ -15,6 +15,8 @@ A NumPy archive of plain arrays, without pickles, written beside, synced and ren
 | order | the grain at each place in memory, (N,), where an order is kept; all else is in the order of the grains |
 | far/… | loads of the last long-range summation, what their cycle has used up, positions when the list was made |
 
+`files.state` says what each array must be like.
+
 Random numbers are functions of the seed, the grain and the number of the kick, so that there is no state of a generator
 to be kept.
 """
@@ -25,6 +27,7 @@ import hashlib
 import io
 import json
 import math
+import warnings
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -32,7 +35,9 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import BadInput
+from .damaged import set_aside
 from .folder import replace_file
+from .state import check_state
 
 VERSION = 4
 """Of the file format; a newer program reads older versions, an older one refuses newer files.
@@ -54,6 +59,11 @@ def _checksum(arrays: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
+def checkpoint_name(steps: int) -> str:
+    """Name of the file of the state after so many steps; in the order of the names later ones come later."""
+    return f"checkpoint-{int(steps):015d}.npz"
+
+
 def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Path:
     """Write one checkpoint, then drop all but the newest two.
 
@@ -68,7 +78,7 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     memory = io.BytesIO()
     np.savez(memory, **{_META: text}, **arrays)  # type: ignore[arg-type]
-    path = folder / f"checkpoint-{int(meta['steps']):015d}.npz"
+    path = folder / checkpoint_name(meta["steps"])
     replace_file(path, memory.getvalue())
     for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:
         old.unlink(missing_ok=True)
@@ -94,11 +104,16 @@ def _refuse_impossible_sizes(path: Path) -> None:
                     raise ValueError(f"{part.filename} says that it is larger than the file")
 
 
+class NewerFormat(BadInput):
+    """A checkpoint of a SAND that is newer than this one; nothing is wrong with it."""
+
+
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Arrays and meta of one checkpoint.
+    """Arrays and meta of one checkpoint, fit to go on from.
 
     Raises:
-        BadInput: not a checkpoint, of a newer version, or damaged.
+        NewerFormat: of a newer version.
+        BadInput: not a checkpoint, damaged, or with numbers that a state cannot have.
     """
     try:
         _refuse_impossible_sizes(path)
@@ -108,24 +123,40 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         whole = isinstance(meta, dict)
     except Exception as error:  # whatever a broken file makes the readers do
         raise BadInput(f"{path} is not a readable checkpoint ({type(error).__name__})") from error
-    if not whole or meta.get("format") != "SAND checkpoint":
+    if not whole or meta.get("format") != "SAND checkpoint" or not isinstance(meta.get("version"), int):
         raise BadInput(f"{path} is not a checkpoint of SAND")
-    if meta.get("version", 0) > VERSION:
-        raise BadInput(
+    if meta["version"] > VERSION:
+        raise NewerFormat(
             f"{path} was written by a newer SAND (format {meta['version']}, this one reads up to {VERSION}); "
             "update SAND"
         )
     if _checksum(arrays) != meta.get("sha256"):
         raise BadInput(f"{path} is damaged: its checksum is wrong")
+    try:
+        check_state(arrays, meta)
+    except BadInput as error:
+        raise BadInput(f"{path} cannot be gone on from: {error}") from None
     return arrays, meta
 
 
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """The newest checkpoint that is whole.  Raises BadInput if there is none."""
-    problems: list[str] = []
+    """The newest checkpoint that is whole; newer ones that are not are renamed, with a warning that says so.
+
+    Raises:
+        NewerFormat: one of a newer version is met first.
+        BadInput: there is none; no file is renamed then.
+    """
+    problems: list[tuple[Path, str]] = []
     for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
         try:
-            return read_checkpoint(path)
+            arrays, meta = read_checkpoint(path)
+        except NewerFormat:
+            raise
         except BadInput as error:
-            problems += error.problems
-    raise BadInput([*problems, f"{folder} holds no checkpoint to go on from"])
+            problems.append((path, str(error)))
+            continue
+        for damaged, said in problems:
+            aside = set_aside(damaged)
+            warnings.warn(f"{said}; it is now {aside.name}, and the run goes on from {path.name}", stacklevel=2)
+        return arrays, meta
+    raise BadInput([*(said for _, said in problems), f"{folder} holds no checkpoint to go on from"])

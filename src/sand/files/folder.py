@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import csv
+import errno
 import json
 import os
 import tomllib
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import BadInput, FilesFailed
+from .damaged import DIGEST, digest_of, set_aside_in
+from .lock import LOCK, refuse_locked, writing
 
 CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW = (
     "case.toml",
@@ -25,6 +26,8 @@ CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGH
     "flights.csv",
     "view.html",
 )
+_NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
+"""Errors by which systems say that they cannot sync a folder."""
 OURS = (CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW)
 
 
@@ -33,28 +36,41 @@ def make_folder(path: str | Path, *, overwrite: bool = False) -> Path:
 
     Raises:
         BadInput: it exists and is not empty (unless `overwrite`, which removes an earlier run's own files and
-            nothing else).
+            nothing else); or another process writes to it.
         FilesFailed: it cannot be made or written to.
     """
     folder = Path(path)
     try:
         if folder.exists() and not folder.is_dir():
             raise BadInput(f"{folder} is a file; give the name of a new folder")
-        if folder.is_dir() and any(folder.iterdir()):
+        if (folder / LOCK).exists():
+            refuse_locked(folder)
+        if is_used(folder):
             if not overwrite:
                 raise BadInput(
                     f"folder {folder} exists and is not empty; give another one, remove it, "
                     "or say that it may be overwritten"
                 )
-            for old in [*(folder / name for name in OURS), *folder.glob("checkpoint-*.npz")]:
-                old.unlink(missing_ok=True)
+            with writing(folder):
+                damaged = set_aside_in(folder, (*OURS, "checkpoint-*.npz"))
+                ours = [*(folder / name for name in OURS), *folder.glob("checkpoint-*.npz"), *damaged]
+                # first the one file that others keep open: where that forbids removing it (Windows), nothing is removed
+                for old in [folder / TRAJECTORY, *ours]:
+                    old.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".probe"
         probe.write_bytes(b"")
         probe.unlink()
+    except FilesFailed:
+        raise
     except OSError as error:
         raise FilesFailed(f"cannot write to folder {folder}: {error.strerror}") from error
     return folder
+
+
+def is_used(folder: Path) -> bool:
+    """True if a folder is there and holds more than what a lock left."""
+    return folder.is_dir() and any(one.name != LOCK for one in folder.iterdir())
 
 
 def replace_file(path: Path, content: bytes) -> None:
@@ -70,15 +86,29 @@ def replace_file(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(beside, path)
-        handle = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        _sync_names(path.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
         raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error
+
+
+def _sync_names(folder: Path) -> None:
+    """Write the names in a folder to the disk, so that a power cut does not undo a renaming.
+
+    Windows opens no folder, and some file systems cannot sync one: there the system decides when names are written.
+    """
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except PermissionError:
+        return
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in _NO_SYNC:
+            raise
+    finally:
+        os.close(handle)
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
@@ -100,13 +130,19 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Raises BadInput for a missing or broken file."""
+    """What a JSON file holds.
+
+    Raises:
+        BadInput: it is missing, broken, or not what was written: the digest in it is wrong.
+    """
     try:
         content = json.loads(read_text(path))
     except json.JSONDecodeError:
         raise BadInput(f"{path} is not JSON") from None
     if not isinstance(content, dict):
         raise BadInput(f"{path} is not a summary of SAND")
+    if content.get(DIGEST, digest_of(content)) != digest_of(content):
+        raise BadInput(f"{path} is damaged: its numbers are not those that were written, as its digest tells")
     return content
 
 
@@ -136,50 +172,3 @@ def write_toml(path: Path, content: dict[str, Any], comment: str) -> None:
 
     text = "".join(f"# {line}\n" for line in comment.splitlines()) + "\n" + tomli_w.dumps(content)
     replace_file(path, text.encode())
-
-
-class LedgerFile:
-    """ledger.csv: one row per entry, numbers to the last bit; opened anew for each row, so nothing is held.
-
-    Args:
-        path: of the file; what it held before is replaced.
-        columns: names, the first being `step`.
-        rows: that it begins with.
-    """
-
-    def __init__(self, path: Path, columns: Sequence[str], rows: Iterable[dict[str, float]] = ()):
-        self.path, self.columns = path, list(columns)
-        lines = [",".join(self.columns), *(self._line(row) for row in rows)]
-        replace_file(path, ("\n".join(lines) + "\n").encode())
-
-    def _line(self, row: dict[str, float]) -> str:
-        return ",".join(repr(row[name]) for name in self.columns)
-
-    def append(self, row: dict[str, float]) -> None:
-        """Raises FilesFailed."""
-        try:
-            with open(self.path, "a", encoding="utf-8", newline="") as file:
-                file.write(self._line(row) + "\n")
-        except OSError as error:
-            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
-
-
-def _whole_rows(text: str) -> list[str]:
-    """The rows below the header; a last one that a kill tore in two is left out."""
-    lines = text.split("\n")[:-1]
-    return [line for line in lines[1:] if line.count(",") == lines[0].count(",")]
-
-
-def _number(text: str) -> float:
-    """Counts stay whole numbers."""
-    return int(text) if text.lstrip("-").isdigit() else float(text)
-
-
-def read_ledger(path: Path) -> list[dict[str, float]]:
-    """The rows of ledger.csv as numbers; a torn last row is left out.  Raises BadInput."""
-    text = read_text(path)
-    rows = list(csv.DictReader([text.split("\n", 1)[0], *_whole_rows(text)]))
-    try:
-        return [{k: _number(v) for k, v in row.items()} for row in rows]
-    except (TypeError, ValueError):
-        raise BadInput(f"{path} is not a ledger of SAND") from None

@@ -20,10 +20,10 @@ SI.  Orientations are scalar first, as GSD has them.
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
 | log/bonds/share | stretch, slide, roll and twist as shares of what the contact can bear |
-| log/crc32 | check sum over all of a frame |
+| log/crc32 | check sum over all numbers of a frame but its step; a second one over step, names of materials and these |
 
-Vectors are in the laboratory frame.  Files of development versions lack some of the last rows; they are read all
-the same.
+Vectors are in the laboratory frame.  Files of development versions lack some of the last rows, and the second check
+sum; they are read all the same.
 """
 
 from __future__ import annotations
@@ -105,13 +105,30 @@ def stored_frame(
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
-    frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
+    frame.log["crc32"] = np.array([_crc32(frame, b""), _crc32(frame, _head_of(frame))], dtype=np.uint32)
     return frame
 
 
-def _crc32(stored: Any) -> int:
-    """CRC-32 over all numbers of a frame, as the file holds them."""
-    p, code = stored.particles, 0
+def code_of(stored: Any) -> int:
+    """The check sum over the numbers of a frame that it was stored with.  Raises KeyError if there is none."""
+    return int(stored.log["crc32"][0])
+
+
+def _refuse_changed(stored: Any) -> None:
+    """Raises ValueError if a check sum tells that a frame is not as it was written; the first files have none."""
+    codes = stored.log.get("crc32", ())
+    if any(int(code) != _crc32(stored, head) for code, head in zip(codes, (b"", _head_of(stored)), strict=False)):
+        raise ValueError("its check sum is wrong")
+
+
+def _head_of(stored: Any) -> bytes:
+    """Step and names of materials."""
+    return f"{int(stored.configuration.step)} {list(stored.particles.types)}".encode()
+
+
+def _crc32(stored: Any, head: bytes) -> int:
+    """CRC-32 over what stands at the head of a frame, and all its numbers as the file holds them."""
+    p, code = stored.particles, zlib.crc32(head)
     single = (p.position, p.diameter, p.velocity, p.mass, p.charge, p.orientation)
     parts = [np.asarray(part, np.float32) for part in single]
     parts += [np.asarray(part, np.uint32) for part in (p.typeid, stored.bonds.group)]
@@ -131,8 +148,7 @@ class Frame:
     """
 
     def __init__(self, stored: Any):
-        if "crc32" in stored.log and int(stored.log["crc32"][0]) != _crc32(stored):
-            raise ValueError("its check sum is wrong")
+        _refuse_changed(stored)
         self.step = int(stored.configuration.step)
         self.time = float(stored.log["time"][0])
         scale = float(stored.log["scale/length"][0])

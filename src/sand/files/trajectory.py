@@ -7,7 +7,7 @@ import ctypes
 import os
 import time as wall
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,14 @@ import numpy as np
 from ..core.box import Box
 from ..core.errors import BadInput, FilesFailed
 from ..core.grains import Grains
-from .frame import Frame, FrameSequence, stored_frame
-from .gsd_index import CHUNKS, cut, make_room, mend, read_index, refuse_impossible_sizes
+from .damaged import set_aside
+from .frame import Frame, FrameSequence, code_of, stored_frame
+from .gsd_index import CHUNKS, cut, holds_data, make_room, mend, mend_or_keep, read_index, refuse_impossible_sizes
 
 FLUSH_EVERY = 1.0
 """Seconds of wall time between flushes; GSD buffers, and what is not flushed dies with the process."""
 MOST_WAITING = 50
 """Frames that wait for a flush at most."""
-DAMAGED = "trajectory-damaged.gsd"
-"""Where a file goes that cannot be gone on with."""
 SINGLE_PER_GRAIN = 64
 """Bytes of a grain in a frame besides what is logged."""
 
@@ -36,15 +35,18 @@ class TrajectoryWriter:
         path: of the file; made if missing.
         resume_at: number of the step from which an existing file is gone on with: later frames it holds already are not
             written twice, but those that are not whole are dropped, and so is what turns out to be of another history.
+        written: steps of the frames that the run has written up to that step.
 
     Raises:
         FilesFailed: the file cannot be written.
 
-    A file that is beyond mending is moved aside, with a warning: frames are for looking, the checkpoint is what counts.
+    A file that is beyond mending is moved aside, and of one that has lost frames a copy is kept, with a warning: frames
+    are for looking, the checkpoint is what counts.
     """
 
-    def __init__(self, path: Path, resume_at: int | None = None):
+    def __init__(self, path: Path, resume_at: int | None = None, written: Sequence[float] = ()):
         self.path = path
+        self._file: Any = None  # closed between runs
         self._there: dict[int, tuple[int, int]] = {}  # later frames: number and check sum by step
         self._last = self._whole_until = -1 if resume_at is None else resume_at  # steps: of the last frame, and flush
         self._lost = False  # given up after an error
@@ -54,11 +56,12 @@ class TrajectoryWriter:
         try:
             if resume_at is not None and path.exists():
                 try:
-                    self._there = mend(path, resume_at)
+                    self._there, lost = mend_or_keep(path, resume_at, written)
                 except (BadInput, RuntimeError):
-                    path.replace(path.with_name(DAMAGED))
-                    warnings.warn(f"{path} is beyond mending; it is now {DAMAGED}, and a new one begins", stacklevel=2)
-            self._file = _opened(path, resume_at is not None)
+                    lost = f"{path} is beyond mending; it is now {set_aside(path).name}, and a new one begins"
+                if lost:
+                    warnings.warn(lost, stacklevel=2)
+            self._file = _opened(path, resume_at is not None and path.exists())
             self._entries = len(read_index(path)[1])
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
@@ -79,11 +82,13 @@ class TrajectoryWriter:
             FilesFailed: the frame could not be written; earlier ones stay.
         """
         frame = stored_frame(step, time, grains, box, contacts, exact=exact)
-        if self._is_there(step, int(frame.log["crc32"][0])):
+        if self._is_there(step, code_of(frame)):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + CHUNKS
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
+            if self._file is None:
+                self._file = _opened(self.path, True)
             self._file.append(frame)
         except OSError as error:
             raise self._given_up(error) from error
@@ -98,9 +103,9 @@ class TrajectoryWriter:
             return True
         others = [place for place, _ in self._there.values()] + [number] * (number >= 0)
         if others:
-            self._file.close()
+            self.close()
             cut(self.path, min(others))
-            self._there, self._file = {}, _opened(self.path, True)
+            self._there = {}
         return False
 
     def flush(self, sync: bool = False) -> None:
@@ -109,11 +114,13 @@ class TrajectoryWriter:
         Raises:
             FilesFailed: frames since the last flush may be lost; earlier ones stay.
         """
+        if self._file is None:
+            return
         try:
             make_room(self.path, self._entries, self._pending)
             self._file.flush()
             if sync:
-                with open(self.path, "rb") as same:
+                with open(self.path, "r+b") as same:  # Windows syncs no file that is open for reading only
                     os.fsync(same.fileno())
         except OSError as error:
             raise self._given_up(error) from error
@@ -121,8 +128,9 @@ class TrajectoryWriter:
 
     def _given_up(self, error: OSError) -> FilesFailed:
         """Let the file go as it is on the disk."""
-        # GSD would write once more when its object dies, and spoil what is there (see `make_room`)
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
+        if self._file is not None:
+            # GSD would write once more when its object dies, and spoil what is there (see `make_room`)
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
         self._lost = True
         with contextlib.suppress(OSError, RuntimeError, BadInput):
             mend(self.path, self._whole_until)
@@ -135,15 +143,19 @@ class TrajectoryWriter:
                 self.flush()
 
     def close(self) -> None:
-        """Let the file go."""
-        self._file.close()
+        """Let the file go, so that it can be moved or removed on Windows, too; a further frame opens it again."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
 
 def _opened(path: Path, go_on: bool) -> Any:
     """The file to be written, from its beginning or its end."""
     import gsd.hoomd
 
-    return gsd.hoomd.open(str(path), "r+" if go_on and path.exists() else "w")
+    if not go_on:
+        path.touch()  # GSD makes files that others cannot read, but leaves the mode of one that exists
+    return gsd.hoomd.open(str(path), "r+" if go_on else "w")
 
 
 class Frames(FrameSequence):
@@ -169,6 +181,12 @@ class Frames(FrameSequence):
             raise
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             raise BadInput(f"{path} is not a trajectory of SAND ({error})") from error
+        if not len(self._file) and holds_data(self.path):
+            self._file.close()
+            raise BadInput(
+                f"{path} holds data but no frame: its index is damaged, or its first frame is just being written; "
+                "look again, or go on with 'sand resume'"
+            )
 
     def __len__(self) -> int:
         return len(self._file)

@@ -13,6 +13,7 @@ from ..core.grains import Grains
 from ..core.material import Material
 from ..files.checkpoint import newest_checkpoint
 from ..files.folder import CASE, TRAJECTORY, read_toml
+from ..files.lock import writing
 from ..files.trajectory import Frames
 from ..forces.base import FarForce
 from ..setup.frame import Start, from_frame
@@ -213,12 +214,16 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         options: passed on to `Simulation` (observers).
 
     Raises:
-        BadInput: no checkpoint, a damaged one, or a case that needs forces SAND does not know.
+        BadInput: no checkpoint, a damaged one, or a case that needs forces SAND does not know; or another process
+            writes to the folder.
     """
     place = Path(folder)
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
-    arrays, meta = newest_checkpoint(place)
+    if not any(place.glob("checkpoint-*.npz")):
+        raise BadInput(f"{place} holds no checkpoint to go on from")
+    with writing(place):
+        arrays, meta = newest_checkpoint(place)
     case = _case_of_checkpoint(place, meta)
     names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
     library = case.materials_by_name()
@@ -236,6 +241,8 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         )
     except (KeyError, IndexError) as error:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
+    if (grains.arrays.material != part["material"]).any():
+        raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
     simulation = Simulation(
         grains,
         case.forces.build(),

@@ -13,6 +13,7 @@ from ..analysis.clusters import cluster_labels
 from ..core.errors import BadInput
 from ..files import folder as files
 from ..files.export import export_frames
+from ..files.ledger import read_ledger
 from ..files.trajectory import Frame, Frames
 from ..setup.frame import from_frame
 from .case import read_case
@@ -52,7 +53,7 @@ class Opened:
     @cached_property
     def ledger(self) -> dict[str, np.ndarray]:
         """Columns of the ledger by name (K,), SI.  Raises BadInput."""
-        books = Books.of(files.read_ledger(self.folder / files.LEDGER))
+        books = Books.of(read_ledger(self.folder / files.LEDGER))
         return {name: books[name] for name in books.columns}
 
     @cached_property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import platform
 import time as wall
@@ -9,11 +10,15 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..core.errors import BadInput, FilesFailed
 from ..core.jit import cache_folder
 from ..core.world import CLOCK, COUNT, LOST, STAGE
 from ..files import folder as files
-from ..files.checkpoint import write_checkpoint
-from ..files.folder import LedgerFile, make_folder, read_ledger, write_json, write_toml
+from ..files.checkpoint import checkpoint_name, write_checkpoint
+from ..files.damaged import sealed
+from ..files.folder import make_folder, plain, read_json, write_json, write_toml
+from ..files.ledger import LedgerFile, keep_if_damaged, read_ledger
+from ..files.lock import FolderLock
 from ..files.trajectory import TrajectoryWriter
 from .outcome import Result
 
@@ -34,6 +39,8 @@ class Record:
         out: the folder.
         overwrite: an earlier run's files in it may be replaced.
         resumed: the folder is that of the run itself, which goes on.
+
+    A lock keeps all others from writing to the folder during each `run`, from `open` to `release`.
     """
 
     def __init__(self, out: str | Path, overwrite: bool = False, resumed: bool = False):
@@ -44,11 +51,25 @@ class Record:
         self._saved, self._took = wall.monotonic(), 0.0
         self._ends = (math.inf, math.inf)
         self._case: dict[str, Any] = {}
+        self._lock: FolderLock | None = None
+        self._known = self._on_disk() if resumed else {}
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
-        """Begin or go on with the files; called by each `run` with its end."""
+        """Begin or go on with the files; called by each `run` with its end.
+
+        Raises:
+            BadInput: another process or simulation writes to the folder, or has written to it since this one did.
+            FilesFailed: nothing can be written.
+        """
         from .build import case_of
 
+        lock = FolderLock(self.folder)
+        try:
+            self._refuse_others_files(simulation.steps)
+        except BadInput:
+            lock.release()
+            raise
+        self._lock = lock
         if (until, last_step) != self._ends:
             self._ends = (until, last_step)
             self._case = case_of(simulation, until, last_step)
@@ -56,12 +77,53 @@ class Record:
             write_toml(self.folder / files.CASE, self._case, text)
         if self._trajectory is not None:
             return
+        if self._resumed:
+            self._look_at_earlier(simulation)
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         steps = simulation.steps if self._resumed else None
-        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, steps)
+        self._trajectory = TrajectoryWriter(
+            self.folder / files.TRAJECTORY, steps, [row["step"] for row in simulation.ledger.rows]
+        )
         if not self._resumed:
             self._frame(simulation)
         self.save(simulation)
+
+    def release(self) -> None:
+        """Let others write to the folder; `open` takes the lock again."""
+        if self._lock is not None:
+            self._known = self._on_disk()
+            self._lock.release()
+            self._lock = None
+
+    def _on_disk(self) -> dict[str, tuple[int, int]]:
+        """Size and time of each checkpoint, by which those of others are told."""
+        found = {}
+        for path in self.folder.glob("checkpoint-*.npz"):
+            with contextlib.suppress(OSError):
+                found[path.name] = (path.stat().st_size, path.stat().st_mtime_ns)
+        return found
+
+    def _refuse_others_files(self, steps: int) -> None:
+        """Raises BadInput if the folder holds what this simulation, which has taken so many steps, did not write."""
+        found, first = self._on_disk(), self._trajectory is None
+        begun = self._resumed or not first
+        strange = any(self._known.get(name) != seen for name, seen in found.items())
+        if first and self._resumed:  # someone may have gone on since the checkpoint was read
+            strange |= bool(found) and max(found) != checkpoint_name(steps)
+        if strange or (not begun and (self.folder / files.TRAJECTORY).exists()):
+            told = "go on from what it left with sand.resume" if begun else "give another folder"
+            raise BadInput(f"another run has written to {self.folder} since this simulation was made; {told}")
+
+    def _look_at_earlier(self, simulation: Simulation) -> None:
+        """Of a run that goes on: keep a ledger that was damaged, drop a summary of steps that are taken again."""
+        try:
+            keep_if_damaged(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
+            with contextlib.suppress(BadInput):
+                steps = read_json(self.folder / files.SUMMARY).get("steps")
+                if isinstance(steps, int) and steps > simulation.steps:
+                    (self.folder / files.SUMMARY).unlink()
+        except OSError as error:
+            raise FilesFailed(f"cannot write to folder {self.folder}: {error.strerror}") from error
 
     def earlier_rows(self, steps: int) -> list[dict[str, float]]:
         """The rows of the ledger file up to a step, where the checkpoint has none."""
@@ -103,7 +165,7 @@ class Record:
             "wall_seconds": simulation.wall_seconds,
             "temperature": simulation.temperature,
             "choices": simulation.choices,
-            "case": files.plain(self._case),
+            "case": plain(self._case),
             "ledger": simulation.ledger.columns,
             "clock": CLOCK,
             "count": COUNT,
@@ -126,9 +188,12 @@ class Record:
             self._trajectory.rescue()
 
     def close(self, simulation: Simulation, result: Result) -> None:
-        """Checkpoint, summary and figure; the trajectory stays open for a further `run`."""
+        """Checkpoint, summary and figure; a further `run` opens the trajectory again."""
         self.save(simulation)
-        write_json(self.folder / files.SUMMARY, summary_of(simulation, result))
+        if self._trajectory is not None:
+            self._trajectory.close()
+        summary = summary_of(simulation, result) | (self._ledger.described() if self._ledger else {})
+        write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
         if simulation.ledger.rows:
             from ..view.figure import run_figure, save
 

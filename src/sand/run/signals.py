@@ -7,9 +7,12 @@ import threading
 from types import FrameType
 from typing import Any
 
+STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name))
+"""Signals that ask a program to stop; SIGBREAK is Ctrl-Break of Windows, the one that other programs can send there."""
+
 
 class Signals:
-    """While the block runs, SIGINT and SIGTERM are only noted; a second one acts as usual.
+    """While the block runs, these signals are only noted; a second one acts as usual.
 
     Outside the main thread Python cannot catch signals, and nothing is changed.
     """
@@ -20,7 +23,7 @@ class Signals:
 
     def __enter__(self) -> Signals:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in STOPS:
                 if signal.getsignal(number) is not signal.SIG_IGN:  # as in a background job of a shell
                     self._before[number] = signal.signal(number, self._note)
         return self

@@ -94,8 +94,7 @@ class Simulation:
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
         self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
         self.temperature = kinetic_temperature(grains)
-        columns = [force.column for force, _, _ in self._engine.far] + [f.name for f in self._engine.outside]
-        self.ledger = Ledger(columns)
+        self.ledger = Ledger([*(f.column for f, _, _ in self._engine.far), *(f.name for f in self._engine.outside)])
         self.record = Record(out, overwrite, resumed=restart is not None) if out is not None else None
         self.wall_seconds = 0.0
         self._begun = restart is not None
@@ -212,6 +211,9 @@ class Simulation:
                 self.record.rescue()
             self._broken = f"its files could not be written ({error}); go on with sand.resume, or start again"
             raise
+        finally:
+            if self.record:
+                self.record.release()
 
     def view(self, path: str | Path | None = None) -> Any:
         """The grains in motion: a widget in a notebook with anywidget, else a page, opened if there is a browser.

@@ -9,6 +9,7 @@ from typing import Any
 from ..analysis.books import Books
 from ..core.errors import BadInput
 from ..files import folder as files
+from ..files.ledger import read_rows
 
 STALE = 3600.0
 """Seconds without a frame after which a run that has not ended may be one that was killed."""
@@ -31,19 +32,26 @@ def run_folder(place: str | Path) -> Path | None:
     return place.parent if place.name == files.TRAJECTORY and (place.parent / files.CASE).exists() else None
 
 
+PROBLEM = "problem"
+"""Key of what is to be said of a summary that cannot be read."""
+
+
 def summary_of(folder: Path) -> Mapping[str, Any] | None:
-    """How a run ended; None while it has not."""
+    """How a run ended; None while it has not; what is wrong, under PROBLEM, where that cannot be read."""
     try:
-        return files.read_json(folder / files.SUMMARY)
-    except BadInput:
-        return None
+        return files.read_json(folder / files.SUMMARY) if (folder / files.SUMMARY).exists() else None
+    except BadInput as error:
+        return {PROBLEM: str(error)}
 
 
 class RunBooks:
-    """The ledger of a run, read again when it has changed; None while there is none."""
+    """The ledger of a run, read again when it has changed; None while there is none, or none that can be read.
+
+    `problem` says what is wrong with it, if anything is.
+    """
 
     def __init__(self, folder: Path):
-        self._path = folder / files.LEDGER
+        self._path, self.problem = folder / files.LEDGER, ""
         self._known: tuple[tuple[int, int], Books | None] = ((0, 0), None)
 
     def __call__(self) -> Books | None:
@@ -51,7 +59,11 @@ class RunBooks:
             found = self._path.stat()
             stamp = (found.st_size, found.st_mtime_ns)
             if stamp != self._known[0]:
-                self._known = (stamp, Books.of(files.read_ledger(self._path)))
-        except (OSError, BadInput):
+                self._known = (stamp, None)
+                rows, self.problem = read_rows(self._path)
+                self._known = (stamp, Books.of(rows))
+        except OSError:
             return None
+        except BadInput as error:
+            self.problem = str(error)
         return self._known[1]

@@ -19,7 +19,7 @@ from . import dimensions
 from .packets import frame_bytes, frame_packet, grains_packet
 from .palettes import colours, palettes
 from .ranges import ranges_of
-from .run_files import RunBooks, killed_note, run_folder, summary_of
+from .run_files import PROBLEM, RunBooks, killed_note, run_folder, summary_of
 from .series import of_frames, of_ledger
 from .style import BIG
 
@@ -163,7 +163,9 @@ class Story:
         torn = self.frames.torn
         left = [f"{torn} frame{'s' if torn > 1 else ''} at the end left out: not whole"] if torn else []
         silent = killed_note(self.frames.age) if self._ended is None else ""
-        return [*self.notes, *left, *([silent] if silent else [])]
+        self._books()  # looks whether the ledger is as it should be
+        wrong = [getattr(self._books, "problem", ""), (self._ended or {}).get(PROBLEM, "")]
+        return [*self.notes, *left, *(text for text in (silent, *wrong) if text)]
 
     @property
     def size(self) -> int:

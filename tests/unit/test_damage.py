@@ -1,0 +1,304 @@
+"""Files of a run that were changed or cut: said in a line, kept beside, and no other number is ever read from them."""
+
+import json
+import random
+import shutil
+import warnings
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.core.box import Box
+from sand.files import folder as files
+from sand.files.damaged import sealed
+from sand.files.following import Following
+from sand.files.gsd_index import ENTRY, read_index
+from sand.files.ledger import LedgerFile, keep_if_damaged, read_ledger
+from sand.files.trajectory import Frames, TrajectoryWriter, read_frames
+from sand.view.story import story_of
+
+from .reels import contacts_of, grains_of, reel
+
+COLUMNS = ("step", "time", "translation", "normal", "lost_forming", "total", "momentum_x", "contacts")
+
+
+def rows_of(count):
+    """Rows of a ledger like those of a run."""
+    rng = np.random.default_rng(1)
+    rows = []
+    for k in range(count):
+        energies = {name: float(v) for name, v in zip(COLUMNS[2:5], rng.normal(size=3) * 1e-18, strict=True)}
+        row = {"step": 60 * k, "time": 1e-12 * k, **energies}
+        rows.append(
+            {**row, "total": float(np.sum(list(energies.values()))), "momentum_x": 1e-25 * k, "contacts": k % 7}
+        )
+    return rows
+
+
+def ended_run(folder, count=40):
+    """ledger.csv and summary.json of a run that has ended."""
+    folder.mkdir(exist_ok=True)
+    file = LedgerFile(folder / files.LEDGER, COLUMNS, rows_of(count)[:3])
+    for row in rows_of(count)[3:]:
+        file.append(row)
+    content = {"outcome": "finished", "time": 1.5e-9, "steps": 60 * (count - 1), "drift": 3.2e-5, "choices": {"a": "b"}}
+    files.write_json(folder / files.SUMMARY, sealed(files.plain(content | file.described())))
+    return rows_of(count)
+
+
+def read_with_notes(read, path):
+    """What is read, and how many warnings came with it; None in place of what is refused in one line."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            found = read(path)
+        except sand.BadInput as error:
+            assert len(error.problems) == 1 and str(path.parent) in str(error)
+            return None, 0
+    return found, len(caught)
+
+
+@pytest.mark.parametrize(("name", "read"), [(files.LEDGER, read_ledger), (files.SUMMARY, files.read_json)])
+def test_changed_bytes_give_no_other_number(tmp_path, name, read):
+    """Each of 800 changed bytes: refused, or a note, or the same numbers."""
+    ended_run(tmp_path)
+    path, rng = tmp_path / name, random.Random(3)
+    good, whole = path.read_bytes(), read(path)
+    refused = 0
+    for _ in range(800):
+        bad = bytearray(good)
+        bad[rng.randrange(len(bad))] = rng.choice(b'0123456789.,-e\n" x\x00\xff')
+        path.write_bytes(bad)
+        found, notes = read_with_notes(read, path)
+        refused += found is None
+        if name == files.SUMMARY and found is not None:
+            numbers = {key: value for key, value in whole.items() if key in found}
+            assert all(found[key] == value for key, value in numbers.items()) and len(numbers) >= len(whole) - 1
+        else:
+            assert found in (None, whole) or notes, bytes(bad)
+    assert refused > 600
+
+
+def test_a_run_that_goes_on_is_checked_by_its_rows(tmp_path):
+    """Without a summary a digit of an energy, a step or a column more is noticed; a torn last row is no fault."""
+    ended_run(tmp_path)
+    (tmp_path / files.SUMMARY).unlink()
+    path = tmp_path / files.LEDGER
+    good = path.read_text()
+    lines = good.splitlines()
+    parts = lines[5].split(",")
+    for changed, said in (
+        (lambda: [*parts[:2], str(2 * float(parts[2])), *parts[3:]], "total = .*columns add up to"),
+        (lambda: ["60", *parts[1:]], "steps and times must grow"),
+        (lambda: [*parts[:-1], parts[-1] + ".0"], "contacts = "),
+        (lambda: [*parts[:2], parts[2].replace("e", "E"), *parts[3:]], "no run writes"),
+        (lambda: [*parts, "1"], "has 9 columns, not 8"),
+        (lambda: [*parts[:2], "nan", *parts[3:]], "not finite"),
+        (lambda: [*parts[:2], "x", *parts[3:]], "not a number"),
+    ):
+        path.write_text("\n".join([*lines[:5], ",".join(changed()), *lines[6:]]) + "\n")
+        with pytest.raises(sand.BadInput, match=f"row 5 .*{said}"):
+            read_ledger(path)
+    path.write_text(good[:-20])
+    assert read_with_notes(read_ledger, path) == (rows_of(40)[:-1], 0)
+    path.write_text(
+        "\n".join([*lines[:-1], ",".join([*lines[-1].split(",")[:2], "nan", "1.0", "1.0", "nan", "0.0", "1"])]) + "\n"
+    )
+    assert np.isnan(read_ledger(path)[-1]["total"])  # the last row of a run that the physics stopped
+
+
+def test_a_ledger_that_ends_early_and_one_that_goes_on(tmp_path):
+    """Half of it: a note. More than the summary counts, of a run that was resumed: nothing. A missing row: a note."""
+    rows = ended_run(tmp_path)
+    path = tmp_path / files.LEDGER
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:21]))
+    with pytest.warns(UserWarning, match=r"ledger\.csv has 20 of the 40 rows that the run had written"):
+        assert read_ledger(path) == rows[:20]
+    path.write_text("".join(lines[:7] + lines[8:]))
+    with pytest.warns(UserWarning, match="39 of the 40 rows"):
+        read_ledger(path)
+    path.write_text("".join(lines) + lines[-1].replace("2340,", "2400,"))
+    assert read_with_notes(read_ledger, path)[1] == 0
+    assert len(read_ledger(path)) == 41
+    path.write_text(
+        "".join(lines).replace("1.9000000000000002e-24", "1.9000000000000001e-24").replace(",1.9e-24", ",1.8e-24")
+    )
+    with pytest.raises(sand.BadInput, match=r"as the digest in summary\.json tells"):
+        read_ledger(path)
+
+
+def test_a_ledger_from_which_a_run_does_not_go_on_is_kept(tmp_path):
+    """Before it is written anew from a checkpoint; one that merely is shorter, or longer, is not."""
+    rows = ended_run(tmp_path)
+    path, aside = tmp_path / files.LEDGER, tmp_path / "ledger.csv.damaged"
+    good = path.read_text()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for text in (good, good[:-30], good + "7,torn", good[: len(good) // 2]):
+            path.write_text(text)
+            keep_if_damaged(path, COLUMNS, rows)
+    keep_if_damaged(path, COLUMNS, rows[:20])
+    bad = good[:900] + "7" + good[901:]
+    for number in ("", "-2"):
+        path.write_text(bad)
+        with pytest.warns(UserWarning, match=rf"ledger\.csv did not hold .*now ledger\.csv\.damaged{number}"):
+            keep_if_damaged(path, COLUMNS, rows)
+        assert aside.with_name(aside.name + number).read_text() == bad and not path.exists()
+
+
+@pytest.fixture
+def run(looked_at, tmp_path):
+    """A copy of a finished run."""
+    return shutil.copytree(looked_at[0], tmp_path / "run")
+
+
+def test_readers_of_a_run_say_so(run, capsys):
+    """A changed ledger and summary: `sand.open`, `sand info`, `sand plot` and the page; half a ledger: a note."""
+    ledger, summary = run / files.LEDGER, run / files.SUMMARY
+    known = json.loads(summary.read_text())
+    assert known["ledger_rows"] == 6 and len(known["ledger_sha256"]) == len(known["sha256"]) == 64
+    lines = ledger.read_text().splitlines(keepends=True)
+    ledger.write_text("".join(lines[:4]))
+    with pytest.warns(UserWarning, match="3 of the 6 rows"):
+        assert len(sand.open(run).ledger["step"]) == 3
+    for words in (["info", str(run)], ["plot", str(run), "--what", "energies"]):
+        assert main(words) == 0
+        said = capsys.readouterr().err.strip().splitlines()
+        assert len(said) == 1 and "note:" in said[0] and "3 of the 6 rows" in said[0]
+    assert "3 of the 6 rows" in story_of(run).manifest()["note"]
+    ledger.write_text("".join([*lines[:3], lines[3].replace("5", "6"), *lines[4:]]))
+    for words in (["info", str(run)], ["plot", str(run), "--what", "energies", "--overwrite"]):
+        assert main(words) == 2
+        assert "ledger.csv is damaged: row 3" in capsys.readouterr().err
+    assert "ledger.csv is damaged" in story_of(run).manifest()["note"]
+    ledger.write_text("".join(lines))
+    summary.write_text(summary.read_text().replace('"steps": ', '"steps": 1'))
+    with pytest.raises(sand.BadInput, match=r"summary\.json is damaged"):
+        sand.open(run).summary  # noqa: B018
+    assert main(["info", str(run)]) == 2
+    assert "summary.json is damaged" in capsys.readouterr().err
+    assert "summary.json is damaged" in story_of(run).manifest()["note"]
+
+
+def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
+    """`sand resume` names it, and the older one it goes on from; the file is there under another name."""
+    old, new = sorted(run.glob("checkpoint-*.npz"))
+    bad = bytearray(new.read_bytes())
+    bad[len(bad) // 2] ^= 1
+    new.write_bytes(bad)
+    with pytest.warns(
+        UserWarning, match=f"{new.name} is .*now {new.name}.damaged, and the run goes on from {old.name}"
+    ):
+        assert sand.resume(run).steps == int(old.stem.split("-")[1])
+    assert not new.exists() and new.with_name(f"{new.name}.damaged").read_bytes() == bytes(bad)
+    sand.Simulation(grains_of(2), out=run, overwrite=True)
+    assert not list(run.glob("*.damaged"))
+
+
+def test_every_entry_of_an_index_that_is_damaged(tmp_path):
+    """Of 40 frames, 30 up to the checkpoint: if some of these are lost it is said and the file kept; else neither."""
+    good = reel(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)
+    place, entries = read_index(good)
+    written, rng = [10 * k for k in range(41)], random.Random(5)
+    told = 0
+    for number in sorted(rng.sample(range(len(entries)), 40)):
+        for field, value in (("location", 0), ("location", 2**40), ("frame", 2**33), ("type", 200)):
+            path = tmp_path / f"{number}-{field}-{value}" / "trajectory.gsd"
+            path.parent.mkdir()
+            bad = entries.copy()
+            bad[number][field] = value
+            content = bytearray(good.read_bytes())
+            content[place : place + len(entries) * ENTRY.itemsize] = bad.tobytes()
+            path.write_bytes(content)
+            with pytest.raises(sand.BadInput):
+                Frames(path)
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                TrajectoryWriter(path, 290, written).close()
+            steps = [frame.step for frame in read_frames(path)]
+            assert steps == written[: len(steps)]
+            lost = max(30 - len(steps), 0)
+            kept = list(path.parent.glob("*.damaged*"))
+            assert len(caught) == len(kept) == (lost > 0)
+            if not steps:
+                assert "beyond mending; it is now trajectory.gsd.damaged" in str(caught[0].message)
+                assert kept[0].read_bytes() == bytes(content)
+            elif lost:
+                assert f"{lost} of its 30 frames are lost; as it was it is now trajectory.gsd.damaged" in str(
+                    caught[0].message
+                )
+                assert kept[0].read_bytes() == bytes(content)
+                TrajectoryWriter(path, 290, written).close()  # what was told once is not told again
+                told += 1
+            shutil.rmtree(path.parent)
+    assert told > 40
+
+
+def test_data_without_a_frame(tmp_path):
+    """An index that names nothing, of a file that holds something: an error; mended and kept."""
+    path = reel(tmp_path / "trajectory.gsd", [[(0, 1)]] * 5, 3)
+    place, entries = read_index(path)
+    with open(path, "r+b") as file:
+        file.seek(place)
+        file.write(bytes(len(entries) * ENTRY.itemsize))
+    for read in (read_frames, Following, Frames):
+        with pytest.raises(sand.BadInput, match="holds data but no frame"):
+            read(path)
+    with pytest.warns(UserWarning, match=r"beyond mending; it is now trajectory\.gsd\.damaged"):
+        TrajectoryWriter(path, 40, [0, 10, 20, 30, 40]).close()
+    assert read_frames(path) == []
+    empty = tmp_path / "empty.gsd"
+    TrajectoryWriter(empty).close()
+    assert read_frames(empty) == []
+
+
+def test_step_and_materials_are_inside_the_check(tmp_path):
+    """Other numbers there are refused, frame by frame; a file whose check leaves them out is read as before."""
+    import gsd.hoomd
+
+    path = reel(tmp_path / "new.gsd", [[(0, 1)]] * 3, 3)
+    with gsd.hoomd.open(str(path), "r") as file:
+        frames = [file[k] for k in range(3)]
+    for change, number in (("step", 1), ("types", 0), ("early", 2)):
+        other = tmp_path / f"{change}.gsd"
+        with gsd.hoomd.open(str(other), "w") as file:
+            for k, frame in enumerate(frames):
+                step, types = frame.configuration.step, frame.particles.types
+                if change == "step" and k == number:
+                    frame.configuration.step = step + 5
+                if change == "types":
+                    frame.particles.types = ["silica"]
+                if change == "early":
+                    frame.log["crc32"] = frame.log["crc32"][:1]
+                file.append(frame)
+                frame.configuration.step, frame.particles.types = step, types
+        if change == "early":
+            assert [frame.step for frame in read_frames(other)] == [0, 10, 20]
+            with gsd.hoomd.open(str(other), "r") as file:
+                spoilt = file[1]
+            spoilt.particles.velocity = spoilt.particles.velocity + 1.0
+            with gsd.hoomd.open(str(other), "r+") as file:
+                file.append(spoilt)
+            number = 3
+        with pytest.raises(sand.BadInput, match="check sum"):
+            Frames(other)[number]
+
+
+def test_an_early_file_is_gone_on_with(tmp_path):
+    """Frames with the new check behind those with the old one: all are read."""
+    import gsd.hoomd
+
+    path = reel(tmp_path / "a.gsd", [[(0, 1)]] * 2, 3)
+    with gsd.hoomd.open(str(path), "r") as file:
+        frames = [file[k] for k in range(2)]
+    with gsd.hoomd.open(str(path), "w") as file:
+        for frame in frames:
+            frame.log["crc32"] = frame.log["crc32"][:1]
+            file.append(frame)
+    writer = TrajectoryWriter(path, 10, [0, 10])
+    writer.write(20, 2e-12, grains_of(3, 2), Box.periodic(1e-6), contacts_of([(0, 1)], 2))
+    writer.close()
+    assert [frame.step for frame in read_frames(path)] == [0, 10, 20]

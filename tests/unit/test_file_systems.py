@@ -1,0 +1,145 @@
+"""What files need of the system: modes, the sync of folders, room on the disk; where Windows and macOS differ."""
+
+import errno
+import os
+import shutil
+import stat
+import sys
+
+import numpy as np
+import pytest
+
+import sand
+from sand.core.errors import FilesFailed
+from sand.experiments.executors import MOST_ON_WINDOWS, executor_for
+from sand.files.bodies import contacts_of
+from sand.files.checkpoint import write_checkpoint
+from sand.files.folder import make_folder, replace_file, write_json
+from sand.files.gsd_index import make_room
+from sand.files.ledger import LedgerFile
+from sand.files.trajectory import TrajectoryWriter, read_frames
+
+from ..systems import keeps_modes
+
+GRAINS = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica")
+
+
+def add_frame(writer, step):
+    writer.write(step, 1e-9 * step, GRAINS, sand.Box.open(), contacts_of(GRAINS))
+
+
+@keeps_modes
+@pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
+def test_all_files_of_a_run_are_readable_by_the_same_people(tmp_path, mask):
+    """Each has 0666 less the umask: GSD by itself takes 0660, so that others could read all but the frames."""
+    before = os.umask(mask)
+    try:
+        writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
+        add_frame(writer, 0)
+        writer.close()
+        LedgerFile(tmp_path / "ledger.csv", ["step"])
+        write_json(tmp_path / "summary.json", {})
+        write_checkpoint(tmp_path, {"clock": np.zeros(3)}, {"steps": 1})
+    finally:
+        os.umask(before)
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}
+    assert len(modes) == 4
+    assert set(modes.values()) == {0o666 & ~mask}, modes
+
+
+def test_a_closed_trajectory_goes_on_with_the_next_frame(tmp_path):
+    """Between runs the file is closed, so that Windows lets it be moved or removed; no frame is lost."""
+    writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
+    for step in range(4):
+        add_frame(writer, step)
+        writer.close()
+        writer.flush(sync=True)
+    assert [frame.step for frame in read_frames(tmp_path / "trajectory.gsd")] == [0, 1, 2, 3]
+    (tmp_path / "trajectory.gsd").unlink()
+    with pytest.raises(FilesFailed, match=r"cannot write .*trajectory\.gsd"):
+        add_frame(writer, 4)
+    assert not (tmp_path / "trajectory.gsd").exists()
+
+
+@pytest.mark.parametrize("code", [errno.EINVAL, errno.EBADF, errno.EACCES])
+def test_folders_that_cannot_be_synced(tmp_path, monkeypatch, code):
+    """Some file systems refuse the sync of a folder, which is no reason to refuse the file."""
+    plain = os.fsync
+
+    def sync(number):
+        if stat.S_ISDIR(os.fstat(number).st_mode):
+            raise OSError(code, os.strerror(code))
+        plain(number)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    replace_file(tmp_path / "a.json", b"{}")
+    assert (tmp_path / "a.json").read_bytes() == b"{}"
+
+
+def test_folders_that_cannot_be_opened(tmp_path, monkeypatch):
+    """Windows opens no folder: the file is written all the same."""
+    plain = os.open
+
+    def opened(path, *words, **options):
+        if os.path.isdir(path):
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return plain(path, *words, **options)
+
+    monkeypatch.setattr(os, "open", opened)
+    replace_file(tmp_path / "a.json", b"{}")
+    assert (tmp_path / "a.json").read_bytes() == b"{}"
+
+
+def test_an_error_of_the_disk_is_not_passed_over(tmp_path, monkeypatch):
+    """EIO while a folder is synced is an error of the disk."""
+    plain = os.fsync
+
+    def sync(number):
+        if not stat.S_ISREG(os.fstat(number).st_mode):
+            raise OSError(errno.EIO, "Input/output error")
+        plain(number)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    if os.name != "nt":
+        with pytest.raises(FilesFailed, match="Input/output error"):
+            replace_file(tmp_path / "a.json", b"{}")
+
+
+def test_a_full_disk_without_posix_fallocate(tmp_path, monkeypatch):
+    """macOS and Windows do not have it: the free space of the disk is asked for instead."""
+    writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
+    add_frame(writer, 0)
+    writer.close()
+    size = (tmp_path / "trajectory.gsd").stat().st_size
+    monkeypatch.delattr(os, "posix_fallocate", raising=False)
+    make_room(tmp_path / "trajectory.gsd", 40, 1000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(100, 90, 10))
+    with pytest.raises(OSError, match="No space left") as error:
+        make_room(tmp_path / "trajectory.gsd", 40, 1000)
+    assert error.value.errno == errno.ENOSPC
+    assert (tmp_path / "trajectory.gsd").stat().st_size == size
+
+
+def test_overwriting_a_run_that_is_looked_at(tmp_path, monkeypatch):
+    """Windows removes no file that another program has open: then no other file is removed either."""
+    names = {"case.toml", "trajectory.gsd", "summary.json"}
+    for name in names:
+        (tmp_path / name).write_text("{}", encoding="utf-8")
+    plain = os.unlink
+
+    def unlink(path, *words, **options):
+        if str(path).endswith(".gsd"):
+            raise PermissionError(errno.EACCES, "The process cannot access the file")
+        plain(path, *words, **options)
+
+    monkeypatch.setattr(os, "unlink", unlink)
+    with pytest.raises(FilesFailed, match="cannot access the file"):
+        make_folder(tmp_path, overwrite=True)
+    assert names <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_too_many_processes_for_windows(monkeypatch):
+    """Said in a line, where `concurrent.futures` raises ValueError."""
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(sand.BadInput, match="at most 61"), executor_for(MOST_ON_WINDOWS + 1):
+        pass

@@ -1,0 +1,56 @@
+"""Every copy of the page carries the licences of what is bundled in it."""
+
+import re
+
+import pytest
+
+from sand.core.errors import BadInput
+from sand.files.page import PAGE, read_bundle
+from sand.view.page import write_page
+from sand.view.story import story_of
+
+from .reels import reel
+
+HOLDERS = {
+    "three": "three.js authors",
+    "fflate": "Arjun Barrett",
+    "uplot": "Leon Sorokin",
+    "SAND, grainview": "The SAND developers",
+}
+
+
+@pytest.fixture(scope="module")
+def bundle():
+    """Script and sheet of styles as they were built."""
+    try:
+        return read_bundle()
+    except BadInput as why:
+        pytest.skip(str(why))
+
+
+def licences_in(text):
+    """The comment that a script or sheet begins with."""
+    found = re.match(r"/\*!\n(.*?)\*/\n", text, re.DOTALL)
+    assert found, f"no licences at the beginning of {text[:60]!r}; build the page again"
+    return found[1]
+
+
+def test_script_and_styles_begin_with_the_licences(bundle):
+    """Name, version, copyright and the whole text of each package; the sheet has styles of uPlot alone."""
+    script, sheet = (licences_in(part) for part in bundle)
+    for name, holder in HOLDERS.items():
+        assert re.search(rf"^{name} [0-9(]", script, re.MULTILINE), name
+        assert re.search(rf"^Copyright .*{re.escape(holder)}$", script, re.MULTILINE), holder
+    assert script.count("Permission is hereby granted") == script.count("OTHER DEALINGS IN") == 3
+    assert "Redistribution and use in source and binary forms" in script
+    assert "Leon Sorokin" in sheet and "OTHER DEALINGS IN" in sheet
+    assert (PAGE / "licences.txt").read_text("utf-8") == script
+
+
+def test_a_file_to_send_carries_them(bundle, tmp_path):
+    """`sand view --html` puts script and sheet into the file, and their first comments with them."""
+    reel(tmp_path / "a.gsd", [[(0, 1)], []], 3)
+    write_page(story_of(tmp_path / "a.gsd"), tmp_path / "a.html", bundle=bundle)
+    text = (tmp_path / "a.html").read_text("utf-8")
+    for part in bundle:
+        assert licences_in(part) in text

@@ -1,0 +1,167 @@
+"""One writer for a folder: others are refused in a line, whoever they are; a kill lets go."""
+
+import errno
+import subprocess
+import sys
+import warnings
+
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.core.errors import FilesFailed
+from sand.files import lock as lock_files
+from sand.files.folder import make_folder
+from sand.files.lock import LOCK, FolderLock, writing
+from sand.run.observers import Observer
+
+from ..physics.setups import struck_chain
+
+HOLD = (
+    "import sys; from pathlib import Path; from sand.files.lock import FolderLock\n"
+    "held = FolderLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()\n"
+)
+
+
+@pytest.fixture
+def held(tmp_path):
+    """A folder that holds a file and that another process writes to; and that process."""
+    (tmp_path / "case.toml").write_text("")
+    job = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert job.stdout.readline() == "held\n"
+    yield tmp_path, job
+    job.kill()
+    job.communicate()
+
+
+def test_another_process_is_named_and_a_kill_lets_go(held):
+    """Refused with the number of the process, again and again; when it is killed the system releases the lock."""
+    folder, job = held
+    for _ in range(2):
+        with pytest.raises(sand.BadInput, match=rf"another process \(pid {job.pid}\) writes to {folder}"):
+            FolderLock(folder)
+    job.kill()
+    job.wait()
+    with writing(folder):
+        pass
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["resume"], ["run", "CASE", "--out"], ["run", "CASE", "--overwrite", "--out"], ["scatter", "CASE", "--out"]],
+)
+def test_commands_end_with_a_line(held, tmp_path, capsys, words):
+    """Exit code 2, one line; the files stay as they are."""
+    folder, job = held
+    case = tmp_path.parent / f"{tmp_path.name}.toml"
+    if words[0] == "run":
+        case.write_text(
+            '[run]\nuntil = "1 ns"\n[box]\nperiodic = "1 um"\n[grains]\nkind = "gas"\nnumber = 2\nradius = "10 nm"\n'
+            'material = "silica"\ntemperature = "1 K"\n[forces.contact]\n'
+        )
+    else:
+        case.write_text(
+            '[projectile]\nradius = "10 nm"\nmaterial = "iron"\n[flight]\nspeed = "1 m/s"\nstart = "100 nm"\n'
+            '[measure]\njob = "trajectories"\nimpact_parameters = ["0 nm"]\n'
+        )
+    (folder / "checkpoint-000000000000001.npz").write_bytes(b"")
+    assert main([*(str(case) if word == "CASE" else word for word in words), str(folder)]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1 and f"another process (pid {job.pid}) writes to {folder}" in said[0]
+    assert sorted(path.name for path in folder.iterdir()) == [LOCK, "case.toml", "checkpoint-000000000000001.npz"]
+
+
+def test_what_a_lock_leaves_is_no_run(tmp_path):
+    """The lock file stays, with a number that says nothing once the lock is released; the folder counts as empty."""
+    with writing(tmp_path), pytest.raises(sand.BadInput, match="another simulation of this process"):
+        make_folder(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [LOCK]
+    assert make_folder(tmp_path) == tmp_path
+    (tmp_path / LOCK).write_text("\n4194305\n")
+    with writing(tmp_path):
+        pass
+
+
+def test_one_that_is_released_twice_and_a_folder_that_has_gone(tmp_path):
+    """The first is no error; the second is a line, and the folder is not made again."""
+    one = FolderLock(tmp_path)
+    one.release()
+    other = FolderLock(tmp_path)
+    one.release()
+    with pytest.raises(sand.BadInput):
+        FolderLock(tmp_path)
+    other.release()
+    with pytest.raises(FilesFailed, match="no such folder"):
+        FolderLock(tmp_path / "gone")
+    assert not (tmp_path / "gone").exists()
+
+
+def test_without_locks_a_run_goes_on_with_a_warning(tmp_path, monkeypatch):
+    """A network file system that knows none; a disk that is full is an error."""
+    import filelock
+
+    for number, raised in ((errno.ENOLCK, False), (errno.ENOSYS, False), (errno.ENOSPC, True)):
+
+        def fails(self, number=number):
+            raise OSError(number, "as it is there")
+
+        monkeypatch.setattr(filelock.FileLock, "_acquire", fails)
+        if raised:
+            with pytest.raises(FilesFailed, match="cannot write"):
+                FolderLock(tmp_path)
+        else:
+            with pytest.warns(UserWarning, match="has no locks: see that no other process"):
+                FolderLock(tmp_path).release()
+
+
+def test_a_number_that_cannot_be_read(held, monkeypatch):
+    """As on Windows, or while it is being written: the line does without it."""
+    monkeypatch.setattr(lock_files, "LOCK", LOCK)
+    (held[0] / LOCK).write_bytes(b"")
+    with pytest.raises(sand.BadInput, match="another process writes to"):
+        FolderLock(held[0])
+
+
+class Others(Observer):
+    """Tries to write to the folder of a run while it is on its way."""
+
+    def __init__(self, folder):
+        self.folder, self.said = folder, []
+
+    def see(self, simulation, row):
+        if self.said:
+            return
+        for attempt in (
+            lambda: sand.resume(self.folder),
+            lambda: sand.Simulation(simulation.start, simulation.forces, out=self.folder, overwrite=True),
+        ):
+            with pytest.raises(sand.BadInput) as error:
+                attempt()
+            self.said.append(str(error.value))
+
+
+def test_simulations_of_one_process(tmp_path):
+    """While one runs no other writes to its folder; afterwards another may, and then the first is refused."""
+    folder, setup = tmp_path / "run", struck_chain()
+    first = sand.Simulation(setup.grains, setup.forces, out=folder, frame_every="0.1 ns")
+    late = sand.Simulation(setup.grains, setup.forces, out=folder, frame_every="0.1 ns")
+    first.run(until="0.1 ns")
+    others = Others(folder)
+    first.observers.append(others)
+    first.run(until="0.2 ns")
+    assert len(others.said) == 2 and all("another simulation of this process" in said for said in others.said)
+    with pytest.raises(sand.BadInput, match=r"another run has written to .*give another folder"):
+        late.run(until="0.1 ns")
+    again, never = sand.resume(folder), sand.resume(folder)
+    again.run(until="0.3 ns")
+    for old in (first, never):
+        with pytest.raises(sand.BadInput, match=r"another run has written to .*sand\.resume"):
+            old.run(until="0.4 ns")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert again.run(until="0.4 ns").outcome is sand.Outcome.FINISHED
+        assert [row["step"] for row in again.ledger.rows] == sand.open(folder).ledger["step"].tolist()
+    with pytest.raises(sand.BadInput, match="another run"):  # refused once, refused again
+        first.run(until="0.4 ns")

@@ -1,0 +1,132 @@
+"""A checkpoint with a right check sum and impossible numbers: refused in a line before compiled code sees it."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.core.world import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
+from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.files.state import GOALS, NUMBERS, STORED, check_state
+
+REFERENCE = Path(__file__).parents[1] / "reference"
+ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))
+META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
+WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32)}
+FAR = 2**31 - 1
+"""An index that is none."""
+
+
+def refused(folder, arrays, meta=META):
+    """What is said of a checkpoint that is written with a right check sum."""
+    path = write_checkpoint(folder, arrays, dict(meta))
+    with pytest.raises(sand.BadInput) as error:
+        newest_checkpoint(folder)
+    said, last = error.value.problems
+    assert said.startswith(f"{path} cannot be gone on from: ") and "no checkpoint to go on from" in last
+    assert path.exists()
+    return said
+
+
+@pytest.mark.parametrize("version", range(1, VERSION + 1))
+def test_states_of_every_format_are_right(version):
+    """Nothing is wrong with what SAND has written so far."""
+    check_state(*read_checkpoint(next((REFERENCE / f"run-v{version}").glob("*.npz"))))
+
+
+def test_every_array_of_a_checkpoint_is_in_the_table():
+    """A new one needs a line there."""
+    assert set(WITH_ORDER) == set(STORED)
+
+
+@pytest.mark.parametrize("name", list(STORED))
+def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
+    """Each array in turn: another type, one column less or more, one axis less, not a number, an index beyond."""
+    good = WITH_ORDER[name]
+    changed = {
+        "type": good.astype({"f": np.float32, "u": np.int64, "i": np.float64}[good.dtype.kind]),
+        "axis": good[None],
+        "number": np.array(1, good.dtype),
+    }
+    if good.shape[-1] > 1 or name not in ("contacts/bond", "near/step", "near/length"):
+        changed["shape"] = np.concatenate([good, good], axis=-1) if good.size else np.zeros((3, 1))
+    if good.size and good.dtype.kind == "f":
+        changed["not a number"] = np.full_like(good, np.nan)
+    if good.size and name.split("/")[-1] in ("pair", "side", "start", "order", "id"):
+        changed["beyond"] = good.copy()
+        changed["beyond"].flat[-1] = FAR
+    if name in ("grains/radius", "grains/mass", "grains/inertia"):
+        changed["zero"], changed["below 0"] = 0.0 * good, -good
+    if name in ("contacts/bonded", "near/touching"):
+        changed["neither"] = np.full_like(good, 2)
+    for what, array in changed.items():
+        said = refused(tmp_path, {**WITH_ORDER, name: array})
+        sizing = what == "shape" and name in ("grains/radius", "contacts/pair", "near/pair")  # then others do not fit
+        assert sizing or f"'{name}'" in said, (what, said)
+    if STORED[name].needed:
+        without = {other: array for other, array in WITH_ORDER.items() if other != name}
+        assert re.search(f"there is no array '{name}'", refused(tmp_path, without))
+
+
+def changed_at(name, index, value):
+    array = WITH_ORDER[name].copy()
+    array[index] = value
+    return {**WITH_ORDER, name: array}
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [(CONTACTS, 2), (CONTACTS, 10**15), (CONTACTS, -1), (PAIRS, 4), (STAGE, 1), (STEPS, 61), (GRAIN1, FAR)],
+)
+def test_counters_that_do_not_fit(tmp_path, place, value):
+    """The numbers of contacts and pairs are those of the arrays, the step that of meta.json; a grain is one."""
+    assert f"{COUNT[place]} = {value}" in refused(tmp_path, changed_at("count", place, value))
+
+
+def test_lists_that_do_not_fit(tmp_path):
+    """A pair of one grain, contacts in the wrong grain's list, a list that shrinks, a grain twice in the order."""
+    for name, index, value, words in (
+        ("contacts/pair", (0, 0), ARRAYS["contacts/pair"][1, 0], "beside itself"),
+        ("near/pair", (1, 0), ARRAYS["near/pair"][0, 0], "beside itself"),
+        ("contacts/start", 1, 5, "'contacts/start'"),
+        ("order", 0, 1, "once"),
+        ("grains/id", 0, 1, "once"),
+    ):
+        assert words in refused(tmp_path, changed_at(name, index, value))
+    turned = ARRAYS["contacts/side"][::-1].copy()
+    assert "contacts of each grain" in refused(tmp_path, {**ARRAYS, "contacts/side": turned})
+
+
+@pytest.mark.parametrize("name", [*NUMBERS, *GOALS, "choices", "case", "ledger"])
+def test_meta_that_is_none(name):
+    """Text, a list, not a number, endless, below 0, or missing: one line that names it."""
+    strange = ["", 3] if name in ("choices", "case", "ledger") else ["", [1], -1, np.nan, np.inf, 10**400, True]
+    for value in strange:
+        with pytest.raises(sand.BadInput, match=f"meta.json has {name} = "):
+            check_state(ARRAYS, {**META, "version": VERSION, name: value})
+    if name in (*NUMBERS, *GOALS):
+        with pytest.raises(sand.BadInput, match=f"meta.json has {name} = None"):
+            check_state(ARRAYS, {key: value for key, value in META.items() if key != name} | {"version": VERSION})
+
+
+def test_commands_refuse_what_would_have_crashed(tmp_path, capsys):
+    """`sand resume` and `sand info`: exit code 2 and a line; materials that the case does not have, too."""
+    for arrays in (
+        changed_at("contacts/pair", (1, 2), FAR),
+        changed_at("near/pair", (1, 2), FAR),
+        changed_at("grains/material", slice(None), 1),
+    ):
+        folder = tmp_path / "run"
+        shutil.copytree(REFERENCE / f"run-v{VERSION}", folder)
+        path = write_checkpoint(folder, arrays, dict(META))
+        assert main(["resume", str(folder)]) == 2
+        said = capsys.readouterr().err.strip().splitlines()
+        assert str(folder) in said[0] and not [line for line in said if "internal" in line]
+        if arrays["grains/material"][0] == 0:
+            assert f"names grain {FAR}, but the grains are 0 to 3" in said[0]
+            assert main(["info", str(path)]) == 2
+        shutil.rmtree(folder)
