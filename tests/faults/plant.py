@@ -30,12 +30,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from .faults import FAULTS, Fault
+from .faults import FAULTS, SOURCES, Fault
 
 HERE = Path(__file__).parents[2]
-BUILT = Path("src/sand/view/page")
+BUILT = Path(SOURCES) / "view" / "page"
 """Made by a build and not in git, but tests need it."""
 MISSED, TIMEOUT, CRASH = "MISSED", "TIMEOUT", "CRASH"
+SUITE = "the whole suite"
 PASSED, FAILED, INTERRUPTED = 0, 1, 2
 """Exit codes of pytest; a test file that cannot be imported counts as interrupted."""
 
@@ -46,7 +47,7 @@ class Finding:
 
     fault: Fault
     caught_by: str  # test id, CRASH, TIMEOUT or MISSED
-    suite: bool  # did the whole default suite run?
+    ran: str  # the named test, or the whole suite
     seconds: float
 
     @property
@@ -97,15 +98,26 @@ def run(copy: Path, words: Sequence[str], timeout: float) -> tuple[int | None, s
         errors="replace",
         start_new_session=True,
     )
+    _RUNNING.add(process)
     try:
         output, _ = process.communicate(timeout=timeout)
         return process.returncode, output
     except subprocess.TimeoutExpired:
         return None, ""
     finally:
-        with contextlib.suppress(OSError, AttributeError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        end(process)
+        _RUNNING.discard(process)
+
+
+_RUNNING: set[subprocess.Popen[str]] = set()
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    """Kill a process and what it has started."""
+    with contextlib.suppress(OSError, AttributeError):  # no such group any more, or a system without groups
+        os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
+    process.wait()
 
 
 def pytest_words(tests: Sequence[str], workers: int = 0) -> list[str]:
@@ -122,7 +134,7 @@ def verdict(code: int | None, output: str) -> str | None:
         return TIMEOUT
     if code < 0:
         return CRASH
-    found = re.search(r"^(?:FAILED|ERROR) (\S+(?: \S+?\])?)", output, re.MULTILINE)
+    found = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, re.MULTILINE)
     if code in (FAILED, INTERRUPTED) and found:
         return found[1]
     raise SystemExit(f"pytest ended with exit code {code}:\n{output[-3000:]}")
@@ -131,7 +143,7 @@ def verdict(code: int | None, output: str) -> str | None:
 @contextlib.contextmanager
 def planted(copy: Path, fault: Fault) -> Iterator[None]:
     """The fault is in the copy for as long as the block lasts; afterwards the file is as it was, its times included."""
-    path = copy / fault.file
+    path = copy / SOURCES / fault.file
     times = path.stat()
     text = path.read_text(encoding="utf-8")
     if text.count(fault.old) != 1:
@@ -148,11 +160,11 @@ def examine(fault: Fault, copy: Path, options: argparse.Namespace) -> Finding:
     """Plant one fault and look for a test that fails."""
     begun = time.monotonic()
     with planted(copy, fault):
-        found = verdict(*run(copy, pytest_words(fault.named(options.before)), options.timeout))
-        suite = found is None and not options.named_only
-        if suite:
-            found = verdict(*run(copy, pytest_words([], options.workers), options.suite_timeout))
-    return Finding(fault, found or MISSED, suite, time.monotonic() - begun)
+        ran = fault.named(options.before)
+        found = verdict(*run(copy, pytest_words([ran]), options.timeout))
+        if found is None and not options.named_only:
+            ran, found = SUITE, verdict(*run(copy, pytest_words([], options.workers), options.suite_timeout))
+    return Finding(fault, found or MISSED, ran, time.monotonic() - begun)
 
 
 def prepare(tree: Path, place: Path, faults: Sequence[Fault], options: argparse.Namespace) -> list[Path]:
@@ -164,7 +176,7 @@ def prepare(tree: Path, place: Path, faults: Sequence[Fault], options: argparse.
     code, output = run(copies[0], ["-c", "import sand; print(sand.__file__)"], 300.0)
     if code != 0 or not Path(output.strip().splitlines()[-1]).is_relative_to(copies[0]):
         raise SystemExit(f"the copy of {tree} is not what Python imports:\n{output}")
-    tests = sorted({name for fault in faults for name in fault.named(options.before)})
+    tests = sorted({fault.named(options.before) for fault in faults})
     begun = time.monotonic()
     found = verdict(*run(copies[0], pytest_words(tests), options.timeout * max(len(faults), 1)))
     if found is not None:
@@ -195,7 +207,13 @@ def examine_all(tree: Path, faults: Sequence[Fault], options: argparse.Namespace
             return found
 
         with ThreadPoolExecutor(options.jobs) as pool:
-            return list(pool.map(one, faults))
+            try:
+                return list(pool.map(one, faults))
+            except BaseException:  # Ctrl-C, too
+                pool.shutdown(wait=False, cancel_futures=True)
+                for process in list(_RUNNING):
+                    end(process)
+                raise
 
 
 def state_of(tree: Path) -> str:
@@ -208,12 +226,17 @@ def state_of(tree: Path) -> str:
     return (said["commit"] or "no commit") + (" with changes" if said["changes"] else "")
 
 
+def told(found: Finding) -> str:
+    """The test, or what happened instead and what was run."""
+    return f"`{found.caught_by}`" if found.caught else f"{found.caught_by} by {found.ran}"
+
+
 def as_markdown(findings: Sequence[Finding], state: str, total: float) -> str:
     """The table for people."""
     caught = sum(found.caught for found in findings)
     rows = [
-        f"| {found.fault.name} | {found.fault.kind} | {found.fault.area} | `{found.fault.file}` "
-        f"| {found.caught_by if not found.caught else '`' + found.caught_by + '`'} | {found.seconds:.0f} |"
+        f"| {found.fault.name} | {found.fault.kind} | {found.fault.area} | `{SOURCES}{found.fault.file}` "
+        f"| {told(found)} | {found.seconds:.0f} |"
         for found in findings
     ]
     head = (
@@ -256,6 +279,7 @@ def parsed(argv: Sequence[str] | None) -> argparse.Namespace:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the table; the exit code is 1 if a fault was not caught."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the copies are removed then, too
     options = parsed(argv)
     faults, tree = chosen(options.only), options.tree.resolve()
     if options.list or not faults:

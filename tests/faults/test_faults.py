@@ -7,24 +7,22 @@ from collections import Counter
 
 import pytest
 
-from .faults import AREAS, FAULTS, KINDS, Fault
+from .faults import AREAS, FAULTS, KINDS, SOURCES, Fault
 from .plant import CRASH, HERE, MISSED, TIMEOUT, Finding, as_markdown, chosen, copy_of, planted, verdict
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-def test_a_fault_fits_its_file_and_names_tests_that_exist(fault):
-    """Its text occurs once, what stands there instead is another, still Python, and each named test is a function."""
-    text = (HERE / fault.file).read_text(encoding="utf-8")
+def test_a_fault_fits_its_file_and_names_a_test_that_exists(fault):
+    """Its text occurs once, what stands there instead is another, still Python, and the named test is a function."""
+    text = (HERE / SOURCES / fault.file).read_text(encoding="utf-8")
     assert text.count(fault.old) == 1
     assert fault.old != fault.new and "\n" not in fault.old.rstrip("\n")
     compile(text.replace(fault.old, fault.new), fault.file, "exec")
-    assert fault.tests
-    for name in fault.tests:
-        file, *parts = name.split("::")
-        found = ast.parse((HERE / file).read_text(encoding="utf-8")).body
-        for part in parts:
-            found = next(node.body for node in found if getattr(node, "name", None) == part.split("[")[0])
-        assert parts
+    file, *parts = fault.named(before=False).split("::")
+    found = ast.parse((HERE / file).read_text(encoding="utf-8")).body
+    assert parts
+    for part in parts:
+        found = next(node.body for node in found if getattr(node, "name", None) == part.split("[")[0])
 
 
 def test_faults_are_of_all_kinds_everywhere():
@@ -63,27 +61,28 @@ def test_planting_changes_a_copy_for_a_while(tmp_path):
     """The copy has the fault inside the block and the old file, with its times, after it; the tree is never touched."""
     tree = tmp_path / "tree"
     (tree / "src/sand/view/page").mkdir(parents=True)
-    (tree / "one.py").write_text("x = 1\n", encoding="utf-8")
+    (tree / SOURCES / "one.py").write_text("x = 1\n", encoding="utf-8")
     (tree / "built.js").write_text("ignored")
     (tree / "src/sand/view/page/page.js").write_text("built")
     (tree / ".gitignore").write_text("built.js\npage/\n")
     subprocess.run(["git", "init", "-q"], cwd=tree, check=True)
     copy = copy_of(tree, tmp_path / "copy")
     assert {path.name for path in copy.rglob("*") if path.is_file()} == {"one.py", ".gitignore", "page.js"}
-    times, fault = (copy / "one.py").stat(), Fault("two", "sign", "formula", "one.py", "1", "2", ("t",))
+    times, fault = (copy / SOURCES / "one.py").stat(), Fault("two", "sign", "formula", "one.py", "1", "2", "t")
     with planted(copy, fault):
-        assert (copy / "one.py").read_text() == "x = 2\n"
-    assert (copy / "one.py").read_text() == (tree / "one.py").read_text() == "x = 1\n"
-    assert (copy / "one.py").stat().st_mtime_ns == times.st_mtime_ns
-    with pytest.raises(SystemExit, match="occurs 0 times"), planted(copy, Fault("no", "", "", "one.py", "y", "z", ())):
+        assert (copy / SOURCES / "one.py").read_text() == "x = 2\n"
+    assert (copy / SOURCES / "one.py").read_text() == (tree / SOURCES / "one.py").read_text() == "x = 1\n"
+    assert (copy / SOURCES / "one.py").stat().st_mtime_ns == times.st_mtime_ns
+    with pytest.raises(SystemExit, match="occurs 0 times"), planted(copy, Fault("no", "", "", "one.py", "y", "z", "t")):
         raise AssertionError
 
 
 def test_the_table_counts_what_was_caught():
     """A test or a crash is a catch, a miss and a test that never ends are none."""
-    found = [Finding(FAULTS[0], by, False, 1.0) for by in ("tests/a.py::test_b", CRASH, MISSED, TIMEOUT)]
+    found = [Finding(FAULTS[0], by, "the named test", 1.0) for by in ("tests/a.py::test_b", CRASH, MISSED, TIMEOUT)]
     assert [one.caught for one in found] == [True, True, False, False]
-    assert "2 of 4 caught" in as_markdown(found, "abc", 60.0)
+    table = as_markdown(found, "abc", 60.0)
+    assert "2 of 4 caught" in table and "MISSED by the named test" in table
 
 
 def test_the_script_lists_its_faults():
