@@ -218,12 +218,11 @@ def examine_all(tree: Path, faults: Sequence[Fault], options: argparse.Namespace
 
 def state_of(tree: Path) -> str:
     """The commit of a tree, and whether tracked files differ from it."""
-    words = {"commit": ["rev-parse", "--short=10", "HEAD"], "changes": ["status", "--porcelain", "-uno"]}
-    said = {
-        name: subprocess.run(["git", *w], cwd=tree, capture_output=True, text=True).stdout.strip()
-        for name, w in words.items()
-    }
-    return (said["commit"] or "no commit") + (" with changes" if said["changes"] else "")
+
+    def said(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=tree, capture_output=True, text=True).stdout.strip()
+
+    return said("rev-parse", "--short=10", "HEAD") + (" with changes" if said("status", "--porcelain", "-uno") else "")
 
 
 def told(found: Finding) -> str:
