@@ -1,6 +1,7 @@
 """The table of planted faults fits the sources and tests of today, and planting leaves everything as it was."""
 
 import ast
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -57,6 +58,7 @@ def test_a_run_without_a_failed_test_is_no_catch(code):
         verdict(code, "no tests ran")
 
 
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
 def test_planting_changes_a_copy_for_a_while(tmp_path):
     """The copy has the fault inside the block and the old file, with its times, after it; the tree is never touched."""
     tree = tmp_path / "tree"
