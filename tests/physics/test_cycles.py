@@ -30,7 +30,6 @@ def energy_error(sim, steps=100_000, looks=20):
     """Largest change of the total [J] over the steps."""
     for _ in range(looks):
         sim.run(steps=steps // looks)
-        sim._look()
     total = sim.ledger["total"]
     return np.abs(total - total[0]).max()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sand.core.jit import kernel
+from sand.core.jit import COMPILED, kernel
 from sand.physics.noise import LOW, normal_vector, philox, random_words, uniform
 
 # Random123's kat_vectors, philox4x32 with 10 rounds: counter, key, result
@@ -29,7 +29,7 @@ def fill_normals(seed, number, grain, stream, out):
 
 
 compiled_words, compiled_normals = kernel(fill_words, keep=False), kernel(fill_normals, keep=False)
-compiled = pytest.mark.skipif(not hasattr(compiled_words, "_cache"), reason="too many numbers with the compiler off")
+compiled = pytest.mark.skipif(not COMPILED, reason="too many numbers with the compiler off")
 
 
 def filled(way, rows, kind, addresses, types=(np.int64, np.int64, np.uint32, np.int64)):

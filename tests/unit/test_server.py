@@ -1,6 +1,7 @@
 """The server of `sand view`: tells those who may know, and nobody else, whatever they send."""
 
 import http.client
+import inspect
 import json
 import socket
 import time
@@ -105,7 +106,16 @@ def test_tokens_are_new_each_time(server):
     other = Server(server.story)
     other.server_close()
     assert len(other.token) >= 32 and other.token != server.token
-    assert server.server_address[0] == "127.0.0.1"
+
+
+def test_it_listens_at_one_address_of_this_machine(server):
+    """The socket is bound to 127.0.0.1, a neighbour of it in the loopback network is refused, and nothing can be asked
+    for but a story and a port: no setting opens the server to other machines.
+    """
+    assert server.socket.family == socket.AF_INET and server.socket.getsockname() == ("127.0.0.1", server.port)
+    with pytest.raises(OSError), socket.create_connection(("127.0.0.2", server.port), timeout=5):
+        pass
+    assert list(inspect.signature(Server).parameters) == ["story", "port"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,158 @@
+"""Single-line faults, and the tests that should catch each of them; `tests.faults.plant` plants them.
+
+They are slips that people make: a sign, a factor 2, an image or a unit that is forgotten, one too many or too few, a
+row that is lost, an error that is swallowed.  They lie in formulas, loops, settings, files, commands, set-up and
+analysis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+KINDS = ("sign", "factor 2", "forgotten image", "forgotten unit", "off by one", "lost row", "swallowed error")
+AREAS = ("formula", "loop", "settings", "files", "command", "analysis", "set-up")
+SOURCES, TESTS = "src/sand/", "tests/"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One line that is wrong.
+
+    Attributes:
+        name: for the table.
+        kind: of KINDS.
+        area: of AREAS.
+        file: below SOURCES.
+        old, new: part of a line that occurs once in the file, and what stands there instead.
+        test: below TESTS, the test that should fail, of the checkout that this file belongs to.
+        before: that of the starting commit, where it is another.
+    """
+
+    name: str
+    kind: str
+    area: str
+    file: str
+    old: str
+    new: str
+    test: str
+    before: str = ""
+
+    def named(self, before: bool) -> str:
+        """The test to run first, from the top of the checkout."""
+        return TESTS + (self.before if before and self.before else self.test)
+
+    @property
+    def searched(self) -> str:
+        """What words of the command line are looked for in."""
+        return f"{self.name} | {self.kind} | {self.area} | {self.file}"
+
+
+# fmt: off
+FAULTS = (
+    # formulas
+    Fault("half the JKR force", "factor 2", "formula", "physics/adhesion.py",
+          "return 4.0 * pull_off_force * (cube * cube - cube)", "return 2.0 * pull_off_force * (cube * cube - cube)",
+          "unit/test_adhesion.py::test_special_points_are_exact"),
+    Fault("the cut-off pushes where it should pull", "sign", "formula", "physics/dipole.py",
+          "(both - 5.0 * product) + slope * energy", "(both - 5.0 * product) - slope * energy",
+          "unit/test_dipole.py::test_force_is_the_slope_of_the_energy"),
+    Fault("the rate of 1/r^5 as if it were 1/r^4", "off by one", "formula", "physics/dipole_rates.py",
+          "-3.0 * inverse3 * radial, -5.0 * three * radial", "-3.0 * inverse3 * radial, -4.0 * three * radial",
+          "unit/test_far.py::test_taylor_rates_are_finite_differences"),
+    Fault("friction of a spin with r^3 for r^4", "forgotten unit", "formula", "physics/gas.py",
+          "accommodation * density * speed * radius**4", "accommodation * density * speed * radius**3",
+          "unit/test_gas_drag.py::test_the_shortest_time"),
+    Fault("a quaternion product with one wrong sign", "sign", "formula", "physics/rotation.py",
+          "cosine * q[1] + y * q[3] + z * q[0] - x * q[2]", "cosine * q[1] + y * q[3] - z * q[0] - x * q[2]",
+          "unit/test_rotation.py::test_turn_is_a_rotation_in_the_laboratory_frame"),
+    Fault("the rate of a cut central force", "sign", "formula", "physics/central.py",
+          "grow += slope_rate - slope * radial * inverse2", "grow += slope_rate + slope * radial * inverse2",
+          "unit/test_far.py::test_central_force_is_minus_the_gradient"),
+    Fault("Box and Muller without the 2", "factor 2", "formula", "physics/noise.py",
+          "math.sqrt(-2.0 * math.log(uniform(word1)))", "math.sqrt(-1.0 * math.log(uniform(word1)))",
+          "unit/test_noise.py::test_moments_of_the_normals"),
+    Fault("pairs of equal sizes counted twice", "factor 2", "formula", "theory/smoluchowski.py",
+          "np.where(i == j, 0.5, 1.0)", "np.where(i == j, 1.0, 1.0)",
+          "unit/test_kinetics.py::test_constant_kernel_against_the_exact_solution"),
+    Fault("no images along z", "forgotten image", "formula", "core/box.py",
+          "v[2] - span.z * np.rint(v[2] * span.inverse_z)", "v[2]",
+          "unit/test_box.py::test_nearest_image_is_the_shortest"),
+    Fault("sliding forgets where it ends", "factor 2", "formula", "physics/contact.py",
+          "slide = dot(add(before.slide, left.slide), sub(reached.slide, left.slide))",
+          "slide = dot(before.slide, sub(reached.slide, left.slide))",
+          "physics/test_contact_law.py::test_what_yielding_dissipates"),
+    # loops
+    Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "kernels/cells.py",
+          "(0, high - nx + 1)", "(0, high - nx)",
+          "unit/test_cells.py::test_many_grains_in_thin_cells"),
+    Fault("both grains are pushed the same way", "sign", "loop", "kernels/gathering.py",
+          "force = sub(force, load(contacts.push, c))", "force = add(force, load(contacts.push, c))",
+          "unit/test_gathering.py::test_sums_are_those_of_brute_force"),
+    Fault("no reaction of a dipole's force", "sign", "loop", "kernels/dipoles.py",
+          "accrue(force, j, (-f[0], -f[1], -f[2]))", "accrue(force, j, f)",
+          "physics/test_magnetics.py::test_loads_against_brute_force_with_images"),
+    Fault("a touch is given a whole kick", "factor 2", "loop", "kernels/events.py",
+          "owed - 0.5 * dt * dot(load(contacts.push, c), n)", "owed - dt * dot(load(contacts.push, c), n)",
+          "physics/test_conservation.py::test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls"),
+    Fault("half the speed at the start of a curve", "factor 2", "loop", "stepping/touch.py",
+          "v0 = scale(dt / 5.0, ", "v0 = scale(dt / 10.0, ",
+          "physics/test_adaptive.py::test_touch_comes_at_the_analytic_time"),
+    Fault("after a break the others keep the wrong twist", "lost row", "loop", "kernels/events.py",
+          "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
+          "unit/test_drop_broken.py::test_each_column_moves_with_its_contact",
+          "physics/test_conservation.py::test_a_struck_chain_closes_its_books"),
+    # settings and units
+    Fault("a tesla without a second", "forgotten unit", "settings", "core/units.py",
+          '"T": (0, 0, 1, -2, -1, 0)', '"T": (0, 0, 1, -1, -1, 0)',
+          "unit/test_units.py::test_units_that_need_no_pint_are_those_of_pint"),
+    Fault("a run of no steps", "off by one", "settings", "run/case.py",
+          "steps: Annotated[int, Field(ge=1, strict=True)]", "steps: Annotated[int, Field(ge=0, strict=True)]",
+          "unit/test_case.py::test_one_mistake_is_one_line"),
+    Fault("a material with a number that cannot be", "swallowed error", "settings", "core/material.py",
+          "problems += error.problems", "problems += []",
+          "unit/test_grains.py::test_materials_check_themselves"),
+    Fault("a moment per mass taken for a moment", "forgotten unit", "settings", "core/grains.py",
+          "per_mass * mass", "per_mass",
+          "unit/test_grains.py::test_what_follows_from_radius_and_material"),
+    # files
+    Fault("orientations are read one place off", "off by one", "files", "files/frame.py",
+          "np.roll(np.asarray(p.orientation), -1, axis=1)", "np.roll(np.asarray(p.orientation), 1, axis=1)",
+          "unit/test_frame_quantities.py::test_a_frame_holds_grains_and_contacts",
+          "unit/test_files.py::test_the_trajectory_holds_what_the_world_held"),
+    Fault("a check sum without the numbers", "swallowed error", "files", "files/checkpoint.py",
+          "digest.update(array.tobytes())", "digest.update(b'')",
+          "unit/test_checkpoint_numbers.py::test_numbers_that_were_changed_are_refused",
+          "unit/test_files.py::test_a_damaged_checkpoint_is_refused_and_the_older_one_used"),
+    Fault("a table without its first row", "lost row", "files", "files/table.py",
+          "    for row in rows:\n", "    for row in rows[1:]:\n",
+          "unit/test_tables.py::test_a_table_has_all_its_rows",
+          "unit/test_growth.py::test_the_commands"),
+    Fault("radii in metres among angstroms", "forgotten unit", "files", "files/xyz.py",
+          "[grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment]",
+          "[grains.position / ANGSTROM, grains.radius, grains.moment]",
+          "unit/test_builders.py::test_bodies_come_back_from_files"),
+    Fault("a full disk is not told", "swallowed error", "files", "files/folder.py",
+          'raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error',
+          "return",
+          "unit/test_files.py::test_a_failed_write_leaves_the_old_file"),
+    # commands
+    Fault("the last frame of a slice", "off by one", "command", "cli/export.py",
+          "first + 1 if first != -1 else None", "first + 1",
+          "unit/test_opened.py::test_the_export_command"),
+    Fault("a mistake ends with exit code 0", "swallowed error", "command", "cli/main.py",
+          "return str(error).splitlines(), MISTAKE", "return str(error).splitlines(), DONE",
+          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2"),
+    Fault("an end before the start", "swallowed error", "command", "cli/options.py",
+          'return si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
+          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2"),
+    # analysis
+    Fault("a cluster is made whole without images", "forgotten image", "analysis", "analysis/clusters.py",
+          "whole[i] + box.nearest(whole[j] - whole[i])", "whole[i] + (whole[j] - whole[i])",
+          "unit/test_clusters.py::test_clusters_are_made_whole"),
+    # set-up
+    Fault("a gas overlaps across the faces of its box", "forgotten image", "set-up", "setup/gas.py",
+          "apart = box.nearest(here - placed[done])", "apart = here - placed[done]",
+          "unit/test_gas.py::test_no_two_grains_are_closer_than_the_clearance",
+          "unit/test_watch.py::test_what_is_no_number_is_the_largest"),
+)
+# fmt: on

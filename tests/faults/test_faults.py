@@ -1,0 +1,94 @@
+"""The table of planted faults fits the sources and tests of today, and planting leaves everything as it was."""
+
+import ast
+import shutil
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+from .faults import AREAS, FAULTS, KINDS, SOURCES, Fault
+from .plant import CRASH, HERE, MISSED, TIMEOUT, Finding, as_markdown, chosen, copy_of, planted, verdict
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_fault_fits_its_file_and_names_a_test_that_exists(fault):
+    """Its text occurs once, what stands there instead is another, still Python, and the named test is a function."""
+    text = (HERE / SOURCES / fault.file).read_text(encoding="utf-8")
+    assert text.count(fault.old) == 1
+    assert fault.old != fault.new and "\n" not in fault.old.rstrip("\n")
+    compile(text.replace(fault.old, fault.new), fault.file, "exec")
+    file, *parts = fault.named(before=False).split("::")
+    found = ast.parse((HERE / file).read_text(encoding="utf-8")).body
+    assert parts
+    for part in parts:
+        found = next(node.body for node in found if getattr(node, "name", None) == part.split("[")[0])
+
+
+def test_faults_are_of_all_kinds_everywhere():
+    """Thirty with names of their own; every kind, and every part of the program."""
+    assert len(FAULTS) == len({fault.name for fault in FAULTS}) == 30
+    assert {fault.kind for fault in FAULTS} == set(KINDS)
+    assert {fault.area for fault in FAULTS} == set(AREAS)
+    assert min(Counter(fault.area for fault in FAULTS if fault.area not in ("analysis", "set-up")).values()) >= 3
+    assert chosen(["forgotten image"]) == [fault for fault in FAULTS if fault.kind == "forgotten image"]
+
+
+@pytest.mark.parametrize(
+    ("code", "output", "expected"),
+    [
+        (0, "3 passed", None),
+        (1, "F\nFAILED tests/a.py::test_b[x-1] - assert 1 == 2\n1 failed", "tests/a.py::test_b[x-1]"),
+        (1, "FAILED tests/a.py::test_b[two words] - E\n", "tests/a.py::test_b[two words]"),
+        (2, "ERROR tests/a.py - NameError\n!!! Interrupted", "tests/a.py"),
+        (None, "", TIMEOUT),
+        (-11, "", CRASH),
+    ],
+)
+def test_what_pytest_says_is_understood(code, output, expected):
+    """Exit code and summary become the name of the test, or what happened instead."""
+    assert verdict(code, output) == expected
+
+
+@pytest.mark.parametrize("code", [1, 3, 4, 5])
+def test_a_run_without_a_failed_test_is_no_catch(code):
+    """A wrong name or an error of pytest itself ends the script; it is not taken for a test that failed."""
+    with pytest.raises(SystemExit, match=f"exit code {code}"):
+        verdict(code, "no tests ran")
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
+def test_planting_changes_a_copy_for_a_while(tmp_path):
+    """The copy has the fault inside the block and the old file, with its times, after it; the tree is never touched."""
+    tree = tmp_path / "tree"
+    (tree / "src/sand/view/page").mkdir(parents=True)
+    (tree / SOURCES / "one.py").write_text("x = 1\n", encoding="utf-8")
+    (tree / "built.js").write_text("ignored")
+    (tree / "src/sand/view/page/page.js").write_text("built")
+    (tree / ".gitignore").write_text("built.js\npage/\n")
+    subprocess.run(["git", "init", "-q"], cwd=tree, check=True)
+    copy = copy_of(tree, tmp_path / "copy")
+    assert {path.name for path in copy.rglob("*") if path.is_file()} == {"one.py", ".gitignore", "page.js"}
+    times, fault = (copy / SOURCES / "one.py").stat(), Fault("two", "sign", "formula", "one.py", "1", "2", "t")
+    with planted(copy, fault):
+        assert (copy / SOURCES / "one.py").read_text() == "x = 2\n"
+    assert (copy / SOURCES / "one.py").read_text() == (tree / SOURCES / "one.py").read_text() == "x = 1\n"
+    assert (copy / SOURCES / "one.py").stat().st_mtime_ns == times.st_mtime_ns
+    with pytest.raises(SystemExit, match="occurs 0 times"), planted(copy, Fault("no", "", "", "one.py", "y", "z", "t")):
+        raise AssertionError
+
+
+def test_the_table_counts_what_was_caught():
+    """A test or a crash is a catch, a miss and a test that never ends are none."""
+    found = [Finding(FAULTS[0], by, "the named test", 1.0) for by in ("tests/a.py::test_b", CRASH, MISSED, TIMEOUT)]
+    assert [one.caught for one in found] == [True, True, False, False]
+    table = as_markdown(found, "abc", 60.0)
+    assert "2 of 4 caught" in table and "MISSED by the named test" in table
+
+
+def test_the_script_lists_its_faults():
+    """`python -m tests.faults.plant --list` from the top of a checkout."""
+    words = [sys.executable, "-m", "tests.faults.plant", "--list", "--only", "command"]
+    done = subprocess.run(words, cwd=HERE, capture_output=True, text=True, check=True)
+    assert len(done.stdout.splitlines()) == 3

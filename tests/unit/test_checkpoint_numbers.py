@@ -1,0 +1,76 @@
+"""Checkpoints whose archive is whole but whose numbers are not those that were written, and ones that hold code."""
+
+import zipfile
+
+import numpy as np
+import pytest
+
+import sand
+from sand.files.checkpoint import newest_checkpoint, read_checkpoint, write_checkpoint
+
+ARRAYS = {"a/x": np.arange(6.0).reshape(2, 3), "count": np.array([3, 4])}
+
+
+def rewritten(path, change):
+    """The archive packed anew with `change` applied to its arrays by name: its own check sums are right again."""
+    with np.load(path, allow_pickle=False) as saved:
+        arrays = {name: saved[name] for name in saved.files}
+    change(arrays)
+    np.savez(path, **arrays)
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+
+
+def set_number(arrays):
+    arrays["a/x"][1, 2] = np.nextafter(5.0, 6.0)
+
+
+def swap(arrays):
+    arrays["a/x"] = arrays["a/x"][::-1].copy()
+
+
+def drop(arrays):
+    del arrays["count"]
+
+
+def retype(arrays):
+    arrays["count"] = arrays["count"].astype(np.float64)
+
+
+@pytest.mark.parametrize("change", [set_number, swap, drop, retype])
+def test_numbers_that_were_changed_are_refused(tmp_path, change):
+    """One last bit, rows in another order, an array that is gone or of another type: the check sum of SAND is wrong."""
+    write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
+    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 2})
+    rewritten(path, lambda arrays: None)
+    assert read_checkpoint(path)[1]["steps"] == 2
+    rewritten(path, change)
+    with pytest.raises(sand.BadInput, match=path.name):
+        read_checkpoint(path)
+    assert newest_checkpoint(tmp_path)[1]["steps"] == 1
+
+
+class Code:
+    """What a pickle would run when it is read."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (self.path, "w")
+
+
+def test_code_in_a_checkpoint_is_not_run(tmp_path):
+    """An array of objects is a pickle: refused in one line, and what it would do is not done."""
+    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
+    trace = tmp_path / "run"
+
+    def add(arrays):
+        arrays["extra"] = np.array([Code(str(trace))], dtype=object)
+
+    rewritten(path, add)
+    trace.unlink(missing_ok=True)
+    with pytest.raises(sand.BadInput, match=path.name) as caught:
+        read_checkpoint(path)
+    assert len(caught.value.problems) == 1
+    assert not trace.exists()

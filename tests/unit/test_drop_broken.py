@@ -1,0 +1,35 @@
+"""Broken contacts are taken out of the arrays, and every number of the others goes where its contact goes."""
+
+import numpy as np
+import pytest
+
+from sand.core.arrays import ContactArrays, contact_arrays
+from sand.core.world import CONTACTS, COUNT
+from sand.kernels.contacts import BROKE
+from sand.kernels.events import drop_broken
+
+BY_GRAIN = {"side", "start", "turn"}
+"""Arrays that are made anew from the pairs."""
+
+
+@pytest.mark.parametrize("broken", [[0], [1, 2, 5], [6], [], list(range(7))])
+def test_each_column_moves_with_its_contact(broken):
+    """Seven contacts with numbers by chance: what is left is what NumPy leaves of every array, to the bit.
+
+    Room for more contacts than there are, constants and losses for each, and damping, so that nothing is left out.
+    The loop is called as plain Python.
+    """
+    contacts = contact_arrays(9, 20, 15, channels=6)
+    rng, count = np.random.default_rng(4), np.zeros(len(COUNT), np.int64)
+    count[CONTACTS] = 7
+    for name in set(ContactArrays._fields) - BY_GRAIN:
+        array = getattr(contacts, name)
+        array[...] = rng.integers(1, 9, array.shape) if array.dtype.kind == "u" else rng.normal(size=array.shape)
+    contacts.flag[contacts.flag == BROKE] = 0
+    contacts.flag[broken] = BROKE
+    kept = [c for c in range(7) if c not in broken]
+    expected = {name: getattr(contacts, name)[..., kept].copy() for name in set(ContactArrays._fields) - BY_GRAIN}
+    drop_broken(contacts, count)
+    assert count[CONTACTS] == len(kept)
+    for name, array in expected.items():
+        assert (getattr(contacts, name)[..., : len(kept)] == array).all(), name
