@@ -9,7 +9,7 @@ import warnings
 import sand
 from sand.run.record import versions
 
-from . import files, regimes, scaling
+from . import files, main_job, regimes, scaling
 from .long_range import growth, savings, tell
 from .rows import all_rows
 from .table import HEAD, about, line, tell_about
@@ -24,10 +24,16 @@ def main() -> None:
     parser.add_argument("--files", action="store_true", help="what frames and checkpoints cost, instead")
     parser.add_argument("--page", action="store_true", help="what the page of a run costs in a browser, instead")
     parser.add_argument("--scaling", action="store_true", help="cost of a grain's step from 100 grains on, instead")
+    parser.add_argument(
+        "--main-job", action="store_true", help="time the main job and write docs/main-job.json, instead"
+    )
     parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     sand.set_threads(1)  # a row that needs more says so
+    if options.main_job:
+        print(main_job.write())
+        return
     if options.page:
         from . import page  # needs Playwright and a Chromium
 

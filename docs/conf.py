@@ -3,6 +3,7 @@
 Build with:  sphinx-build -W --keep-going -b html docs docs/_build/html
 """
 
+import json
 import os
 import sys
 from pathlib import Path
@@ -22,7 +23,9 @@ source_suffix = {".md": "myst-nb"}
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
 nitpicky = True
 
-myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "substitution"]
+# measured by `python -m benchmarks --main-job`
+myst_substitutions = {"main_job": json.loads((HERE / "main-job.json").read_text("utf-8"))["sentence"]}
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
 

@@ -1,6 +1,8 @@
 """The table of `python -m benchmarks`: its rows are complete and judged rightly. No time is bounded here."""
 
 import itertools
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 import sand
 
 table = pytest.importorskip("benchmarks.table", reason="benchmarks are not beside the tests")
-from benchmarks import decks, pieces, scaling, timing, worlds  # noqa: E402
+from benchmarks import decks, main_job, pieces, scaling, timing, worlds  # noqa: E402
 
 
 def test_a_row_is_met_if_all_that_it_is_asked_is():
@@ -91,3 +93,11 @@ def test_scaling_leaves_out_what_does_not_fit(monkeypatch):
     rows = list(scaling.rows(True))
     assert len(rows) == 9
     assert all("needs" in one["skipped"] for one in rows)
+
+
+def test_readme_quotes_the_measured_main_job():
+    """The one time of the main job that pages give is that of docs/main-job.json, in the words made from it."""
+    top = Path(__file__).parents[2]
+    measured = json.loads((top / "docs" / "main-job.json").read_text("utf-8"))
+    assert measured["sentence"] == main_job.sentence(measured)
+    assert measured["sentence"] in " ".join((top / "README.md").read_text("utf-8").split())

@@ -31,7 +31,7 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
     if quiet:
         return nullcontext()
     jit = with_notes(lambda: import_module("sand.core.jit"))  # it may warn of the compiler or its cache
-    return jit.compiling(lambda: note("compiling (once per version of SAND), about a quarter of a minute …"))
+    return jit.compiling(lambda: note("compiling the loops for this combination of forces, for this and later runs …"))
 
 
 def emit(content: dict[str, Any]) -> None:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from PIL import Image  # comes with matplotlib
 
 from ..analysis.quantities import material_names
 from ..core.box import Box
@@ -34,8 +33,6 @@ WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """Inches, inches, pixels per inch: 1600 × 1000 pixels."""
 SMALL_GRAIN = 11.0
 """Pixels: with grains of a smaller radius in the box, the largest clusters are shown by themselves too."""
-LARGEST_FILE = 300_000
-"""Bytes of the PNG."""
 SQUEEZE = 6
 """Of zlib; 9 saves another twentieth of a figure of shaded grains, and takes ten times as long, a second."""
 _PNG: dict[str, Any] = {
@@ -203,22 +200,14 @@ def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG of at most 300 kB: of coarser shades if it must."""
+    """The figure as a PNG."""
     with styled():
         figure.savefig(content := io.BytesIO(), **_PNG)
-    for step in (4, 8, 16, 32):
-        if content.tell() <= LARGEST_FILE:
-            break
-        # Crowds of small shaded grains hardly compress; steps this fine are not seen on them.
-        picture = np.asarray(Image.open(content).convert("RGB"), dtype=np.int16)
-        coarse = np.minimum((picture + step // 2) // step * step, 255).astype(np.uint8)
-        content = io.BytesIO()
-        Image.fromarray(coarse).save(content, format="png", dpi=(DPI, DPI), compress_level=SQUEEZE)
     return content.getvalue()
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write the figure as a PNG below 300 kB; the file is whole or not there.
+    """Write the figure as a PNG; the file is whole or not there.
 
     Raises:
         FilesFailed: the disk is full, the folder has vanished, …
