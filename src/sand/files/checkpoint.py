@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import BadInput
-from .folder import replace_file
+from .folder import refuse_devices, replace_file
 
 VERSION = 4
 """Of the file format; a newer program reads older versions, an older one refuses newer files.
@@ -81,6 +81,7 @@ def _refuse_impossible_sizes(path: Path) -> None:
     Raises:
         ValueError: an array larger than the file, or than its part of it.
     """
+    refuse_devices(path)
     size = path.stat().st_size
     with zipfile.ZipFile(path) as archive:
         for part in archive.infolist():

@@ -15,7 +15,7 @@ from ..files import folder as files
 from ..files.checkpoint import write_checkpoint
 from ..files.folder import LedgerFile, make_folder, read_ledger, write_json, write_toml
 from ..files.trajectory import TrajectoryWriter
-from .outcome import Result
+from .outcome import Outcome, Result
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -39,6 +39,7 @@ class Record:
     def __init__(self, out: str | Path, overwrite: bool = False, resumed: bool = False):
         self.folder = Path(out) if resumed else make_folder(out, overwrite=overwrite)
         self._resumed = resumed
+        self.draws = True  # a figure at the end of each `run`
         self._trajectory: TrajectoryWriter | None = None
         self._ledger: LedgerFile | None = None
         self._saved, self._took = wall.monotonic(), 0.0
@@ -129,6 +130,12 @@ class Record:
         """Checkpoint, summary and figure; the trajectory stays open for a further `run`."""
         self.save(simulation)
         write_json(self.folder / files.SUMMARY, summary_of(simulation, result))
+        # whoever interrupts a run does not want to wait for its figure
+        if self.draws and result.outcome is not Outcome.INTERRUPTED:
+            self.draw(simulation)
+
+    def draw(self, simulation: Simulation) -> None:
+        """The figure of the run so far."""
         if simulation.ledger.rows:
             from ..view.figure import run_figure, save
 
