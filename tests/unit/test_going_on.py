@@ -130,7 +130,12 @@ def test_a_collision_that_was_killed_goes_on(place, hit, capsys):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [('"2.0 m/s"', '"3 m/s"'), ("grains = 2", "grains = 3"), ("contact", "gravity")]
+    ("old", "new"),
+    [
+        ('"2.0 m/s"', '"3 m/s"'),
+        ("grains = 2", "grains = 3"),
+        ("[forces.contact]", "[forces.contact]\nbeyond = 'release'"),
+    ],
 )
 def test_a_collision_cannot_change_on_its_way(place, hit, capsys, old, new):
     """Another speed, another body, another force: one line."""

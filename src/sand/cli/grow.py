@@ -52,7 +52,13 @@ def command(
     folder = Path(out or Path(case).stem)
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder} is a file; give another folder with --out")
-    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "threads": threads, "quiet": quiet, "as_json": as_json}
+    how: dict[str, Any] = {
+        "workers": workers,
+        "scheduler": scheduler,
+        "threads": threads,
+        "quiet": quiet,
+        "as_json": as_json,
+    }
     return boxes(content, chosen or own or USUAL_SEEDS, folder, **how)
 
 

@@ -93,8 +93,8 @@ def of_job_folder(path: Path) -> Told | None:
     name, json = UNFINISHED[kind]
     listed = [("files", "  ".join(report.files_of(path)))]
     if kind == "grow":
-        ended = sum((one.parent / files.SUMMARY).exists() for one in path.glob(f"seed-*/{files.CASE}"))
-        listed.append(("boxes", f"{ended} have been closed"))
+        ends = [files.read_json(one).get("outcome") for one in path.glob(f"seed-*/{files.SUMMARY}")]
+        listed.append(("boxes", f"{ends.count('finished')} finished"))
     if kind == "grow" and (path / files.GROWTH).exists():
         content = {"kind": json, "folder": str(path), "finished": True, **files.read_json(path / files.GROWTH)}
         return f"{path}: boxes", [("state", "finished"), *listed, ("measure with", f"sand analyse {path}")], content
