@@ -1,4 +1,4 @@
-"""Ctrl-C in every command: one line that says how to go on, exit code 130; `sand resume` then ends as if nothing had been."""
+"""Ctrl-C in every command: one line that says how to go on, code 130; `sand resume` ends as if nothing had been."""
 
 import json
 import os
