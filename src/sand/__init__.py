@@ -6,7 +6,8 @@ Names are loaded when first used, so that `import sand` and `sand --help` cost n
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+
+TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 
 __version__ = "0.1.0"
 
@@ -48,6 +49,8 @@ _ROOMS = ("setup", "theory", "analysis", "experiments", "files")
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from . import analysis as analysis
     from . import experiments as experiments
     from . import files as files

@@ -165,7 +165,7 @@ def test_the_command(tmp_path, capsys):
     }
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     assert main(["scatter", str(case), "--out", str(out)]) == 2
-    assert "--resume" in capsys.readouterr().err
+    assert "sand resume" in capsys.readouterr().err
     assert main(["scatter", str(case), "--out", str(out), "--resume", "--workers", "2"]) == 0
     assert "sigma = " in capsys.readouterr().out
     for name in ("flights.csv", "results.csv", "figure.png"):
@@ -197,7 +197,7 @@ def test_a_killed_job_goes_on(tmp_path):
     assert not (cut / "scattering.json").exists()
     with open(cut / "flights.csv", "a") as file:
         file.write("0,3,77,1,3.3e-")
-    assert main(["scatter", str(case), "--out", str(cut), "--quiet", "--resume"]) == 0
+    assert main(["resume", str(cut), "--quiet"]) == 0
     for name in ("flights.csv", "results.csv"):
         assert (cut / name).read_bytes() == (whole / name).read_bytes()
 
@@ -334,7 +334,7 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
         assert main(["scatter", str(case), "--out", str(out), "--workers", "2"]) == 2
     told = capsys.readouterr().err
     assert "a worker process died" in told
-    assert "--resume" in told
+    assert "sand resume" in told
     assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
 
 
@@ -353,7 +353,7 @@ def test_sigterm_says_how_to_go_on(tmp_path):
     told = job.communicate(timeout=30)[1]
     assert job.returncode == 130
     assert told.count("sand:") == 1
-    assert "--resume" in told
+    assert "sand resume" in told
 
 
 def test_a_map_needs_speeds_that_differ(tmp_path, capsys):

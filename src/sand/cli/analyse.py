@@ -13,8 +13,13 @@ from . import options, report
 
 
 @click.command("analyse", short_help="Measure growth, moments and fractal dimension of runs.")
-@click.argument("folders", metavar="DIR...", nargs=-1, required=True)
-@click.option("--out", metavar="FOLDER", help="Write analysis.json, growth.csv, aggregates.csv and growth.png there.")
+@click.argument("folders", metavar="DIR...", nargs=-1, required=True, type=options.PLACE)
+@click.option(
+    "--out",
+    metavar="FOLDER",
+    type=options.PLACE,
+    help="Write analysis.json, growth.csv, aggregates.csv and growth.png there.",
+)
 @click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Values of S between which z is fitted.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
 @options.as_json

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..core.errors import BadInput
+from ..run.limits import MOST_GRAINS
 from . import options, report
 from .exits import DONE
 
@@ -16,7 +18,7 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
 
 @click.command("build", short_help="Make an aggregate and write it to a file.")
 @click.argument("kind", metavar="KIND", type=click.Choice((*KINDS, "pca")))
-@click.option("--grains", type=int, metavar="N", help="Number of grains.")
+@click.option("--grains", type=options.COUNT, metavar="N", help="Number of grains.")
 @click.option("--shape", metavar="NX,NY,NZ", help="Sides of a lattice, instead of a cube number of grains.")
 @click.option(
     "--radius",
@@ -33,8 +35,10 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
 @click.option("--magnetic", metavar="PART", help="Part of the grains that have a moment, 0 to 1.")
 @click.option("--dimension", metavar="D", help="Fractal dimension of a fractal (default 1.8).")
 @click.option("--prefactor", metavar="K", help="Fractal prefactor of a fractal (default 1.3).")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Same seed, same aggregate.")
-@click.option("--out", required=True, metavar="FILE", help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd).")
+@click.option("--seed", type=options.SEED, default=0, show_default=True, help="Same seed, same aggregate.")
+@click.option(
+    "--out", required=True, metavar="FILE", type=options.PLACE, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
+)
 @click.option("--overwrite", is_flag=True, help="Replace the file if it is there.")
 @options.as_json
 @options.debug
@@ -72,9 +76,11 @@ def _arguments(given: dict[str, Any]) -> dict[str, Any]:
     shape = found.pop("shape")
     if shape is not None:
         words = [word.strip() for word in shape.split(",")]
-        if len(words) != 3 or not all(word.isdecimal() and int(word) > 0 for word in words):
+        if len(words) != 3 or not all(word.isdecimal() and len(word) < 10 and int(word) > 0 for word in words):
             raise BadInput(f"--shape {shape!r} must be three whole numbers above 0, such as 5,5,5")
         found["shape"] = [int(word) for word in words]
+        if math.prod(found["shape"]) > MOST_GRAINS:
+            raise BadInput(f"--shape {shape} has more than {MOST_GRAINS:.0e} grains")
         if found["grains"] is not None:
             raise BadInput("--shape already says how many grains there are; leave --grains out")
     for name in ("dimension", "prefactor", "magnetic"):

@@ -9,70 +9,70 @@ from typing import Any
 import click
 
 from ..core.errors import BadInput
+from ..core.threads import set_threads
 from . import options, report
+from .exits import DONE, INTERRUPTED
 
 SHOWN = 12
 """Collisions listed one by one on the screen; all of them are in collision.json."""
 
 
 @click.command("collide", short_help="Collide two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml")
-@click.option("--out", metavar="DIR", help="Folder for the files (default: the case's name).")
+@click.argument("case", metavar="CASE.toml", type=options.PLACE)
+@click.option("--out", metavar="DIR", type=options.PLACE, help="Folder for the files (default: the case's name).")
 @click.option("--seeds", metavar="LIST", help="Seeds instead of those in the case: '3', '1,2,5' or '1-20'.")
-@click.option("--workers", type=click.IntRange(min=1), default=1, help="Processes that share the seeds (default 1).")
+@options.workers
+@options.threads
 @click.option("--overwrite", is_flag=True, help="Replace the run that the folder holds.")
 @options.as_json
 @options.debug
-def command(case: str, out: str | None, seeds: str | None, workers: int, overwrite: bool, as_json: bool) -> int:
+def command(
+    case: str, out: str | None, seeds: str | None, workers: int, threads: int | None, overwrite: bool, as_json: bool
+) -> int:
     """Collide the bodies that CASE.toml describes, until nothing happens any more.
 
     Leaves collision.json and a figure in the folder; for a single seed also the trajectory, the ledger and all
-    that `sand run` leaves.
+    that `sand run` leaves.  Ctrl-C stops it; `sand resume` then goes on.
     """
-    from ..experiments.collision_case import read_collision
-    from ..files.folder import COLLISION, FIGURE, make_folder, write_json
-    from ..files.lock import writing
+    set_threads(threads)
+    chosen = None if seeds is None else read_seeds(seeds)
+    from ..experiments.collision_job import CollisionJob
     from .launch import refuse_folder
 
-    described = read_collision(case)
-    chosen = read_seeds(seeds) if seeds else described.impact.seeds
-    folder = Path(out or described.impact.out or Path(case).stem)
-    refuse_folder(folder, Path(case), overwrite=overwrite)
-    if len(chosen) == 1:
-        outcome, _ = report.with_notes(lambda: described.run(chosen[0], out=folder, overwrite=overwrite))
-        results = [outcome.to_dict()]
-    else:
-        make_folder(folder, overwrite=overwrite)
-        with writing(folder):
-            results = _many(case, chosen, workers)
-            from ..view.collisions import collision_figure
-            from ..view.figure import save
+    job = CollisionJob(case, None if out is None else Path(out), chosen, overwrite=overwrite)
+    refuse_folder(job.folder, Path(case), overwrite=overwrite)
+    return collide(job, f"collide {case}", workers, threads, as_json)
 
-            save(collision_figure(results), folder / FIGURE)
-    content = {"case": str(case), "folder": str(folder), "collisions": results, "counts": dict(counts(results))}
-    write_json(folder / COLLISION, content)
+
+def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> int:
+    """Do a `CollisionJob`, tell how it ended; returns the exit code.
+
+    Raises:
+        BadInput: as the job; or a worker process has died.
+    """
+    from concurrent.futures import BrokenExecutor
+
+    from ..experiments.executors import executor_for
+    from .interrupt import Watch
+
+    many = len(job.case.impact.seeds) > 1
+    try:
+        with (
+            report.compiling(as_json or quiet),
+            Watch() as watch,
+            executor_for(workers if many else 1, threads=threads) as executor,
+        ):
+            content = report.with_notes(lambda: job.run(executor, [watch]))
+    except KeyboardInterrupt:
+        report.note(f"interrupted; {report.way_on(job.folder)}")
+        return INTERRUPTED
+    except BrokenExecutor:
+        raise BadInput(f"a worker process died; {report.way_on(job.folder)}") from None
     if as_json:
         report.emit(content)
-    else:
-        _tell(case, folder, results)
-    return 0
-
-
-def _many(case: str, seeds: list[int], workers: int) -> list[dict[str, Any]]:
-    """All seeds, in processes if asked for."""
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-
-    from ..core.threads import one_thread
-    from ..experiments.collision_case import run_seeds
-    from ..files.folder import read_toml
-
-    content = read_toml(case)
-    if workers == 1:
-        return run_seeds(content, seeds)
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=one_thread) as pool:
-        return run_seeds(content, seeds, pool)
+    elif not quiet:
+        _tell(heading, job.folder, content["collisions"])
+    return DONE
 
 
 def counts(results: list[dict[str, Any]]) -> Counter[str]:
@@ -85,21 +85,24 @@ def read_seeds(text: str) -> list[int]:
     seeds: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not (first.isdecimal() and (last.isdecimal() or not dash)) or int(last or first) - int(first) > 100_000:
-            raise BadInput(f"--seeds {text!r} must be whole numbers such as '3', '1,2,5' or '1-20'")
-        seeds += range(int(first), int(last or first) + 1)
+        ends = [first, last or first]
+        known = all(end.isdecimal() and len(end) < 20 for end in ends) and (last or not dash)
+        if not known or int(ends[1]) - int(ends[0]) > 100_000 or int(ends[1]) > options.MOST_SEED:
+            shown = text if len(text) <= 40 else f"{text[:40]}…"
+            raise BadInput(f"--seeds {shown!r} must be whole numbers below 2^63 such as '3', '1,2,5' or '1-20'")
+        seeds += range(int(ends[0]), int(ends[1]) + 1)
     if not seeds:
         raise BadInput(f"--seeds {text!r} names no seed: the first number must not be above the last")
-    return seeds
+    return list(dict.fromkeys(seeds))
 
 
-def _tell(case: str, folder: Path, results: list[dict[str, Any]]) -> None:
+def _tell(heading: str, folder: Path, results: list[dict[str, Any]]) -> None:
     rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", line(r)) for r in results[:SHOWN]]
     if len(results) > SHOWN:
         rows.append(("…", f"and {len(results) - SHOWN} more"))
     tally = ", ".join(f"{n} × {name}" for name, n in counts(results).most_common())
     rows += [("outcomes", tally), ("files", f"{folder}/")]
-    report.show(f"collide {case}", rows)
+    report.show(heading, rows)
 
 
 def line(r: dict[str, Any]) -> str:

@@ -14,9 +14,9 @@ FORMATS = ("xyz", "lammps-dump", "lammps-data", "vtk")
 
 
 @click.command("export", short_help="Write a run's frames for other programs.")
-@click.argument("folder", metavar="DIR")
+@click.argument("folder", metavar="DIR", type=options.PLACE)
 @click.option("--to", "form", required=True, type=click.Choice(FORMATS), help="What for.")
-@click.option("--out", metavar="PATH", help="Path without ending (default: 'trajectory' in DIR).")
+@click.option("--out", metavar="PATH", type=options.PLACE, help="Path without ending (default: 'trajectory' in DIR).")
 @click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
 @click.option("--overwrite", is_flag=True, help="Replace files that are there.")
 @options.as_json

@@ -20,7 +20,7 @@ Told = tuple[str, report.Rows, dict[str, Any]]
 
 
 @click.command("info", short_help="What a run, or one of its files, holds.")
-@click.argument("path", metavar="DIR|FILE")
+@click.argument("path", metavar="DIR|FILE", type=options.PLACE)
 @options.as_json
 @options.debug
 def command(path: str, as_json: bool) -> int:
@@ -76,7 +76,7 @@ def of_run(path: Path) -> Told:
     """A run's folder: how it ended or how far it is."""
     from ..core.units import spoken
 
-    if not (path / files.CASE).exists():
+    if not any((path / name).exists() for name in (files.CASE, files.ONE_COLLISION)):
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
     if (job := of_job_folder(path)) is not None:
         return job

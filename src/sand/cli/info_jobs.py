@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import BadInput
 from ..files import folder as files
+from ..run.kinds import command_for
 from . import report
 
+UNFINISHED = {
+    "scatter": ("a scattering job", "scattering"),
+    "collide": ("collisions", "collision"),
+    "grow": ("boxes", "growth"),
+}
+"""Jobs by the command that began them: what they are called for people, and for machines."""
 Told = tuple[str, report.Rows, dict[str, Any]]
 """A heading, rows for people, and the same for machines."""
 
@@ -17,16 +25,39 @@ Told = tuple[str, report.Rows, dict[str, Any]]
 def of_other_case(path: Path) -> Told | None:
     """A case of another command, checked; None if it is not one."""
     content = files.read_toml(path)
-    if "flight" in content or "measure" in content:
+    kind = command_for(content)
+    if kind == "scatter":
         return _scatter_case(path)
-    if "impact" in content:
-        from ..experiments.collision_case import read_collision
+    if kind == "collide":
+        return _collision_case(path, content)
+    return _growth_case(path) if kind == "grow" else None
 
-        case = read_collision(path)
-        rows = [("bodies", f"{case.projectile.kind} on {case.target.kind}"), ("seeds", str(len(case.impact.seeds)))]
-        rows.append(("run it with", f"sand collide {path}"))
-        return f"{path}: a collision without mistakes", rows, {"kind": "collision case", "case": content}
-    return None
+
+def _collision_case(path: Path, content: dict[str, Any]) -> Told:
+    from ..experiments.collision_case import read_collision
+
+    case = read_collision(path)
+    simulation = report.with_notes(lambda: report.blame(path, case.check))
+    rows: report.Rows = [
+        ("bodies", f"{case.projectile.kind} on {case.target.kind}, {len(simulation.grains)} grains"),
+        ("seeds", str(len(case.impact.seeds))),
+        ("run it with", f"sand collide {shlex.quote(str(path))}"),
+    ]
+    return f"{path}: a collision without mistakes", rows, {"kind": "collision case", "case": content}
+
+
+def _growth_case(path: Path) -> Told:
+    from ..experiments.growth_case import read_growth
+    from ..run.build import simulation_of
+    from ..run.case import check_case
+
+    content, seeds = read_growth(path)
+    simulation = report.with_notes(lambda: report.blame(path, lambda: simulation_of(check_case(content, ""), None)))
+    rows: report.Rows = [
+        ("boxes", f"{len(seeds or [])} of {len(simulation.grains)} grains"),
+        ("run it with", f"sand grow {shlex.quote(str(path))}"),
+    ]
+    return f"{path}: boxes without mistakes", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}}
 
 
 def _scatter_case(path: Path) -> Told:
@@ -47,7 +78,7 @@ def _scatter_case(path: Path) -> Told:
 
 
 def of_job_folder(path: Path) -> Told | None:
-    """A folder of `sand scatter` or `sand collide`; None if it is not one."""
+    """A folder of `sand scatter`, `sand collide` or `sand grow`; None if it is not one."""
     for name in (files.SCATTERING, files.COLLISION):
         if (path / name).exists():
             told = of_job_file(path / name)
@@ -55,10 +86,20 @@ def of_job_folder(path: Path) -> Told | None:
             heading, rows, content = told
             listed = [*rows, ("files", "  ".join(report.files_of(path)))]
             return f"{path}: {heading.split(': ', 1)[1]}", listed, {**content, "folder": str(path)}
-    if (path / files.FLIGHTS).exists():
-        rows = [("state", "cut short"), ("go on with", f"sand scatter {path / files.CASE} --out {path} --resume")]
-        return f"{path}: a scattering job", rows, {"kind": "scattering", "folder": str(path), "finished": False}
-    return None
+    one = (path / files.ONE_COLLISION).exists()  # case.toml is that of its simulation
+    kind = "collide" if one else command_for(files.read_toml(path / files.CASE))
+    if kind not in UNFINISHED:
+        return None
+    name, json = UNFINISHED[kind]
+    listed = [("files", "  ".join(report.files_of(path)))]
+    if kind == "grow":
+        ends = [files.read_json(one).get("outcome") for one in path.glob(f"seed-*/{files.SUMMARY}")]
+        listed.append(("boxes", f"{ends.count('finished')} finished"))
+    if kind == "grow" and (path / files.GROWTH).exists():
+        content = {"kind": json, "folder": str(path), "finished": True, **files.read_json(path / files.GROWTH)}
+        return f"{path}: boxes", [("state", "finished"), *listed, ("measure with", f"sand analyse {path}")], content
+    rows = [("state", "running, or cut short"), *listed, ("go on with", report.resume_line(path))]
+    return f"{path}: {name}", rows, {"kind": json, "folder": str(path), "finished": False}
 
 
 def of_job_file(path: Path) -> Told | None:

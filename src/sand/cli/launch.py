@@ -55,11 +55,29 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         except (Exception, KeyboardInterrupt) as error:
             if not (watch.asked or isinstance(error, KeyboardInterrupt)):
                 raise
-            return _cut_off(folder)  # a compiler that is interrupted may fail in any way
+            result = _only_drawing(simulation, goal, folder)
+            if result is None:
+                return _cut_off(folder)  # a compiler that is interrupted may fail in any way
+            report.note("the figure is left out")
         finally:
             if bar is not None:
                 bar.finish()
     return _conclude(result, folder, talk=talk, as_json=as_json)
+
+
+def _only_drawing(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
+    """The result of a run that was through when Ctrl-C came, but for its figure; None for any other."""
+    from ..run.outcome import Outcome, Result
+
+    if simulation.time < goal[0] and simulation.steps < goal[1]:
+        return None
+    try:
+        summary = read_json(folder / SUMMARY)
+    except BadInput:
+        return None
+    if (summary.get("steps"), summary.get("outcome")) != (simulation.steps, "finished"):
+        return None
+    return Result(Outcome.FINISHED, simulation.steps, simulation.time, simulation.ledger.drift)
 
 
 def _goal(simulation: Any, end: End | None) -> tuple[float, float]:
@@ -97,7 +115,9 @@ def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
 
 def _cut_off(folder: Path) -> int:
     """Ctrl-C before the first step, or twice: the last checkpoint, if any, is what is left."""
-    if report.checkpoints(folder):
+    if not folder.is_dir():
+        report.note(f"interrupted; the folder {folder} is not there, start again")
+    elif report.checkpoints(folder):
         report.note(f"interrupted at once; go on from the last checkpoint with: {report.resume_line(folder)}")
     else:
         report.note("interrupted before the first step; nothing is lost, start again")
@@ -106,6 +126,8 @@ def _cut_off(folder: Path) -> int:
 
 def _what_is_left(folder: Path) -> str:
     """What to do when a file could not be written."""
+    if not folder.is_dir():
+        return f"the folder {folder} has vanished with all that was in it; start again"
     if report.checkpoints(folder):
         return f"once that is mended go on from the last checkpoint with: {report.resume_line(folder)}"
     return "there is no checkpoint yet; once that is mended start again, with --overwrite"
@@ -136,8 +158,8 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         return
     if not overwrite:
         told = "give another one with --out, or --overwrite to replace the run in it"
-        if report.checkpoints(folder):
-            told += f"; or go on with that run: {report.resume_line(folder)}"
+        if report.can_go_on(folder):
+            told += f"; or go on with what is in it: {report.resume_line(folder)}"
         raise BadInput(f"folder {folder} exists and is not empty; {told}")
     if any((folder / name).exists() and (folder / name).samefile(case) for name in report.OURS):
         raise BadInput(

@@ -1,41 +1,21 @@
-"""The `sand` command: parse, call one command, turn errors into exit codes."""
+"""The entry point of the `sand` command: deals with Ctrl-C from the first moment on, then loads the rest."""
 
 from __future__ import annotations
 
-import os
+import signal
 import sys
-from collections.abc import Sequence
 
-import click
+TYPE_CHECKING = False  # typing takes as long to load as all the rest here
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
 
-from .. import __version__
-from ..core.errors import SandError
-from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
-from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
-
-COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
-"""One module per command; each has a `command`."""
-
-
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="sand", message="%(prog)s %(version)s")
-@options.debug
-@click.pass_context
-def sand(context: click.Context) -> None:
-    """SAND: dust aggregates, grain by grain, with sticking contacts and magnetic dipoles.
-
-    Exit codes: 0 done, 2 a mistake in what was asked for, 3 stopped by physics, 130 interrupted.
-    """
-    if context.invoked_subcommand is None:
-        click.echo(context.get_help())
-
-
-for _module in COMMANDS:
-    sand.add_command(_module.command)
+INTERRUPTED = 130
+"""Exit code after Ctrl-C; it stands here, too, because nothing else of ours may be loaded yet."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The entry point; returns the exit code.
+    """Run one command; returns the exit code.
 
     Args:
         argv: words after `sand`; those of the command line by default.
@@ -44,55 +24,57 @@ def main(argv: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a terminal that cannot show µ or … gets something else instead
             stream.reconfigure(errors="replace")
-    try:
-        return _call(words)
-    except BrokenPipeError:  # the reader went away, as in `sand info DIR | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or flushing at exit would complain
-        return DONE
+    with _Interrupts(to_the_end=argv is None) as interrupts:
+        try:
+            from .program import run_command
+
+            return run_command(words, lambda: interrupts.asked)
+        except KeyboardInterrupt:
+            pass
+        except Exception:  # an import that is cut short fails in any way
+            if not interrupts.asked:
+                raise
+        sys.stderr.write("sand: interrupted\n")
+        return INTERRUPTED
 
 
-def _call(words: list[str]) -> int:
-    """Run the command; its errors become lines and an exit code, unless --debug."""
-    try:
-        with sand.make_context("sand", list(words)) as context, report.noting():
-            return sand.invoke(context) or DONE
-    except click.exceptions.Exit as stop:  # --help, --version
-        return stop.exit_code
-    except BrokenPipeError:
-        raise
-    except (KeyboardInterrupt, click.Abort):
-        return _fail(["interrupted"], INTERRUPTED, words)
-    except Exception as error:
-        if "--debug" in words and not isinstance(error, click.ClickException):
-            raise
-        return _fail(*_explained(error), words)
+class _Interrupts:
+    """Ctrl-C raises KeyboardInterrupt in the block, and is remembered: what is being imported may swallow it.
 
+    Args:
+        to_the_end: the program ends with the block; Ctrl-C then ends it at once, without a word.
+    """
 
-def _explained(error: Exception) -> tuple[list[str], int]:
-    """What to say of an error, and the exit code."""
-    if isinstance(error, SandError):
-        return str(error).splitlines(), MISTAKE
-    if isinstance(error, click.UsageError):
-        where = error.ctx.command_path if error.ctx else "sand"
-        return [f"{_one_line(error.format_message()).rstrip('.')}; see {where} --help"], MISTAKE
-    if isinstance(error, click.ClickException):
-        return [_one_line(error.format_message())], MISTAKE
-    if isinstance(error, MemoryError):
-        return ["not enough memory for this; take fewer grains"], MISTAKE
-    told = _one_line(f"{type(error).__name__}: {error}")
-    return [f"internal error ({told}); run again with --debug and report what it prints"], FAILED
+    def __init__(self, to_the_end: bool):
+        self.asked = False
+        self._to_the_end = to_the_end
+        self._before: Any = None
+        self._hook = sys.unraisablehook
 
+    def __enter__(self) -> _Interrupts:
+        before = signal.getsignal(signal.SIGINT)
+        if before not in (signal.SIG_IGN, None):  # a shell's `sand run … &` is not for Ctrl-C
+            try:
+                signal.signal(signal.SIGINT, self._raise)
+            except ValueError:  # not in the main thread
+                return self
+            self._before = before
+            sys.unraisablehook = self._lost
+        return self
 
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
+    def _raise(self, _number: int, _frame: Any) -> None:
+        self.asked = True
+        raise KeyboardInterrupt
 
+    def _lost(self, unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            self._hook(unraisable)
 
-def _fail(lines: list[str], code: int, words: list[str]) -> int:
-    for line in lines:
-        report.note(line)
-    if "--json" in words:
-        report.emit({"error": lines, "exit_code": code})
-    return code
+    def __exit__(self, *_: object) -> None:
+        if self._before is None:
+            return
+        signal.signal(signal.SIGINT, signal.SIG_DFL if self._to_the_end else self._before)
+        sys.unraisablehook = self._hook
 
 
 if __name__ == "__main__":

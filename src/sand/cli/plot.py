@@ -25,11 +25,13 @@ class Source(NamedTuple):
 
 
 @click.command("plot", short_help="Draw figures of a run, and a still picture of a frame.")
-@click.argument("source", metavar="DIR")
+@click.argument("source", metavar="DIR", type=options.PLACE)
 @click.option("--what", metavar="WHAT,…", help="Which (default: all over time, and still).")
-@click.option("--out", metavar="FOLDER", help="Where to (default: 'plots' in DIR).")
+@click.option("--out", metavar="FOLDER", type=options.PLACE, help="Where to (default: 'plots' in DIR).")
 @click.option("--format", "form", type=click.Choice(FORMATS), default="png", show_default=True, help="Of the files.")
-@click.option("--frame", metavar="K", type=int, default=-1, help="Which frame, as in Python (default: the last).")
+@click.option(
+    "--frame", metavar="K", type=options.FRAME, default=-1, help="Which frame, as in Python (default: the last)."
+)
 @click.option("--colour", metavar="QUANTITY", default="cluster", show_default=True, help="What colours grains show.")
 @click.option("--bonds", type=click.Choice(["load", "mode", "none"]), default="none", help="What contacts show.")
 @click.option("--arrows/--no-arrows", default=True, help="Moments as arrows (default: they are).")

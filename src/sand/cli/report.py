@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 import warnings
 from collections.abc import Callable, Iterable, Iterator
@@ -15,15 +16,33 @@ from typing import Any, TypeVar
 import click
 
 from ..core.errors import BadInput
-from ..files.folder import OURS, plain
+from ..files.folder import CASE, ONE_COLLISION, OURS, plain, read_toml
+from ..run.kinds import command_for
 
 T = TypeVar("T")
 Rows = list[tuple[str, str]]
 
 
+LONGEST = 600
+"""Characters of a note."""
+_UNFIT = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""Control characters, and those that change the direction of what follows: they can rewrite what a terminal shows."""
+
+
+def clean(text: str) -> str:
+    """The text as one line, with `\\x1b` and the like in place of control characters."""
+    return _UNFIT.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """One line for people; all that goes to the terminal comes through here, or through `clean`."""
+    click.echo(clean(text), err=err)
+
+
 def note(text: str) -> None:
-    """One line on stderr."""
-    click.echo(f"sand: {text}", err=True)
+    """One line on stderr; of what is too long to be read, its middle is left out."""
+    shown = text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} … {text[-LONGEST // 3 :]}"
+    say(f"sand: {shown}", err=True)
 
 
 def compiling(quiet: bool = False) -> AbstractContextManager[None]:
@@ -36,13 +55,15 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
 
 def emit(content: dict[str, Any]) -> None:
     """The one JSON object of --json; NaN and infinities become null."""
-    click.echo(json.dumps(plain(content), indent=2, allow_nan=False))
+    # JSON escapes all other control characters itself
+    click.echo(json.dumps(plain(content), indent=2, allow_nan=False).replace("\x7f", "\\u007f"))
 
 
 def show(heading: str, rows: Rows) -> None:
     """A heading and two columns."""
     width = max((len(label) for label, _ in rows), default=0)
-    click.echo("\n".join([heading, *(f"  {label:<{width}}  {text}" for label, text in rows)]))
+    for line in [heading, *(f"  {label:<{width}}  {text}" for label, text in rows)]:
+        say(line)
 
 
 def with_notes(make: Callable[[], T]) -> T:
@@ -82,6 +103,23 @@ def blame(case: Path, make: Callable[[], T]) -> T:
 def resume_line(folder: Path) -> str:
     """What to type to go on with a run."""
     return f"sand resume {shlex.quote(str(folder))}"
+
+
+def way_on(folder: Path) -> str:
+    """How to go on with what has stopped, in words."""
+    if can_go_on(folder):
+        return f"go on with: {resume_line(folder)}"
+    return "nothing is lost, start again"
+
+
+def can_go_on(folder: Path) -> bool:
+    """True if `sand resume` finds something to go on with in a folder."""
+    if checkpoints(folder) or (folder / ONE_COLLISION).exists():
+        return True
+    try:
+        return command_for(read_toml(folder / CASE)) in ("grow", "scatter", "collide")
+    except BadInput:
+        return False
 
 
 def checkpoints(folder: Path) -> list[Path]:

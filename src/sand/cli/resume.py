@@ -1,4 +1,4 @@
-"""`sand resume DIR`: go on with a run from its newest checkpoint."""
+"""`sand resume DIR`: go on with what was interrupted, whichever command began it."""
 
 from __future__ import annotations
 
@@ -9,31 +9,105 @@ import click
 
 from ..core.errors import BadInput
 from ..core.threads import set_threads
+from ..files.folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, read_json, read_toml
+from ..run.kinds import command_for
 from . import options, report
+from .exits import DONE
+
+RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
+"""What a finished job has in its folder."""
 
 
-@click.command("resume", short_help="Go on with a run from its newest checkpoint.")
-@click.argument("folder", metavar="DIR")
-@options.end_of_run('A later end than planned, such as "10 us".')
+@click.command("resume", short_help="Go on with what was interrupted, in the folder of any command.")
+@click.argument("folder", metavar="DIR", type=options.PLACE)
+@options.end_of_run('Of a run: a later end than planned, such as "10 us".')
+@options.workers
+@options.scheduler
 @options.threads
 @options.as_json
 @options.quiet
 @options.debug
-def command(folder: str, until: str | None, threads: int | None, as_json: bool, quiet: bool) -> int:
-    """Go on with the run in DIR from its newest checkpoint, to its planned end or to --until."""
+def command(
+    folder: str,
+    until: str | None,
+    workers: int,
+    scheduler: str | None,
+    threads: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Go on with the run in DIR from its newest checkpoint, to its planned end or to --until.
+
+    The folders of `sand collide`, `sand scatter` and `sand grow` are gone on with, too: what is finished is kept, and
+    the results are those of a job that was never interrupted.
+    """
     asked = options.seconds(until)
     set_threads(threads)
+    place = Path(folder)
+    kind = _kind(place)
+    if kind != "run":
+        if until is not None:
+            raise BadInput(f"--until is for a run; {folder} holds a job of `sand {kind}`")
+        if scheduler is not None and kind == "collide":
+            raise BadInput("--scheduler is for jobs of `sand scatter` and `sand grow`; take --workers")
+        how = {"workers": workers, "threads": threads, "quiet": quiet, "as_json": as_json}
+        return _job(kind, place, scheduler, how)
+    if workers > 1 or scheduler is not None:
+        raise BadInput("--workers and --scheduler are for jobs of many parts; a run takes --threads")
+    return _run(place, until, asked, quiet=quiet, as_json=as_json)
+
+
+def _kind(folder: Path) -> str:
+    """The command that began what is in a folder.  Raises BadInput for what is none."""
+    if folder.is_file():
+        raise BadInput(f"{folder} is a file; give the folder of a run")
+    if (folder / ONE_COLLISION).exists():
+        return "collide"
+    kind = command_for(read_toml(folder / CASE)) if (folder / CASE).exists() else None
+    return kind or "run"
+
+
+def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) -> int:
+    """Go on with the job of `sand collide`, `sand scatter` or `sand grow`; returns the exit code."""
+    from .collide import collide
+    from .grow import boxes
+    from .scatter import scatter
+
+    if (folder / RESULTS[kind]).exists():
+        if how["as_json"]:
+            report.emit({**read_json(folder / RESULTS[kind]), "folder": str(folder)})
+        elif not how["quiet"]:
+            report.say(f"{folder} is finished, its results are in {folder / RESULTS[kind]}")
+        return DONE
+    if kind == "grow":
+        from ..experiments.growth_case import read_growth
+
+        content, seeds = read_growth(folder / CASE)
+        return boxes(content, seeds or [], folder, scheduler=scheduler, **how)
+    if kind == "scatter":
+        from ..experiments.scattering_case import read_scattering
+
+        del how["threads"]  # a flight is done by one
+        read = read_scattering(folder / CASE)
+        return scatter(folder / CASE, read, folder, resume=True, scheduler=scheduler, **how)
+    from ..experiments.collision_job import CollisionJob, description_in
+
+    job = CollisionJob(description_in(folder) or folder / CASE, folder, resume=True)
+    return collide(job, f"resume {folder}", **how)
+
+
+def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as_json: bool) -> int:
+    """Go on with a run; returns the exit code."""
     from ..run.build import resume
     from .launch import End, launch
 
-    place = Path(folder)
     simulation = report.with_notes(lambda: resume(place))
     if asked is not None and asked <= simulation.time:
-        raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, where {folder} stands")
+        raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, where {place} stands")
     if asked is None and _is_there(simulation):
         return _nothing_to_do(simulation, place, quiet=quiet, as_json=as_json)
     end = None if asked is None else End(asked)
-    return launch(lambda: simulation, place, f"resume {folder}", end, quiet=quiet, as_json=as_json)
+    return launch(lambda: simulation, place, f"resume {place}", end, quiet=quiet, as_json=as_json)
 
 
 def _is_there(simulation: Any) -> bool:
@@ -49,14 +123,14 @@ def _stand(simulation: Any) -> str:
 
 
 def _nothing_to_do(simulation: Any, folder: Path, *, quiet: bool, as_json: bool) -> int:
-    from ..files.folder import SUMMARY, read_json
+    from ..files.folder import SUMMARY
 
     if as_json:
         there = (folder / SUMMARY).exists()
         report.emit({**(read_json(folder / SUMMARY) if there else {}), "folder": str(folder)})
     elif not quiet:
-        click.echo(
+        report.say(
             f"{folder} has reached its planned end, it stands at t = {_stand(simulation)}; "
             f"to go further: {report.resume_line(folder)} --until TIME"
         )
-    return 0
+    return DONE

@@ -13,14 +13,18 @@ from . import options, report
 
 
 @click.command("run", short_help="Run the simulation that a case file describes.")
-@click.argument("case", metavar="CASE.toml", required=False)
-@click.option("--out", metavar="DIR", help="Folder for the files (default: the case's name).")
+@click.argument("case", metavar="CASE.toml", required=False, type=options.PLACE)
+@click.option("--out", metavar="DIR", type=options.PLACE, help="Folder for the files (default: the case's name).")
 @click.option(
-    "--from", "source", metavar="FILE", help="Trajectory, or folder of a run, whose grains and contacts to take."
+    "--from",
+    "source",
+    metavar="FILE",
+    type=options.PLACE,
+    help="Trajectory, or folder of a run, whose grains and contacts to take.",
 )
-@click.option("--frame", type=int, metavar="K", help="Which frame of it, from 0; −1, the last, by default.")
+@click.option("--frame", type=options.FRAME, metavar="K", help="Which frame of it, from 0; −1, the last, by default.")
 @options.end_of_run('End of the run instead of that in the case, such as "5 us".')
-@click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed instead of that in the case.")
+@click.option("--seed", type=options.SEED, metavar="N", help="Seed instead of that in the case.")
 @click.option("--overwrite", is_flag=True, help="Replace the run that the folder holds.")
 @options.threads
 @options.as_json

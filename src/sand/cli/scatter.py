@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,11 +14,11 @@ from .exits import DONE, INTERRUPTED
 
 
 @click.command("scatter", short_help="Cross-sections and trajectories of two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml")
-@click.option("--out", metavar="DIR", help="Folder for the files (default: the case's name).")
-@click.option("--workers", type=click.IntRange(min=1), default=1, help="Processes that share the work (default 1).")
-@click.option("--scheduler", metavar="ADDRESS", help="A running dask scheduler instead, tcp://host:port.")
-@click.option("--resume", is_flag=True, help="Go on with the flights that the folder holds.")
+@click.argument("case", metavar="CASE.toml", type=options.PLACE)
+@click.option("--out", metavar="DIR", type=options.PLACE, help="Folder for the files (default: the case's name).")
+@options.workers
+@options.scheduler
+@click.option("--resume", is_flag=True, help="Go on with the flights that the folder holds, as sand resume does.")
 @click.option("--overwrite", is_flag=True, help="Replace the job that the folder holds.")
 @options.quiet
 @options.as_json
@@ -37,46 +36,70 @@ def command(
     """Fly the bodies that CASE.toml describes past each other.
 
     Leaves scattering.json, results.csv and a figure in the folder, and for cross-sections and maps flights.csv with
-    every single flight. The numbers are the same for any number of workers and after any interruption.
+    every single flight. The numbers are the same for any number of workers and after any interruption; `sand resume`
+    goes on after one.
+    """
+    from ..experiments.scattering_case import read_scattering
+
+    if resume and overwrite:
+        raise BadInput("--resume and --overwrite exclude each other")
+    read = read_scattering(case)
+    folder = Path(out or read[0].measure.out or Path(case).stem)
+    _refuse(folder, Path(case), resume=resume, overwrite=overwrite)
+    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "quiet": quiet, "as_json": as_json}
+    return scatter(Path(case), read, folder, resume=resume, overwrite=overwrite, **how)
+
+
+def scatter(
+    case: Path,
+    read: tuple[Any, Any],
+    folder: Path,
+    *,
+    resume: bool,
+    overwrite: bool = False,
+    workers: int,
+    scheduler: str | None,
+    quiet: bool,
+    as_json: bool,
+) -> int:
+    """Fly what a case asks for, tell what came of it; returns the exit code.
+
+    Args:
+        read: what `read_scattering` gives for the case.
+        resume: go on with the flights in the folder.
+
+    Raises:
+        BadInput: the folder belongs to another case, or a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
-    from contextlib import ExitStack
 
     from ..experiments.executors import executor_for
-    from ..experiments.scattering_case import read_scattering
     from ..experiments.scattering_job import Job
     from ..files.folder import make_folder, read_toml
     from ..files.lock import writing
     from .interrupt import Watch
 
-    described, flights = read_scattering(case)
-    folder = Path(out or described.measure.out or Path(case).stem)
-    if resume and overwrite:
-        raise BadInput("--resume and --overwrite exclude each other")
-    _refuse(folder, Path(case), resume=resume, overwrite=overwrite)
-    with executor_for(workers, scheduler) as executor, ExitStack() as held:
-        if not resume:
-            make_folder(folder, overwrite=overwrite)
-        held.enter_context(writing(folder))
-        job = Job(described, flights, read_toml(case), folder, resume)
-        bar = _Bar(not (quiet or as_json))
-        words = f"sand scatter {shlex.quote(case)} --out {shlex.quote(str(folder))} --resume"
-        try:
-            with report.compiling(quiet), Watch():
+    bar = _Bar(not (quiet or as_json))
+    try:
+        with report.compiling(quiet), Watch(), executor_for(workers, scheduler) as executor:
+            if not resume:
+                make_folder(folder, overwrite=overwrite)
+            with writing(folder):
+                job = Job(*read, read_toml(case), folder, resume)
                 content = report.with_notes(lambda: job.run(executor, bar.see))
-        except KeyboardInterrupt:
-            report.note(f"interrupted; {'go on with: ' + words if job.table else 'nothing is lost, start again'}")
-            return INTERRUPTED
-        except BrokenExecutor:
-            raise BadInput(f"a worker process died; what was flown is kept, go on with: {words}") from None
-        finally:
-            bar.close()
+    except KeyboardInterrupt:
+        bar.close()
+        report.note(f"interrupted; {report.way_on(folder)}")
+        return INTERRUPTED
+    except BrokenExecutor:
+        raise BadInput(f"a worker process died; {report.way_on(folder)}") from None
+    finally:
+        bar.close()
     if as_json:
         report.emit({**content, "folder": str(folder)})
     elif not quiet:
-        report.show(
-            f"scatter {case}", [*rows_of(content), ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")]
-        )
+        files = ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")
+        report.show(f"scatter {case}", [*rows_of(content), files])
     return DONE
 
 
@@ -85,15 +108,10 @@ def _refuse(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
     from ..files.folder import FLIGHTS
     from .launch import refuse_folder
 
-    if resume:
-        if not (folder / FLIGHTS).exists():
-            raise BadInput(f"there is nothing to resume in {folder}: no {FLIGHTS}")
-        return
-    if not overwrite and (folder / FLIGHTS).exists():
-        raise BadInput(
-            f"folder {folder} holds a job; go on with it by --resume, or --overwrite it, or give another --out"
-        )
-    refuse_folder(folder, case, overwrite=overwrite)
+    if not resume:
+        refuse_folder(folder, case, overwrite=overwrite)
+    elif not (folder / FLIGHTS).exists():
+        raise BadInput(f"there is nothing to resume in {folder}: no {FLIGHTS}")
 
 
 class _Bar:

@@ -27,8 +27,14 @@ YOUNG = 5.0
 
 
 @click.command("view", short_help="Look at the grains of a run in the browser.")
-@click.argument("folder", metavar="DIR")
-@click.option("--html", "html", metavar="FILE", help="Write one page with everything in it instead, to keep or send.")
+@click.argument("folder", metavar="DIR", type=options.PLACE)
+@click.option(
+    "--html",
+    "html",
+    metavar="FILE",
+    type=options.PLACE,
+    help="Write one page with everything in it instead, to keep or send.",
+)
 @click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Every K-th frame only.")
 @click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
 @click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Listen there (default: any free).")
@@ -143,7 +149,7 @@ class _Bar:
         from tqdm import tqdm
 
         if self._bar is None:
-            self._bar = tqdm(total=count, desc=self.target.name, unit="frame", disable=None, leave=False)
+            self._bar = tqdm(total=count, desc=report.clean(self.target.name), unit="frame", disable=None, leave=False)
         self._bar.update(done - self._bar.n)
         if done == count:
             self._bar.close()

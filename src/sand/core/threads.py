@@ -29,11 +29,6 @@ def set_threads(number: int | None) -> None:
     _wished = None if number is None else _checked(number, "threads")
 
 
-def one_thread() -> None:
-    """For processes that share the cores with others of their kind: no more threads."""
-    set_threads(1)
-
-
 def threads() -> int:
     """Threads that a large simulation uses.
 

@@ -38,7 +38,10 @@ EXAMPLES = {
 # A number, then a unit made of names, small integer powers, products and quotients; nothing that computes.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|[+-]?(?:inf|nan)"
 _UNIT = r"[A-Za-zµμΩÅ°%][A-Za-zµμΩÅ°]*(?:(?:\^|\*\*)?-?\d|[²³])?"
-_TEXT = re.compile(rf"\s*({_NUMBER})\s*({_UNIT}(?:\s*(?:[*/·]|\s)\s*{_UNIT})*)?\s*", re.IGNORECASE)
+# Only one way leads through each text: otherwise a text that does not fit takes longer than anybody waits.
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*({_UNIT}(?:(?:\s*[*/·]\s*|\s+){_UNIT})*)?\s*", re.IGNORECASE)
+LONGEST_TEXT = 100
+"""Characters of a number with its unit; longer text is refused before it is parsed."""
 
 
 # Tens, and powers of m, kg, s, A, K: what is written with these alone needs no pint, which takes 0.3 s to load.
@@ -87,13 +90,16 @@ def _factor(text: str, unit: str) -> float | None:
     """What one `text` is in `unit`, or None where that makes no sense."""
     given, wanted = _powers(text), _powers(unit)
     if given and wanted:
-        return float(f"1e{given[0] - wanted[0]}") if given[1:] == wanted[1:] else None
+        factor = float(f"1e{given[0] - wanted[0]}")
+        return factor if given[1:] == wanted[1:] and 0.0 < factor < math.inf else None
     import pint
 
     spelled = text.replace("·", "*").replace("²", "**2").replace("³", "**3")
     spelled = re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", spelled)
     try:
-        return float(_registry().Quantity(1.0, spelled).to(unit.replace("^", "**")).magnitude)
+        none, one = (_registry().Quantity(n, spelled).to(unit.replace("^", "**")).magnitude for n in (0.0, 1.0))
+        # 0 degC is not 0 K, and 0 dB is 1: such units have no factor
+        return float(one) if none == 0.0 and 0.0 < one < math.inf else None
     except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError, ValueError, AssertionError):
         return None
 
@@ -108,20 +114,31 @@ def _times(number: str, factor: float) -> float:
 
 def _complain(value: Any, unit: str, name: str) -> BadInput:
     example = EXAMPLES.get(unit, f"1 {unit}")
-    return BadInput(f"{name} = {value!r} is not a quantity in {unit}; give a number in SI or text such as '{example}'")
+    shown = f"{name} = {shortened(value)}"
+    return BadInput(f"{shown} is not a quantity in {unit}; give a number in SI or text such as '{example}'")
+
+
+def shortened(value: Any) -> str:
+    """`value` as Python writes it, its middle left out where that is too long for a message."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits, lists in lists without end
+        return f"a {type(value).__name__} that is too long to be shown"
+    return text if len(text) <= LONGEST_TEXT else f"{text[:60]}…{text[-20:]}"
 
 
 def in_unit(value: Any, unit: str) -> Any:
     """`value` as an SI float or array of `unit`, or None if it is of another kind.
 
-    Text without a unit counts as SI only where the unit is "1".
+    Text without a unit counts as SI where the unit is "1", and where the number is 0, which is the same in all units.
     """
     if isinstance(value, str):
-        match = _TEXT.fullmatch(value)
+        match = _TEXT.fullmatch(value) if len(value) <= LONGEST_TEXT else None
         if not match:
             return None
         number, given = match.groups()
-        factor = _factor(given.strip(), unit) if given else (1.0 if unit == "1" else None)
+        bare = 1.0 if unit == "1" or float(number) == 0.0 else None
+        factor = _factor(given.strip(), unit) if given else bare
         return None if factor is None else _times(number, factor)
     if isinstance(value, bool):
         return None
@@ -135,7 +152,7 @@ def in_unit(value: Any, unit: str) -> Any:
         return None if factor is None else np.asarray(value.magnitude, dtype=np.float64)[()] * factor
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, RecursionError):
         return None
     return float(array) if array.ndim == 0 else array
 
@@ -159,7 +176,7 @@ def si(value: Any, unit: str, name: str, *, above: float | None = None, least: f
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:
         raise _complain(value, unit, name)
-    shown = f"{name} = {value!r}"
+    shown = f"{name} = {shortened(value)}"
     if not math.isfinite(number):
         raise BadInput(f"{shown} is not finite; give a number in {unit}")
     if number != 0.0 and not LEAST < abs(number) < MOST:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
@@ -24,12 +27,17 @@ from ..run.case import (
     with_integrator,
     wrong_materials,
 )
+from ..run.kinds import BODIES, refuse_other_command
+from ..run.limits import MOST_GRAINS
 from ..run.mistakes import complaints
+from ..run.sections import Count, PlaceName, Seed
+from ..run.simulation import Simulation
 from ..setup.aggregates import build
+from ..setup.encounters import offset_of
 from ..setup.moments import WAYS
 from ..setup.population import radii_of
 from ..stepping.verlet import Verlet
-from .collision import Collision, collide
+from .collision import Approach, Collision, approach, finished, gone_on_with, prepared
 
 Kind = Literal["grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"]
 """The builders, `setup.aggregates.KINDS`, and a file."""
@@ -39,10 +47,10 @@ class BodySection(Section):
     """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
 
     kind: Kind
-    path: str | None = None
+    path: PlaceName | None = None
     length: str | None = None
-    grains: Annotated[int, Field(ge=1, strict=True)] | None = None
-    shape: list[Annotated[int, Field(ge=1, strict=True)]] | None = None
+    grains: Count | None = None
+    shape: list[Count] | None = None
     radius: Any = None
     material: str = "silica"
     moment: Any = None
@@ -83,6 +91,8 @@ class BodySection(Section):
             raise ValueError(f"grains is missing: how many does the {self.kind} have?")
         if regular and (self.shape is None or len(self.shape) != 3):
             raise ValueError("shape is missing: three whole numbers, such as [5, 5, 5]")
+        if self.shape is not None and math.prod(self.shape) > MOST_GRAINS:
+            raise ValueError(f"shape = {self.shape} has more than {MOST_GRAINS:.0e} grains")
         if self.moment is not None and self.kind == "file":
             raise ValueError("moment: a file brings its own moments; leave it out")
         return self
@@ -105,8 +115,14 @@ class ImpactSection(Section):
     impact_parameter: Any = 0.0
     along: Literal["x", "y", "z"] = "x"
     turn: bool = True
-    seeds: list[Annotated[int, Field(ge=0, strict=True)]] = Field(default_factory=lambda: [1], min_length=1)
-    out: str | None = None
+    seeds: list[Seed] = Field(default_factory=lambda: [1], min_length=1)
+    out: PlaceName | None = None
+
+    @field_validator("impact_parameter")
+    @classmethod
+    def _offset(cls, value: Any) -> Any:
+        offset_of(value, 1.0)
+        return value
 
 
 class CollisionCase(Section):
@@ -124,20 +140,39 @@ class CollisionCase(Section):
     def _method(cls, value: Any) -> Any:
         return integrator(value)
 
-    def run(self, seed: int, **options: Any) -> tuple[Collision, Any]:
-        """One collision; with `turn` the bodies are turned at random by the seed.  Raises BadInput."""
+    def approach(self, seed: int) -> Approach:
+        """The bodies of one collision; with `turn` they are turned at random by the seed.  Raises BadInput."""
         materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
-        return collide(
+        return approach(
             self.target.build(materials, 2 * seed),
             self.projectile.build(materials, 2 * seed + 1),
             speed=self.impact.speed,
             impact_parameter=self.impact.impact_parameter,
             along=self.impact.along,
             seed=seed if self.impact.turn else None,
-            forces=self.forces.build() or None,
-            stepping=self.stepping,
-            **options,
         )
+
+    def prepared(self, start: Approach, **options: Any) -> Simulation:
+        """The simulation of one collision at its start; options as for `Simulation`.  Raises BadInput."""
+        return prepared(start, self.forces.build() or None, self.stepping, **options)
+
+    def gone_on_with(self, start: Approach, folder: Path, **options: Any) -> Simulation:
+        """The simulation of a collision that was interrupted, see `collision.gone_on_with`.  Raises BadInput."""
+        return gone_on_with(start, folder, self.forces.build() or None, self.stepping, **options)
+
+    def check(self) -> Simulation:
+        """The first collision at its start, in memory, so that all that can be wrong with it is found.
+
+        Raises:
+            BadInput: what only shows when bodies, forces and materials come together.
+        """
+        return self.prepared(self.approach(self.impact.seeds[0]))
+
+    def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
+        """One collision; options as for `Simulation`.  Raises BadInput."""
+        start = self.approach(seed)
+        simulation = self.prepared(start, **options)
+        return finished(start, simulation), simulation
 
 
 def wrong_bodies(content: dict[str, Any]) -> list[str]:
@@ -153,6 +188,16 @@ def wrong_bodies(content: dict[str, Any]) -> list[str]:
     return problems
 
 
+def with_whole_paths(content: dict[str, Any]) -> dict[str, Any]:
+    """The case with the bodies' files named so that they are found from any folder."""
+    whole = dict(content)
+    for body in BODIES & content.keys():
+        given = content[body]
+        if isinstance(given, dict) and isinstance(given.get("path"), str):
+            whole[body] = {**given, "path": str(Path(given["path"]).absolute())}
+    return whole
+
+
 def read_collision(path: str | Path) -> CollisionCase:
     """Read and check a case file of `sand collide`.
 
@@ -160,6 +205,7 @@ def read_collision(path: str | Path) -> CollisionCase:
         BadInput: every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
+    refuse_other_command(content, path, "collide")
     problems = wrong_bodies(content)
     case, model = None, with_integrator(CollisionCase, content)
     try:
@@ -172,21 +218,50 @@ def read_collision(path: str | Path) -> CollisionCase:
     return case
 
 
-def run_seed(text: str, seed: int) -> dict[str, Any]:
+def run_seed(text: str, seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
     """One collision of a case given as JSON, its outcome as a dictionary: what worker processes run."""
     import warnings
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         content = json.loads(text)
-        return with_integrator(CollisionCase, content).model_validate(content).run(seed)[0].to_dict()
+        case = with_integrator(CollisionCase, content).model_validate(content)
+        return case.run(seed, observers=list(observers))[0].to_dict()
 
 
-def run_seeds(case: dict[str, Any], seeds: list[int], executor: Any = None) -> list[dict[str, Any]]:
+def run_seeds(
+    case: dict[str, Any],
+    seeds: list[int],
+    executor: Any = None,
+    known: dict[int, dict[str, Any]] | None = None,
+    keep: Callable[[int, dict[str, Any]], None] | None = None,
+    observers: Sequence[Any] = (),
+) -> list[dict[str, Any]]:
     """The outcomes for many seeds in their order, on any `concurrent.futures.Executor` or here.
 
     Args:
         case: content of a case file that `read_collision` has accepted.
+        known: outcomes by seed that need not be computed again.
+        keep: called with each seed and its outcome as soon as it is there, in any order.
+        observers: of the simulations, where there is no executor.
     """
-    work = partial(run_seed, json.dumps(case))
-    return list(executor.map(work, seeds)) if executor is not None else [work(seed) for seed in seeds]
+    own: dict[str, Any] = {} if executor is not None else {"observers": observers}
+    work, found = partial(run_seed, json.dumps(case), **own), dict(known or {})
+    left = [seed for seed in dict.fromkeys(seeds) if seed not in found]
+    for seed, outcome in _outcomes(work, left, executor):
+        found[seed] = outcome
+        if keep is not None:
+            keep(seed, outcome)
+    return [found[seed] for seed in seeds]
+
+
+def _outcomes(
+    work: Callable[[int], dict[str, Any]], seeds: list[int], executor: Any
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Each seed and its outcome, as they come."""
+    if executor is None:
+        yield from ((seed, work(seed)) for seed in seeds)
+        return
+    waiting = {executor.submit(work, seed): seed for seed in seeds}
+    for future in as_completed(waiting):
+        yield waiting[future], future.result()

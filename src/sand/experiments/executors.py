@@ -10,9 +10,10 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 
 from ..core.errors import BadInput
-from ..core.threads import one_thread
+from ..core.threads import set_threads
 
 ANSWER = 10.0
 """Seconds that a scheduler has for its first answer."""
@@ -22,11 +23,16 @@ _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
 @contextmanager
-def executor_for(workers: int = 1, scheduler: str | None = None) -> Iterator[Executor | None]:
+def executor_for(
+    workers: int = 1, scheduler: str | None = None, threads: int | None = None
+) -> Iterator[Executor | None]:
     """An executor for the block; None for one worker, which is this process.
+
+    An exception in the block, Ctrl-C among them, ends the processes: each run in them writes its checkpoint first.
 
     Args:
         workers: processes to start, each a new interpreter.
+        threads: of each of them; one by default, because they share the cores.
         scheduler: address of a running dask scheduler, "tcp://host:port", instead. Work of a worker that dies is done
             again by another.
 
@@ -42,19 +48,27 @@ def executor_for(workers: int = 1, scheduler: str | None = None) -> Iterator[Exe
         raise BadInput(f"workers = {workers}; on Windows Python starts at most {MOST_ON_WINDOWS} processes")
     else:
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_signals_to_parent) as pool:
+        begin = partial(_leave_signals_to_parent, threads or 1)
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=begin) as pool:
             _start(pool, workers)
+            processes = list((getattr(pool, "_processes", None) or {}).values())
             try:
                 yield pool
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
+                for process in processes:  # or the program would end only with the piece of work they are at
+                    process.terminate()
                 raise
 
 
-def _leave_signals_to_parent() -> None:
-    """Ctrl-C goes to all processes of a terminal; the parent alone answers it.  Cores are shared by processes."""
+def _leave_signals_to_parent(threads: int) -> None:
+    """Ctrl-C goes to all processes of a terminal; the parent alone answers it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    one_thread()
+    set_threads(threads)
+
+
+def _nothing() -> None:
+    """Work that makes the pool start a process."""
 
 
 def _start(pool: Executor, workers: int) -> None:
@@ -62,7 +76,7 @@ def _start(pool: Executor, workers: int) -> None:
     here = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGINT, signal.SIG_IGN) if here else None
     try:
-        for future in [pool.submit(_leave_signals_to_parent) for _ in range(workers)]:
+        for future in [pool.submit(_nothing) for _ in range(workers)]:
             future.result()
     finally:
         if here:

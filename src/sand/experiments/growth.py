@@ -1,10 +1,8 @@
-"""How aggregates grow: ensembles of boxes, and what they have in common (Figure 1, Eqs. 15–25)."""
+"""How aggregates grow: what the boxes of an ensemble have in common (Figure 1, Eqs. 15–25)."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,9 +13,10 @@ from ..analysis.fits import PowerLaw, RateLaw, power_law, rate_law
 from ..analysis.fractal import Dimension, ensemble_dimension
 from ..core.errors import BadInput
 from ..files import folder as files
-from ..run.build import case_of, resume, simulation_of
-from ..run.case import check_case
 from ..run.opened import Opened
+from .boxes import alike, grow, one_box
+
+__all__ = ["Box", "Growth", "alike", "boxes_in", "grow", "growth_of", "one_box", "read_box"]
 
 LOOKS = 10
 """Frames of each box at which its aggregates are measured, evenly over the run, the last among them."""
@@ -27,86 +26,6 @@ LARGEST_PART = 0.15
 """Part of all grains up to which S is fitted: beyond, a box runs out of partners."""
 LEAST = 3
 """Grains of an aggregate from which its moment counts."""
-
-
-def grow(
-    content: dict[str, Any],
-    seeds: Sequence[int],
-    folder: str | Path,
-    executor: Executor | None = None,
-    told: Callable[[int, str], None] | None = None,
-) -> list[Path]:
-    """Run the same box for many seeds, each into its own folder; runs that are there already are gone on with.
-
-    Args:
-        content: a case as for `sand run`, as read from TOML.
-        seeds: one box each.
-        folder: that holds their folders, seed-1 and so on.
-        executor: where; one after the other in this process by default.
-        told: called with a seed and how its run ended.
-
-    Returns:
-        The folders, in the order of the seeds.
-
-    Raises:
-        BadInput: a case with mistakes, a folder that holds something else, a run stopped by physics.
-        Interrupted: Ctrl-C; calling again goes on.
-    """
-    place = Path(folder)
-    check_case(content, "case")
-    places = [place / f"seed-{seed}" for seed in seeds]
-    others = [
-        there for there in boxes_of(place) if there not in places
-    ]  # those of these seeds are looked at by one_box
-    if others:
-        asked = alike(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
-        for there in others:
-            known = alike(files.read_toml(there / files.CASE))
-            if changed := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
-                raise BadInput(f"{there} holds a box with other [{changed[0]}]; give another folder")
-    jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
-    if executor is None:
-        outcomes: Any = (one_box(*job) for job in jobs)
-    else:
-        waiting = [executor.submit(one_box, *job) for job in jobs]
-        outcomes = (future.result() for future in waiting)
-    wrong = []
-    for seed, outcome in zip(seeds, outcomes, strict=True):
-        if told is not None:
-            told(seed, outcome)
-        if outcome != "finished":
-            wrong.append(f"seed {seed}: stopped ({outcome}); see {place / f'seed-{seed}' / files.SUMMARY}")
-    if wrong:
-        raise BadInput(wrong)
-    return places
-
-
-def boxes_of(folder: Path) -> list[Path]:
-    """The folders that `grow` has begun in a folder."""
-    return [there.parent for there in folder.glob(f"seed-*/{files.CASE}")]
-
-
-def one_box(content: dict[str, Any], seed: int, folder: str) -> str:
-    """Run one box to its end, from its newest checkpoint if it has one; returns the name of the outcome.
-
-    Raises:
-        BadInput: the folder holds a run of another case.
-    """
-    place, case = Path(folder), check_case(content, "case")
-    case.run.seed = seed
-    if any(place.glob("checkpoint-*.npz")):
-        simulation = resume(place)
-        asked, there = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
-        if changed := [name for name in asked if name != "run" and asked[name] != there[name]]:
-            raise BadInput(f"{place} holds a run with other [{changed[0]}]; give another folder, or the same case")
-        until = case.run.until if case.run.until is None else max(case.run.until, simulation.time)
-    else:
-        # a folder without a checkpoint is what a kill at the very start leaves
-        simulation, until = simulation_of(case, place, overwrite=True), case.run.until
-    steps = None if case.run.steps is None else case.run.steps - simulation.steps
-    if steps is not None and steps <= 0:
-        return "finished"
-    return simulation.run(until, steps=steps).outcome.name.lower()
 
 
 class Box(NamedTuple):
@@ -155,15 +74,6 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
 def _usual(moments: np.ndarray) -> float:
     """Mean size of the moments of the grains that have one; 0 if none has."""
     return float(moments[moments > 0.0].mean()) if (moments > 0.0).any() else 0.0
-
-
-def alike(case: dict[str, Any]) -> dict[str, Any]:
-    """What boxes of an ensemble have in common: the case but for [run] and for cut-offs, which follow the grains."""
-    forces = {
-        name: {key: value for key, value in table.items() if key != "cutoff"}
-        for name, table in case.get("forces", {}).items()
-    }
-    return {name: table for name, table in case.items() if name != "run"} | {"forces": forces}
 
 
 def boxes_in(folder: str | Path) -> list[Path]:

@@ -13,7 +13,9 @@ from ..core.errors import BadInput
 from ..core.material import PRESETS
 from ..files.folder import read_toml
 from ..run.case import MaterialSection, Section
+from ..run.kinds import refuse_other_command
 from ..run.mistakes import complaints
+from ..run.sections import PlaceName, Seed
 from .collision_case import BodySection, Kind, wrong_bodies
 from .encounters import Flight
 from .scattering_input import Asking, flight, impact_parameter
@@ -50,9 +52,9 @@ class MeasureSection(Section):
     impact_parameters: list[Any] = Field(default_factory=list)
     spins: list[Any] = Field(default_factory=list)
     cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
-    per_cell: Annotated[int, Field(ge=1, strict=True)] = 64
-    seed: Annotated[int, Field(ge=0, lt=2**63, strict=True)] = 0
-    out: str | None = None
+    per_cell: Annotated[int, Field(ge=1, le=10**9, strict=True)] = 64
+    seed: Seed = 0
+    out: PlaceName | None = None
 
     @field_validator("relative_error")
     @classmethod
@@ -133,6 +135,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
         BadInput: every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
+    refuse_other_command(content, path, "scatter")
     problems = wrong_bodies(content)
     try:
         case = ScatterCase.model_validate(content)

@@ -15,6 +15,7 @@ from ..files.folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_toml
 from ..files.table import GrowingTable, write_table
 from ..run.record import versions
 from ..view.figure import save
+from .collision_case import with_whole_paths
 from .encounters import Flight
 from .flights import COLUMNS, Trajectory, trajectory
 from .maps import probability_map
@@ -49,11 +50,12 @@ class Job:
 
     def __post_init__(self) -> None:
         place = self.folder / CASE
+        self.content = with_whole_paths(self.content)
         if self.resume and place.exists():
-            if read_toml(place) != self.content:
+            if with_whole_paths(read_toml(place)) != self.content:
                 raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
         else:
-            write_toml(place, self.content, "sand scatter: what was asked for")
+            write_toml(place, self.content, "sand scatter: what was asked for; sand resume reads it")
         self.before: dict[int, list[list[float]]] = {}
         self.table = None
         if self.case.measure.job != "trajectories":

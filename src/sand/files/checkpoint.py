@@ -36,7 +36,7 @@ import numpy as np
 
 from ..core.errors import BadInput
 from .damaged import set_aside
-from .folder import replace_file
+from .folder import refuse_devices, replace_file
 from .state import check_state
 
 VERSION = 4
@@ -91,6 +91,7 @@ def _refuse_impossible_sizes(path: Path) -> None:
     Raises:
         ValueError: an array larger than the file, or than its part of it.
     """
+    refuse_devices(path)
     size = path.stat().st_size
     with zipfile.ZipFile(path) as archive:
         for part in archive.infolist():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -64,6 +65,43 @@ class GrowingTable:
         head, *lines = read_text(self.path).split("\n")[:-1]
         lines.sort(key=lambda line: [float(part) for part in line.split(",")])
         replace_file(self.path, ("\n".join([head, *lines]) + "\n").encode())
+
+
+class GrowingOutcomes:
+    """Outcomes of the parts of a job, one JSON object a line; a line that a kill tore in two is dropped.
+
+    Args:
+        path: of the file; made anew unless `resume`.
+        case: what the outcomes are of, the first line of the file.
+        resume: keep what is there.
+
+    Raises:
+        BadInput: the file is no such list, or one of another case.
+        FilesFailed: it cannot be written.
+    """
+
+    def __init__(self, path: Path, case: dict[str, Any], *, resume: bool = False):
+        self.path = path
+        head = json.dumps({"case": case}, sort_keys=True)
+        lines = read_text(path).split("\n")[:-1] if resume and path.exists() else []
+        if lines and lines[0] != head:
+            raise BadInput(f"{path} holds outcomes of another case; put the case back, or begin anew elsewhere")
+        self.found: dict[int, dict[str, Any]] = {}
+        for line in lines[1:]:
+            try:
+                entry = json.loads(line)
+                self.found[int(entry["seed"])] = dict(entry["outcome"])
+            except (ValueError, TypeError, KeyError, RecursionError):
+                raise BadInput(f"{path} is not a list of outcomes; remove it, they are then computed again") from None
+        replace_file(path, "".join(line + "\n" for line in [head, *lines[1:]]).encode())
+
+    def add(self, seed: int, outcome: dict[str, Any]) -> None:
+        """Keep one outcome; its numbers are read back to the last bit.  Raises FilesFailed."""
+        try:
+            with open(self.path, "a", encoding="utf-8", newline="") as file:
+                file.write(json.dumps({"seed": seed, "outcome": outcome}) + "\n")
+        except OSError as error:
+            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
 
 
 def _told(value: float) -> str:

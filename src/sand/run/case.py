@@ -6,24 +6,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    ValidationError,
-    ValidationInfo,
-    create_model,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, PrivateAttr, ValidationError, create_model, field_validator, model_validator
 
 from ..core.box import Box, as_box
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import moment_size
 from ..core.material import PRESETS, Material, material_named
-from ..core.units import si
 from ..files.folder import read_toml
 from ..forces.central import Attraction, Charges
 from ..forces.contact import Contact
@@ -36,34 +24,21 @@ from ..setup.gas import SPINS
 from ..stepping.adaptive import Adaptive
 from ..stepping.neighbours import Neighbours
 from ..stepping.verlet import Verlet
+from .kinds import refuse_other_command
 from .mistakes import complaints
+from .sections import Count, Duration, PlaceName, Section, Seed, Steps, quantity
 
 INTEGRATORS: dict[str, type] = {"verlet": Verlet, "adaptive": Adaptive}
-
-
-def quantity(unit: str, **bounds: float) -> Any:
-    """A number with a unit, as text or in SI."""
-
-    def read(value: Any, info: ValidationInfo) -> float:
-        return si(value, unit, str(info.field_name), **bounds)
-
-    return Annotated[Any, BeforeValidator(read)]
-
-
-class Section(BaseModel):
-    """A table of a case file; an unknown key in it is a mistake."""
-
-    model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 
 class RunSection(Section):
     """[run]: how long (a time, or a number of steps), how often, which seed, where to."""
 
-    until: quantity("s", above=0.0) | None = None  # type: ignore[valid-type]
-    steps: Annotated[int, Field(ge=1, strict=True)] | None = None
-    frame_every: quantity("s", above=0.0) | None = None  # type: ignore[valid-type]
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
-    out: str | None = None
+    until: Duration | None = None
+    steps: Steps | None = None
+    frame_every: Duration | None = None
+    seed: Seed = 0
+    out: PlaceName | None = None
 
     @model_validator(mode="after")
     def _ends(self) -> RunSection:
@@ -112,15 +87,15 @@ class GrainsSection(Section):
     """[grains]: a gas of grains, or those of a `file`: a frame of a trajectory, or a body; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
-    number: Annotated[int, Field(ge=1, strict=True)] | None = None
+    number: Count | None = None
     radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
     material: str | list[str] = "iron"
     moment: Any = None
     charge: quantity("C") | None = None  # type: ignore[valid-type]
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
     spins: str = "kT/2"
-    file: str | None = None
-    frame: Annotated[int, Field(strict=True)] = -1
+    file: PlaceName | None = None
+    frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
     length: str | None = None
 
     @field_validator("moment")
@@ -218,7 +193,7 @@ class Case(Section):
     run: RunSection
     box: BoxSection = BoxSection()
     grains: GrainsSection
-    materials: dict[str, MaterialSection] = {}
+    materials: dict[str, MaterialSection] = Field(default_factory=dict)
     forces: ForcesSection = ForcesSection()
     stepping: Verlet = Verlet()
     neighbours: Neighbours = Neighbours()
@@ -274,7 +249,9 @@ def read_case(path: str | Path) -> Case:
     Raises:
         BadInput: every mistake of the file, one line each, with its place.
     """
-    case = check_case(read_toml(path), str(path))
+    content = read_toml(path)
+    refuse_other_command(content, path, "run")
+    case = check_case(content, str(path))
     if case.grains.file is not None:  # as seen from the case file
         case.grains.file = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return case

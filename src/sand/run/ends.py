@@ -10,6 +10,17 @@ import numpy as np
 from ..core.errors import BadInput
 from ..core.units import si
 
+SHORTEST = 1e-21
+"""Shortest time [s] that may be asked for; light passes through less than a picometre meanwhile."""
+
+
+def duration(value: Any, name: str) -> float:
+    """A time span [s] of at least `SHORTEST`.  Raises BadInput."""
+    seconds = si(value, "s", name, above=0.0)
+    if seconds < SHORTEST:
+        raise BadInput(f"{name} = {value!r} must be at least {SHORTEST:g} s: nothing moves in less")
+    return seconds
+
 
 def ends_of(
     until: Any, steps: int | None, time: float, taken: int, planned: tuple[float, float]
@@ -25,6 +36,8 @@ def ends_of(
         BadInput: no end, one that is past, or steps that are no whole number of at least 1.
     """
     end = math.inf if until is None else si(until, "s", "until")
+    if 0.0 < end < SHORTEST:
+        duration(until, "until")
     last = math.inf if steps is None else taken + _whole_steps(steps)
     if until is None and steps is None:
         end, last = planned

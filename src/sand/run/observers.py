@@ -47,16 +47,21 @@ class Schedule:
     def __init__(self, every: float, time: float):
         self._every = every
         self._number = 0
+        self._after = -math.inf
         self.pass_by(time)
 
     @property
     def due(self) -> float:
-        return self._number * self._every if math.isfinite(self._every) else math.inf
+        return max(self._number * self._every, self._after) if math.isfinite(self._every) else math.inf
 
     def pass_by(self, time: float) -> None:
         """Move on to the first due time after `time`."""
         if not math.isfinite(self._every):
             return
         self._number = max(self._number, math.floor(time / self._every))
-        while self._number * self._every <= time:
-            self._number += 1
+        # rounding may put the first multiple tried, or the second, before `time`
+        for _ in range(2):
+            if self._number * self._every <= time:
+                self._number += 1
+        # multiples that double precision no longer tells from `time`: every step is a frame then
+        self._after = math.nextafter(time, math.inf)

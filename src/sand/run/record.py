@@ -20,7 +20,7 @@ from ..files.folder import make_folder, plain, read_json, write_json, write_toml
 from ..files.ledger import LedgerFile, keep_if_damaged, read_ledger
 from ..files.lock import FolderLock
 from ..files.trajectory import TrajectoryWriter
-from .outcome import Result
+from .outcome import Outcome, Result
 
 if TYPE_CHECKING:
     from .simulation import Simulation
@@ -46,6 +46,7 @@ class Record:
     def __init__(self, out: str | Path, overwrite: bool = False, resumed: bool = False):
         self.folder = Path(out) if resumed else make_folder(out, overwrite=overwrite)
         self._resumed = resumed
+        self.draws = True  # a figure at the end of each `run`
         self._trajectory: TrajectoryWriter | None = None
         self._ledger: LedgerFile | None = None
         self._saved, self._took = wall.monotonic(), 0.0
@@ -194,6 +195,12 @@ class Record:
             self._trajectory.close()
         summary = summary_of(simulation, result) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
+        # whoever interrupts a run does not want to wait for its figure
+        if self.draws and result.outcome is not Outcome.INTERRUPTED:
+            self.draw(simulation)
+
+    def draw(self, simulation: Simulation) -> None:
+        """The figure of the run so far."""
         if simulation.ledger.rows:
             from ..view.figure import run_figure, save
 

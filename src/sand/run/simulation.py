@@ -14,7 +14,7 @@ import numpy as np
 from ..core.box import as_box
 from ..core.errors import BadInput, FilesFailed, Interrupted
 from ..core.grains import Grains
-from ..core.units import si, spoken
+from ..core.units import spoken
 from ..core.world import World
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
@@ -25,7 +25,7 @@ from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
 from .at_grains import at_grains
 from .contacts import ContactTable
-from .ends import ends_of
+from .ends import duration, ends_of
 from .ledger import Ledger, kinetic_energies, take_stock
 from .observers import Observer, Schedule, tick_all
 from .outcome import OF_STOP, Outcome, Result
@@ -84,7 +84,7 @@ class Simulation:
         self.neighbours = neighbours or Neighbours()
         self.seed = seed
         self.observers = list(observers)
-        self.frame_every = None if frame_every is None else si(frame_every, "s", "frame_every", above=0.0)
+        self.frame_every = None if frame_every is None else duration(frame_every, "frame_every")
         self._chosen: dict[str, str] = {}  # what the start of a resumed run decided
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
         self.origin = ""  # what is to be said of where the grains came from

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.errors import BadInput
 from ..core.grains import Grains
-from ..core.units import in_unit, si
+from ..core.units import MOST, in_unit, shortened, si
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -74,7 +74,7 @@ def encounter(
         float((np.linalg.norm(b.position - c, axis=1) + b.radius).max())
         for b, c in zip((target, projectile), centres, strict=True)
     ]
-    offset = _offset(impact_parameter, sum(reach))
+    offset = offset_of(impact_parameter, sum(reach))
     back = _clearance(
         target.position - centres[0],
         target.radius,
@@ -121,17 +121,25 @@ def _direction(along: Any) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def _offset(given: Any, whole: float) -> float:
+def offset_of(given: Any, whole: float) -> float:
+    """The impact parameter [m] as `encounter` takes it.
+
+    Args:
+        given: a length, or a part of `whole` as text, "0.5 b".
+        whole: sum of the outer radii [m].
+
+    Raises:
+        BadInput: neither, or below 0.
+    """
     if isinstance(given, str) and given.strip().endswith("b"):
-        try:
-            offset: Any = float(given.strip()[:-1]) * whole
-        except ValueError:
-            offset = None
+        part = in_unit(given.strip()[:-1], "1")
+        offset = None if part is None else part * whole
     else:
         offset = in_unit(given, "m")
-    if offset is None or np.ndim(offset) != 0 or not 0.0 <= offset < np.inf:
+    if offset is None or np.ndim(offset) != 0 or not 0.0 <= offset < MOST:
         raise BadInput(
-            f"impact_parameter = {given!r} must be a length ≥ 0 such as '10 nm', or a part of the reach, '0.5 b'"
+            f"impact_parameter = {shortened(given)} must be a length ≥ 0 such as '10 nm', or a part of the reach, "
+            "'0.5 b'"
         )
     return float(offset)
 

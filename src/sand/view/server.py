@@ -7,13 +7,16 @@ point here.
 
 from __future__ import annotations
 
+import contextlib
 import hmac
 import json
 import os
 import re
 import secrets
 import threading
+import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from typing import Any
@@ -32,7 +35,9 @@ PATIENCE = 30.0
 USUAL_PORT = 80
 """Of http: addresses and hosts do not name it."""
 AT_ONCE = 64
-"""Connections."""
+"""Connections; for one more, that which has been silent for longest is closed."""
+BOTH_WAYS = 2
+"""What SHUT_RDWR is everywhere."""
 HEADERS = {
     "Content-Security-Policy": SERVED,
     "X-Content-Type-Options": "nosniff",
@@ -79,7 +84,8 @@ class Server(ThreadingHTTPServer):
     def __init__(self, story: Story, port: int = 0):
         script, styles = read_bundle()
         self.story, self.token = story, secrets.token_urlsafe(24)
-        self._room = threading.BoundedSemaphore(AT_ONCE)
+        self._lines: dict[int, _Line] = {}
+        self._lock = threading.Lock()
         self._files = {
             "": ("text/html; charset=utf-8", served(f"{story.name} – SAND")),
             "grainview.js": ("text/javascript; charset=utf-8", script),
@@ -113,18 +119,43 @@ class Server(ThreadingHTTPServer):
         self.server_close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """In a thread of its own; beyond AT_ONCE of them a client is turned away."""
-        if not self._room.acquire(blocking=False):
-            self.shutdown_request(request)
-            return
+        """In a thread of its own; where there are AT_ONCE of them, one that waits for its client is ended first."""
+        with self._lock:
+            if len(self._lines) >= AT_ONCE:
+                silent = [line for line in self._lines.values() if not line.busy]
+                if not silent:  # all are being answered, which is soon over
+                    self.shutdown_request(request)
+                    return
+                self._close(min(silent, key=lambda line: (line.trusted, line.since)))
+            self._lines[id(request)] = _Line(request)
         super().process_request(request, client_address)
+
+    def _close(self, line: _Line) -> None:
+        """End a connection; its thread wakes up and finds that out."""
+        self._lines.pop(id(line.request), None)
+        with contextlib.suppress(OSError):
+            line.request.shutdown(BOTH_WAYS)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """What the thread does."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._room.release()
+            with self._lock:
+                line = self._lines.get(id(request))
+                if line is not None and line.request is request:
+                    del self._lines[id(request)]
+
+    def note(self, request: Any, *, busy: bool, trusted: bool = False) -> None:
+        """What a connection does from now on.
+
+        Args:
+            busy: an answer is being worked out; otherwise its client is waited for.
+            trusted: it has named the token.
+        """
+        line = self._lines.get(id(request))
+        if line is not None and line.request is request:
+            line.busy, line.since, line.trusted = busy, time.monotonic(), line.trusted or trusted
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A client that went away is nobody's trouble."""
@@ -184,6 +215,16 @@ def _json(content: dict[str, Any]) -> bytes:
     return json.dumps(plain(content), allow_nan=False, separators=(",", ":")).encode()
 
 
+@dataclass
+class _Line:
+    """A connection, and since when it does what it does."""
+
+    request: Any
+    since: float = field(default_factory=time.monotonic)
+    busy: bool = False
+    trusted: bool = False
+
+
 class _Handler(BaseHTTPRequestHandler):
     """One connection."""
 
@@ -194,7 +235,12 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         try:
-            kind, content = self.server.answer(*self._asked())
+            asked = self._asked()
+            self.server.note(self.request, busy=True, trusted=True)
+            try:
+                kind, content = self.server.answer(*asked)
+            finally:
+                self.server.note(self.request, busy=False)
             self._send(200, kind, content)
         except Refused as refused:
             self._send(refused.status, JSON, _json({"error": str(refused)}))

@@ -1,0 +1,58 @@
+"""Case files of `sand grow`: those of `sand run`, and which seeds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from ..core.errors import BadInput
+from ..files.folder import read_toml
+from ..run.case import Case, check_case
+from ..run.kinds import refuse_other_command
+from ..run.mistakes import complaints
+from ..run.sections import Section, Seed
+
+
+class GrowSection(Section):
+    """[grow]: one box for each seed."""
+
+    seeds: list[Seed] = Field(min_length=1)
+
+
+class GrowthCase(Case):
+    """The case of a box and the seeds of all boxes."""
+
+    grow: GrowSection
+
+
+def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
+    """Read and check a case file of `sand grow`, which may be one of `sand run`.
+
+    Returns:
+        The case of a box as `growth.grow` takes it, and the seeds if the file has [grow].
+
+    Raises:
+        BadInput: every mistake of the file, one line each, with its place.
+    """
+    content = read_toml(path)
+    refuse_other_command(content, path, "grow")
+    given = content.pop("grow", None)
+    problems: list[str] = []
+    seeds = None
+    if given is not None:
+        try:
+            seeds = GrowSection.model_validate(given).seeds
+        except ValidationError as error:
+            slips = [{**slip, "loc": ("grow", *slip["loc"])} for slip in error.errors()]
+            problems += [f"{path}: {line}" for slip in slips for line in complaints(slip, GrowthCase, {})]
+    try:
+        case = check_case(content, str(path))
+    except BadInput as error:
+        raise BadInput(problems + error.problems) from None
+    if problems:
+        raise BadInput(problems)
+    if case.grains.file is not None:  # as seen from the case file
+        content["grains"]["file"] = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
+    return content, seeds

@@ -1,0 +1,304 @@
+"""Ctrl-C in every command: one line that says how to go on, code 130; `sand resume` ends as if nothing had been."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from sand.cli.interrupt import Watch
+from sand.cli.main import main
+from sand.experiments import collision_case
+from sand.files.checkpoint import newest_checkpoint
+from sand.files.table import GrowingOutcomes
+
+COLLISION = """
+[target]
+kind = "chain"
+grains = 2
+radius = "0.1 um"
+[projectile]
+kind = "grain"
+radius = "0.1 um"
+[impact]
+speed = "2 m/s"
+seeds = [1, 2, 3]
+[forces.contact]
+"""
+BOX = """
+[run]
+until = "2 ns"
+frame_every = "0.2 ns"
+[box]
+periodic = "300 nm"
+[grains]
+number = 6
+radius = "10 nm"
+material = "silica"
+temperature = "300 K"
+[forces.contact]
+"""
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty folder to work in, with a case of each kind."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hit.toml").write_text(COLLISION)
+    (tmp_path / "box.toml").write_text(BOX)
+    return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def _empty_figures(monkeypatch):
+    """Figures are files without content: drawing takes longer than all the rest."""
+    monkeypatch.setattr("sand.view.figure.run_figure", lambda simulation: None)
+    monkeypatch.setattr("sand.view.collisions.collision_figure", lambda results: None)
+    monkeypatch.setattr("sand.view.figure.save", lambda figure, path: path.write_bytes(b""))
+
+
+def interrupt(patch, when):
+    """Press Ctrl-C between two steps, once `when(simulation)` holds."""
+
+    def tick(self, simulation):
+        if when(simulation):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    patch.setattr(Watch, "tick", tick, raising=False)
+
+
+def same_run(one, other):
+    """True if two folders hold the same run to the last bit."""
+    (a, meta_a), (b, meta_b) = newest_checkpoint(one), newest_checkpoint(other)
+    assert meta_a["steps"] == meta_b["steps"] and a.keys() == b.keys()
+    assert (one / "ledger.csv").read_bytes() == (other / "ledger.csv").read_bytes()
+    return all(a[name].tobytes() == b[name].tobytes() for name in a)
+
+
+def has_made(simulation):
+    return simulation.ledger.rows[-1]["made"] > 0
+
+
+def flies(simulation):
+    return simulation.steps > 0
+
+
+def looked_twice(simulation):
+    return has_made(simulation) and len(simulation.ledger.rows) > 40
+
+
+@pytest.fixture(scope="module")
+def hit(tmp_path_factory):
+    """The folder of a collision that was left alone."""
+    top = tmp_path_factory.mktemp("hit")
+    (top / "hit.toml").write_text(COLLISION)
+    assert main(["collide", str(top / "hit.toml"), "--seeds", "2", "--out", str(top / "whole"), "--json"]) == 0
+    return top / "whole"
+
+
+@pytest.mark.parametrize("moments", [[has_made], [flies, has_made, looked_twice]])
+def test_a_collision_goes_on(place, hit, capsys, monkeypatch, moments):
+    """Interrupted before, while and after bodies meet, once or often: the same bits, and collision.json."""
+    words = ["collide", "hit.toml", "--seeds", "2", "--out", "cut"]
+    for when in moments:
+        with monkeypatch.context() as patch:
+            interrupt(patch, when)
+            assert main(words) == 130
+        assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; go on with: sand resume cut"
+        assert not (place / "cut" / "collision.json").exists() and not (place / "cut" / "figure.png").exists()
+        words = ["resume", "cut", "--threads", "1"]
+    assert main(["info", "cut"]) == 0
+    assert "go on with  sand resume cut" in capsys.readouterr().out
+    assert main(["collide", "hit.toml", "--seeds", "2", "--out", "cut"]) == 2
+    assert "sand resume cut" in capsys.readouterr().err
+    assert main(["resume", "cut", "--quiet"]) == 0
+    ours, theirs = (json.loads((one / "collision.json").read_text()) for one in (place / "cut", hit))
+    assert ours["collisions"] == theirs["collisions"] and ours["counts"] == theirs["counts"]
+    assert same_run(place / "cut", hit)
+    assert (place / "cut" / "figure.png").exists()
+    before = (place / "cut" / "collision.json").stat().st_mtime_ns
+    assert main(["resume", "cut"]) == 0
+    assert "cut is finished" in capsys.readouterr().out
+    assert (place / "cut" / "collision.json").stat().st_mtime_ns == before
+
+
+def test_a_collision_that_was_killed_goes_on(place, hit, capsys):
+    """Without a checkpoint it begins anew; with all looks taken and no outcome it only judges."""
+    shutil.copytree(hit, place / "late")
+    (place / "late" / "collision.json").unlink()
+    (place / "early").mkdir()
+    shutil.copy(hit / "collision.toml", place / "early")
+    for name in ("late", "early"):
+        assert main(["resume", name, "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert told["collisions"] == json.loads((hit / "collision.json").read_text())["collisions"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"2.0 m/s"', '"3 m/s"'),
+        ("grains = 2", "grains = 3"),
+        ("[forces.contact]", "[forces.contact]\nbeyond = 'release'"),
+    ],
+)
+def test_a_collision_cannot_change_on_its_way(place, hit, capsys, old, new):
+    """Another speed, another body, another force: one line."""
+    shutil.copytree(hit, place / "cut")
+    (place / "cut" / "collision.json").unlink()
+    path = place / "cut" / "collision.toml"
+    text = path.read_text().replace("2 m/s", "2.0 m/s")
+    assert old in text
+    path.write_text(text.replace(old, new))
+    assert main(["resume", "cut"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "cannot change on its way" in err
+
+
+def test_many_collisions_go_on(place, capsys, monkeypatch):
+    """What is finished is kept and not done again; collision.json is that of a job that was left alone."""
+    assert main(["collide", "hit.toml", "--out", "whole", "--json"]) == 0
+    capsys.readouterr()
+    real = GrowingOutcomes.add
+
+    def add(self, seed, outcome):
+        real(self, seed, outcome)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(GrowingOutcomes, "add", add)
+        assert main(["collide", "hit.toml", "--out", "cut", "--seeds", "1-3"]) == 130
+    assert capsys.readouterr().err == "sand: interrupted; go on with: sand resume cut\n"
+    with (place / "cut" / "collisions.jsonl").open("a") as file:
+        file.write('{"seed": 2, "outc')  # torn by a kill
+    assert main(["info", "cut"]) == 0
+    assert "sand resume cut" in capsys.readouterr().out
+    done, run = [], collision_case.run_seed
+
+    def counted(text, seed, **options):
+        done.append(seed)
+        return run(text, seed, **options)
+
+    monkeypatch.setattr(collision_case, "run_seed", counted)
+    assert main(["resume", "cut"]) == 0
+    assert done == [2, 3] and "outcomes" in capsys.readouterr().out
+    ours, theirs = (json.loads((place / name / "collision.json").read_text()) for name in ("cut", "whole"))
+    assert ours["collisions"] == theirs["collisions"] and ours["counts"] == theirs["counts"]
+    assert not (place / "cut" / "collisions.jsonl").exists()
+
+
+def test_outcomes_of_another_case_are_not_taken(place, capsys, monkeypatch):
+    """A case that was changed while its job was interrupted: one line, and nothing is mixed."""
+    monkeypatch.setattr(
+        collision_case, "run_seed", lambda text, seed, **options: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
+    assert main(["collide", "hit.toml", "--out", "cut"]) == 130
+    path = place / "cut" / "case.toml"
+    path.write_text(path.read_text().replace("2 m/s", "3 m/s"))
+    capsys.readouterr()
+    assert main(["resume", "cut"]) == 2
+    assert "holds outcomes of another case" in capsys.readouterr().err
+
+
+def test_boxes_go_on(place, capsys, monkeypatch):
+    """The second box interrupted: the first is kept as it is, growth.json comes at the end, the bits are the same."""
+    assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "whole", "--quiet", "--threads", "1"]) == 0
+    with monkeypatch.context() as patch:
+        interrupt(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
+        assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--quiet"]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; go on with: sand resume cut"
+    before = {path: path.stat().st_mtime_ns for path in (place / "cut" / "seed-1").iterdir()}
+    assert main(["info", "cut"]) == 0
+    assert "sand resume cut" in capsys.readouterr().out
+    assert main(["resume", "cut", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["outcomes"] == {"1": "finished", "2": "finished"}
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+    assert same_run(place / "cut" / "seed-2", place / "whole" / "seed-2")
+    told = json.loads((place / "cut" / "growth.json").read_text())
+    assert told["seeds"] == [1, 2] and told["boxes"]["seed-2"]["outcome"] == "finished"
+    assert main(["resume", "cut"]) == 0
+    assert "cut is finished" in capsys.readouterr().out
+    assert main(["info", "cut"]) == 0
+    assert "sand analyse cut" in capsys.readouterr().out
+    for words, part in ((["--until", "1 us"], "--until is for a run"), ([], "")):
+        assert main(["resume", "cut", *words]) == (2 if words else 0)
+        assert part in capsys.readouterr().err
+    assert main(["run", "box.toml", "--out", "cut"]) == 2
+    assert main(["resume", "cut/seed-1", "--workers", "2"]) == 2
+    assert "--threads" in capsys.readouterr().err
+
+
+# --- the figure, and the first moments ------------------------------------------------------------------
+
+
+def test_an_interrupted_run_does_not_wait_for_its_figure(place, capsys, monkeypatch):
+    """None is drawn after Ctrl-C; and Ctrl-C while one is drawn leaves it out of a run that is finished."""
+    drawn = []
+
+    def slow(simulation):
+        drawn.append(simulation)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("sand.view.figure.run_figure", slow)
+    assert main(["run", "box.toml", "--out", "done"]) == 0
+    out, err = capsys.readouterr()
+    assert "done" in out and "sand: the figure is left out" in err and len(drawn) == 1
+    assert json.loads((place / "done" / "summary.json").read_text())["outcome"] == "finished"
+    interrupt(monkeypatch, flies)
+    assert main(["run", "box.toml", "--out", "cut"]) == 130
+    assert len(drawn) == 1 and "resume with: sand resume cut" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("module", "words"), [("click", ["cite"]), ("numpy", ["info", "box.toml"]), ("pydantic", ["info", "box.toml"])]
+)
+def test_interrupted_while_it_is_loaded(place, module, words):
+    """Ctrl-C in the first moments, while modules are imported, also where an import makes another error of it."""
+    program = (
+        "import importlib.abc, os, signal, sys\n"
+        "class Finder(importlib.abc.MetaPathFinder):\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        f"        if name == {module!r}:\n"
+        "            try:\n"
+        "                os.kill(os.getpid(), signal.SIGINT)\n"
+        "            except KeyboardInterrupt:\n"
+        "                raise ImportError('cut short') from None\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "from sand.cli.main import main\n"
+        f"sys.exit(main({words!r}))\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr, ended.stdout) == (130, "sand: interrupted\n", "")
+
+
+def test_advice_where_the_folder_has_vanished(place, capsys, monkeypatch):
+    """Nothing that cannot be done is advised."""
+    interrupt(monkeypatch, lambda simulation: shutil.rmtree(place / "gone", ignore_errors=True) or simulation.steps > 0)
+    assert main(["run", "box.toml", "--out", "gone"]) in (2, 130)
+    err = capsys.readouterr().err
+    assert "sand resume" not in err and "vanished" in err
+
+
+def test_control_characters_do_not_reach_the_terminal(place, capsys):
+    """A name that would clear the screen, turn the text round or begin a new line is shown as it would be typed."""
+    name = "a\x1b[2Jb\x9bc\u202ed\ne\x7f.toml"
+    (place / name).write_text(BOX)
+    (place / "twisted.toml").write_text(BOX + '["\\u001b[31mred"]\n')
+    for words in (
+        ["info", name],
+        ["info", name + "x"],
+        ["info", "twisted.toml"],
+        ["resume", name],
+        ["run", "--\x1b[2J"],
+    ):
+        main(words)
+        out, err = capsys.readouterr()
+        shown = out + err
+        assert shown and not {"\x1b", "\x9b", "\u202e", "\x7f", "\r"} & set(shown)
+        assert all(line.startswith(("sand: ", "  ", name[:1])) for line in shown.splitlines())
+        assert "\\x1b" in shown
+    assert main(["info", name, "--json"]) == 0
+    assert "\x7f" not in capsys.readouterr().out
