@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +18,8 @@ from ..core.errors import BadInput, FilesFailed
 
 LOCK = ".lock"
 """The lock file in a folder."""
+LOOKS, LOOKING = 5, 0.1
+"""How often the number of a process is looked for, and within which time [s]."""
 
 
 class FolderLock:
@@ -77,13 +80,20 @@ def _is_full(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno in full
 
 
+def _holder(folder: Path) -> int | None:
+    """The number of the process in a lock file; None where it cannot be read, also a moment later."""
+    for _ in range(LOOKS):
+        with contextlib.suppress(OSError, ValueError), open(folder / LOCK, "rb", buffering=0) as file:
+            file.seek(1)
+            return int(file.read(32))
+        time.sleep(LOOKING / LOOKS)  # it may just be being written
+    return None
+
+
 def _in_use(folder: Path) -> str:
     """What to say of a folder whose lock another one holds."""
-    try:
-        with open(folder / LOCK, "rb", buffering=0) as file:
-            file.seek(1)
-            number = int(file.read(32))
-    except (OSError, ValueError):  # just being written
+    number = _holder(folder)
+    if number is None:
         return f"another process writes to {folder}; wait until it has ended, or give another folder"
     if number == os.getpid():
         return f"another simulation of this process (pid {number}) writes to {folder}; give each a folder of its own"
