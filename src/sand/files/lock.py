@@ -61,9 +61,9 @@ class FolderLock:
         self._lock, self._process = lock, os.getpid()
         if not told:
             return
-        with contextlib.suppress(OSError), open(path, "r+b") as file:  # a full disk: the lock holds without a number
-            file.truncate()
-            file.write(f"\n{os.getpid()}\n".encode())  # the first byte is what Windows locks, and lets nobody read
+        with contextlib.suppress(OSError), open(path, "r+b", buffering=0) as file:  # on a full disk it does without
+            file.seek(1)  # the first byte is what is locked; Windows lets nobody else read or write it
+            file.write(f"{os.getpid():<20}\n".encode())
 
     def release(self) -> None:
         """Let others write to the folder; a second time, and in a process that was forked off, it does nothing."""
