@@ -10,6 +10,7 @@ from typing import Any
 
 from ..core.errors import BadInput
 from ..files import folder as files
+from ..files.lock import writing
 from ..run.build import case_of, resume, simulation_of
 from ..run.case import check_case
 
@@ -54,6 +55,21 @@ def grow(
             if changed := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
                 raise BadInput(f"{there} holds a box with other [{changed[0]}]; give another folder")
     _describe(place, content, seeds)
+    with writing(place):
+        _run_all(content, seeds, places, place, executor, told, observers)
+    return places
+
+
+def _run_all(
+    content: dict[str, Any],
+    seeds: Sequence[int],
+    places: Sequence[Path],
+    place: Path,
+    executor: Executor | None,
+    told: Callable[[int, str], None] | None,
+    observers: Sequence[Any],
+) -> None:
+    """The boxes of `grow`, and growth.json when all of them are finished."""
     jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
     if executor is None:
         outcomes: Any = (one_box(*job, observers) for job in jobs)
@@ -70,7 +86,6 @@ def grow(
         raise BadInput(wrong)
     ends = {one.name: files.read_json(one / files.SUMMARY) for one in places}
     files.write_json(place / files.GROWTH, {"seeds": list(seeds), "boxes": ends})
-    return places
 
 
 def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> None:

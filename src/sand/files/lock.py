@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +18,8 @@ from ..core.errors import BadInput, FilesFailed
 
 LOCK = ".lock"
 """The lock file in a folder."""
+LOOKS, LOOKING = 5, 0.1
+"""How often the number of a process is looked for, and within which time [s]."""
 
 
 class FolderLock:
@@ -24,6 +27,7 @@ class FolderLock:
 
     Args:
         folder: there already.
+        told: whether the number of this process is written to the lock file, for those who are refused.
 
     Raises:
         BadInput: another process holds it, or another simulation of this one.
@@ -32,7 +36,7 @@ class FolderLock:
     Where the file system knows no locks (some network file systems), it is granted with a warning.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, *, told: bool = True):
         from filelock import FileLock, Timeout
 
         path = folder / LOCK
@@ -55,9 +59,11 @@ class FolderLock:
             )
             return
         self._lock, self._process = lock, os.getpid()
-        with contextlib.suppress(OSError), open(path, "r+b") as file:  # a full disk: the lock holds without a number
-            file.truncate()
-            file.write(f"\n{os.getpid()}\n".encode())  # the first byte is what Windows locks, and lets nobody read
+        if not told:
+            return
+        with contextlib.suppress(OSError), open(path, "r+b", buffering=0) as file:  # on a full disk it does without
+            file.seek(1)  # the first byte is what is locked; Windows lets nobody else read or write it
+            file.write(f"{os.getpid():<20}\n".encode())
 
     def release(self) -> None:
         """Let others write to the folder; a second time, and in a process that was forked off, it does nothing."""
@@ -74,13 +80,20 @@ def _is_full(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno in full
 
 
+def _holder(folder: Path) -> int | None:
+    """The number of the process in a lock file; None where it cannot be read, also a moment later."""
+    for _ in range(LOOKS):
+        with contextlib.suppress(OSError, ValueError), open(folder / LOCK, "rb", buffering=0) as file:
+            file.seek(1)
+            return int(file.read(32))
+        time.sleep(LOOKING / LOOKS)  # it may just be being written
+    return None
+
+
 def _in_use(folder: Path) -> str:
     """What to say of a folder whose lock another one holds."""
-    try:
-        with open(folder / LOCK, "rb", buffering=0) as file:
-            file.seek(1)
-            number = int(file.read(32))
-    except (OSError, ValueError):  # just being written
+    number = _holder(folder)
+    if number is None:
         return f"another process writes to {folder}; wait until it has ended, or give another folder"
     if number == os.getpid():
         return f"another simulation of this process (pid {number}) writes to {folder}; give each a folder of its own"
@@ -99,5 +112,5 @@ def writing(folder: Path) -> Iterator[None]:
 
 def refuse_locked(folder: Path) -> None:
     """Raises BadInput if another process, or another simulation of this one, writes to a folder with a lock file."""
-    with contextlib.suppress(FilesFailed), writing(folder):
-        pass
+    with contextlib.suppress(FilesFailed):
+        FolderLock(folder, told=False).release()
