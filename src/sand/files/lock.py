@@ -24,6 +24,7 @@ class FolderLock:
 
     Args:
         folder: there already.
+        told: whether the number of this process is written to the lock file, for those who are refused.
 
     Raises:
         BadInput: another process holds it, or another simulation of this one.
@@ -32,7 +33,7 @@ class FolderLock:
     Where the file system knows no locks (some network file systems), it is granted with a warning.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, *, told: bool = True):
         from filelock import FileLock, Timeout
 
         path = folder / LOCK
@@ -55,6 +56,8 @@ class FolderLock:
             )
             return
         self._lock, self._process = lock, os.getpid()
+        if not told:
+            return
         with contextlib.suppress(OSError), open(path, "r+b") as file:  # a full disk: the lock holds without a number
             file.truncate()
             file.write(f"\n{os.getpid()}\n".encode())  # the first byte is what Windows locks, and lets nobody read
@@ -99,5 +102,5 @@ def writing(folder: Path) -> Iterator[None]:
 
 def refuse_locked(folder: Path) -> None:
     """Raises BadInput if another process, or another simulation of this one, writes to a folder with a lock file."""
-    with contextlib.suppress(FilesFailed), writing(folder):
-        pass
+    with contextlib.suppress(FilesFailed):
+        FolderLock(folder, told=False).release()
