@@ -53,10 +53,12 @@ for words in (
     ["run", "case.toml", "--out", "run"],
     ["resume", "run", "--until", "3 ps"],
     ["info", "run"],
-    ["run", "case.toml", "--out", "run", "--overwrite", "--quiet"],
 ):
     code = main(words)
     assert code == 0, (words, code)
+ended = sand.resume("run")
+ended.run(until="4 ps")
+assert main(["run", "case.toml", "--out", "run", "--overwrite", "--quiet"]) == 0, "a run that has ended keeps files open"
 """
 TESTS = """
 import pytest
