@@ -142,6 +142,7 @@ class Others(Observer):
             self.said.append(str(error.value))
 
 
+@pytest.mark.compiled("contacts")
 def test_simulations_of_one_process(tmp_path):
     """While one runs no other writes to its folder; afterwards another may, and then the first is refused."""
     folder, setup = tmp_path / "run", struck_chain()
