@@ -27,8 +27,8 @@ def test_a_fault_fits_its_file_and_names_a_test_that_exists(fault):
 
 
 def test_faults_are_of_all_kinds_everywhere():
-    """Thirty with names of their own; every kind, and every part of the program."""
-    assert len(FAULTS) == len({fault.name for fault in FAULTS}) == 30
+    """Thirty or more with names of their own; every kind, and every part of the program."""
+    assert len(FAULTS) == len({fault.name for fault in FAULTS}) >= 30
     assert {fault.kind for fault in FAULTS} == set(KINDS)
     assert {fault.area for fault in FAULTS} == set(AREAS)
     assert min(Counter(fault.area for fault in FAULTS if fault.area not in ("analysis", "set-up")).values()) >= 3

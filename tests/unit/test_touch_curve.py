@@ -1,0 +1,60 @@
+"""The curve of two grains within a Runge–Kutta step, against motions that it has to follow exactly."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+import sand
+from sand.core.stages import stage_arrays
+from sand.stepping.runge_kutta import STAGES, V, X
+from sand.stepping.touch import curve_at, first_entry, way_of_pair
+
+STEP = 0.3
+
+
+def moving(rng, box):
+    """Two grains on polynomials of degree 5 in time, as a step finds them, and their true separation at a time."""
+    ways = [[Polynomial(rng.normal(size=6)) for _ in range(3)] for _ in range(2)]
+    grains, stages = sand.Grains(np.zeros((2, 3)), 1.0, sand.SILICA).arrays, stage_arrays(2)
+    for g, way in enumerate(ways):
+        for axis, x in enumerate(way):
+            stages.start[X + axis, g], grains.position[axis, g] = x(0.0), x(STEP)
+            for stage, time in ((0, 0.0), (STAGES - 1, STEP)):
+                stages.rate[stage, X + axis, g] = x.deriv(1)(time)
+                stages.rate[stage, V + axis, g] = x.deriv(2)(time)
+    apart = np.array([a(0.0) - b(0.0) for a, b in zip(*ways, strict=True)])
+    image = box.nearest(apart) - apart
+    return grains, stages, lambda time: np.array([a(time) - b(time) for a, b in zip(*ways, strict=True)]) + image
+
+
+@pytest.mark.parametrize("box", [sand.Box.open(), sand.Box.periodic(1.5)])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_curve_is_the_motion_of_degree_five(box, seed):
+    """There is one polynomial of degree 5 with these values, velocities and accelerations at both ends: this one.
+
+    Place and slope at eleven times, to the rounding of terms of some 10: 1e-13; across the faces of a box the nearest
+    image at the start is followed.  In plain Python.
+    """
+    grains, stages, apart = moving(np.random.default_rng(seed), box)
+    points = way_of_pair(grains, stages, box.span, 0, 1, STEP)
+    for part in np.linspace(0.0, 1.0, 11):
+        place, slope = curve_at(points, part)
+        h = 1e-3
+        nearby = [apart((part + k * h) * STEP) for k in (-2, -1, 1, 2)]
+        assert place == pytest.approx(apart(part * STEP), abs=1e-13)
+        # fourth-order differences err by h⁴/30 of the fifth derivative, some 1e-9
+        assert slope == pytest.approx((nearby[0] - 8 * nearby[1] + 8 * nearby[2] - nearby[3]) / (12 * h), abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_first_entry_is_where_the_distance_falls_to_the_limit(seed):
+    """Of 2001 times the first at which the motion is within the limit, to the time between two of them."""
+    grains, stages, apart = moving(np.random.default_rng(seed), sand.Box.open())
+    parts = np.linspace(0.0, 1.0, 2001)
+    distance = np.linalg.norm([apart(part * STEP) for part in parts], axis=1)
+    limit = distance.min() + 0.3 * (distance[0] - distance.min())
+    points = way_of_pair(grains, stages, sand.Box.open().span, 0, 1, STEP)
+    if distance.argmin() == 0:  # they part: nothing is entered below the distance at the start
+        assert first_entry(points, 0.999 * distance[0]) > 1.0
+    else:
+        assert first_entry(points, limit) == pytest.approx(parts[np.argmax(distance <= limit)], abs=1e-3)
