@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from numba.core.config import DISABLE_JIT
 from numba.core.event import Event, Listener, register
 
-from .specs import FIXTURES, SPECS, parts_of, watched
+from .specs import FIXTURES, SPECS, WORKERS, parts_of, watched
 from .validation import Recorder, parse_part, part_of
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
@@ -104,7 +104,7 @@ def _mark(item: pytest.Item, tier: str | None) -> None:
     if mark is not None:
         if not mark.args or not set(mark.args) <= set(SPECS):
             raise pytest.UsageError(f"{item.nodeid}: compiled{mark.args} must name some of {', '.join(SPECS)}")
-        item.add_marker(pytest.mark.xdist_group(mark.args[0]))
+        item.add_marker(pytest.mark.xdist_group(WORKERS.get(mark.args[0], mark.args[0])))
 
 
 # ---- what a test may compile -------------------------------------------------------------------------

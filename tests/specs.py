@@ -72,6 +72,8 @@ DRIVERS: dict[str, Callable[[], sand.Simulation]] = {
 SPECS = (*DRIVERS, "scattering", "small")
 """Drivers by name; flights of two bodies; whatever compiles in a second or two."""
 
+WORKERS = {"adaptive": "flights", "scattering": "flights"}
+"""Specifications that share a worker, because tests compare one with the other."""
 FIXTURES = {"looked_at": "fields", "in_a_field": "fields"}
 """Fixtures shared by many tests that run a simulation, and its driver."""
 

@@ -26,6 +26,7 @@ class Fault:
         old, new: part of a line that occurs once in the file, and what stands there instead.
         test: below TESTS, the test that should fail, of the checkout that this file belongs to.
         before: that of the starting commit, where it is another.
+        began_as: file, old and new at the starting commit, where the line was another.
     """
 
     name: str
@@ -36,6 +37,11 @@ class Fault:
     new: str
     test: str
     before: str = ""
+    began_as: tuple[str, str, str] | None = None
+
+    def line(self, before: bool) -> tuple[str, str, str]:
+        """File, old and new text; those of the starting commit if asked for."""
+        return self.began_as if before and self.began_as else (self.file, self.old, self.new)
 
     def named(self, before: bool) -> str:
         """The test to run first, from the top of the checkout."""
@@ -109,9 +115,11 @@ FAULTS = (
     Fault("a tesla without a second", "forgotten unit", "settings", "core/units.py",
           '"T": (0, 0, 1, -2, -1, 0)', '"T": (0, 0, 1, -1, -1, 0)',
           "unit/test_units.py::test_units_that_need_no_pint_are_those_of_pint"),
-    Fault("a run of no steps", "off by one", "settings", "run/case.py",
-          "steps: Annotated[int, Field(ge=1, strict=True)]", "steps: Annotated[int, Field(ge=0, strict=True)]",
-          "unit/test_case.py::test_one_mistake_is_one_line"),
+    Fault("a run of no steps", "off by one", "settings", "run/sections.py",
+          "Steps = Annotated[int, Field(ge=1, le=MOST_STEPS", "Steps = Annotated[int, Field(ge=0, le=MOST_STEPS",
+          "unit/test_case.py::test_one_mistake_is_one_line",
+          began_as=("run/case.py", "steps: Annotated[int, Field(ge=1, strict=True)]",
+                    "steps: Annotated[int, Field(ge=0, strict=True)]")),
     Fault("a material with a number that cannot be", "swallowed error", "settings", "core/material.py",
           "problems += error.problems", "problems += []",
           "unit/test_grains.py::test_materials_check_themselves"),
@@ -136,19 +144,23 @@ FAULTS = (
           "[grains.position / ANGSTROM, grains.radius, grains.moment]",
           "unit/test_builders.py::test_bodies_come_back_from_files"),
     Fault("a full disk is not told", "swallowed error", "files", "files/folder.py",
-          'raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error',
-          "return",
-          "unit/test_files.py::test_a_failed_write_leaves_the_old_file"),
+          'raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error', "return",
+          "unit/test_files.py::test_a_failed_write_leaves_the_old_file",
+          began_as=("files/folder.py",
+                    'raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error',
+                    "return")),
     # commands
     Fault("the last frame of a slice", "off by one", "command", "cli/export.py",
           "first + 1 if first != -1 else None", "first + 1",
           "unit/test_opened.py::test_the_export_command"),
-    Fault("a mistake ends with exit code 0", "swallowed error", "command", "cli/main.py",
+    Fault("a mistake ends with exit code 0", "swallowed error", "command", "cli/program.py",
           "return str(error).splitlines(), MISTAKE", "return str(error).splitlines(), DONE",
-          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2"),
-    Fault("an end before the start", "swallowed error", "command", "cli/options.py",
-          'return si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
-          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2"),
+          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2",
+          began_as=("cli/main.py", "return str(error).splitlines(), MISTAKE", "return str(error).splitlines(), DONE")),
+    Fault("an end before the start", "swallowed error", "command", "run/ends.py",
+          'seconds = si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
+          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2",
+          began_as=("cli/options.py", 'return si(value, "s", name, above=0.0)', 'return si(value, "s", name)')),
     # analysis
     Fault("a cluster is made whole without images", "forgotten image", "analysis", "analysis/clusters.py",
           "whole[i] + box.nearest(whole[j] - whole[i])", "whole[i] + (whole[j] - whole[i])",

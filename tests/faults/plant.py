@@ -141,14 +141,15 @@ def verdict(code: int | None, output: str) -> str | None:
 
 
 @contextlib.contextmanager
-def planted(copy: Path, fault: Fault) -> Iterator[None]:
+def planted(copy: Path, fault: Fault, before: bool = False) -> Iterator[None]:
     """The fault is in the copy for as long as the block lasts; afterwards the file is as it was, its times included."""
-    path = copy / SOURCES / fault.file
+    file, old, new = fault.line(before)
+    path = copy / SOURCES / file
     times = path.stat()
     text = path.read_text(encoding="utf-8")
-    if text.count(fault.old) != 1:
-        raise SystemExit(f"{fault.name}: its text occurs {text.count(fault.old)} times in {fault.file}, not once")
-    path.write_text(text.replace(fault.old, fault.new), encoding="utf-8")
+    if text.count(old) != 1:
+        raise SystemExit(f"{fault.name}: its text occurs {text.count(old)} times in {file}, not once")
+    path.write_text(text.replace(old, new), encoding="utf-8")
     try:
         yield
     finally:
@@ -159,7 +160,7 @@ def planted(copy: Path, fault: Fault) -> Iterator[None]:
 def examine(fault: Fault, copy: Path, options: argparse.Namespace) -> Finding:
     """Plant one fault and look for a test that fails."""
     begun = time.monotonic()
-    with planted(copy, fault):
+    with planted(copy, fault, options.before):
         ran = fault.named(options.before)
         found = verdict(*run(copy, pytest_words([ran]), options.timeout))
         if found is None and not options.named_only:
@@ -264,7 +265,9 @@ def parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     """The options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tree", type=Path, default=HERE, help="checkout to copy (default: this one)")
-    parser.add_argument("--before", action="store_true", help="use the names that tests had at the starting commit")
+    parser.add_argument(
+        "--before", action="store_true", help="use the lines and the names of tests of the starting commit"
+    )
     parser.add_argument("--only", nargs="+", default=[], metavar="WORD", help="faults with one of these words")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="copies that work at the same time")
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="for the named tests of one fault")

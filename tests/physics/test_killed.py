@@ -18,8 +18,8 @@ from ..systems import KILL, stops_others
 
 CASE = """
 [run]
-until = "30 ns"
-frame_every = "0.3 ns"
+until = "40 ns"
+frame_every = "0.4 ns"
 seed = 3
 
 [box]

@@ -40,8 +40,8 @@ def retype(arrays):
 @pytest.mark.parametrize("change", [set_number, swap, drop, retype])
 def test_numbers_that_were_changed_are_refused(tmp_path, change):
     """One last bit, rows in another order, an array that is gone or of another type: the check sum of SAND is wrong."""
-    write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
-    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 2})
+    write_checkpoint(tmp_path, ARRAYS, {"steps": 1, "time": 0.0})
+    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 2, "time": 1.0})
     rewritten(path, lambda arrays: None)
     assert read_checkpoint(path)[1]["steps"] == 2
     rewritten(path, change)
@@ -62,7 +62,7 @@ class Code:
 
 def test_code_in_a_checkpoint_is_not_run(tmp_path):
     """An array of objects is a pickle: refused in one line, and what it would do is not done."""
-    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 1})
+    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 1, "time": 0.0})
     trace = tmp_path / "run"
 
     def add(arrays):

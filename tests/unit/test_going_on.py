@@ -15,6 +15,7 @@ from sand.experiments import collision_case
 from sand.files.checkpoint import newest_checkpoint
 from sand.files.table import GrowingOutcomes
 
+pytestmark = pytest.mark.compiled("contacts")
 COLLISION = """
 [target]
 kind = "chain"
