@@ -168,16 +168,18 @@ def loads_of_numpy(tree: ast.AST) -> list[ast.Call]:
             modules |= {alias.asname or alias.name for alias in node.names if alias.name == "numpy"}
         elif isinstance(node, ast.ImportFrom) and node.module == "numpy":
             functions |= {alias.asname or alias.name for alias in node.names if alias.name == "load"}
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)] if modules or functions else []
     return [
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in {*(f"{name}.load" for name in modules), *functions}
+        call
+        for call in calls
+        if getattr(call.func, "id", None) in functions
+        or (getattr(call.func, "attr", None) == "load" and getattr(call.func.value, "id", None) in modules)
     ]
 
 
 def refuses_pickles(call: ast.Call) -> bool:
     """Whether a call says allow_pickle=False itself."""
-    return any(word.arg == "allow_pickle" and ast.unparse(word.value) == "False" for word in call.keywords)
+    return any(word.arg == "allow_pickle" and getattr(word.value, "value", None) is False for word in call.keywords)
 
 
 def test_calls_that_load_arrays_are_found():
