@@ -58,7 +58,7 @@ for words in (
     assert code == 0, (words, code)
 ended = sand.resume("run")
 ended.run(until="4 ps")
-assert main(["run", "case.toml", "--out", "run", "--overwrite", "--quiet"]) == 0, "a run that has ended keeps files open"
+assert main(["run", "case.toml", "--out", "run", "--overwrite", "--quiet"]) == 0, "an ended run keeps files open"
 """
 TESTS = """
 import pytest
