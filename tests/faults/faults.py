@@ -147,7 +147,8 @@ FAULTS = (
           'raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error', "return",
           "unit/test_files.py::test_a_failed_write_leaves_the_old_file",
           began_as=("files/folder.py",
-                    'raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") from error',
+                    'raise FilesFailed(f"cannot write {path}: {error.strerror}; what was there is untouched") '
+                    "from error",
                     "return")),
     # commands
     Fault("the last frame of a slice", "off by one", "command", "cli/export.py",

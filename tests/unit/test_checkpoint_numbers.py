@@ -1,14 +1,17 @@
 """Checkpoints whose archive is whole but whose numbers are not those that were written, and ones that hold code."""
 
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sand
-from sand.files.checkpoint import newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 
-ARRAYS = {"a/x": np.arange(6.0).reshape(2, 3), "count": np.array([3, 4])}
+REFERENCE = Path(__file__).parents[1] / "reference" / f"run-v{VERSION}"
+ARRAYS, META = read_checkpoint(next(REFERENCE.glob("*.npz")))
+META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
 
 
 def rewritten(path, change):
@@ -22,11 +25,12 @@ def rewritten(path, change):
 
 
 def set_number(arrays):
-    arrays["a/x"][1, 2] = np.nextafter(5.0, 6.0)
+    position = arrays["grains/position"]
+    position[1, 2] = np.nextafter(position[1, 2], 1.0)
 
 
 def swap(arrays):
-    arrays["a/x"] = arrays["a/x"][::-1].copy()
+    arrays["grains/velocity"] = arrays["grains/velocity"][::-1].copy()
 
 
 def drop(arrays):
@@ -40,8 +44,8 @@ def retype(arrays):
 @pytest.mark.parametrize("change", [set_number, swap, drop, retype])
 def test_numbers_that_were_changed_are_refused(tmp_path, change):
     """One last bit, rows in another order, an array that is gone or of another type: the check sum of SAND is wrong."""
-    write_checkpoint(tmp_path, ARRAYS, {"steps": 1, "time": 0.0})
-    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 2, "time": 1.0})
+    write_checkpoint(tmp_path, ARRAYS, {**META, "steps": 1})
+    path = write_checkpoint(tmp_path, ARRAYS, {**META, "steps": 2})
     rewritten(path, lambda arrays: None)
     assert read_checkpoint(path)[1]["steps"] == 2
     rewritten(path, change)
@@ -62,7 +66,7 @@ class Code:
 
 def test_code_in_a_checkpoint_is_not_run(tmp_path):
     """An array of objects is a pickle: refused in one line, and what it would do is not done."""
-    path = write_checkpoint(tmp_path, ARRAYS, {"steps": 1, "time": 0.0})
+    path = write_checkpoint(tmp_path, ARRAYS, {**META, "steps": 1})
     trace = tmp_path / "run"
 
     def add(arrays):
