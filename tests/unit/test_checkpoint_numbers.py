@@ -7,11 +7,19 @@ import numpy as np
 import pytest
 
 import sand
+from sand.core.world import STEPS
 from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 
 REFERENCE = Path(__file__).parents[1] / "reference" / f"run-v{VERSION}"
 ARRAYS, META = read_checkpoint(next(REFERENCE.glob("*.npz")))
 META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
+
+
+def written(folder, steps):
+    """Write the reference state as that of a step; the path."""
+    count = ARRAYS["count"].copy()
+    count[STEPS] = steps
+    return write_checkpoint(folder, {**ARRAYS, "count": count}, {**META, "steps": steps})
 
 
 def rewritten(path, change):
@@ -44,8 +52,8 @@ def retype(arrays):
 @pytest.mark.parametrize("change", [set_number, swap, drop, retype])
 def test_numbers_that_were_changed_are_refused(tmp_path, change):
     """One last bit, rows in another order, an array that is gone or of another type: the check sum of SAND is wrong."""
-    write_checkpoint(tmp_path, ARRAYS, {**META, "steps": 1})
-    path = write_checkpoint(tmp_path, ARRAYS, {**META, "steps": 2})
+    written(tmp_path, 1)
+    path = written(tmp_path, 2)
     rewritten(path, lambda arrays: None)
     assert read_checkpoint(path)[1]["steps"] == 2
     rewritten(path, change)
@@ -66,7 +74,7 @@ class Code:
 
 def test_code_in_a_checkpoint_is_not_run(tmp_path):
     """An array of objects is a pickle: refused in one line, and what it would do is not done."""
-    path = write_checkpoint(tmp_path, ARRAYS, {**META, "steps": 1})
+    path = written(tmp_path, 1)
     trace = tmp_path / "run"
 
     def add(arrays):
