@@ -6,8 +6,8 @@ import json
 import math
 import shlex
 import warnings
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -47,12 +47,24 @@ def show(heading: str, rows: Rows) -> None:
 
 def with_notes(make: Callable[[], T]) -> T:
     """`make()`, its warnings printed as notes, each once."""
-    with warnings.catch_warnings(record=True) as caught:
+    with notes():
+        return make()
+
+
+@contextmanager
+def notes() -> Iterator[None]:
+    """Warnings are printed as notes, at once and each once."""
+    told: set[str] = set()
+
+    def tell(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        if issubclass(category, UserWarning) and str(message) not in told:
+            told.add(str(message))
+            note(f"note: {message}")
+
+    with warnings.catch_warnings():
         warnings.simplefilter("always")
-        made = make()
-    for text in dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)):
-        note(f"note: {text}")
-    return made
+        warnings.showwarning = tell
+        yield
 
 
 def blame(case: Path, make: Callable[[], T]) -> T:

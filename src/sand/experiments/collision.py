@@ -13,6 +13,7 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..analysis.shape import gyration_radius
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.units import si
@@ -73,6 +74,7 @@ class Collision:
         return asdict(self)
 
 
+@checked
 def collide(
     target: Grains,
     projectile: Grains,
@@ -217,6 +219,7 @@ def _rebound(grains: Grains, labels: np.ndarray, order: np.ndarray) -> float:
     return float(np.linalg.norm(mean[0] - mean[1]))
 
 
+@checked
 def collide_many(
     build: Callable[[int], tuple[Grains, Grains]],
     seeds: Sequence[int],

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..core.units import si
 from ..stepping.encounter import BOUND, FAILED, HIT
@@ -90,6 +91,7 @@ class CrossSection:
         return own | more
 
 
+@checked
 def cross_section(
     radius: Any = None,
     material: Any = None,
@@ -117,6 +119,7 @@ def cross_section(
     return measure(flying, relative_error=relative_error, seed=seed, executor=executor)
 
 
+@checked
 def measure(
     flying: Flight,
     *,

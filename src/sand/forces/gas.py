@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.constants import BOLTZMANN
 from ..core.errors import FORBID_EXTRA, BadInput
@@ -23,6 +24,7 @@ FASTEST = 0.5
 lacks 6 % of the drag of mirrors and 4 % of that of diffuse walls."""
 
 
+@checked
 @dataclass(frozen=True)
 class Gas:
     """A thin gas around the grains: it brakes them (Epstein) and keeps them in Brownian motion.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.units import in_unit, si
@@ -26,6 +27,7 @@ class Encounter(NamedTuple):
     flight: float  # time until the bodies can touch first [s], about
 
 
+@checked
 def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
     """The body turned as a whole by a random rotation about its centre of mass; moments turn with it."""
     from scipy.spatial.transform import Rotation  # slow to load
@@ -33,6 +35,7 @@ def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
     return turned(body, Rotation.random(random_state=rng))
 
 
+@checked
 def turned(body: Grains, rotation: Rotation) -> Grains:
     """The body turned as a whole about its centre of mass, velocities, spins and moments too."""
     middle = np.average(body.position, axis=0, weights=body.mass)
@@ -50,6 +53,7 @@ def turned(body: Grains, rotation: Rotation) -> Grains:
     )
 
 
+@checked
 def encounter(
     target: Grains, projectile: Grains, *, speed: Any, impact_parameter: Any = 0.0, along: Any = "x"
 ) -> Encounter:
