@@ -125,10 +125,9 @@ def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
     each = (radius + 0.5 * CLEARANCE * radius.mean()) ** 3
     filled = 4.0 / 3.0 * math.pi * float(each.mean()) * number / box.volume
     if filled > most:
-        side = (filled / most) ** (1.0 / 3.0)
         raise BadInput(
-            f"number = {number}: these grains with their clearance would fill {filled:.3g} of the box; random places reach "
-            f"{most:g}; take at most {int(number * most / filled)} grains, or sides {side:.3g} times as long"
+            f"no room for grains: {number} would fill {filled:.3g} with their clearance, and random places fill at most "
+            f"{most:g} of a box; take a larger box or fewer grains, up to {int(number * most / filled)}"
         )
 
 
