@@ -43,11 +43,11 @@ def checked(thing: T) -> T:
 
 
 def _refuse_change(self: Any, name: str, *value: Any) -> None:
-    kind = type(self).__name__
+    kind = shown(type(self))
     known = [field.name for field in dataclasses.fields(self)]
     if name in known:
-        raise NoSuchAttribute(f"{name} of {shown(type(self))} cannot be assigned; make a new one: {kind}({name}=…)")
-    raise NoSuchAttribute(f"{shown(type(self))} has no '{name}'; {did_you_mean(name, known)}")
+        raise NoSuchAttribute(f"{name} of {kind} cannot be assigned; make a new one: {kind}({name}=…)")
+    raise NoSuchAttribute(f"{kind} has no '{name}'; {did_you_mean(name, known)}")
 
 
 def _wrapped(function: Callable) -> Callable:

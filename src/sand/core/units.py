@@ -147,6 +147,8 @@ LEAST, MOST = 1e-60, 1e60
 """Sizes of SI numbers whose products and powers do not run out of the range of double precision."""
 
 
+MELTED = 5000.0
+"""Temperature [K] at which no material is solid."""
 HOTTEST = 1e12
 """Temperature [K] from which on there are no atoms, and no nuclei."""
 MOST_GRAINS = 100_000_000

@@ -190,7 +190,7 @@ def _speed(speed: Any, unit: str, heat: float, body: Grains | None) -> float | N
     times = si(speed, "1", "speed", above=0.0)
     if not heat > 0.0:
         raise BadInput("speed_unit = 'thermal' needs a temperature above 0 K")
-    return None if body is None else times * thermal_speed(float(body.mass.sum()), heat)
+    return None if body is None else si(times * thermal_speed(float(body.mass.sum()), heat), "m/s", "speed")
 
 
 def _drift(value: Any, heat: float, body: Grains | None) -> tuple[Any, float]:

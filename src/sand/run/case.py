@@ -100,6 +100,8 @@ class MaterialSection(Section):
         """Raises BadInput for missing or impossible numbers."""
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
+            if name in PRESETS and material_named(self.like).name != name:
+                raise BadInput(f"'{name}' is a material of its own, like = '{self.like}' makes it another; rename it")
             return material_named(self.like).but(name=name, **given)
         needed = ("density", "young_modulus", "poisson_ratio")
         missing = [key for key in needed if key not in given]

@@ -16,7 +16,7 @@ from ..core.constants import BOLTZMANN, LIGHT
 from ..core.errors import BadInput, did_you_mean, warn
 from ..core.grains import Grains, moment_size, vector_for_all
 from ..core.material import Material
-from ..core.units import MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
+from ..core.units import MELTED, MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
 """Variance of each spin component in units of kT/I: mean rotational energy kT/2 in all, (3/2)kT, or none."""
@@ -30,8 +30,6 @@ MANY = 1000
 """Grains from which on that is certain."""
 PATIENCE = 5.0
 """Wall time [s] after which placing grains is worth a word."""
-MELTED = 5000.0
-"""Temperature [K] at which no material is solid."""
 RELATIVE = 0.2
 """Thermal speeds over that of light at which no grain of a large number is faster."""
 
@@ -126,8 +124,8 @@ def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
     filled = 4.0 / 3.0 * math.pi * float(each.mean()) * number / box.volume
     if filled > most:
         raise BadInput(
-            f"no room for grains: {number} would fill {filled:.3g} with their clearance, and random places fill at most "
-            f"{most:g} of a box; take a larger box or fewer grains, up to {int(number * most / filled)}"
+            f"no room for grains: {number} would fill {filled:.3g} with their clearance, and random places fill "
+            f"at most {most:g} of a box; take a larger box or fewer grains, up to {int(number * most / filled)}"
         )
 
 
