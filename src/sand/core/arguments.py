@@ -35,10 +35,13 @@ def checked(thing: T) -> T:
     """
     if not isinstance(thing, type):
         return typing.cast(T, _wrapped(typing.cast(Callable, thing)))
+    settings = dataclasses.is_dataclass(thing) and thing.__dataclass_params__.frozen  # type: ignore[attr-defined]
     if "__init__" in vars(thing):
-        thing.__init__ = _wrapped(thing.__init__)  # type: ignore[misc]
-    if dataclasses.is_dataclass(thing) and thing.__dataclass_params__.frozen:  # type: ignore[attr-defined]
-        thing.__setattr__ = thing.__delattr__ = _refuse_change  # type: ignore[method-assign]
+        thing.__init__ = _wrapped(thing.__init__, settings=settings)  # type: ignore[misc]
+    if settings:
+        refused = ("__setattr__", "__delattr__")
+        for name in refused:
+            setattr(thing, name, _refuse_change)
     return thing
 
 
@@ -50,7 +53,9 @@ def _refuse_change(self: Any, name: str, *value: Any) -> None:
     raise NoSuchAttribute(f"{kind} has no '{name}'; {did_you_mean(name, known)}")
 
 
-def _wrapped(function: Callable) -> Callable:
+def _wrapped(function: Callable, *, settings: bool = False) -> Callable:
+    """The function behind a check of its arguments; `settings` also say what else is wrong with them."""
+
     @functools.wraps(function)
     def call(*args: Any, **given: Any) -> Any:
         signature, readers = _known(function)
@@ -58,18 +63,31 @@ def _wrapped(function: Callable) -> Callable:
             bound = signature.bind(*args, **given)
         except TypeError:
             raise BadInput(_mismatch(function, signature, args, given)) from None
-        problems = []
+        problems = {}
         for name, value in bound.arguments.items():
             if name in readers:
                 try:
                     bound.arguments[name] = readers[name](value, name)
                 except BadInput as error:
-                    problems += error.problems
+                    problems[name] = error.problems
         if problems:
-            raise BadInput(problems)
+            others = _complaints(function, bound) if settings else []
+            own = [line for name in problems if not any(f"{name} =" in o for o in others) for line in problems[name]]
+            raise BadInput([*own, *others])
         return function(*bound.args, **bound.kwargs)
 
     return call
+
+
+def _complaints(function: Callable, bound: inspect.BoundArguments) -> list[str]:
+    """What settings, of which some are of a wrong kind, say themselves."""
+    try:
+        function(*bound.args, **bound.kwargs)
+    except BadInput as error:
+        return error.problems
+    except Exception:  # whatever values of a wrong kind lead to
+        pass
+    return []
 
 
 @functools.cache

@@ -174,8 +174,8 @@ def si(
         above, least, below: the number must be > above, ≥ least, < below.
 
     Raises:
-        BadInput: wrong unit, not a number, not finite, or out of range, a speed above that of light, a temperature
-            above `HOTTEST`; one line.
+        BadInput: wrong unit, not a number, not finite, or out of range, a temperature above `HOTTEST`, a speed above
+            that of light unless `below` is given; one line.
     """
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:
@@ -191,7 +191,7 @@ def si(
         raise BadInput(f"{told} must be at least {least:g} {unit}".removesuffix(" 1"))
     if below is not None and not number < below:
         raise BadInput(f"{told} must be below {below:g} {unit}".removesuffix(" 1"))
-    if unit == "m/s" and not abs(number) < LIGHT:
+    if unit == "m/s" and below is None and not abs(number) < LIGHT:
         raise BadInput(f"{told} is not below the speed of light, {LIGHT:.4g} m/s")
     if unit == "K" and number > HOTTEST:
         raise BadInput(f"{told} is above {HOTTEST:g} K, where no matter is made of atoms")

@@ -67,7 +67,7 @@ class Adaptive:
         for key, unit in {"tolerance": "1", **ERRORS}.items():
             if key != "tolerance" and is_word(getattr(self, key), "auto"):
                 continue
-            bounds = {"below": 1.0} if key == "tolerance" else {}
+            bounds = {"below": 1.0 if key == "tolerance" else math.inf}
             try:
                 object.__setattr__(self, key, si(getattr(self, key), unit, f"stepping: {key}", above=0.0, **bounds))
             except BadInput as error:
