@@ -61,7 +61,10 @@ UNUSUAL = [
     (lambda: sand.Simulation(sand.Grains([[0, 0, 0]], 10.0, "silica"), [sand.Contact()]), "a radius of 10 m"),
     (lambda: sand.setup.gas(2, "1 um", temperature="6000 K", **IRON), "no material is solid above 5000 K"),
     (lambda: sand.Simulation(grains(), [sand.Gas("6000 K", density=1e-6)]), "no material is solid above 5000 K"),
-    (lambda: sand.Simulation(grains(gap=-1e-9)), "grains 0 and 1 overlap by 1 nm, and there is no sand.Contact()"),
+    (
+        lambda: sand.Simulation(grains(gap=-1e-9)),
+        "grains 0 and 1 overlap by 1 nm, and there is no",
+    ),
 ]
 
 

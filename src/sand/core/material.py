@@ -107,6 +107,14 @@ def material_named(name: str) -> Material:
         raise BadInput(f"unknown material '{name}'; {did_you_mean(name.lower(), list(PRESETS))}") from None
 
 
+def like_preset(preset: str, name: str) -> Material:
+    """The preset that a material called `name` is to be like.  Raises BadInput if that is the name of another preset."""
+    found = material_named(preset)
+    if PRESETS.get(name.lower(), found).name != found.name:
+        raise BadInput(f"'{name}' is a material of its own, like = '{preset}' makes it another; give it another name")
+    return found
+
+
 def as_material(given: Any, name: str = "material") -> Material:
     """A Material from a Material or the name of a preset.  Raises BadInput."""
     found = material_named(given) if isinstance(given, str) else given

@@ -22,7 +22,7 @@ from pydantic import (
 from ..core.box import Box, as_box
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import moment_size
-from ..core.material import PRESETS, Material, material_named
+from ..core.material import PRESETS, Material, like_preset
 from ..core.units import si
 from ..files.folder import read_toml
 from ..forces.central import Attraction, Charges
@@ -100,9 +100,7 @@ class MaterialSection(Section):
         """Raises BadInput for missing or impossible numbers."""
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
-            if name in PRESETS and material_named(self.like).name != name:
-                raise BadInput(f"'{name}' is a material of its own, like = '{self.like}' makes it another; rename it")
-            return material_named(self.like).but(name=name, **given)
+            return like_preset(self.like, name).but(name=name, **given)
         needed = ("density", "young_modulus", "poisson_ratio")
         missing = [key for key in needed if key not in given]
         if missing:

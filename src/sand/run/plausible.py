@@ -11,12 +11,13 @@ from ..core.grains import Grains
 from ..core.units import is_word, spoken
 from ..forces.base import FarForce, Force
 from ..forces.contact import Contact
-from .first_contacts import touching
 
 OUTSIDE = 1e-3
 """How far a centre may lie outside a periodic box, in sides of it: frames in single precision are mended by that."""
 LARGEST = 1e-2
 """Radius [m] beyond which grains are hardly dust."""
+NEAREST = 8
+"""Neighbours of a grain, itself among them, that are looked at for overlaps."""
 SUNK = 1e-3
 """Overlap, in radii of the smaller grain, that without a contact law is more than rounding."""
 
@@ -36,8 +37,9 @@ def unusual(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
             f"grain {largest} has a radius of {size}: contacts are made for dust, far below {spoken(LARGEST, 'm')}; "
             "is the unit right?"
         )
-    if not any(isinstance(force, Contact) for force in forces):
-        warnings += _overlaps(grains, box)
+    alone = bool(forces) and not any(isinstance(force, (Contact, FarForce)) for force in forces)
+    if not alone and not any(isinstance(force, Contact) for force in forces):
+        warnings += _overlaps(grains, box)  # grains that feel only what surrounds them may be in one place
     return warnings
 
 
@@ -69,14 +71,28 @@ def _short_cutoffs(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
 
 
 def _overlaps(grains: Grains, box: Box) -> list[str]:
-    found = touching(grains, box)
-    smaller = grains.radius[found.pair].min(axis=1) if len(found.pair) else np.zeros(0)
-    deep = np.flatnonzero(found.overlap > SUNK * smaller)
+    pair = _nearest(grains, box)
+    overlap = grains.overlaps(pair, box)
+    deep = np.flatnonzero(overlap > SUNK * grains.radius[pair].min(axis=1))
     if not len(deep):
         return []
-    (i, j), overlap = found.pair[deep[0]], spoken(float(found.overlap[deep[0]]), "m")
-    others = f", and {len(deep) - 1} more pairs do" if len(deep) > 1 else ""
+    i, j = pair[deep[0]]
     return [
-        f"grains {i} and {j} overlap by {overlap}{others}, and there is no sand.Contact() among the forces: "
-        "they pass through each other"
+        f"grains {i} and {j} overlap by {spoken(float(overlap[deep[0]]), 'm')}, and there is no sand.Contact() among "
+        "the forces: grains pass through each other"
     ]
+
+
+def _nearest(grains: Grains, box: Box) -> np.ndarray:
+    """Pairs (P, 2) of each grain with its few nearest neighbours; all pairs might be too many."""
+    from scipy.spatial import cKDTree  # slow to load
+
+    count = len(grains)
+    if count == 1:
+        return np.zeros((0, 2), np.int64)
+    lengths = np.array([0.0 if v is None else v for v in box.lengths])
+    folded = np.where(lengths > 0.0, np.mod(grains.position, np.where(lengths > 0.0, lengths, 1.0)), grains.position)
+    folded = np.where((lengths > 0.0) & (folded >= lengths), 0.0, folded)
+    _, others = cKDTree(folded, boxsize=lengths).query(folded, min(count, NEAREST))
+    pairs = np.stack([np.repeat(np.arange(count), others.shape[1]), others.ravel()], axis=1)
+    return np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
