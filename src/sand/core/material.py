@@ -108,7 +108,7 @@ def material_named(name: str) -> Material:
 
 
 def like_preset(preset: str, name: str) -> Material:
-    """The preset that a material called `name` is to be like.  Raises BadInput if that is the name of another preset."""
+    """The preset that a material called `name` is like.  Raises BadInput if another preset has this name."""
     found = material_named(preset)
     if PRESETS.get(name.lower(), found).name != found.name:
         raise BadInput(f"'{name}' is a material of its own, like = '{preset}' makes it another; give it another name")
