@@ -96,7 +96,9 @@ def __getattr__(name: str) -> Any:
         return found
     if name in _ROOMS:
         return importlib.import_module(f".{name}", __name__)
-    raise AttributeError(f"module 'sand' has no '{name}'")
+    from .core.errors import NoSuchAttribute, did_you_mean
+
+    raise NoSuchAttribute(f"module 'sand' has no '{name}'; {did_you_mean(name, __all__)}")
 
 
 def __dir__() -> list[str]:

@@ -21,8 +21,9 @@ def crash(tmp_path_factory):
     """A run in which a fast grain hits a compact cluster in a corner of a periodic box; its folder and frames."""
     folder = tmp_path_factory.mktemp("frames") / "crash"
     cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=1)
+    corner = np.array([1.4e-7, 0.9e-7, 1.4e-7])
     place = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
-    place += [1.4e-7, 0.9e-7, 1.4e-7]
+    place = sand.Box.periodic("0.3 um").wrap(place + corner)
     speed = np.zeros((41, 3))
     speed[40] = [0.3, 0.4, -30.0]
     grains = sand.Grains(place, RADIUS, "silica", velocity=speed, moment="2 A m^2/kg")

@@ -91,7 +91,7 @@ def test_turning_keeps_the_body():
         (lambda: chain(0, radius=R, material=M), "grains of a chain = 0 must be .* at least 1"),
         (lambda: chain(3, radius=-1.0, material=M), "radius = -1.0 must be above 0"),
         (lambda: lattice(2, 0, radius=R, material=M), "side of a lattice = 0"),
-        (lambda: pca(2.5, radius=R, material=M), "grains of an aggregate = 2.5"),
+        (lambda: pca(2.5, radius=R, material=M), "grains = 2.5 must be a whole number"),
         (lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=0.0), "speed = 0.0"),
         (
             lambda: encounter(grain(radius=R, material=M), grain(radius=R, material=M), speed=1.0, along="w"),

@@ -66,7 +66,7 @@ def test_a_copy_is_independent():
         ({"position": "1 nm"}, r"position must be"),
         ({"material": "irom"}, r"unknown material 'irom'; did you mean 'iron'"),
         ({"material": [sand.IRON]}, r"material has 1 entries but there are 2 grains"),
-        ({"material": [1, 2]}, r"material of grain 0 is 1"),
+        ({"material": [1, 2]}, r"material of grain 0 = 1"),
         ({"material": [sand.IRON, sand.IRON.but(density=1.0)]}, r"two different materials are called 'iron'"),
         ({"moment": "200 K"}, r"moment = '200 K' must be"),
         ({"moment": -1.0}, r"moment = -1.0 must be"),

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from ..core.errors import NoSuchKey, did_you_mean, shown
 from ..core.world import LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
@@ -49,7 +50,9 @@ class Books:
         return Books(self.columns, (self.rows[k] for k in numbers))
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """One column over time."""
+        """One column over time.  Raises BadInput for a name that is no column."""
+        if column not in self.columns:
+            raise NoSuchKey(f"there is no column {shown(column)}; {did_you_mean(str(column), self.columns)}")
         return np.array([row[column] for row in self.rows])
 
     def _change(self) -> float:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
+from ..core.errors import refuse_other
 from .clusters import cluster_labels, unwrapped
 from .magnetism import aggregate_moments
 from .network import network
@@ -28,6 +30,7 @@ COLUMNS = {
 """Name, unit and meaning of every column of a census."""
 
 
+@checked
 def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
     """The aggregates of a frame, the largest first: columns (K,) as in COLUMNS.
 
@@ -35,6 +38,7 @@ def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
         frame: of a trajectory, or anything with position, radius, mass, moment, pair (C, 2) and box.
         least: aggregates of fewer grains are left out.
     """
+    refuse_other(frame, "position", "pair", "moment", "box")
     labels = cluster_labels(len(frame.position), frame.pair)
     sizes = np.bincount(labels)
     whole = unwrapped(frame.position, frame.pair, frame.box)
@@ -68,6 +72,7 @@ def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
     return {name: table[:, c] for c, name in enumerate(COLUMNS)}
 
 
+@checked
 def size_distribution(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sizes s (K,) that occur and how many clusters n_s (K,) have each."""
     sizes, numbers = np.unique(np.bincount(labels), return_counts=True)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
+from ..core.errors import BadInput
 
 FEW = 200
 """Grains and contacts together that are followed one by one sooner than SciPy makes its graph (130 µs)."""
 
 
+@checked
 def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     """The cluster each grain belongs to, numbered by their lowest grain.
 
@@ -20,7 +23,12 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     Returns:
         (N,) integers 0…K−1.
     """
-    ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    ends = np.asarray(pairs, dtype=np.int64)
+    if ends.size % 2:
+        raise BadInput(f"pairs has shape {ends.shape} but must be (C, 2): two grains for each contact")
+    ends = ends.reshape(-1, 2)
+    if len(ends) and not 0 <= ends.min() <= ends.max() < count:
+        raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
     if not len(ends):
         return np.arange(count)  # a gas need not wait for SciPy's graphs, which take long to load
     if count + len(ends) <= FEW:
@@ -49,17 +57,20 @@ def _followed(count: int, ends: np.ndarray) -> np.ndarray:
     return np.array([numbers.setdefault(lowest(grain), len(numbers)) for grain in range(count)], dtype=np.int64)
 
 
+@checked
 def cluster_sizes(labels: np.ndarray) -> np.ndarray:
     """Number of grains of each cluster, (K,)."""
     return np.bincount(labels)
 
 
+@checked
 def mean_cluster_size(labels: np.ndarray) -> float:
     """S = Σ s² n_s / Σ s n_s (Eq. 17): the size of the cluster of a grain picked at random."""
     sizes = cluster_sizes(labels).astype(np.float64)
     return float((sizes**2).sum() / sizes.sum())
 
 
+@checked
 def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     """Positions (N, 3) [m] in which clusters are whole, not cut by the faces of a periodic box.
 

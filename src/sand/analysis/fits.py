@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 
 STEEPEST = 0.99
@@ -32,6 +33,7 @@ class PowerLaw(NamedTuple):
         return self.prefactor * np.asarray(x) ** self.exponent
 
 
+@checked
 def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) -> PowerLaw:
     """Fit y ∝ x^exponent; errors by a jackknife over groups.
 
@@ -48,6 +50,8 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
     if np.ptp(np.log(x)) < SAME:
         raise BadInput("a power law needs at least two different x")
     group = np.arange(len(x)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
+    if len(group) != len(x):
+        raise BadInput(f"groups must have one entry for each of {len(x)} points, not {len(group)}")
     # about the middle, so that sums of squares lose no digits
     middle = float(np.log(x).mean())
     u, v = np.log(x) - middle, np.log(y)
@@ -102,6 +106,7 @@ class RateLaw(NamedTuple):
         return _grown(np.asarray(time), self.degree, self.time)
 
 
+@checked
 def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
     """Fit S = (1 + t/zτ)^z to ln S of the mean over boxes; errors by a jackknife over boxes.
 
@@ -159,6 +164,7 @@ def _rate(time: np.ndarray, size: np.ndarray) -> tuple[float, float]:
     return float(found.x[0]), float(first * np.exp(found.x[1]))
 
 
+@checked
 def separation(first: np.ndarray, second: np.ndarray) -> float:
     """How far the mean of `first` lies above that of `second`, in standard errors of the difference (Welch).
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from .fits import PowerLaw, power_law
 from .shape import gyration_radius
@@ -43,6 +44,7 @@ class Dimension(NamedTuple):
     window: tuple[float, float]  # distances [m], or numbers of grains, that were used
 
 
+@checked
 def ensemble_dimension(
     sizes: np.ndarray, gyration: np.ndarray, grain_radius: float, groups: np.ndarray | None = None, least: int = 5
 ) -> Dimension:
@@ -82,6 +84,7 @@ def _one(position: np.ndarray) -> tuple[np.ndarray, float, float]:
     return place, float(np.median(nearest)), gyration_radius(place)
 
 
+@checked
 def correlation_dimension(position: np.ndarray, window: tuple[float, float] | None = None) -> Dimension:
     """D of n(r) ∝ r^D, the mean number of grains within r of a grain that is not at the rim, itself counted.
 
@@ -107,6 +110,7 @@ def grains_within(centres: np.ndarray, place: np.ndarray, radii: np.ndarray) -> 
     return cKDTree(centres).count_neighbors(cKDTree(place), radii) / len(centres)
 
 
+@checked
 def box_dimension(position: np.ndarray, window: tuple[float, float] | None = None, seed: int = 0) -> Dimension:
     """D of box counting: n(s) ∝ s^−D boxes of side s are needed, the fewest over shifted and turned grids.
 

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import BadInput, did_you_mean
+from ..core.arguments import checked
+from ..core.errors import BadInput, did_you_mean, refuse_other
 from ..files.frame import MODES as SHARES
 from .clusters import cluster_labels, cluster_sizes
 from .magnetism import aggregate_moments
@@ -135,6 +136,7 @@ CONTACT_NAMES = tuple(one.name for one in CONTACTS)
 _BY_NAME: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS)}
 
 
+@checked
 def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
     """The quantity of that name.  Raises BadInput."""
     if name not in allowed:
@@ -142,6 +144,7 @@ def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
     return _BY_NAME[name]
 
 
+@checked
 def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarray:
     """The numbers of a quantity in a frame, SI: (N,) of grains or (C,) of contacts, NaN where there is none.
 
@@ -154,6 +157,7 @@ def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarr
         BadInput: no such quantity, or the frame has no number for it.
     """
     found = quantity(name, GRAIN_NAMES + CONTACT_NAMES)
+    refuse_other(frame, "radius", "pair")
     values = found.of(frame, field)
     if values.size and np.isnan(values).all():
         raise BadInput(f"{name} is not known: {found.missing or 'no number is finite'}")

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..kernels.discs import area_of_union
 
@@ -18,9 +19,12 @@ def _centred(position: np.ndarray, mass: np.ndarray | None) -> tuple[np.ndarray,
     if place.ndim != 2 or place.shape[1] != 3 or not len(place):
         raise BadInput(f"positions must be (N, 3) with N ≥ 1, not {place.shape}")
     weight = np.ones(len(place)) if mass is None else np.asarray(mass, dtype=np.float64)
+    if weight.shape != (len(place),) or not weight.sum() > 0.0:
+        raise BadInput(f"mass must have one entry for each of {len(place)} grains, above 0 together")
     return place - np.average(place, axis=0, weights=weight), weight
 
 
+@checked
 def gyration_radius(
     position: np.ndarray, mass: np.ndarray | None = None, radius: np.ndarray | float | None = None
 ) -> float:
@@ -34,6 +38,7 @@ def gyration_radius(
     return math.sqrt(np.trace(gyration_tensor(position, mass, radius)))
 
 
+@checked
 def gyration_tensor(
     position: np.ndarray, mass: np.ndarray | None = None, radius: np.ndarray | float | None = None
 ) -> np.ndarray:
@@ -44,12 +49,14 @@ def gyration_tensor(
     return tensor + np.eye(3) * own / 5.0
 
 
+@checked
 def inertia_tensor(position: np.ndarray, mass: np.ndarray, radius: np.ndarray | float) -> np.ndarray:
     """Moment of inertia about the centre of mass (3, 3) [kg m²], spheres with their own ⅖mr²."""
     tensor = gyration_tensor(position, mass, radius)
     return float(np.sum(mass)) * (np.trace(tensor) * np.eye(3) - tensor)
 
 
+@checked
 def principal_lengths(
     position: np.ndarray, mass: np.ndarray | None = None, radius: np.ndarray | float | None = None
 ) -> np.ndarray:
@@ -58,17 +65,20 @@ def principal_lengths(
     return np.sqrt(np.clip(values[::-1], 0.0, None))
 
 
+@checked
 def elongation(position: np.ndarray, mass: np.ndarray | None, radius: np.ndarray | float) -> float:
     """Longest over shortest principal length, extent of the grains included: 1 for a sphere, large for a chain."""
     lengths = principal_lengths(position, mass, radius)
     return float(lengths[0] / lengths[2])
 
 
+@checked
 def characteristic_radius(position: np.ndarray, mass: np.ndarray | None, radius: np.ndarray | float) -> float:
     """√(5/3) r_g [m], the radius of the homogeneous sphere with this radius of gyration, extent of grains included."""
     return math.sqrt(5.0 / 3.0) * gyration_radius(position, mass, radius)
 
 
+@checked
 def filling_factor(position: np.ndarray, radius: np.ndarray | float, mass: np.ndarray | None = None) -> float:
     """Volume of the grains over that of the sphere of `characteristic_radius`: 1 for one grain."""
     each = np.broadcast_to(np.asarray(radius, float), len(position))
@@ -76,6 +86,7 @@ def filling_factor(position: np.ndarray, radius: np.ndarray | float, mass: np.nd
     return float((each**3).sum() / characteristic_radius(position, weight, each) ** 3)
 
 
+@checked
 def coordination(count: int, pairs: np.ndarray) -> np.ndarray:
     """Number of contacts of each grain (N,)."""
     return np.bincount(np.asarray(pairs, dtype=np.int64).reshape(-1), minlength=count)
@@ -89,6 +100,7 @@ def directions_of_view(count: int) -> np.ndarray:
     return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
 
 
+@checked
 def projected_area(
     position: np.ndarray, radius: np.ndarray | float, directions: np.ndarray | int = DIRECTIONS
 ) -> tuple[float, float]:

@@ -47,7 +47,8 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
                 simulation.observers.append(bar)
         try:
             until, steps = end or End()
-            result = simulation.run(until, steps=steps)
+            with report.notes():
+                result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
         except FilesFailed as error:

@@ -66,7 +66,7 @@ def run_command(words: list[str], asked: Callable[[], bool]) -> int:
 def _call(words: list[str], asked: Callable[[], bool]) -> int:
     """Run the command; its errors become lines and an exit code, unless --debug."""
     try:
-        with sand.make_context("sand", list(words)) as context, report.noting():
+        with sand.make_context("sand", list(words)) as context, report.notes():
             return sand.invoke(context) or DONE
     except click.exceptions.Exit as stop:  # --help, --version
         return stop.exit_code

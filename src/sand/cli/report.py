@@ -68,27 +68,23 @@ def show(heading: str, rows: Rows) -> None:
 
 def with_notes(make: Callable[[], T]) -> T:
     """`make()`, its warnings printed as notes, each once."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        made = make()
-    for text in dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)):
-        note(f"note: {text}")
-    return made
+    with notes():
+        return make()
 
 
 @contextmanager
-def noting() -> Iterator[None]:
-    """Warnings of the block are printed as notes, one line each, when they come."""
+def notes() -> Iterator[None]:
+    """Warnings are printed as notes, at once and each once."""
+    told: set[str] = set()
+
+    def tell(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        if issubclass(category, UserWarning) and str(message) not in told:
+            told.add(str(message))
+            note(f"note: {message}")
+
     with warnings.catch_warnings():
-        usual = warnings.showwarning
-
-        def show(message: Any, category: type[Warning], *where: Any, **more: Any) -> None:
-            if issubclass(category, UserWarning):
-                note(f"note: {message}")
-            else:
-                usual(message, category, *where, **more)
-
-        warnings.showwarning = show
+        warnings.simplefilter("always")
+        warnings.showwarning = tell
         yield
 
 

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .errors import BadInput
+from .arguments import checked
+from .errors import BadInput, shown
 from .jit import formula
 from .units import si
 
@@ -39,11 +40,16 @@ def nearest_image(v, span):
     )
 
 
+@checked
 @dataclass(frozen=True)
 class Box:
     """Lengths of the periodic axes [m]; None for an open axis.  Build it with `open` or `periodic`."""
 
     lengths: tuple[float | None, float | None, float | None] = (None, None, None)
+
+    def __post_init__(self) -> None:
+        if not all(length is None or (isinstance(length, (int, float)) and length > 0.0) for length in self.lengths):
+            raise BadInput(f"lengths = {shown(self.lengths)} must be lengths in m or None; see sand.Box.periodic")
 
     @classmethod
     def open(cls) -> Box:
@@ -51,6 +57,7 @@ class Box:
         return cls()
 
     @classmethod
+    @checked
     def periodic(cls, x: Any, y: Any = "same", z: Any = "same") -> Box:
         """A periodic box: one length for a cube, or one per axis with None for an open axis.
 
@@ -129,10 +136,10 @@ def as_box(value: Any) -> Box:
         return value
     if value is None:
         return Box.open()
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple)) or np.ndim(value) == 1:
         if len(value) != 3:
             raise BadInput(
-                f'box = {value!r} must be one length or three; for an open axis give None, in a case file "open"'
+                f'box = {shown(value)} must be one length or three; for an open axis give None, in a case file "open"'
             )
         return Box.periodic(*value)
     return Box.periodic(value)

@@ -2,6 +2,9 @@
 
 import math
 
+LIGHT = 299792458.0
+"""c [m/s], exact"""
+
 BOLTZMANN = 1.380649e-23
 """k_B [J/K], exact"""
 

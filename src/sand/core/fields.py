@@ -55,37 +55,42 @@ def public(array: np.ndarray) -> np.ndarray:
     return view
 
 
-def stored(field: Field, values: Any, count: int, *, positive: bool = False) -> np.ndarray:
+def stored(field: Field, values: Any, count: int, *, positive: bool = False, called: str = "") -> np.ndarray:
     """`values` in the stored shape, or one line for what is wrong with them.
 
     Args:
-        values: SI numbers, text with a unit, or a quantity; one value serves all grains where width is 1.
+        values: SI numbers, text with a unit, or a quantity; one value serves all grains where width is 1, one vector
+            where width is 3.
         count: number of grains N.
         positive: every number must be above 0.
+        called: what the user calls it, if that is not the name of the field.
 
     Raises:
         BadInput: wrong unit, shape (N, width) or a value that is not finite, with the first grain concerned.
     """
+    name = called or field.name
     array = in_unit(values, field.unit)
     if array is None:
         example = EXAMPLES.get(field.unit, f"1 {field.unit}")
-        raise BadInput(f"{field.name} is not in {field.unit}; give numbers in SI or text such as '{example}'")
+        raise BadInput(f"{name} is not in {field.unit}; give numbers in SI or text such as '{example}'")
     array = np.asarray(array, dtype=np.float64)
     if array.ndim == 0 and field.width == 1:
         array = np.full(count, float(array))
+    if field.width == 3 and array.shape == (3,):
+        array = np.tile(array, (count, 1))
     shape = (count,) if field.width == 1 else (count, field.width)
     if array.shape != shape:
         raise BadInput(
-            f"{field.name} has shape {array.shape} but must be {shape} for {count} grains "
-            f"({field.meaning}, in {field.unit})"
+            f"{name} has shape {array.shape} but must be {shape} for {count} grains"
+            f"{', or three numbers for all' if field.width == 3 else ''} ({field.meaning}, in {field.unit})"
         )
     rows = array.reshape(count, -1)
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise BadInput(
-            f"{field.name} of grain {bad[0]} is {array[bad[0]]}: numbers must be finite, in {field.unit};"
+            f"{name} of grain {bad[0]} is {array[bad[0]]}: numbers must be finite, in {field.unit};"
             f" {bad.size} of {count} concerned"
         )
     if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
-        raise BadInput(f"{field.name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0")
+        raise BadInput(f"{name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0")
     return np.array(array.T, order="C")

@@ -8,14 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .arguments import checked
 from .box import Box
-from .errors import BadInput
+from .constants import LIGHT
+from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from .fields import BY_NAME, FIELDS, blank, public, stored
-from .material import Material, material_named
+from .material import Material, as_material
 from .units import in_unit
 
 ROUNDING = 1e-7
 """Gap that still is a contact, as a part of the sum of radii: coordinates of seven digits; no adhesion."""
+
+
+NAMES = (*BY_NAME, "material", "id")
+"""Quantities of grains that a user can read."""
 
 
 class GrainArrays(NamedTuple):
@@ -44,16 +50,14 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
     Args:
         material: a Material or preset name for all grains, or a sequence of N of them.
     """
-    one = isinstance(material, (str, Material))
-    each: Sequence[Any] = [material] * count if one else list(material)
+    several = isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str)
+    each: Sequence[Any] = list(material) if several else [as_material(material)] * count
     if len(each) != count:
         raise BadInput(f"material has {len(each)} entries but there are {count} grains")
     index: dict[Material, int] = {}
     numbers = np.empty(count, dtype=np.uint32)
     for i, given in enumerate(each):
-        found = material_named(given) if isinstance(given, str) else given
-        if not isinstance(found, Material):
-            raise BadInput(f"material of grain {i} is {found!r}; give a sand.Material or the name of a preset")
+        found = as_material(given, f"material of grain {i}")
         numbers[i] = index.setdefault(found, len(index))
     names = [m.name for m in index]
     if doubles := sorted({name for name in names if names.count(name) > 1}):
@@ -61,16 +65,21 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
     return tuple(index), numbers
 
 
+SMALLEST = 1e-10
+"""Radius [m] below which a grain is no longer made of atoms."""
+
+
+@checked
 class Grains:
-    """N spheres.
+    """N spheres.  What they are is fixed once they are made; a simulation works on a copy.
 
     Args:
         position: (N, 3) [m], laboratory frame.
-        radius: scalar or (N,) [m] > 0.
+        radius: scalar or (N,) [m] ≥ 1e-10, an atom.
         material: one `sand.Material` (or preset name) for all, or a sequence of N.
-        velocity: (N, 3) [m/s]; at rest by default.
-        spin: (N, 3) [rad/s], laboratory frame; none by default.
-        moment: (N, 3) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
+        velocity: (N, 3) or, the same for all, (3,) [m/s], slower than light; at rest by default.
+        spin: (N, 3) or (3,) [rad/s], laboratory frame, surfaces slower than light; none by default.
+        moment: (N, 3) or (3,) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
             "6.6e-18 A m^2" or per mass "200 A m^2/kg"; "material" takes each material's own specific moment; none
             by default.
         charge: scalar or (N,) [C]; none by default.
@@ -99,7 +108,7 @@ class Grains:
         arrays = {field.name: blank(field, count) for field in FIELDS}
         given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
         for name, values in given.items():
-            if values is None:
+            if values is None and name not in ("position", "radius"):
                 continue
             try:
                 arrays[name] = stored(BY_NAME[name], values, count, positive=name == "radius")
@@ -115,7 +124,7 @@ class Grains:
                 arrays["body_moment"] = _moments(moment, arrays["mass"], specific, count)
         except BadInput as error:
             problems += error.problems
-        if problems:
+        if problems := problems or _impossible(arrays):
             raise BadInput(problems)
         arrays["inertia"] = 0.4 * arrays["mass"] * arrays["radius"] ** 2
         arrays["orientation"][3] = 1.0
@@ -127,12 +136,27 @@ class Grains:
 
     def __getattr__(self, name: str) -> np.ndarray:
         """Any quantity of the field table, (N,) or (N, width), read only."""
-        if name not in BY_NAME and name not in ("material", "id"):
-            raise AttributeError(f"grains have no '{name}'")
+        if name not in NAMES:
+            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
         return public(getattr(self.arrays, name))
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refused, since neither the arrays nor what follows from them would know."""
+        if name == "arrays" or (name == "materials" and name not in self.__dict__):
+            object.__setattr__(self, name, value)
+        elif name in NAMES or name == "materials":
+            key = "material" if name == "materials" else name
+            raise NoSuchAttribute(
+                f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}=…), "
+                "and build a new Simulation from them"
+            )
+        elif type(self).__module__.startswith("sand."):
+            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
+        else:
+            object.__setattr__(self, name, value)
+
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *BY_NAME, "material", "id"]
+        return [*super().__dir__(), *NAMES]
 
     def __repr__(self) -> str:
         names = ", ".join(m.name for m in self.materials)
@@ -165,10 +189,42 @@ def _count(position: Any) -> int:
     return int(np.shape(array)[0])
 
 
+def _impossible(arrays: dict[str, np.ndarray]) -> list[str]:
+    """Complaints about radii, speeds and spins that no grain can have."""
+    radius, speed, spin = arrays["radius"], _sizes(arrays["velocity"]), _sizes(arrays["spin"])
+    small, fast, whirling = int(np.argmin(radius)), int(np.argmax(speed)), int(np.argmax(spin * radius))
+    problems = []
+    if radius[small] < SMALLEST:
+        problems.append(f"radius of grain {small} is {radius[small]:g} m, less than that of an atom, {SMALLEST:g} m")
+    if speed[fast] >= LIGHT:
+        problems.append(
+            f"velocity of grain {fast} is {speed[fast]:g} m/s; it must be below that of light, {LIGHT:.4g} m/s"
+        )
+    if spin[whirling] * radius[whirling] >= LIGHT:
+        surface = f"{spin[whirling] * radius[whirling]:g} m/s"
+        problems.append(
+            f"spin of grain {whirling} moves its surface at {surface}; it must be below that of light, {LIGHT:.4g} m/s"
+        )
+    return problems
+
+
+def _sizes(vectors: np.ndarray) -> np.ndarray:
+    """Sizes (N,) of vectors (3, N), whose squares may be out of range."""
+    return np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
+
+
+def vector_for_all(moment: Any) -> np.ndarray | None:
+    """The moment (3,) [A m²] that all grains are given, or None where sizes or (N, 3) are given.  Raises BadInput."""
+    vector = None if isinstance(moment, str) else in_unit(moment, "A m^2")
+    if vector is None or np.shape(vector) != (3,):
+        return None
+    return stored(BY_NAME["body_moment"], moment, 1)[:, 0]
+
+
 def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) -> np.ndarray:
     """(3, N) [A m²] from vectors, or from a size (absolute or per mass), then along +z."""
-    if not isinstance(moment, str) and np.ndim(in_unit(moment, "A m^2")) == 2:
-        return stored(BY_NAME["body_moment"], moment, count)
+    if not isinstance(moment, str) and np.ndim(in_unit(moment, "A m^2")) > 0:
+        return stored(BY_NAME["body_moment"], moment, count, called="moment")
     vectors = np.zeros((3, count))
     vectors[2] = moment_size(moment, mass, specific)
     return vectors
@@ -186,9 +242,10 @@ def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.
     if size is None:
         per_mass = in_unit(moment, "A m^2/kg")
         size = None if per_mass is None else per_mass * mass
-    if size is None or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
+    fits = size is not None and np.shape(size) in ((), mass.shape)
+    if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
         raise BadInput(
-            f"moment = {moment!r} must be (N, 3) numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
+            f"moment = {shown(moment)} must be (N, 3) or three numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
             "or, per mass, '200 A m^2/kg', or 'material'"
         )
     return np.broadcast_to(np.asarray(size, dtype=np.float64), mass.shape)

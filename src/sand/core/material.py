@@ -6,7 +6,8 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import BadInput, did_you_mean
+from .arguments import checked
+from .errors import BadInput, did_you_mean, shown
 from .units import si
 
 _UNITS = {
@@ -19,6 +20,7 @@ _UNITS = {
 }
 
 
+@checked
 @dataclass(frozen=True)
 class Material:
     """One material.  Numbers are SI or text with a unit; all problems are reported at once.
@@ -103,3 +105,19 @@ def material_named(name: str) -> Material:
         return PRESETS[name.lower()]
     except KeyError:
         raise BadInput(f"unknown material '{name}'; {did_you_mean(name.lower(), list(PRESETS))}") from None
+
+
+def like_preset(preset: str, name: str) -> Material:
+    """The preset that a material called `name` is like.  Raises BadInput if another preset has this name."""
+    found = material_named(preset)
+    if PRESETS.get(name.lower(), found).name != found.name:
+        raise BadInput(f"'{name}' is a material of its own, like = '{preset}' makes it another; give it another name")
+    return found
+
+
+def as_material(given: Any, name: str = "material") -> Material:
+    """A Material from a Material or the name of a preset.  Raises BadInput."""
+    found = material_named(given) if isinstance(given, str) else given
+    if not isinstance(found, Material):
+        raise BadInput(f"{name} = {shown(given)}; give a sand.Material or the name of a preset: {', '.join(PRESETS)}")
+    return found

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 
-from .errors import BadInput
+from .arguments import checked
+from .errors import BadInput, shown
 
 _wished: int | None = None
 
@@ -17,6 +18,7 @@ def cores() -> int:
         return os.cpu_count() or 1
 
 
+@checked
 def set_threads(number: int | None) -> None:
     """Let large simulations of this process use so many threads; None: as many as there are cores, or `$SAND_THREADS`.
 
@@ -47,4 +49,4 @@ def _checked(number: int | str, name: str) -> int:
             return int(number)
     except (TypeError, ValueError):
         pass
-    raise BadInput(f"{name} = {number!r}; it must be a whole number, at least 1")
+    raise BadInput(f"{name} = {shown(number)}; it must be a whole number, at least 1")

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from .errors import BadInput
+from .constants import LIGHT
+from .errors import BadInput, shown
 
 #: one example per unit, for error messages
 EXAMPLES = {
@@ -114,17 +115,9 @@ def _times(number: str, factor: float) -> float:
 
 def _complain(value: Any, unit: str, name: str) -> BadInput:
     example = EXAMPLES.get(unit, f"1 {unit}")
-    shown = f"{name} = {shortened(value)}"
-    return BadInput(f"{shown} is not a quantity in {unit}; give a number in SI or text such as '{example}'")
-
-
-def shortened(value: Any) -> str:
-    """`value` as Python writes it, its middle left out where that is too long for a message."""
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # whole numbers of more than 4300 digits, lists in lists without end
-        return f"a {type(value).__name__} that is too long to be shown"
-    return text if len(text) <= LONGEST_TEXT else f"{text[:60]}…{text[-20:]}"
+    return BadInput(
+        f"{name} = {shown(value)} is not a quantity in {unit}; give a number in SI or text such as '{example}'"
+    )
 
 
 def in_unit(value: Any, unit: str) -> Any:
@@ -140,7 +133,7 @@ def in_unit(value: Any, unit: str) -> Any:
         bare = 1.0 if unit == "1" or float(number) == 0.0 else None
         factor = _factor(given.strip(), unit) if given else bare
         return None if factor is None else _times(number, factor)
-    if isinstance(value, bool):
+    if value is None or isinstance(value, bool):
         return None
     if hasattr(value, "to_value"):  # astropy
         try:
@@ -161,31 +154,79 @@ LEAST, MOST = 1e-60, 1e60
 """Sizes of SI numbers whose products and powers do not run out of the range of double precision."""
 
 
-def si(value: Any, unit: str, name: str, *, above: float | None = None, least: float | None = None) -> float:
+MELTED = 5000.0
+"""Temperature [K] at which no material is solid."""
+HOTTEST = 1e12
+"""Temperature [K] from which on there are no atoms, and no nuclei."""
+MOST_GRAINS = 100_000_000
+"""More do not fit into the memory of a machine: a grain takes about a kilobyte."""
+MOST_SEED = 2**64 - 1
+
+
+def si(
+    value: Any,
+    unit: str,
+    name: str,
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    below: float | None = None,
+) -> float:
     """One finite number in SI.
 
     Args:
         value: float in SI, text with a unit, or a pint or astropy quantity.
         unit: the SI unit, e.g. "m", "A m^2/kg"; "1" for a pure number.
         name: how the user called it, for the message.
-        above, least: the number must be > above, ≥ least.
+        above, least, below: the number must be > above, ≥ least, < below.
 
     Raises:
-        BadInput: wrong unit, not a number, not finite, or out of range; one line.
+        BadInput: wrong unit, not a number, not finite, or out of range, a temperature above `HOTTEST`, a speed above
+            that of light unless `below` is given; one line.
     """
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:
         raise _complain(value, unit, name)
-    shown = f"{name} = {shortened(value)}"
+    told = f"{name} = {shown(value)}"
     if not math.isfinite(number):
-        raise BadInput(f"{shown} is not finite; give a number in {unit}")
+        raise BadInput(f"{told} is not finite; give a number in {unit}")
     if number != 0.0 and not LEAST < abs(number) < MOST:
-        raise BadInput(f"{shown} is not between {LEAST:g} and {MOST:g} {unit}, where numbers can be computed with")
+        raise BadInput(f"{told} is not between {LEAST:g} and {MOST:g} {unit}, where numbers can be computed with")
     if above is not None and not number > above:
-        raise BadInput(f"{shown} must be above {above:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{told} must be above {above:g} {unit}".removesuffix(" 1"))
     if least is not None and not number >= least:
-        raise BadInput(f"{shown} must be at least {least:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{told} must be at least {least:g} {unit}".removesuffix(" 1"))
+    if below is not None and not number < below:
+        raise BadInput(f"{told} must be below {below:g} {unit}".removesuffix(" 1"))
+    if unit == "m/s" and below is None and not abs(number) < LIGHT:
+        raise BadInput(f"{told} is not below the speed of light, {LIGHT:.4g} m/s")
+    if unit == "K" and number > HOTTEST:
+        raise BadInput(f"{told} is above {HOTTEST:g} K, where no matter is made of atoms")
     return float(number)
+
+
+def is_word(value: Any, word: str) -> bool:
+    """True for this text; arrays, which cannot be compared with text, are another thing."""
+    return isinstance(value, str) and value == word
+
+
+def whole_number(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
+    """A whole number from `least` to `most`.  Raises BadInput."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or value < least or (most is not None and value > most):
+        bounds = (
+            f"of at least {least}" if most is None or (is_whole and value < least) else f"from {least} to {most:.3g}"
+        )
+        raise BadInput(f"{name} = {shown(value)} must be a whole number {bounds}")
+    return int(value)
+
+
+def seed_given(value: Any) -> int:
+    """The seed of random numbers, 0 … 2⁶⁴ − 1.  Raises BadInput."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or not 0 <= value <= MOST_SEED:
+        raise BadInput(f"seed = {shown(value)} must be a whole number of at least 0, below 2**64")
+    return int(value)
 
 
 def spoken(value: float, unit: str) -> str:

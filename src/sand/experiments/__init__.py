@@ -8,6 +8,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+from ..core.errors import NoSuchAttribute, did_you_mean
+
 MODULES = ("chain_impact", "collision", "kernel_table", "maps", "scattering")
 """What there is to be used; the other modules serve these and the command line."""
 
@@ -15,4 +17,4 @@ MODULES = ("chain_impact", "collision", "kernel_table", "maps", "scattering")
 def __getattr__(name: str) -> Any:
     if name in MODULES:
         return importlib.import_module(f".{name}", __name__)
-    raise AttributeError(f"module 'sand.experiments' has no '{name}'")
+    raise NoSuchAttribute(f"module 'sand.experiments' has no '{name}'; {did_you_mean(name, MODULES)}")

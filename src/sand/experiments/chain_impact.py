@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..core.material import Material
 from ..core.units import si
@@ -43,6 +44,7 @@ class Shape(NamedTuple):
     rolled: float  # how far the struck end grain went round its neighbour [°]; nan if it broke off
 
 
+@checked
 def strike(
     material: Material | str,
     radius: Any,
@@ -80,11 +82,13 @@ def strike(
     return simulation
 
 
+@checked
 def shape_of(simulation: Simulation) -> Shape:
     """What the chain of `strike` has become; the last grain is the projectile."""
     return shape(simulation.grains.position, simulation.contacts["pair"], len(simulation.grains) - 1)
 
 
+@checked
 def shape(position: np.ndarray, pairs: np.ndarray, grains: int) -> Shape:
     """Classify chain and projectile.
 
@@ -118,6 +122,7 @@ def shape(position: np.ndarray, pairs: np.ndarray, grains: int) -> Shape:
     return Shape("T" if is_t else "branched", best, rolled)
 
 
+@checked
 def first_touch(
     material: Material | str, radius: float, place: float, grains: int = 8
 ) -> tuple[np.ndarray, list[list[int]]]:
@@ -134,12 +139,14 @@ def first_touch(
     return position, pairs
 
 
+@checked
 def stick_at_first_touch(material: Material | str, radius: float, place: float, grains: int = 8) -> Shape:
     """What hit-and-stick makes of the same impact: nothing rolls."""
     position, pairs = first_touch(material, radius, place, grains)
     return shape(position, np.array(pairs), grains)
 
 
+@checked
 def shape_map(
     material: Material | str, radius: Any, speeds: Sequence[float], places: Sequence[float], **options: Any
 ) -> np.ndarray:

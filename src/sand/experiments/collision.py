@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.units import si
@@ -30,6 +31,7 @@ LOOKS = 400
 """It is stopped after this many looks at the latest."""
 
 
+@checked
 def collide(
     target: Grains,
     projectile: Grains,
@@ -164,6 +166,7 @@ def _until_quiet(simulation: Simulation, start: Approach) -> bool:
     return False
 
 
+@checked
 def collide_many(
     build: Callable[[int], tuple[Grains, Grains]],
     seeds: Sequence[int],

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..files.folder import replace_file
 from ..files.table import write_table
@@ -21,6 +22,7 @@ GRAM, CUBIC_CM = 1e3, 1e6
 """g in a kg, cm³ in a m³."""
 
 
+@checked
 def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Kernel:
     """K = σ v of any two masses, from some.
 
@@ -69,12 +71,14 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Ker
     return Kernel(f"measured, {len(table)} rows", function)
 
 
+@checked
 def on_grid(kernel: Rate, masses: Any) -> np.ndarray:
     """K(m_i, m_j) (K, K) [m³/s] of masses (K,) [kg] > 0 that rise.  Raises BadInput."""
     m = _masses(masses)
     return np.asarray(kernel(*np.broadcast_arrays(m[:, None], m[None, :])), float)
 
 
+@checked
 def write_csv(path: str | Path, kernel: Rate, masses: Any) -> None:
     """A line for each pair m1 ≤ m2: `mass1` [kg], `mass2` [kg], `kernel` [m³/s].
 
@@ -93,6 +97,7 @@ def write_csv(path: str | Path, kernel: Rate, masses: Any) -> None:
     )
 
 
+@checked
 def write_cgs(path: str | Path, kernel: Rate, masses: Any) -> None:
     """Plain text for `numpy.loadtxt`: masses (K,) [g] in the first row, then K (K, K) [cm³/s].
 
@@ -104,6 +109,7 @@ def write_cgs(path: str | Path, kernel: Rate, masses: Any) -> None:
     replace_file(Path(path), ("\n".join(lines) + "\n").encode())
 
 
+@checked
 def for_dustpy(table: Any, scale_heights: Any) -> np.ndarray:
     """What DustPy's `dust.kernel` holds: ∫ n1 n2 K dz/(N1 N2) = K/√(2π(H1² + H2²)) [cm²/s], half of it for equals.
 

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..stepping.encounter import HIT
 from .encounters import Flight
@@ -66,6 +67,7 @@ class ProbabilityMap:
         ]
 
 
+@checked
 def probability_map(
     flights: Sequence[Flight],
     *,

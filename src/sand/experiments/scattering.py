@@ -8,7 +8,6 @@ when the projectile is as far away again and on its way out.  Errors of a step a
 from __future__ import annotations
 
 import time as wall
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass
@@ -17,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..core.arguments import checked
+from ..core.errors import BadInput, warn
 from ..core.units import si
 from ..stepping.encounter import BOUND, FAILED, HIT
 from .encounters import Flight
@@ -90,6 +90,7 @@ class CrossSection:
         return own | more
 
 
+@checked
 def cross_section(
     radius: Any = None,
     material: Any = None,
@@ -117,6 +118,7 @@ def cross_section(
     return measure(flying, relative_error=relative_error, seed=seed, executor=executor)
 
 
+@checked
 def measure(
     flying: Flight,
     *,
@@ -161,12 +163,12 @@ def _warn(strata: Strata, rows: np.ndarray, farthest: float) -> None:
     if failed > 0.01 * len(rows):
         raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin are out of all range")
     if failed:
-        warnings.warn(f"{failed} of {len(rows)} flights could not be computed and count as misses", stacklevel=3)
+        warn(f"{failed} of {len(rows)} flights could not be computed and count as misses")
     hits, _ = strata.counts()
     if not hits.any():
-        warnings.warn(f"none of {len(rows)} flights hit: sigma is 0 as far as they can tell", stacklevel=3)
+        warn(f"none of {len(rows)} flights hit: sigma is 0 as far as they can tell")
     if hits[-1] and (len(strata) + 1) * strata.width > farthest * (1 + 1e-9):
-        warnings.warn("flights hit at all b that begin on the sphere of starts: sigma is cut off there", stacklevel=3)
+        warn("flights hit at all b that begin on the sphere of starts: sigma is cut off there")
 
 
 def seed_of(seed: int, setup: int) -> int:

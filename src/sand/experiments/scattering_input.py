@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.constants import BOLTZMANN
-from ..core.errors import BadInput, did_you_mean
+from ..core.errors import BadInput, did_you_mean, shown
 from ..core.grains import Grains
-from ..core.material import Material, material_named
+from ..core.material import Material, as_material
 from ..core.units import in_unit, si, spoken
 from ..forces.vectors import three
 from ..kernels.starts import ALIGNED, GIVEN, RANDOM
@@ -60,6 +61,7 @@ class Asking:
             raise BadInput(self.problems)
 
 
+@checked
 def flight(
     radius: Any = None,
     material: Material | str | None = None,
@@ -159,7 +161,7 @@ def _bodies(ask: Asking, given: dict[str, Any]) -> tuple[Any, Any]:
     """Projectile and target; None for what could not be made."""
     for name in ("projectile", "target"):
         if given[name] is not None and not isinstance(given[name], Grains):
-            ask.problems.append(f"{name} = {given[name]!r} must be grains, such as sand.setup.grain(...)")
+            ask.problems.append(f"{name} = {shown(given[name])} must be grains, such as sand.setup.grain(...)")
             return None, None
     first = given["projectile"]
     if first is None:
@@ -174,7 +176,7 @@ def _made(radius: Any, material: Material | str | None, moment: Any) -> Grains:
     missing = [name for name, value in (("radius", radius), ("material", material)) if value is None]
     if missing:
         raise BadInput(f"{name} is missing; give radius and material, or a projectile" for name in missing)
-    known = material_named(material) if isinstance(material, str) else material
+    known = as_material(material)
     r = si(radius, "m", "radius", above=0.0)
     size = float(np.linalg.norm(Grains([[0.0, 0.0, 0.0]], r, known, moment=moment).moment))
     return Grains([[0.0, 0.0, 0.0]], r, known, moment=[[size, 0.0, 0.0]])
@@ -188,7 +190,7 @@ def _speed(speed: Any, unit: str, heat: float, body: Grains | None) -> float | N
     times = si(speed, "1", "speed", above=0.0)
     if not heat > 0.0:
         raise BadInput("speed_unit = 'thermal' needs a temperature above 0 K")
-    return None if body is None else times * thermal_speed(float(body.mass.sum()), heat)
+    return None if body is None else si(times * thermal_speed(float(body.mass.sum()), heat), "m/s", "speed")
 
 
 def _drift(value: Any, heat: float, body: Grains | None) -> tuple[Any, float]:

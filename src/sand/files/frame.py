@@ -37,6 +37,7 @@ from typing import Any, overload
 import numpy as np
 
 from ..core.box import Box
+from ..core.errors import BadInput, shown
 from ..core.grains import Grains
 
 OPEN_MARGIN = 4.0
@@ -184,6 +185,10 @@ class Frame:
         return len(self.radius)
 
 
+class NoSuchFrame(BadInput, IndexError):
+    """There is no frame of this number; an IndexError, so that loops over frames end."""
+
+
 class FrameSequence(Sequence[Frame]):
     """Frames of a file at `path`, by number or slice; a subclass says how many (`__len__`) and reads one (`_frame`)."""
 
@@ -201,6 +206,8 @@ class FrameSequence(Sequence[Frame]):
     def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
+        if not isinstance(index, (int, np.integer)):
+            raise NoSuchFrame(f"frame {shown(index)} must be a whole number, from 0 to {len(self) - 1}")
         if not -len(self) <= index < len(self):
-            raise IndexError(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+            raise NoSuchFrame(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
         return self._frame(index % len(self))

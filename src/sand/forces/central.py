@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.constants import COULOMB, GRAVITATION
 from ..core.grains import Grains
@@ -15,6 +16,7 @@ from ..kernels.sums import FarSums
 from .cutoff import WithCutoff, cutoff_for
 
 
+@checked
 @dataclass(frozen=True)
 class Charges(WithCutoff):
     """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
@@ -60,6 +62,7 @@ class Charges(WithCutoff):
         return float(abs(self.constant) * np.max(self.strengths(grains) ** 2 / (2.0 * grains.radius)))
 
 
+@checked
 @dataclass(frozen=True)
 class Attraction(Charges):
     """Newtonian attraction between the grains, U = −G m1 m2/r; rarely matters below kilometres.

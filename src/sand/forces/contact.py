@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
@@ -24,6 +25,7 @@ JKR_LIMIT = 0.3
 """a0/R above which JKR is at the edge of its validity."""
 
 
+@checked
 @dataclass(frozen=True)
 class Contact:
     """Grains that touch stick: JKR with sliding, rolling and twisting springs.

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
-from ..core.units import si, spoken
+from ..core.units import is_word, si, spoken
 from ..physics.dipole import Cutoff
 
 CUTS = ("smooth", "sharp")
@@ -32,7 +32,7 @@ class Choice(NamedTuple):
 
 def cutoff_given(cutoff: Any, name: str) -> float | None:
     """A length [m], or None for None and "none" (how a case file says it).  Raises BadInput."""
-    if cutoff is None or (isinstance(cutoff, str) and cutoff == "none"):
+    if cutoff is None or is_word(cutoff, "none"):
         return None
     return si(cutoff, "m", f"{name}: cutoff", above=0.0)
 
@@ -75,7 +75,7 @@ class WithCutoff:
         problems = []
         if self.cut not in CUTS:
             problems.append(f"{self.name}: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
-        if self.cutoff != "auto":
+        if not is_word(self.cutoff, "auto"):
             try:
                 object.__setattr__(self, "cutoff", cutoff_given(self.cutoff, self.name))
             except BadInput as error:

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.constants import BOLTZMANN, MAGNETIC
 from ..core.grains import Grains
@@ -21,6 +22,7 @@ CAPTURE = 1.5
 """Automatic cut-off over b_max at thermal speed, in a large box."""
 
 
+@checked
 @dataclass(frozen=True)
 class Dipoles(WithCutoff):
     """Forces and torques between magnetic moments.

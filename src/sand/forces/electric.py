@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA
 from ..core.grains import Grains
@@ -12,6 +13,7 @@ from ..physics.surroundings import UniformElectric, uniform_electric
 from .vectors import along_z
 
 
+@checked
 @dataclass(frozen=True)
 class ElectricField:
     """An electric field that is the same everywhere and always: force q E, energy −q E·x.

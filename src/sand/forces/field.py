@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
@@ -73,6 +74,7 @@ READERS: dict[str, Callable[[Any, str], Any]] = {
 """How each key is read."""
 
 
+@checked
 @dataclass(frozen=True)
 class Field:
     """A magnetic flux density that is the same everywhere: torque μ×B(t), energy −μ·B(t) (Eqs. 40, 41).

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
-from ..core.constants import BOLTZMANN
+from ..core.constants import BOLTZMANN, LIGHT
 from ..core.errors import FORBID_EXTRA, BadInput
 from ..core.grains import Grains
-from ..core.units import si, spoken
+from ..core.units import MELTED, si, spoken
 from ..kernels.gas import GasRules, shortest_stopping_time
 from ..physics import gas as law
 from .vectors import three
@@ -23,6 +24,7 @@ FASTEST = 0.5
 lacks 6 % of the drag of mirrors and 4 % of that of diffuse walls."""
 
 
+@checked
 @dataclass(frozen=True)
 class Gas:
     """A thin gas around the grains: it brakes them (Epstein) and keeps them in Brownian motion.
@@ -87,6 +89,8 @@ class Gas:
             object.__setattr__(self, "wind", three(self.wind, "m/s", "gas: wind"))
         except BadInput as error:
             problems += error.problems
+        if not problems and law.mean_speed(BOLTZMANN * self.temperature, self.molecule_mass) >= LIGHT:
+            problems.append(f"gas: temperature = {self.temperature:g} K: its molecules would be faster than light")
         if problems:
             raise BadInput(problems)
 
@@ -107,8 +111,10 @@ class Gas:
         return shortest_stopping_time(grains.arrays, self.rules())
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns of grains too fast for the linear law, or too large for the free-molecular regime."""
+        """Warns of a gas too hot for solids, and of grains too fast for the linear law or too large for free flow."""
         rules, warnings = self.rules(), []
+        if self.temperature > MELTED:
+            warnings.append(f"gas: temperature = {self.temperature:g} K: no material is solid above {MELTED:g} K")
         speed = np.linalg.norm(grains.velocity - np.array(self.wind), axis=1)
         fastest = int(np.argmax(speed))
         if speed[fastest] > FASTEST * rules.mean_speed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput
 from ..core.grains import Grains
@@ -12,6 +13,7 @@ from ..physics.surroundings import UniformGravity, uniform_gravity
 from .vectors import along_z, components
 
 
+@checked
 @dataclass(frozen=True)
 class Gravity:
     """An acceleration that is the same everywhere and always: force m g, energy −m g·x.

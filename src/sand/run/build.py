@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.box import Box, as_box
 from ..core.errors import BadInput
 from ..core.grains import Grains
@@ -206,6 +207,7 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     return case
 
 
+@checked
 def resume(folder: str | Path, **options: Any) -> Simulation:
     """A run's folder at its newest checkpoint as a simulation; `run()` goes on to the end once asked for.
 

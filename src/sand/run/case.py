@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, ValidationError, create_model, field_va
 from ..core.box import Box, as_box
 from ..core.errors import BadInput, did_you_mean
 from ..core.grains import moment_size
-from ..core.material import PRESETS, Material, material_named
+from ..core.material import PRESETS, Material, like_preset
 from ..files.folder import read_toml
 from ..forces.central import Attraction, Charges
 from ..forces.contact import Contact
@@ -75,7 +75,7 @@ class MaterialSection(Section):
         """Raises BadInput for missing or impossible numbers."""
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
-            return material_named(self.like).but(name=name, **given)
+            return like_preset(self.like, name).but(name=name, **given)
         needed = ("density", "young_modulus", "poisson_ratio")
         missing = [key for key in needed if key not in given]
         if missing:

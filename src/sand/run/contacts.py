@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.errors import NoSuchKey, did_you_mean, shown
+from ..core.optional import optional
 from ..core.world import CONTACTS, RECORDED, World
 from ..kernels.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
 
@@ -48,6 +50,8 @@ class ContactTable(Mapping[str, np.ndarray]):
             self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if there else np.zeros(used)
 
     def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._columns:
+            raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self._columns))}")
         return self._columns[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -74,14 +78,11 @@ class ContactTable(Mapping[str, np.ndarray]):
 
     def to_pandas(self) -> Any:
         """A pandas DataFrame; pandas has to be installed."""
-        import pandas
-
-        return pandas.DataFrame(self._flat())
+        return optional("pandas", "to_pandas").DataFrame(self._flat())
 
     def to_xarray(self) -> Any:
         """An xarray Dataset with dimension `contact` and units as attributes; xarray has to be installed."""
-        import xarray
-
+        xarray = optional("xarray", "to_xarray")
         units = {name: unit for name, unit, _ in COLUMNS}
         variables = {
             name: ("contact", column, {"units": units.get(name, units.get(name[:-2], ""))})

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..core.errors import BadInput, shown
 from ..core.units import si
 
 SHORTEST = 1e-21
@@ -50,5 +50,5 @@ def ends_of(
 
 def _whole_steps(steps: Any) -> int:
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise BadInput(f"steps = {steps!r} must be a whole number of at least 1")
+        raise BadInput(f"steps = {shown(steps)} must be a whole number of at least 1")
     return int(steps)

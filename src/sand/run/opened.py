@@ -10,7 +10,10 @@ import numpy as np
 
 from ..analysis.books import Books
 from ..analysis.clusters import cluster_labels
-from ..core.errors import BadInput
+from ..core.arguments import checked
+from ..core.errors import BadInput, NoSuchKey, did_you_mean, shown
+from ..core.optional import optional
+from ..core.units import si
 from ..files import folder as files
 from ..files.export import export_frames
 from ..files.ledger import read_ledger
@@ -24,6 +27,15 @@ if TYPE_CHECKING:
     from ..view.still import Still
 
 
+class Columns(dict[str, np.ndarray]):
+    """Columns by name; a name that is none of them is refused with the nearest one."""
+
+    def __missing__(self, name: Any) -> np.ndarray:
+        """Raises BadInput, which is a KeyError too."""
+        raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self))}")
+
+
+@checked
 class Opened:
     """What `sand.open(DIR)` gives; nothing is read before it is asked for; only `export` and `view` write.
 
@@ -54,7 +66,7 @@ class Opened:
     def ledger(self) -> dict[str, np.ndarray]:
         """Columns of the ledger by name (K,), SI.  Raises BadInput."""
         books = Books.of(read_ledger(self.folder / files.LEDGER))
-        return {name: books[name] for name in books.columns}
+        return Columns({name: books[name] for name in books.columns})
 
     @cached_property
     def case(self) -> dict[str, Any]:
@@ -66,11 +78,13 @@ class Opened:
         """How the run ended; raises BadInput while it has not."""
         return files.read_json(self.folder / files.SUMMARY)
 
+    @checked
     def contacts(self, frame: int = -1) -> dict[str, np.ndarray]:
         """Contacts of a frame: pair (C, 2), overlap [m], formed [s] (C,), force on the first [N] (C, 3)."""
         one = self.frames[frame]
-        return {"pair": one.pair, "overlap": one.overlap, "formed": one.formed, "force": one.force}
+        return Columns({"pair": one.pair, "overlap": one.overlap, "formed": one.formed, "force": one.force})
 
+    @checked
     def at(self, frame: int = -1) -> Simulation:
         """A new simulation in memory, its clock at 0, with the grains, contacts, box and forces of a frame.
 
@@ -91,6 +105,7 @@ class Opened:
             seed=case.run.seed,
         )
 
+    @checked
     def view(self, path: str | Path | None = None) -> Any:
         """The grains in motion, as `Simulation.view`.
 
@@ -102,11 +117,13 @@ class Opened:
         """
         return view_folder(self.folder, path, lambda: self.at(-1).figure())
 
-    def flux_density(self, time: float) -> np.ndarray | None:
+    @checked
+    def flux_density(self, time: Any) -> np.ndarray | None:
         """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `told.field_in`."""
-        field = field_in(self.folder)
-        return None if field is None else np.asarray(field[1](time))
+        now, field = si(time, "s", "time"), field_in(self.folder)
+        return None if field is None else np.asarray(field[1](now))
 
+    @checked
     def picture(self, frame: int = -1, **how: Any) -> Still:
         """A still picture of a frame, with the outside field of the case; it shows itself in a notebook.
 
@@ -121,6 +138,7 @@ class Opened:
         one = self.frames[frame]
         return still_picture(one, **({"field": self.flux_density(one.time)} | how))
 
+    @checked
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.
 
@@ -137,8 +155,7 @@ class Opened:
 
     def to_xarray(self) -> Any:
         """All frames as an xarray Dataset with dimensions frame, grain and axis, SI; xarray has to be installed."""
-        import xarray
-
+        xarray = optional("xarray", "to_xarray")
         whole: list[Frame] = list(self.frames)
         vectors = ("position", "velocity", "moment", "spin")
         data = {
@@ -157,9 +174,7 @@ class Opened:
 
     def to_pandas(self) -> Any:
         """The ledger as a pandas DataFrame; pandas has to be installed."""
-        import pandas
-
-        return pandas.DataFrame(self.ledger)
+        return optional("pandas", "to_pandas").DataFrame(self.ledger)
 
     def __repr__(self) -> str:
         return f"<run in {self.folder}: {len(self.frames)} frames>"

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import time as wall
-import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import as_box
-from ..core.errors import BadInput, FilesFailed, Interrupted
+from ..core.errors import BadInput, FilesFailed, Interrupted, warn
 from ..core.grains import Grains
-from ..core.units import spoken
+from ..core.units import seed_given, spoken
 from ..core.world import World
 from ..forces.base import Force
 from ..forces.dipoles import kinetic_temperature
@@ -25,10 +25,12 @@ from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
 from .at_grains import at_grains
 from .contacts import ContactTable
-from .ends import duration, ends_of
+from .ends import ends_of
+from .fixed import Fixed, forces_given
 from .ledger import Ledger, kinetic_energies, take_stock
 from .observers import Observer, Schedule, tick_all
 from .outcome import OF_STOP, Outcome, Result
+from .pace import Pace
 from .record import Record
 from .signals import Signals
 from .translate import build_engine
@@ -39,16 +41,17 @@ GUARD_EVERY = 10_000
 """Steps between two looks at whether the energy runs away."""
 
 
-class Simulation:
-    """Grains, forces and a box, and the time they have lived.
+@checked
+class Simulation(Fixed):
+    """Grains, forces and a box, and the time they have lived; only `frame_every` and `observers` can be assigned later.
 
     Args:
         grains: the start; copied.
-        forces: a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once.
+        forces: a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once; or a single one.
         box: a Box, or a length for a periodic cube; open by default.
         stepping: the integrator, `sand.Verlet()` by default, or `sand.Adaptive()`.
         neighbours: how pairs within reach are found, `sand.Neighbours()` by default.
-        seed: of random forces; kept with the run.
+        seed: of random forces, 0 … 2⁶⁴ − 1; kept with the run.
         out: folder for the run's files, made at the first `run`; None keeps everything in memory.
         overwrite: allow `out` to hold an earlier run, whose files are then replaced.
         observers: objects that look on (see `sand.Observer`); they never change the physics.
@@ -64,7 +67,7 @@ class Simulation:
     def __init__(
         self,
         grains: Grains,
-        forces: Sequence[Force] = (),
+        forces: Sequence[Force] | Force = (),
         *,
         box: Any = None,
         stepping: Verlet | Adaptive | None = None,
@@ -77,14 +80,10 @@ class Simulation:
         contacts: Bonds | None = None,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        if not isinstance(grains, Grains):
-            raise BadInput(f"grains = {grains!r}; give sand.Grains(…) or sand.setup.gas(…)")
-        self.forces = list(forces)
-        self.box = as_box(box)
-        self.neighbours = neighbours or Neighbours()
-        self.seed = seed
-        self.observers = list(observers)
-        self.frame_every = None if frame_every is None else duration(frame_every, "frame_every")
+        self.forces = forces_given(forces)
+        self.box, self.neighbours = as_box(box), neighbours or Neighbours()
+        self.seed = None if seed is None else seed_given(seed)
+        self.observers, self.frame_every = observers, frame_every
         self._chosen: dict[str, str] = {}  # what the start of a resumed run decided
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
         self.origin = ""  # what is to be said of where the grains came from
@@ -96,8 +95,7 @@ class Simulation:
         self.temperature = kinetic_temperature(grains)
         self.ledger = Ledger([*(f.column for f, _, _ in self._engine.far), *(f.name for f in self._engine.outside)])
         self.record = Record(out, overwrite, resumed=restart is not None) if out is not None else None
-        self.wall_seconds = 0.0
-        self._begun = restart is not None
+        self.wall_seconds, self._begun = 0.0, restart is not None
         self._broken = ""  # why it cannot be run any further
         if restart is not None:
             arrays, meta = restart
@@ -109,7 +107,8 @@ class Simulation:
             elif self.record:
                 self.ledger.restore(self.record.earlier_rows(self.steps))
         for text in self._engine.warnings:
-            warnings.warn(text, stacklevel=2)
+            warn(text)
+        self._built = True
 
     @property
     def world(self) -> World:
@@ -176,7 +175,8 @@ class Simulation:
         self._start()
         return at_grains(self._engine)
 
-    def run(self, until: Any = None, *, steps: int | None = None) -> Result:
+    @checked
+    def run(self, until: Any = None, *, steps: Any = None) -> Result:
         """Go on until a time, or for a number of steps, whichever comes first.
 
         Args:
@@ -215,6 +215,7 @@ class Simulation:
             if self.record:
                 self.record.release()
 
+    @checked
     def view(self, path: str | Path | None = None) -> Any:
         """The grains in motion: a widget in a notebook with anywidget, else a page, opened if there is a browser.
 
@@ -256,7 +257,7 @@ class Simulation:
 
     def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
         frames = Schedule(self.frame_every or math.inf, self.time)
-        burst, guarded = 64, self.steps
+        burst, guarded, pace = 64, self.steps, Pace(end, last)
         while True:
             began = wall.monotonic()
             left = max(min(burst, last - self.steps, guarded + GUARD_EVERY - self.steps), 0)
@@ -266,6 +267,7 @@ class Simulation:
                 burst = max(64, min(int(burst * min(BURST / max(spent, 1e-9), 2.0)), 10**7))
             if stop in OF_STOP:
                 return OF_STOP[stop]
+            pace.look(self.time, self.steps, spent)
             if self.steps - guarded >= GUARD_EVERY:
                 guarded = self.steps
                 if not self.is_sound:

@@ -40,6 +40,7 @@ from ..stepping.rules import Books, ContactRules, Plan, Rules, Stirring
 from ..stepping.verlet import Verlet
 from .engine import Engine
 from .first_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
+from .plausible import impossible, unusual
 
 MATES = 4
 """Room per grain for neighbours in the list to begin with; it grows when needed."""
@@ -86,7 +87,7 @@ def build_engine(
     Raises:
         BadInput: every problem at once.
     """
-    warnings = _checked(grains, forces, box)
+    warnings = _checked(grains, forces, box, fresh=fresh)
     given = _given(forces, grains)
     reach = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in given.distant]
@@ -210,11 +211,10 @@ def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> Stirring:
     return Stirring(STIR_PART * gas[0].shortest_time(grains), seed, gas[0].rules())
 
 
-def _checked(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """The forces' warnings.  Raises BadInput for everything that does not fit together."""
-    problems: list[str] = []
+def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
+    """Warnings of what is unusual.  Raises BadInput for everything that does not fit together."""
+    problems = impossible(grains, forces, box) if fresh else []
     warnings: list[str] = []
-    _refuse_doubles(forces)
     for force in forces:
         try:
             warnings += force.check(grains, box)
@@ -228,7 +228,7 @@ def _checked(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
         )
     if problems:
         raise BadInput(problems)
-    return warnings
+    return warnings + (unusual(grains, forces, box) if fresh else [])
 
 
 def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> Control:
@@ -251,19 +251,6 @@ def sound_crossing(grains: Grains, number: int) -> float:
     material = grains.materials[number]
     radius = float(grains.radius[grains.material == number].min())
     return radius * math.sqrt(material.density / material.young_modulus)
-
-
-def _refuse_doubles(forces: Sequence[Force]) -> None:
-    names = [getattr(force, "name", None) for force in forces]
-    problems = [
-        f"forces: {force!r} is not a force; give sand.Contact(), sand.Dipoles(), …"
-        for force, name in zip(forces, names, strict=True)
-        if not isinstance(name, str) or not isinstance(force, Force)
-    ]
-    doubles = sorted({str(n) for n in names if n is not None and names.count(n) > 1})
-    problems += [f"forces: '{name}' is given more than once; keep one" for name in doubles]
-    if problems:
-        raise BadInput(problems)
 
 
 def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactRules:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..core.arguments import checked
+from ..core.errors import BadInput, did_you_mean, shown
 from ..core.grains import Grains
-from ..core.material import Material, material_named
-from ..core.units import si
+from ..core.material import Material, as_material
+from ..core.units import MOST_GRAINS, si
 from .ballistic import bcca, bpca
 from .deposit import rbd
 from .diffusion import dla, dlca
@@ -19,18 +21,21 @@ from .moments import magnetised
 from .population import Streams, at_home, population, rest_distances, streams, stuff_of, whole
 
 
+@checked
 def rest_distance(material: Material | str, radius: float) -> float:
     """Distance of the centres of two equal grains in contact at rest [m]: 2r − δ0."""
-    one = material_named(material) if isinstance(material, str) else material
+    one = as_material(material)
     pair = stuff_of(np.full(2, radius), [one, one])
     return float(rest_distances(pair, np.array([0]), np.array([1]))[0])
 
 
+@checked
 def grain(*, radius: Any, material: Any, moment: Any = None, moments: str = "aligned", seed: int = 0) -> Grains:
     """A single grain at the origin."""
     return chain(1, radius=radius, material=material, moment=moment, moments=moments, seed=seed)
 
 
+@checked
 def chain(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "aligned", magnetic: Any = 1.0,
     seed: int = 0,
@@ -57,6 +62,7 @@ def chain(
     return magnetised(at_home(position, made), moment, moments, magnetic, chance.moments, axis=0)
 
 
+@checked
 def lattice(
     nx: int, ny: int | None = None, nz: int | None = None, *, radius: Any, material: Any, moment: Any = None,
     moments: str = "random", magnetic: Any = 1.0, seed: int = 0,
@@ -70,6 +76,7 @@ def lattice(
     return _regular(grid, radius, material, moment, moments, magnetic, chance)
 
 
+@checked
 def hexagonal(
     nx: int, ny: int | None = None, nz: int | None = None, *, radius: Any, material: Any, moment: Any = None,
     moments: str = "random", magnetic: Any = 1.0, seed: int = 0,
@@ -93,6 +100,8 @@ def hexagonal(
 def _sites(nx: int, ny: int | None, nz: int | None) -> np.ndarray:
     """Sites of a cubic lattice of unit spacing (N, 3), centred."""
     sides = [whole(n, "side of a lattice") for n in (nx, nx if ny is None else ny, nx if nz is None else nz)]
+    if math.prod(sides) > MOST_GRAINS:
+        raise BadInput(f"a lattice of {' x '.join(map(str, sides))} is too large: at most {MOST_GRAINS:.3g} grains")
     return np.stack(np.meshgrid(*(np.arange(n) - 0.5 * (n - 1) for n in sides), indexing="ij"), -1).reshape(-1, 3)
 
 
@@ -125,6 +134,7 @@ KINDS: dict[str, Callable[..., Grains]] = {
 """Builders by the name a case file gives them; "pca" is the former name of "bpca"."""
 
 
+@checked
 def build(
     kind: str, grains: int | None = None, *, shape: Sequence[int] | None = None, seed: int = 0, **given: Any
 ) -> Grains:
@@ -138,6 +148,10 @@ def build(
     Raises:
         BadInput: an argument that this kind has no use for, with the reason, and all that the builder refuses.
     """
+    if kind not in KINDS:
+        raise BadInput(f"kind = {kind!r}; {did_you_mean(kind, list(KINDS))}")
+    if shape is not None and len(shape) != 3:
+        raise BadInput(f"shape = {shown(shape)} must be three whole numbers, such as [5, 5, 5]")
     wanted = {name: value for name, value in given.items() if value is not None}
     if kind != "fractal" and (told := [n for n in ("dimension", "prefactor") if n in wanted]):
         raise BadInput(f"{told[0]} = {wanted[told[0]]!r}: {_own(kind)}; leave it out, or take kind = 'fractal'")

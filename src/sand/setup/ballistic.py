@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.grains import Grains
 from ..kernels.aggregation import begin_crowd, grow_ballistic
 from ..kernels.meeting import join_ballistic
@@ -16,6 +17,7 @@ from .population import Population, at_home, population, streams, whole
 ADVICE = "take larger grains, stiffer ones, or a narrower law of radii"
 
 
+@checked
 def bpca(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,
@@ -28,7 +30,8 @@ def bpca(
         grains: N ≥ 1.
         radius: [m], one, (N,), or a law: `Lognormal`, `PowerLaw`, or text as for `radii_of`.
         material: one, N of them, or parts of each, {"silica": 0.7, "iron": 0.3}.
-        moment: size of each moment, as for `sand.Grains`; none by default.
+        moment: size of each moment, as for `sand.Grains`, or one vector (3,) [A m²], which all then have whatever
+            `moments` says, but for "relaxed"; none by default.
         moments: "random", "aligned" (along z) or "relaxed" (in each other's field, a minimum of the energy).
         magnetic: part of the grains that have the moment, 0 … 1.
         seed: same seed, same aggregate.
@@ -46,6 +49,7 @@ def bpca(
     return magnetised(at_home(position.T, made), moment, moments, magnetic, chance.moments)
 
 
+@checked
 def bcca(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,

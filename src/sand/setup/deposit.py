@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.errors import BadInput
 from ..core.grains import Grains
@@ -27,6 +28,7 @@ DOUBLED = 6
 """Deposits of twice the size each that are tried."""
 
 
+@checked
 def rbd(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.grains import Grains
 from ..kernels.aggregation import begin_crowd, grow_diffusing
 from ..kernels.meeting import join_diffusing
@@ -15,6 +16,7 @@ from .moments import magnetised
 from .population import at_home, population, streams, whole
 
 
+@checked
 def dla(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,
@@ -36,6 +38,7 @@ def dla(
     return magnetised(at_home(position.T, made), moment, moments, magnetic, chance.moments)
 
 
+@checked
 def dlca(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,

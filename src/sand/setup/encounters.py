@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..core.arguments import checked
+from ..core.errors import BadInput, shown
 from ..core.grains import Grains
-from ..core.units import MOST, in_unit, shortened, si
+from ..core.units import MOST, in_unit, si
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -26,6 +27,7 @@ class Encounter(NamedTuple):
     flight: float  # time until the bodies can touch first [s], about
 
 
+@checked
 def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
     """The body turned as a whole by a random rotation about its centre of mass; moments turn with it."""
     from scipy.spatial.transform import Rotation  # slow to load
@@ -33,6 +35,7 @@ def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
     return turned(body, Rotation.random(random_state=rng))
 
 
+@checked
 def turned(body: Grains, rotation: Rotation) -> Grains:
     """The body turned as a whole about its centre of mass, velocities, spins and moments too."""
     middle = np.average(body.position, axis=0, weights=body.mass)
@@ -50,6 +53,7 @@ def turned(body: Grains, rotation: Rotation) -> Grains:
     )
 
 
+@checked
 def encounter(
     target: Grains, projectile: Grains, *, speed: Any, impact_parameter: Any = 0.0, along: Any = "x"
 ) -> Encounter:
@@ -138,8 +142,7 @@ def offset_of(given: Any, whole: float) -> float:
         offset = in_unit(given, "m")
     if offset is None or np.ndim(offset) != 0 or not 0.0 <= offset < MOST:
         raise BadInput(
-            f"impact_parameter = {shortened(given)} must be a length ≥ 0 such as '10 nm', or a part of the reach, "
-            "'0.5 b'"
+            f"impact_parameter = {shown(given)} must be a length ≥ 0 such as '10 nm', or a part of the reach, '0.5 b'"
         )
     return float(offset)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput
 from ..core.grains import Grains
 from ..core.units import si
@@ -28,6 +29,7 @@ WRONG = 0.05
 """Radius of gyration may miss the wanted one by this part."""
 
 
+@checked
 def fractal(
     grains: int, *, dimension: Any = 1.8, prefactor: Any = 1.3, radius: Any, material: Any, moment: Any = None,
     moments: str = "random", magnetic: Any = 1.0, seed: int = 0,

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
-from ..core.errors import BadInput, did_you_mean
+from ..core.errors import BadInput, did_you_mean, refuse_other
 from ..core.grains import Grains
 from ..core.material import Material
 from ..core.units import spoken
@@ -41,6 +42,7 @@ class Start(NamedTuple):
     note: str  # where they came from, and what was done to them
 
 
+@checked
 def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     """Grains and contacts of one frame, as `sand.open(DIR).frames` gives it.
 
@@ -54,6 +56,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     Raises:
         BadInput: an unknown material, or overlaps that do not fit the positions.
     """
+    refuse_other(frame, "materials", "pair", "overlap", "position")
     if unknown := [name for name in frame.materials if name not in materials]:
         raise BadInput(
             f"the frame has grains of '{unknown[0]}', which is no known material; describe it in "

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.constants import MAGNETIC
-from ..core.errors import BadInput, did_you_mean
-from ..core.grains import Grains, moment_size
+from ..core.errors import BadInput, did_you_mean, warn
+from ..core.grains import Grains, moment_size, vector_for_all
 from ..core.units import si
 from ..kernels.alignment import alignment_energy, relax
 from .gas import directions
@@ -26,7 +26,7 @@ def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.rand
     """The same grains with magnetic moments, in place.
 
     Args:
-        moment: size of each, as for `sand.Grains`; None: no moments.
+        moment: size of each, as for `sand.Grains`, or one vector (3,) [A m²], the same for all; None: no moments.
         ways: "random": isotropic; "aligned": along `axis`; "relaxed": from random ones, see `relaxed`.
         magnetic: part of the grains that have a moment, 0 … 1; which ones is drawn by chance.
 
@@ -45,17 +45,22 @@ def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.rand
         return body
     count = len(body)
     specific = np.array([m.specific_moment for m in body.materials])[body.material]
-    size = np.array(moment_size(moment, body.mass, specific), dtype=float)
+    vector = vector_for_all(moment)
+    told = moment if vector is None else float(np.linalg.norm(vector))
+    size = np.array(moment_size(told, body.mass, specific), dtype=float)
     size[rng.permutation(count)[: count - int(np.rint(part * count))]] = 0.0
     # drawn in any case: other ways leave the rest of what is drawn as it is
     way = directions(count, rng)
     if ways == "aligned":
         way = np.tile(np.eye(3)[axis], (count, 1))
+    if vector is not None:
+        way = np.tile(vector / (np.linalg.norm(vector) or 1.0), (count, 1))
     body.arrays.body_moment[...] = (way * size[:, None]).T
     body.arrays.moment[...] = body.arrays.body_moment
     return relaxed(body) if ways == "relaxed" else body
 
 
+@checked
 def relaxed(body: Grains) -> Grains:
     """Turn the moments until each lies along the field of the others, in place.
 
@@ -80,12 +85,13 @@ def relaxed(body: Grains) -> Grains:
     sweeps, worst = relax(position, moment, MAGNETIC, TOLERANCE, SWEEPS)
     if worst > TOLERANCE:
         told = f"moments still turn by {worst:.1e} rad a sweep after {sweeps} sweeps: nearly at rest, no more"
-        warnings.warn(told, stacklevel=2)
+        warn(told)
     body.arrays.body_moment[:, chosen] = moment
     body.arrays.moment[...] = body.arrays.body_moment
     return body
 
 
+@checked
 def magnetic_energy(body: Grains) -> float:
     """Energy of all moments in each other's field [J], open space: U = ½ Σ −μ·B."""
     return float(alignment_energy(body.arrays.position, body.arrays.moment, MAGNETIC))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.grains import Grains
 
 BITS = 21
@@ -32,6 +33,7 @@ def places_on_curve(position: np.ndarray) -> np.ndarray:
     return place
 
 
+@checked
 def in_space_order(grains: Grains) -> Grains:
     """The same grains, numbered along a curve that fills space (Morton 1966).
 

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..core.arguments import checked
+from ..core.errors import BadInput, shown
 from ..core.grains import Grains, materials_of
-from ..core.material import Material, material_named
-from ..core.units import in_unit, si, spoken
+from ..core.material import Material, as_material
+from ..core.units import MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
 from ..kernels.crowd import Stuff
 from ..physics.adhesion import rest_overlap, rest_radius
 from ..physics.mixing import pairing_between
@@ -25,6 +26,7 @@ DEEPEST = 0.5
 FORMS = "a length, N of them, 'lognormal(MEDIAN, SIGMA, LEAST, MOST)' or 'power law(EXPONENT, LEAST, MOST)'"
 
 
+@checked
 @dataclass(frozen=True)
 class Lognormal:
     """Radii whose logarithms are normal about ln(median), with spread sigma, none outside least … most.
@@ -66,6 +68,7 @@ class Lognormal:
         return np.clip(drawn, least, most)
 
 
+@checked
 @dataclass(frozen=True)
 class PowerLaw:
     """Radii with dN/dr ∝ r^exponent between least and most.
@@ -132,7 +135,7 @@ def radii_of(given: Any) -> Any:
         return law
     values = in_unit(given, "m")
     if values is None:
-        raise BadInput(f"radius = {given!r} is not known; give {FORMS}")
+        raise BadInput(f"radius = {shown(given)} is not known; give {FORMS}")
     if np.ndim(values) == 0:
         return si(given, "m", "radius", above=0.0)
     values = np.asarray(values)
@@ -180,7 +183,7 @@ def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Materia
     parts = np.array([si(part, "1", f"part of {name}", above=0.0) for name, part in given.items()])
     if not len(parts):
         raise BadInput("material = {} names no material; give parts such as {'silica': 0.7, 'iron': 0.3}")
-    kinds = [m if isinstance(m, Material) else material_named(m) for m in given]
+    kinds = [as_material(m) for m in given]
     ends = np.rint(count * np.cumsum(parts) / parts.sum()).astype(int)
     index = rng.permutation(np.searchsorted(ends, np.arange(count), side="right"))
     return [kinds[k] for k in index]
@@ -230,16 +233,14 @@ class Streams(NamedTuple):
     moments: np.random.Generator
 
 
-def whole(number: Any, name: str, least: int = 1) -> int:
-    """A whole number.  Raises BadInput."""
-    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < least:
-        raise BadInput(f"{name} = {number!r} must be a whole number of at least {least}")
-    return int(number)
+def whole(number: Any, name: str) -> int:
+    """A number of grains, from 1 to what a machine can hold.  Raises BadInput."""
+    return whole_number(number, name, 1, MOST_GRAINS)
 
 
 def streams(seed: Any) -> Streams:
     """Raises BadInput for a seed that is not a whole number."""
-    one, two, three = np.random.SeedSequence(whole(seed, "seed", 0)).spawn(3)
+    one, two, three = np.random.SeedSequence(seed_given(seed)).spawn(3)
     return Streams(np.random.default_rng(one), two.generate_state(1, np.uint64)[0], np.random.default_rng(three))
 
 

@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.errors import FORBID_EXTRA, BadInput
+from ..core.arguments import checked
+from ..core.errors import FORBID_EXTRA, BadInput, shown
 from ..core.grains import Grains
-from ..core.units import si
+from ..core.units import is_word, si
 from .control import Control
 from .verlet import Verlet
 
@@ -28,6 +29,7 @@ class Precision(NamedTuple):
     stride: float  # longest way of a grain in one step [m]
 
 
+@checked
 @dataclass(frozen=True)
 class Adaptive:
     """Dormand and Prince's Runge–Kutta pair 5(4) with prescribed errors while nothing touches, Verlet in between.
@@ -36,7 +38,7 @@ class Adaptive:
     where two grains come to touch.  Momentum is kept to rounding, energy and angular momentum to the errors.
 
     Args:
-        tolerance: the errors that are "auto" are this part of the problem's own scales.
+        tolerance: the errors that are "auto" are this part, below 1, of the problem's own scales.
         position_error: largest error of a position in one step [m], or "auto": of the smallest radius.
         velocity_error: of a velocity [m/s], or "auto": of the fastest start, or of √(U/m) if that is more, U the
             far energy of two grains at touch, m the largest mass; at least a radius in the longest step.
@@ -63,14 +65,15 @@ class Adaptive:
     def __post_init__(self) -> None:
         problems: list[str] = []
         for key, unit in {"tolerance": "1", **ERRORS}.items():
-            if key != "tolerance" and getattr(self, key) == "auto":
+            if key != "tolerance" and is_word(getattr(self, key), "auto"):
                 continue
+            bounds = {"below": 1.0 if key == "tolerance" else math.inf}
             try:
-                object.__setattr__(self, key, si(getattr(self, key), unit, f"stepping: {key}", above=0.0))
+                object.__setattr__(self, key, si(getattr(self, key), unit, f"stepping: {key}", above=0.0, **bounds))
             except BadInput as error:
                 problems.extend(error.problems)
         if not isinstance(self.touching, Verlet):
-            problems.append(f"stepping: touching = {self.touching!r}; give sand.Verlet(…)")
+            problems.append(f"stepping: touching = {shown(self.touching)}; give sand.Verlet(…)")
         if problems:
             raise BadInput(problems)
 

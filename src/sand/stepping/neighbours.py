@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.box import Box
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..core.grains import Grains
-from ..core.units import si, spoken
+from ..core.units import is_word, si, spoken
 from ..kernels.cells import Search
 
 SEARCHES = ("auto", "cells", "all pairs")
@@ -52,6 +53,7 @@ class Found(NamedTuple):
     reason: str
 
 
+@checked
 @dataclass(frozen=True)
 class Neighbours:
     """How pairs within reach are found, for contacts and for long-range forces alike.
@@ -86,7 +88,7 @@ class Neighbours:
             said = getattr(self, name)
             if said not in allowed:
                 problems.append(f"neighbours: {name} = {said!r}; {did_you_mean(str(said), allowed)}")
-        if self.margin != "auto":
+        if not is_word(self.margin, "auto"):
             try:
                 object.__setattr__(self, "margin", si(self.margin, "m", "neighbours: margin", above=0.0))
             except BadInput as error:

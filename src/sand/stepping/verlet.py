@@ -5,17 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.errors import FORBID_EXTRA, BadInput, did_you_mean
-from ..core.units import si
+from ..core.units import is_word, si, whole_number
 from .rules import Beat
 
 BELOW_RESONANCE = 0.48
 """Longest cycle of impulses in fastest periods: at half a period the first of them would push in step."""
 LITERAL_STEPS = 70
 """k_max of the paper."""
+MOST_FAR_STEPS = 1_000_000
+"""Longest cycle that can be asked for."""
 FAR = ("every step", "impulse", "taylor", "taylor-literal")
 
 
+@checked
 @dataclass(frozen=True)
 class Verlet:
     """Velocity Verlet for translation, spin and rotation parameters; second order, keeps momenta exactly.
@@ -24,8 +28,8 @@ class Verlet:
         steps_per_period: steps per fastest period of any contact, ≥ 10 (25: frequencies come out 0.26 % high).
         step: a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
             otherwise.
-        accuracy: part of the largest energy that a long-range force puts at stake, |U_min| for dipoles, that a step
-            away from contacts may misplace.
+        accuracy: part, below 1, of the largest energy that a long-range force puts at stake, |U_min| for dipoles,
+            that a step away from contacts may misplace.
         far: how long-range forces act while grains touch. "impulse" sums them once in a cycle of steps; what of them
             changes acts at the two ends of the cycle (r-RESPA), what lasts in every step, as does the force between
             two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
@@ -60,14 +64,16 @@ class Verlet:
                 problems.extend(error.problems)
 
         take("steps_per_period", "1", least=10.0)
-        take("accuracy", "1", above=0.0)
-        if self.step != "auto":
+        take("accuracy", "1", above=0.0, below=1.0)
+        if not is_word(self.step, "auto"):
             take("step", "s", above=0.0)
         if self.far not in FAR:
             problems.append(f"stepping: far = {self.far!r}; {did_you_mean(str(self.far), FAR)}")
-        whole = isinstance(self.far_steps, int) and not isinstance(self.far_steps, bool)
-        if self.far_steps != "auto" and not (whole and self.far_steps >= 1):
-            problems.append(f'stepping: far_steps = {self.far_steps!r} must be a whole number of at least 1, or "auto"')
+        if not is_word(self.far_steps, "auto"):
+            try:
+                whole_number(self.far_steps, "stepping: far_steps", 1, MOST_FAR_STEPS)
+            except BadInput as error:
+                problems += [f'{line}, or "auto"' for line in error.problems]
         if problems:
             raise BadInput(problems)
 

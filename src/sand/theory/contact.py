@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.errors import BadInput
-from ..core.material import Material, material_named
+from ..core.arguments import checked
+from ..core.errors import BadInput, did_you_mean
+from ..core.material import Material, as_material
 from ..core.units import si
 from ..physics import adhesion
 from ..physics.contact import Bond, bond_between
@@ -68,6 +69,7 @@ class ContactNumbers:
         return math.sqrt(max(v * v - self.sticking_speed**2, 0.0))
 
 
+@checked
 def contact(
     material: Material | str,
     radius: Any,
@@ -89,12 +91,12 @@ def contact(
     Raises:
         BadInput: wrong numbers, or a pair without adhesion, which has no such contact.
     """
-    a = material_named(material) if isinstance(material, str) else material
-    b = a if other is None else material_named(other) if isinstance(other, str) else other
+    a = as_material(material)
+    b = a if other is None else as_material(other, "other")
     r1 = si(radius, "m", "radius", above=0.0)
     r2 = r1 if other_radius is None else si(other_radius, "m", "other_radius", above=0.0)
     if mixing not in MIXING:
-        raise BadInput(f"mixing = {mixing!r}; allowed: {', '.join(MIXING)}")
+        raise BadInput(f"mixing = {mixing!r}; {did_you_mean(mixing, list(MIXING))}")
     for m in (a, b):
         if not (m.surface_energy or 0.0) > 0.0:
             raise BadInput(f"material '{m.name}' has no surface energy above 0, so its grains do not stick")

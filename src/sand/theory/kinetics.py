@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.constants import BOLTZMANN
 from ..core.errors import BadInput, did_you_mean
 from ..core.units import si
@@ -40,25 +41,31 @@ class Kernel:
 
     def __call__(self, mass1: Any, mass2: Any) -> Any:
         """K [m³/s], of the shape that the masses [kg] have together.  Raises BadInput for masses not above 0."""
-        first, second = np.asarray(mass1, float), np.asarray(mass2, float)
+        try:
+            first, second = np.asarray(mass1, float), np.asarray(mass2, float)
+        except (TypeError, ValueError):
+            raise BadInput("masses must be numbers, in kg") from None
         if not (first > 0.0).all() or not (second > 0.0).all():
             raise BadInput("masses must be above 0 kg")
         found = self.function(*np.broadcast_arrays(first, second))
         return float(found) if np.ndim(found) == 0 else found
 
 
+@checked
 def constant(rate: Any) -> Kernel:
     """K = `rate` [m³/s] > 0, λ = 0.  Raises BadInput."""
     value = si(rate, "m^3/s", "rate", above=0.0)
     return Kernel("constant", lambda m1, m2: np.full(np.shape(m1), value), 0.0)
 
 
+@checked
 def additive(rate: Any, mass: Any) -> Kernel:
     """K = rate (N1 + N2), λ = 1: the size grows exponentially (Golovin 1963).  Arguments as for `product`."""
     value, grain = _scale(rate, mass)
     return Kernel("additive", lambda m1, m2: value * (m1 / grain + m2 / grain), 1.0)
 
 
+@checked
 def product(rate: Any, mass: Any) -> Kernel:
     """K = rate N1 N2, λ = 2: a gel, one cluster of all, after 1/(n rate).
 
@@ -73,6 +80,7 @@ def product(rate: Any, mass: Any) -> Kernel:
     return Kernel("product", lambda m1, m2: value * (m1 / grain) * (m2 / grain), 2.0)
 
 
+@checked
 def power(rate: Any, mass: Any, eta: Any, nu: Any) -> Kernel:
     """K = rate [(N1^(η/2) + N2^(η/2))/2]² [2N1N2/(N1 + N2)]^ν: σ ∝ m^η and v ∝ m^ν of Eq. 20; λ = η + ν.
 
@@ -96,6 +104,7 @@ def power(rate: Any, mass: Any, eta: Any, nu: Any) -> Kernel:
     return Kernel(f"power, eta = {2 * half:g}, nu = {speed:g}", function, 2.0 * half + speed)
 
 
+@checked
 def mean_speed(mass: Any, temperature: Any) -> float:
     """⟨v⟩ = √(8 k_B T/(π m)) [m/s], Maxwell's; with the reduced mass, that of two bodies' relative motion.
 
@@ -104,6 +113,7 @@ def mean_speed(mass: Any, temperature: Any) -> float:
     return math.sqrt(8.0 / math.pi) * magnetic.thermal_speed(mass, temperature)
 
 
+@checked
 def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 2.0) -> Kernel:
     """K = π r² (N1^(1/D) + N2^(1/D))² √(8k_B T/(π m̄)): clusters of radius r N^(1/D) in free molecular flow.
 
@@ -129,6 +139,7 @@ def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 
     return Kernel(f"Brownian, D = {dimension:g}", made.function, made.degree)
 
 
+@checked
 def capture(
     radius: Any,
     mass: Any,

@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..core.arguments import checked
 from ..core.constants import BOLTZMANN, MAGNETIC
 from ..core.errors import BadInput
 from ..core.units import si
 from ..physics import dipole
 
 
+@checked
 def reduced_mass(mass: Any, other: Any = None) -> float:
     """m̄ = m1 m2/(m1 + m2) [kg], m/2 for two equal ones (below Eq. 8).
 
@@ -28,6 +30,7 @@ def reduced_mass(mass: Any, other: Any = None) -> float:
     return m1 * m2 / (m1 + m2)
 
 
+@checked
 def thermal_speed(mass: Any, temperature: Any) -> float:
     """v_th = √(k_B T/m) [m/s] (section 4.1), one component's standard deviation.
 
@@ -42,6 +45,7 @@ def thermal_speed(mass: Any, temperature: Any) -> float:
     return math.sqrt(heat / si(mass, "kg", "mass", above=0.0))
 
 
+@checked
 def coupling(moment: Any, distance: Any, temperature: Any) -> float:
     """λ = μ²μ₀/(4π d³ k_B T) (Eq. 1): magnetic over thermal energy.
 
@@ -56,11 +60,13 @@ def coupling(moment: Any, distance: Any, temperature: Any) -> float:
     return dipole.coupling(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
 
 
+@checked
 def interaction_radius(moment: Any, distance: Any, temperature: Any) -> float:
     """R_m = (2μ₀μ²/(π k_B T))^(1/3) = 2 d λ^(1/3) [m] (Eq. 2); it does not depend on d. Arguments as for `coupling`."""
     return dipole.interaction_radius(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
 
 
+@checked
 def geometric_cross_section(radius: Any, other: Any = None) -> float:
     """σ = π (R_i + R_j)² [m²] of two spheres (Eq. 4, printed with a factor 4 that Eq. 26 does not have).
 
@@ -77,6 +83,7 @@ def geometric_cross_section(radius: Any, other: Any = None) -> float:
     return math.pi * (r1 + r2) ** 2
 
 
+@checked
 def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
     """U = k [μ·μ′/r³ − 3 (μ·r)(μ′·r)/r⁵] [J] (Eq. 6, whose last r′ is r), k = μ₀/4π.
 
@@ -94,6 +101,7 @@ def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
     return dipole.pair_load(r, a, b, MAGNETIC)[3]
 
 
+@checked
 def potential_parameter(moment1: Any, moment2: Any = None) -> float:
     """α = 2kμμ′ [J m³] (Eq. 7): U_min = −α/d³.
 
@@ -107,12 +115,14 @@ def potential_parameter(moment1: Any, moment2: Any = None) -> float:
     return dipole.contact_energy(first, second, 1.0, MAGNETIC)
 
 
+@checked
 def lowest_energy(moment1: Any, distance: Any, moment2: Any = None) -> float:
     """U_min = −2kμμ′/d³ [J] (Eq. 7), moments head to tail at the distance d [m] > 0.  Raises BadInput."""
     first, second = _moments(moment1, moment2)
     return -dipole.contact_energy(first, second, si(distance, "m", "distance", above=0.0), MAGNETIC)
 
 
+@checked
 def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
     """U_eff = m̄ b² v∞²/(2r²) − α/r³ [J] (Eqs. 8–10), moments always along r.
 
@@ -131,6 +141,7 @@ def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: 
     return 0.5 * m * (b * v / r) ** 2 - si(alpha, "J m^3", "alpha", least=0.0) / r**3
 
 
+@checked
 def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
     """U_0 = (m̄ v∞² b²/3)³/(2α²) [J] (Eq. 11): the maximum of `effective_potential`, at r = 3α/(m̄ b² v∞²).
 
@@ -141,6 +152,7 @@ def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
     return (si(mass, "kg", "mass", above=0.0) * (v * b) ** 2 / 3.0) ** 3 / (2.0 * strength**2)
 
 
+@checked
 def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> float:
     """b_max = √3 (α/(m̄ v∞²))^(1/3) [m] (Eqs. 12, 13; what is printed as Eq. 13 is b_max²).
 
@@ -157,6 +169,7 @@ def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> 
     return dipole.capture_radius(first, second, m, v, MAGNETIC)
 
 
+@checked
 def capture_cross_section(moment1: Any, mass: Any, speed: Any, moment2: Any = None, c: Any = 1.0) -> float:
     """σ_m = c 3π (α/(m̄ v∞²))^(2/3) [m²] (Eq. 14; Eq. 27 with the paper's c of 0.8–0.9); arguments as `capture_radius`.
 

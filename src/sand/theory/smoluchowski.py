@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.arguments import checked
 from ..core.errors import BadInput, SandError, did_you_mean
 from ..core.units import si
 from .kinetics import Rate
@@ -26,6 +27,7 @@ MOST_SIZES = 3000
 METHODS = ("BDF", "DOP853")
 
 
+@checked
 def all_sizes(largest: int) -> np.ndarray:
     """x = 1, 2, … largest: no size is left out, nothing is shared.  2 … 3000; raises BadInput."""
     count = int(si(largest, "1", "largest", least=2.0))
@@ -33,6 +35,7 @@ def all_sizes(largest: int) -> np.ndarray:
     return np.arange(1.0, count + 1.0)
 
 
+@checked
 def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
     """x (K,) from 1 to at least `largest`: whole numbers while they are closer than the ratio, then that ratio.
 
@@ -51,6 +54,7 @@ def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
     return np.concatenate([first, first[-1] * ratio ** np.arange(1.0, more + 1.0)])
 
 
+@checked
 def coagulate(
     kernel: Rate,
     sizes: Sequence[float] | np.ndarray,

@@ -11,8 +11,9 @@ import numpy as np
 from PIL import Image
 
 from ..analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, quantity
+from ..core.arguments import checked
 from ..core.box import Box
-from ..core.errors import BadInput, did_you_mean
+from ..core.errors import BadInput, did_you_mean, refuse_other
 from .colouring import Key, coloured
 from .figure import DPI, RunFigure, headline
 from .light import Lamps
@@ -64,6 +65,7 @@ class Still(RunFigure):
         return content.getvalue()
 
 
+@checked
 def still_picture(
     frame: Any,
     *,
@@ -97,6 +99,7 @@ def still_picture(
     Raises:
         BadInput: one line for each mistake.
     """
+    refuse_other(frame, "radius", "pair", "box")
     towards = check_picture(colour, bonds, view, size)
     outside = None if field is None else np.asarray(field, dtype=np.float64)
     scene = scene_of(frame, frame.pair, frame.box, whole)
