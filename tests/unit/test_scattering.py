@@ -150,6 +150,7 @@ def test_the_command(tmp_path, capsys):
     assert [round(one["c"], 1) for one in told["cross_sections"]] == [1.0, 1.0]
     assert told["versions"]["numba"] and told["seed"] == 3
     assert {p.name for p in out.iterdir()} == {
+        ".lock",
         "case.toml",
         "flights.csv",
         "results.csv",
