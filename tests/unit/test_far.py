@@ -171,7 +171,7 @@ def test_listed_charges_are_all_charges():
         (lambda: sand.Dipoles(cut="hard"), "dipoles: cut = 'hard'"),
         (lambda: sand.Dipoles(cutoff="1 s"), "dipoles: cutoff"),
         (lambda: sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, charge=[math.nan]), "charge of grain 0 is nan"),
-        (lambda: sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[[0, math.nan, 0]]), "body_moment of grain 0"),
+        (lambda: sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[[0, math.nan, 0]]), "moment of grain 0"),
         (lambda: sand.Gas("-3 K", density=1.0), "gas: temperature = '-3 K'"),
         (lambda: sand.Verlet(far="impulses"), "stepping: far = 'impulses'; did you mean 'impulse'"),
         (lambda: sand.Verlet(far_steps=0), "stepping: far_steps = 0"),

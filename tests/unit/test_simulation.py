@@ -371,7 +371,7 @@ def test_a_pair_that_touches_across_the_faces():
     """Periodic images: a pair through the boundary sticks as it does in the middle, to rounding."""
     ends = []
     for shift in (0.0, 1e-7):
-        x = np.array([[shift - 1.2e-8, 0, 0], [shift + 1.2e-8, 0, 0]])
+        x = sand.Box.periodic(2e-7).wrap(np.array([[shift - 1.2e-8, 0, 0], [shift + 1.2e-8, 0, 0]]))
         grains = sand.Grains(x, 1e-8, sand.SILICA, velocity=[[2.0, 0, 0], [-2.0, 0.5, 0]])
         sim = sand.Simulation(grains, [sand.Contact()], box=2e-7)
         sim.run(steps=3000)

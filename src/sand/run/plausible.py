@@ -30,15 +30,16 @@ def impossible(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
 def unusual(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
     """Warnings of very large grains, and of overlaps that no contact law acts on."""
     warnings = []
+    sticky = any(isinstance(force, Contact) for force in forces)
     largest = int(np.argmax(grains.radius))
-    if grains.radius[largest] > LARGEST:
+    if sticky and grains.radius[largest] > LARGEST:
         size = spoken(float(grains.radius[largest]), "m")
         warnings.append(
             f"grain {largest} has a radius of {size}: contacts are made for dust, far below {spoken(LARGEST, 'm')}; "
             "is the unit right?"
         )
-    alone = bool(forces) and not any(isinstance(force, (Contact, FarForce)) for force in forces)
-    if not alone and not any(isinstance(force, Contact) for force in forces):
+    alone = bool(forces) and not any(isinstance(force, FarForce) for force in forces)
+    if not sticky and not alone:
         warnings += _overlaps(grains, box)  # grains that feel only what surrounds them may be in one place
     return warnings
 
