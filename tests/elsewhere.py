@@ -15,6 +15,7 @@ import stat
 import sys
 import time
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 try:
@@ -41,8 +42,7 @@ NAMES = {
 def become_windows() -> None:
     """Change this process, for good."""
     for module, names in NAMES.items():
-        there = {name: module.__dict__.pop(name) for name in names.split() if name in module.__dict__}
-        module.__getattr__ = _for_others(module.__name__, there)
+        module.__class__ = _without(frozenset(names.split()))
     builtins.__import__ = _refusing(builtins.__import__)
     os.open = _without_folders(os.open)
     os.fsync = _for_writers(os.fsync)
@@ -54,15 +54,16 @@ def _is_ours(module: str) -> bool:
     return module.partition(".")[0] in OURS
 
 
-def _for_others(module: str, there: dict[str, Any]) -> Callable[[str], Any]:
-    """What a module's names are looked up with that it does not have: those taken away are still there for others."""
+def _without(names: frozenset[str]) -> type[ModuleType]:
+    """The class of a module that lacks names where we ask for them; it and others still find them."""
 
-    def found(name: str) -> Any:
-        if name not in there or _is_ours(sys._getframe(1).f_globals.get("__name__", "")):
-            raise AttributeError(f"module {module!r} has no attribute {name!r}", name=name, obj=None)
-        return there[name]
+    class Narrowed(ModuleType):
+        def __getattribute__(self, name: str) -> Any:
+            if name in names and _is_ours(sys._getframe(1).f_globals.get("__name__", "")):
+                raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}", name=name, obj=self)
+            return super().__getattribute__(name)
 
-    return found
+    return Narrowed
 
 
 def _refusing(plain: Callable[..., Any]) -> Callable[..., Any]:
