@@ -200,7 +200,7 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
     }
     (tmp_path / "mine.toml").write_text(
         f'[run]\nuntil = "0.1 ns"\nframe_every = "0.25 ns"\n[grains]\nkind = "file"\nfile = "{folder}"\nframe = 20\n'
-        "[forces.contact]\n[forces.dipoles]\ncutoff = 3.52e-09\n"
+        "[forces.contact]\n[forces.dipoles]\ncutoff = 4e-08\n"
     )
     assert main(["run", "mine.toml", "--quiet"]) == 0
     again = sand.open("mine")

@@ -188,7 +188,7 @@ def test_nothing_needs_no_unit():
     for text in ("1", "0 kg"):
         with pytest.raises(BadInput, match="is not a quantity in m"):
             si(text, "m", "x")
-    with pytest.raises(BadInput, match="too long to be shown"):
+    with pytest.raises(BadInput, match="x = <list> is not a quantity in m"):
         si([10**5000], "m", "x")
 
 

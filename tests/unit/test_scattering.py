@@ -219,7 +219,7 @@ def test_a_killed_job_goes_on(tmp_path):
         ({"start": "10 b_max", "moment": 0.0}, "without moments"),
         ({"escape": "1 nm"}, "beyond the contact"),
         ({"target_velocity": [0.2, 0, 0]}, "never meet"),
-        ({"projectile": "iron"}, "must be grains"),
+        ({"projectile": "iron"}, "projectile = 'iron'"),
         ({"projectile": sand.setup.grain(radius=1e-8, material="iron")}, "leave them out"),
         ({"orientation": [1]}, "orientation"),
         ({"seed": -1}, "seed = -1"),

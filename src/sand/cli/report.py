@@ -179,7 +179,7 @@ def _force(force: Any) -> str:
 
     try:
         usual = type(force)().parameters()
-    except TypeError:  # a force that cannot do without settings
+    except (BadInput, TypeError):  # a force that cannot do without settings
         usual = {}
     settings = ", ".join(f"{key} = {say(v)}" for key, v in force.parameters().items() if v != usual.get(key))
     return f"{force.name} ({settings})" if settings else force.name

@@ -43,8 +43,12 @@ class Dipoles(WithCutoff):
     references: ClassVar[str] = "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975"
 
     def automatic(self, grains: Grains, half: float) -> Choice:
-        """The reach of a thermal capture, where it fits into the box."""
+        """The reach of a thermal capture, at least two grain diameters, where it fits into the box."""
         capture = CAPTURE * thermal_capture(grains)
+        shortest = 4.0 * float(grains.radius.max())
+        if 0.0 < capture < shortest < half:
+            would = f"{CAPTURE} b_max which would be {spoken(capture, 'm')}"
+            return Choice(shortest, f"{self.cut}, two grain diameters, beyond {would}")
         if 0.0 < capture < half:
             return Choice(capture, f"{self.cut}, {CAPTURE} b_max at the grains' thermal speed")
         return Choice(

@@ -56,8 +56,7 @@ class Simulation(Fixed):
         overwrite: allow `out` to hold an earlier run, whose files are then replaced.
         observers: objects that look on (see `sand.Observer`); they never change the physics.
         frame_every: time between frames [s]; by default a two-hundredth of the first `run`.
-        contacts: that are there from the start though they are stretched or strained, as `sand.setup.from_frame` gives
-            them; grains that overlap touch anyway.
+        contacts: present from the start, with their strains, as `sand.setup.from_frame` gives them.
         restart: arrays and meta of a checkpoint in `out` to go on from (`sand.resume` gives them).
 
     Raises:
@@ -181,8 +180,7 @@ class Simulation(Fixed):
 
         Args:
             until: absolute time [s]; the run ends at the first step at or after it. Resumed runs know theirs.
-            steps: number of steps from now, ≥ 1; where long-range forces act in cycles (`Verlet.far`) the run goes on
-                to the end of the last cycle.
+            steps: number of steps from now, ≥ 1; the last cycle of long-range forces (`Verlet.far`) is finished.
 
         Raises:
             BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
