@@ -144,7 +144,10 @@ SETUPS = [
     ("sand.setup.gas(10, '1 um', spins=np.ones(3), **iron)", "spins = array of shape (3,) must be text"),
     ("sand.setup.gas(10, '1 um', seed='a', **iron)", "seed = 'a' must be a whole number"),
     ("sand.setup.gas(10, '1 um', temperature=None, **iron)", "temperature = None is not a quantity in K"),
-    ("sand.setup.build('silica', 10, radius='10 nm', material='silica')", "kind = 'silica'; that is a material; allowed: grain, chain"),
+    (
+        "sand.setup.build('silica', 10, radius='10 nm', material='silica')",
+        "kind = 'silica'; a material; allowed: grain, chain",
+    ),
     ("sand.setup.build('bpac', 10, **iron)", "kind = 'bpac'; did you mean 'bpca'?"),
     ("sand.setup.build(10, **iron)", "kind = 10 must be text"),
     ("sand.setup.build('bpca', 10, radus='10 nm', material='iron')", "did you mean 'radius'?"),

@@ -149,8 +149,8 @@ def build(
         BadInput: an argument that this kind has no use for, with the reason, and all that the builder refuses.
     """
     if kind not in KINDS:
-        told = f"that is a material; allowed: {', '.join(KINDS)}" if kind in PRESETS else did_you_mean(kind, list(KINDS))
-        raise BadInput(f"kind = {kind!r}; {told}")
+        advice = f"a material; allowed: {', '.join(KINDS)}" if kind in PRESETS else did_you_mean(kind, list(KINDS))
+        raise BadInput(f"kind = {kind!r}; {advice}")
     if shape is not None and len(shape) != 3:
         raise BadInput(f"shape = {shown(shape)} must be three whole numbers, such as [5, 5, 5]")
     wanted = {name: value for name, value in given.items() if value is not None}
