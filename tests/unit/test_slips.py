@@ -1,5 +1,6 @@
 """Slips of a script: each raises BadInput with one line that says what to write instead. Nothing is compiled."""
 
+import sys
 import warnings
 from types import SimpleNamespace
 
@@ -143,7 +144,10 @@ SETUPS = [
     ("sand.setup.gas(10, '1 um', spins=np.ones(3), **iron)", "spins = array of shape (3,) must be text"),
     ("sand.setup.gas(10, '1 um', seed='a', **iron)", "seed = 'a' must be a whole number"),
     ("sand.setup.gas(10, '1 um', temperature=None, **iron)", "temperature = None is not a quantity in K"),
-    ("sand.setup.build('silica', 10, radius='10 nm', material='silica')", "kind = 'silica'; did you mean"),
+    (
+        "sand.setup.build('silica', 10, radius='10 nm', material='silica')",
+        "kind = 'silica'; a material; allowed: grain, chain",
+    ),
     ("sand.setup.build('bpac', 10, **iron)", "kind = 'bpac'; did you mean 'bpca'?"),
     ("sand.setup.build(10, **iron)", "kind = 10 must be text"),
     ("sand.setup.build('bpca', 10, radus='10 nm', material='iron')", "did you mean 'radius'?"),
@@ -218,3 +222,35 @@ def test_a_slip_gives_one_line(known, slip, line):
         eval(slip, dict(known))
     assert line in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("slip", "package"),
+    [("table.to_pandas()", "pandas"), ("table.to_xarray()", "xarray"), ("sand.open(run).to_pandas()", "pandas")],
+)
+def test_a_package_that_is_not_installed_is_named(known, monkeypatch, slip, package):
+    monkeypatch.setitem(sys.modules, package, None)  # importing it fails
+    with pytest.raises(sand.BadInput, match=f"needs {package}, which is not installed: pip install {package}"):
+        eval(slip, dict(known))
+
+
+def test_tables_can_be_asked_for_a_name(known):
+    """`in` and `get` work as for any mapping, and `hasattr` for grains and simulations."""
+    assert "overlp" not in known["table"] and known["table"].get("overlp") is None
+    assert not hasattr(known["grains"], "velocty") and not hasattr(known["sim"], "grain")
+
+
+def test_all_that_is_wrong_with_settings_is_told_at_once():
+    """Kinds and ranges, one line each."""
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Contact(beyond=3, slide_factor=-1.0, roll_factor="x")
+    assert len(caught.value.problems) == 3
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Adaptive(tolerance=-1.0, touching="verlet")
+    assert len(caught.value.problems) == 2
+    with pytest.raises(sand.BadInput) as caught:
+        sand.Grains([[0, 0, 0]], 1e-8, "iron", velocty=1, spim=2)
+    assert [line.split(";")[1] for line in caught.value.problems] == [
+        " did you mean 'velocity'?",
+        " did you mean 'spin'?",
+    ]

@@ -11,7 +11,7 @@ import numpy as np
 from ..core.arguments import checked
 from ..core.errors import BadInput, did_you_mean, shown
 from ..core.grains import Grains
-from ..core.material import Material, as_material
+from ..core.material import PRESETS, Material, as_material
 from ..core.units import MOST_GRAINS, si
 from .ballistic import bcca, bpca
 from .deposit import rbd
@@ -149,7 +149,8 @@ def build(
         BadInput: an argument that this kind has no use for, with the reason, and all that the builder refuses.
     """
     if kind not in KINDS:
-        raise BadInput(f"kind = {kind!r}; {did_you_mean(kind, list(KINDS))}")
+        advice = f"a material; allowed: {', '.join(KINDS)}" if kind in PRESETS else did_you_mean(kind, list(KINDS))
+        raise BadInput(f"kind = {kind!r}; {advice}")
     if shape is not None and len(shape) != 3:
         raise BadInput(f"shape = {shown(shape)} must be three whole numbers, such as [5, 5, 5]")
     wanted = {name: value for name, value in given.items() if value is not None}
