@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 from matplotlib.figure import Figure
 from numba.core.config import DISABLE_JIT
 from numba.core.event import Event, Listener, register
@@ -32,11 +33,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job 
 TESTS = Path(__file__).parent
 FOLDERS = ("browser", "peers")
 """Folders under tests/ that run only when their path is given."""
-HOW = {
-    "validate": "{} long statistical checks: pytest --validate",
-    "browser": "{} of the page in a browser: pytest tests/browser",
-    "peers": "{} against other programs: pytest tests/peers",
-}
+HOW = {"browser": "the page in a browser: pytest tests/browser", "peers": "other programs: pytest tests/peers"}
 left_out: Counter[str] = Counter()
 
 
@@ -52,6 +49,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if not config.getoption("--validate"):
+        settings.register_profile("short", max_examples=30)
+        settings.load_profile("short")
     if config.getoption("--record") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Recorder())
 
@@ -71,6 +71,12 @@ def _chosen(config: pytest.Config) -> set[str]:
     if config.getoption("--validate") or config.getoption("--validate-part"):
         chosen.add("validate")
     return chosen
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    if collection_path.parent == TESTS and collection_path.name in FOLDERS:
+        return collection_path.name not in _chosen(config) or None
+    return None
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` and pytest-xdist look at the marks
@@ -161,8 +167,9 @@ def pytest_testnodedown(node: Any) -> None:
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     reporter = config.pluginmanager.getplugin("terminalreporter")
-    told = [HOW[name].format(left_out[name]) for name in HOW if left_out[name]]
-    if told and reporter is not None and not hasattr(config, "workerinput"):
+    told = [f"{left_out['validate']} long statistical checks: pytest --validate"] if left_out["validate"] else []
+    told += [HOW[name] for name in HOW if name not in _chosen(config)]
+    if reporter is not None and not hasattr(config, "workerinput"):
         reporter.write_line("not run: " + "; ".join(told))
 
 

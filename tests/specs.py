@@ -50,12 +50,6 @@ def fields() -> sand.Simulation:
     return sand.Simulation(_pair(), [sand.Contact(), sand.Dipoles(cutoff="1 um"), field])
 
 
-def taylor() -> sand.Simulation:
-    """Contacts and dipoles extrapolated by the paper's Taylor series."""
-    forces = [sand.Contact(), sand.Dipoles(cutoff="1 um")]
-    return sand.Simulation(_pair(), forces, stepping=sand.Verlet(far="taylor"))
-
-
 def adaptive() -> sand.Simulation:
     """Contacts and dipoles, with Runge-Kutta steps while nothing touches."""
     return sand.Simulation(_pair(), [sand.Contact(), sand.Dipoles()], stepping=sand.Adaptive())
@@ -67,7 +61,7 @@ def threads() -> sand.Simulation:
 
 
 DRIVERS: dict[str, Callable[[], sand.Simulation]] = {
-    each.__name__: each for each in (contacts, dipoles, listed, fields, taylor, adaptive, threads)
+    each.__name__: each for each in (contacts, dipoles, listed, fields, adaptive, threads)
 }
 SPECS = (*DRIVERS, "scattering", "small")
 """Drivers by name; flights of two bodies; whatever compiles in a second or two."""

@@ -121,7 +121,7 @@ def test_growth_variants(tmp_path, monkeypatch, capsys):
     assert np.abs(speeds[1] - 10.0 * speeds[0]).max() < 1e-6 * np.abs(speeds[1]).max()
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.validate
 def test_measured_kernel(tmp_path, monkeypatch, capsys):
     """Six pairs at an error of 50 %: σv is of the order of Eq. 14 with μ ∝ N; the table of DustPy is symmetric."""
     monkeypatch.setattr(sampling, "PILOT", 4)

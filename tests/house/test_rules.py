@@ -1,6 +1,7 @@
 """The rules of the house: which room may open which door, how long things may be, who names the compiler."""
 
 import ast
+import functools
 import re
 import shutil
 import subprocess
@@ -34,13 +35,19 @@ MAY_IMPORT = {
 LATE = {("run", "view")}
 
 
+@functools.cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax tree of a source file, parsed once."""
+    return ast.parse(path.read_text("utf-8"))
+
+
 def room_of(path: Path) -> str:
     return path.relative_to(HOUSE).parts[0]
 
 
 def imports(path: Path) -> list[tuple[str, bool]]:
     """(room or package, at the top level of the module?) of every import; typing-only ones are left out."""
-    tree = ast.parse(path.read_text("utf-8"))
+    tree = tree_of(path)
     typing_only = {
         id(inner)
         for node in ast.walk(tree)
@@ -94,7 +101,7 @@ def test_files_and_functions_stay_short():
     long = [str(p.relative_to(TOP)) for p in SOURCES if len(p.read_text("utf-8").splitlines()) >= 300]
     assert not long, long
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in ast.walk(tree_of(path)):
             nested = isinstance(node, ast.FunctionDef) and any(
                 isinstance(inner, ast.FunctionDef) for inner in node.body
             )
@@ -108,7 +115,7 @@ def test_public_names_have_docstrings():
     """Modules, and public classes, functions and methods with more than one statement."""
     silent = []
     for path in SOURCES:
-        tree = ast.parse(path.read_text("utf-8"))
+        tree = tree_of(path)
         if not ast.get_docstring(tree):
             silent.append(str(path.relative_to(TOP)))
         for parent in ast.walk(tree):
@@ -147,7 +154,7 @@ def test_only_files_opens_files_and_only_cli_prints():
     """`open`, `read_text`, `write_text` and friends live in files/ (and the compiler's digest); print in cli/."""
     for path in SOURCES:
         room = room_of(path)
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in ast.walk(tree_of(path)):
             if not isinstance(node, ast.Call):
                 continue
             name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
@@ -202,7 +209,7 @@ def test_no_pickle_no_network():
         names = {name for name, _ in imports(path)}
         assert not names & {"pickle", "dill", "cloudpickle"}, path
         assert not names & (network - {"http", "socketserver"} if path == server else network), path
-        loads += [(path, call) for call in loads_of_numpy(ast.parse(path.read_text("utf-8")))]
+        loads += [(path, call) for call in loads_of_numpy(tree_of(path))]
     assert loads
     assert not [f"{path.relative_to(TOP)}:{call.lineno}" for path, call in loads if not refuses_pickles(call)]
 

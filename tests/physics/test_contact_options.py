@@ -43,7 +43,7 @@ def test_ringing_decays_as_the_oscillator_does(kind):
 
 
 @pytest.mark.compiled("contacts")
-@pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
+@pytest.mark.parametrize("kind", ["constant", pytest.param("viscoelastic", marks=pytest.mark.validate)])
 def test_the_books_of_damped_impacts_close_with_the_square_of_the_step(kind):
     """Aggregates of unequal grains collide with damping: the error falls ≥ 3× per halving (rms of twelve)."""
 

@@ -59,7 +59,7 @@ def test_the_usual_cycle_stays_below_half_a_period():
     assert sand.Verlet(far="every step", far_steps=9).most_steps == 1
 
 
-@pytest.mark.compiled("dipoles", "taylor")
+@pytest.mark.validate
 def test_taylor_series_drift():
     """The literal Taylor series of a ringing chain misplaces its loads: its energy error is far above the default's."""
     errors = {far: energy_error(chain(True, far), 20_000, 4) for far in ("impulse", "taylor", "taylor-literal")}

@@ -96,7 +96,7 @@ def test_projected_area_against_darts():
     assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(darts))
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.validate
 def test_projected_area_of_a_long_rod():
     """Mean shadow of a convex body is a quarter of its surface (Cauchy); spheres 0.02 apart are nearly a capsule.
 
@@ -194,7 +194,7 @@ def test_dimensions_of_exact_shapes(name):
     assert 0.0 <= by_pairs.error < 0.5 and 0.0 < by_boxes.error < 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_larger_bodies_are_nearer_their_dimension():
     """A gasket of 16384 corners against one of 1024, both methods."""
     for method in (correlation_dimension, box_dimension):

@@ -126,7 +126,7 @@ def dimension(make, few, many, count):
     return np.log(many / few) / step, np.log(many / few) / step * wrong
 
 
-@pytest.mark.compiled("small")
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("make", "count", "expected", "bound"), [(bpca, 60, 2.95, 0.2), (bcca, 150, 1.9, 0.15), (dla, 20, 2.5, 0.2)]
 )

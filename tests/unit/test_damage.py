@@ -198,6 +198,7 @@ def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
     assert not list(run.glob("*.damaged"))
 
 
+@pytest.mark.validate
 def test_every_entry_of_an_index_that_is_damaged(tmp_path):
     """Of 40 frames, 30 up to the checkpoint: if some of these are lost it is said and the file kept; else neither."""
     good = reel(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)

@@ -15,6 +15,8 @@ for package in ("sand", "tests", "benchmarks"):
 """
 PACKAGE = """
 import sand
+
+import pytest
 for module in pkgutil.walk_packages(sand.__path__, "sand."):
     if module.name != "sand.__main__":
         importlib.import_module(module.name)
@@ -96,6 +98,7 @@ def test_every_module_and_the_commands_work(tmp_path):
     assert (tmp_path / "run" / "summary.json").stat().st_size > 0
 
 
+@pytest.mark.validate
 def test_every_test_can_be_imported():
     """pytest can collect all tests; only those that need other programs are skipped as a whole."""
     told = elsewhere(TESTS, TOP, compiled=True)

@@ -118,7 +118,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.compiled("dipoles")
-@pytest.mark.parametrize("count", [300, pytest.param(2000, marks=pytest.mark.validate)])
+@pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.validate)])
 @pytest.mark.parametrize(("pattern", "read"), [("checkpoint-*.npz", read_checkpoint), ("trajectory.gsd", read_frames)])
 def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, count):
     """BadInput, or, where nothing that counts was hit, what the whole file holds."""

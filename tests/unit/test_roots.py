@@ -55,7 +55,7 @@ def test_no_root_of_a_distance_that_is_none():
 
 
 @pytest.mark.compiled("small")
-@pytest.mark.parametrize("count", [2, 77, 1001])
+@pytest.mark.parametrize("count", [77, *(pytest.param(n, marks=pytest.mark.validate) for n in (2, 1001))])
 def test_sums_with_seeds_are_those_without(count):
     """Forces and fields of all pairs, with either root: ten roundings in each of 1000 terms, 1e-13 of the largest.
 

@@ -97,7 +97,7 @@ def test_any_split_gives_the_same_numbers(here, monkeypatch):
     assert numbers(other) != numbers(here)
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.validate
 def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
     """dask.distributed with two workers, one of which is killed after the first piece: the same numbers."""
     distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
@@ -179,7 +179,7 @@ def test_the_command(tmp_path, capsys):
     assert "another case" in capsys.readouterr().err
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.validate
 def test_a_killed_job_goes_on(tmp_path):
     """Killed while it flies, a torn line at the end: resumed, its files are those of one that was left alone."""
     case = tmp_path / "case.toml"
