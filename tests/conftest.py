@@ -11,6 +11,7 @@ Tiers (the last line of a run says which were left out and how to run them):
 
 from __future__ import annotations
 
+import compileall
 import signal
 import warnings
 from collections import Counter
@@ -24,8 +25,12 @@ from matplotlib.figure import Figure
 from numba.core.config import DISABLE_JIT
 from numba.core.event import Event, Listener, register
 
-from .specs import FIXTURES, SPECS, WORKERS, parts_of, watched
-from .validation import Recorder, parse_part, part_of
+# Numba's cache tells functions loaded from bytecode from the same functions loaded from source: all processes of a
+# run, workers and children, must load them in the same way, or they compile everything twice.
+compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
+
+from .specs import FIXTURES, SPECS, WORKERS, parts_of, watched  # noqa: E402
+from .validation import Recorder, parse_part, part_of  # noqa: E402
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)

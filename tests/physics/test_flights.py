@@ -126,7 +126,7 @@ def test_momenta_and_energy():
         assert np.abs(np.linalg.norm(one.moment_target, axis=1) - 1.0).max() < 1e-12
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.validate
 def test_aggregates_of_one_grain_are_spheres():
     """The rigid-body kernel with one grain each: the same flights as the kernel of spheres, 1e-6 of R at the end."""
     from sand.experiments.encounters import body_of
@@ -153,7 +153,7 @@ def test_aggregates_of_one_grain_are_spheres():
     assert np.abs(ends[0, :3] - moved).max() < 1e-4 * 1e-8
 
 
-@pytest.mark.compiled("scattering")
+@pytest.mark.validate
 def test_aggregates_keep_energy_and_touch_where_grains_do():
     """A chain of 3 against one of 2, tumbling: energy to 1e-6 of |U_min|, and the first touch is one of grains."""
     distance = 2e-8

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 TOP = Path(__file__).parents[2]
 BEGIN = """
 import importlib, pathlib, pkgutil, sys, warnings
@@ -15,8 +17,6 @@ for package in ("sand", "tests", "benchmarks"):
 """
 PACKAGE = """
 import sand
-
-import pytest
 for module in pkgutil.walk_packages(sand.__path__, "sand."):
     if module.name != "sand.__main__":
         importlib.import_module(module.name)

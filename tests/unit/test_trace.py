@@ -67,7 +67,7 @@ def test_rods_are_met_where_they_are(w):
     assert (facing > -0.1).all()  # nothing is seen from behind
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_chunks_bound_the_memory(monkeypatch):
     """Ten thousand grains in pieces, in small pieces and at once: the same picture, and only at once more memory.
 
