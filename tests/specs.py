@@ -8,6 +8,7 @@ not drivers are marked ``compiled("small")``.
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -79,7 +80,9 @@ def _key(plan: Plan) -> Plan:
 
 @functools.cache
 def _plans() -> dict[Plan, str]:
-    return {_key(make()._engine._plan): name for name, make in DRIVERS.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return {_key(make()._engine._plan): name for name, make in DRIVERS.items()}
 
 
 def name_of(plan: Plan) -> str | None:

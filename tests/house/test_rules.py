@@ -290,6 +290,7 @@ def test_no_large_files():
     assert not large, large
 
 
+@pytest.mark.slow
 def test_the_source_archive_is_complete():
     """What git holds is in the sdist, so that its tests can be run and its docs be built."""
     sdist = pytest.importorskip("hatchling.builders.sdist", reason="the build backend is not installed")

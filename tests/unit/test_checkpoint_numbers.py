@@ -59,7 +59,8 @@ def test_numbers_that_were_changed_are_refused(tmp_path, change):
     rewritten(path, change)
     with pytest.raises(sand.BadInput, match=path.name):
         read_checkpoint(path)
-    assert newest_checkpoint(tmp_path)[1]["steps"] == 1
+    with pytest.warns(UserWarning, match="is damaged"):
+        assert newest_checkpoint(tmp_path)[1]["steps"] == 1
 
 
 class Code:

@@ -121,6 +121,7 @@ def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
     assert "waiting up to 60 s" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_run_that_never_begins(tmp_path, capsys, monkeypatch):
     """After the time for waiting: one line that says what to look for; not for a run that has ended."""
     monkeypatch.setattr(view_command, "WAIT", 0.5)

@@ -10,6 +10,7 @@ from sand.view.style import BIG, SINGLE, rgb
 from .stills import R, alike, at_pixel, frame_of
 
 
+@pytest.mark.slow
 def test_clusters_have_their_colours():
     """At each grain's centre is the hue of its cluster, the largest first; single grains are grey."""
     position = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0], [0, 0, 5], [2, 0, 5], [6, 0, 5]]) * R

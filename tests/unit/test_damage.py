@@ -60,6 +60,7 @@ def read_with_notes(read, path):
     return found, len(caught)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "read"), [(files.LEDGER, read_ledger), (files.SUMMARY, files.read_json)])
 def test_changed_bytes_give_no_other_number(tmp_path, name, read):
     """Each of 800 changed bytes: refused, or a note, or the same numbers."""

@@ -78,6 +78,7 @@ def test_rounding_does_not_tell_an_exponential_from_a_power():
             assert math.isinf(fit.high) and fit.reach < 1e-9
 
 
+@pytest.mark.slow
 def test_the_interval_of_exact_growth_holds_z():
     """Constant kernel, S = 1 + 2t/τ: λ = 0, z = 1, to rounding where all sizes are kept (300: e^−60 is lost).
 

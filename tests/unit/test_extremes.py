@@ -115,7 +115,11 @@ def test_extreme_entries_of_a_case(place, capsys, old, new, part):
         (["build", "lattice", "--shape", "99999999,99999999,99999999", "--out", "a.xyz"], "--shape"),
         (["build", "pca", "--grains", "8", "--out", ""], "--out = ''"),
         (["build", "pca", "--grains", "8", "--out", "a.xyz", "--seed", str(2**64)], "--seed"),
-        (["build", "pca", "--grains", "8", "--out", "a.xyz", "--magnetic", "nan"], "magnetic"),
+        pytest.param(
+            ["build", "pca", "--grains", "8", "--out", "a.xyz", "--magnetic", "nan"],
+            "magnetic",
+            marks=pytest.mark.compiled("small"),
+        ),
         (["build", "fractal", "--grains", "8", "--out", "a.xyz", "--dimension", "nan"], "dimension"),
         (["build", "fractal", "--grains", "8", "--out", "a.xyz", "--prefactor", "inf"], "prefactor"),
         (["build", "pca", "--grains", "8", "--out", "a.xyz", "--radius", "1e400 m"], "radius"),

@@ -98,6 +98,7 @@ def texts(figure):
 # --- history -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_clusters_drawn_are_the_ledgers(grown, figure):
     """S, the largest cluster and the number of clusters are the ledger's columns over its times."""
     drawn = lines(figure.axes[0])
@@ -107,6 +108,7 @@ def test_clusters_drawn_are_the_ledgers(grown, figure):
         np.testing.assert_array_equal(drawn[label][1], grown.ledger[column])
 
 
+@pytest.mark.slow
 def test_energies_drawn_are_the_ledgers(grown, figure):
     """Kinetic, contact, magnetic and outside energies are sums of columns over N k_B T of the start."""
     unit, books = 4 * BOLTZMANN * 100.0, grown.ledger

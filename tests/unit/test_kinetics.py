@@ -116,6 +116,7 @@ def test_z_from_the_exponents(eta, nu):
     assert measured_z(kernel) == pytest.approx(theory.dynamic_exponent(eta, nu), rel=1e-3, abs=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reading", "speed"), [("paper", "impact"), ("mass", "impact"), ("aligned", "thermal")])
 def test_z_of_magnetic_growth(reading, speed):
     """3.31, 2.17 and, with a thermal speed, 1.52, to 1 %; with the exponents of `growth_exponents`."""
@@ -126,6 +127,7 @@ def test_z_of_magnetic_growth(reading, speed):
     assert measured_z(kernel) == pytest.approx(1 / (1 - degree), rel=2e-3, abs=0.0)
 
 
+@pytest.mark.slow
 def test_z_of_33_is_out_of_reach():
     """λ = 0.97: at S = 1e8 z is still some 20 % low, since the mass of small clusters falls as S^(λ−1) only."""
     aligned = measured_z(kinetics.capture(R, MASS, MOMENT, 100.0, reading="aligned"))

@@ -110,6 +110,7 @@ def test_frames_that_cannot_be_read_leave_names_as_they_were():
         assert names[0] == names[1] == names[2] == [0, 0, SINGLE, SINGLE] and names[3] == [0, 0, 0, SINGLE]
 
 
+@pytest.mark.slow
 def test_memory_is_bounded(monkeypatch):
     """With room for eight frames no more of the answers stay in memory, and the last one; names stay the same.
 

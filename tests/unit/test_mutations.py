@@ -254,6 +254,7 @@ def look(name, path):
         simulation_of(found, None)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("count", [150, pytest.param(3400, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("name", list(KINDS))

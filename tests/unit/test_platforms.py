@@ -67,6 +67,7 @@ print(jit.CAN_SHARE, jit.LONG_VECTORS)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("version", "jit", "told"),
     [((0, 99), True, True), ((0, 61), True, True), ((0, 68), True, False), ((0, 99), False, False)],

@@ -296,6 +296,7 @@ def test_wrong_cases_leave_nothing(tmp_path, capsys, change, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("address", "said"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")])
 def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, said):
     """One line, exit 2, nothing written."""

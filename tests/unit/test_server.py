@@ -247,6 +247,7 @@ def test_one_slow_client_keeps_nobody_waiting(server, capfd):
     assert told.out == told.err == ""
 
 
+@pytest.mark.slow
 def test_slow_clients_do_not_lock_the_page(server):
     """Three times as many as there may be: a normal request is answered, and whoever has the token is not ended."""
     known = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)

@@ -43,6 +43,7 @@ def test_every_array_of_a_checkpoint_is_in_the_table():
     assert set(WITH_ORDER) == set(STORED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(STORED))
 def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
     """Each array in turn: another type, one column less or more, one axis less, not a number, an index beyond."""
@@ -113,6 +114,7 @@ def test_meta_that_is_none(name):
             check_state(ARRAYS, {key: value for key, value in META.items() if key != name} | {"version": VERSION})
 
 
+@pytest.mark.slow
 def test_commands_refuse_what_would_have_crashed(tmp_path, capsys):
     """`sand resume` and `sand info`: exit code 2 and a line; materials that the case does not have, too."""
     for arrays in (

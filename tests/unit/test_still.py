@@ -17,6 +17,7 @@ from sand.view.style import rgb
 from .stills import R, alike, at_pixel, frame_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", ["iso", "front", "top", "side", "1,-2,0.4"])
 def test_a_sphere_is_a_disc_of_its_size_at_its_place(view):
     """Centre: mean of the disc's pixels by opacity, to 0.1 pixel; radius √(area/π).
@@ -130,6 +131,7 @@ def test_box_edges_are_hidden_by_grains_in_front():
     assert np.abs(there - line).max() > 0.05 and np.ptp(there) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_grounds(dark):
     """Transparent: nothing where there is nothing, the grain opaque; otherwise the ground of the style."""

@@ -270,6 +270,7 @@ def test_other_numbers_of_grains(tmp_path):
         story.frame(1)
 
 
+@pytest.mark.slow
 def test_several_readers_at_once(tmp_path):
     """Eight threads that ask for frames in any order all get the right ones."""
     story = story_of(reel(tmp_path / "a.gsd", [[(k % 5, k % 5 + 1)] for k in range(30)], 9))

@@ -226,6 +226,7 @@ def test_warnings_about_grains_that_feel_nothing():
 
 
 # --- settings ---------------------------------------------------------------------------------------
+@pytest.mark.slow
 def test_sizes_and_units():
     """One size is along +z, of gravity along −z; text and quantities have units."""
     assert sand.Gravity("9.81 m/s^2").acceleration == (0.0, 0.0, -9.81)

@@ -71,6 +71,7 @@ def compiled_for(folder, name, features=""):
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="LLVM knows these names on x86 only")
 def test_code_is_made_for_the_processor_that_is_named(tmp_path):
     """Zen gathers numbers one by one; Intel's since Sapphire Rapids take 512 bits in long loops, and there alone.

@@ -90,6 +90,7 @@ def test_chunks_bound_the_memory(monkeypatch):
     assert pictures[0][200:300, 350:450, 3].mean() > 0.95
 
 
+@pytest.mark.slow
 def test_a_ball_larger_than_the_picture_is_cut_into_squares():
     """A ball that fills the picture is drawn, in pieces that are within what is looked at in one go."""
     one = Balls(np.zeros((1, 3)), np.ones(1), np.full((1, 3), 0.5), np.zeros((1, 3)))
