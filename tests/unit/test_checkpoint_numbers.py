@@ -11,15 +11,14 @@ from sand.core.world import STEPS
 from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
 
 REFERENCE = Path(__file__).parents[1] / "reference" / f"run-v{VERSION}"
-ARRAYS, META = read_checkpoint(next(REFERENCE.glob("*.npz")))
-META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
 
 
 def written(folder, steps):
     """Write the reference state as that of a step; the path."""
-    count = ARRAYS["count"].copy()
-    count[STEPS] = steps
-    return write_checkpoint(folder, {**ARRAYS, "count": count}, {**META, "steps": steps})
+    arrays, meta = read_checkpoint(next(REFERENCE.glob("*.npz")))
+    meta = {name: value for name, value in meta.items() if name not in ("format", "version", "sha256")}
+    arrays["count"][STEPS] = steps
+    return write_checkpoint(folder, arrays, {**meta, "steps": steps})
 
 
 def rewritten(path, change):
