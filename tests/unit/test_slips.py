@@ -99,7 +99,7 @@ SIMULATIONS = [
     ("sand.Simulation(grains, box='big')", "box length x = 'big' is not a quantity in m"),
     ("sand.Simulation(grains, seed='a')", "seed = 'a' must be a whole number"),
     ("sand.Simulation(grains, seed=-1)", "seed = -1 must be a whole number of at least 0"),
-    ("sand.Simulation(grains, seed=2**64)", "must be a whole number of at least 0, below 2**64"),
+    ("sand.Simulation(grains, seed=2**63)", "must be a whole number of at least 0, below 2**63"),
     ("sand.Simulation(grains, out=7)", "out = 7 must be a path"),
     ("sand.Simulation(grains, observers=7)", "observers = 7 must be a list"),
     ("sand.Simulation(grains, observers=[7])", "observers: 7 is not a sand.Observer"),

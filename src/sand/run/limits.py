@@ -1,7 +1,9 @@
 """The largest numbers that may be asked for."""
 
-MOST_GRAINS = 10**8
-"""Of one simulation; the state of so many takes about 100 GB."""
+from ..core.units import MOST_GRAINS
+
+__all__ = ["MOST_GRAINS", "MOST_PROCESSES", "MOST_SEED", "MOST_STEPS"]
+
 MOST_STEPS = 2**62
 """Steps are counted in 64 bits."""
 MOST_SEED = 2**63 - 1
