@@ -141,10 +141,10 @@ def one_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
         # a folder without a checkpoint is what a kill at the very start leaves
         simulation, until = simulation_of(case, place, overwrite=True, observers=list(observers)), case.run.until
     steps = None if case.run.steps is None else case.run.steps - simulation.steps
-    there = (until is not None and simulation.time >= until) or (steps is not None and steps <= 0)
-    if there and _closed(place).get("steps") == simulation.steps:
+    arrived = (until is not None and simulation.time >= until) or (steps is not None and steps <= 0)
+    if arrived and _closed(place).get("steps") == simulation.steps:
         return "finished"
-    if there:  # a kill left it without a summary
+    if arrived:  # a kill left it without a summary
         until, steps = simulation.time, None
     return simulation.run(until, steps=steps).outcome.name.lower()
 
