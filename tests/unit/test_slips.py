@@ -1,5 +1,6 @@
 """Slips of a script: each raises BadInput with one line that says what to write instead. Nothing is compiled."""
 
+import pickle
 import sys
 import warnings
 from types import SimpleNamespace
@@ -254,3 +255,5 @@ def test_all_that_is_wrong_with_settings_is_told_at_once():
         " did you mean 'velocity'?",
         " did you mean 'spin'?",
     ]
+    again = pickle.loads(pickle.dumps(caught.value))  # as a worker process sends it
+    assert again.problems == caught.value.problems and str(again) == str(caught.value)
