@@ -1,9 +1,7 @@
 """The largest numbers that may be asked for."""
 
-from ..core.units import MOST_GRAINS
-
-__all__ = ["MOST_GRAINS", "MOST_PROCESSES", "MOST_SEED", "MOST_STEPS"]
-
+MOST_GRAINS = 10**8
+"""Of one simulation; the state of so many takes about 100 GB."""
 MOST_STEPS = 2**62
 """Steps are counted in 64 bits."""
 MOST_SEED = 2**63 - 1
