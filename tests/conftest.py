@@ -57,6 +57,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if not config.getoption("--validate"):
         settings.register_profile("short", max_examples=30)
         settings.load_profile("short")
+    if config.getoption("--record") and not config.getoption("--validate"):
+        raise pytest.UsageError("--record is for the whole of --validate; give that, too")
     if config.getoption("--record") and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Recorder())
 

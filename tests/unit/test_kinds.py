@@ -2,7 +2,9 @@
 
 import pytest
 
+import sand
 from sand.cli.main import main
+from sand.files.bodies import write_body
 from sand.run.kinds import command_for
 
 RUN = """
@@ -103,3 +105,21 @@ def test_impact_parameters(tmp_path, capsys, given):
     """A length, or a part of the reach; 0 needs no unit."""
     (tmp_path / "a.toml").write_text(COLLIDE.replace('"2 m/s"', f'"2 m/s"\nimpact_parameter = {given}'))
     assert main(["info", str(tmp_path / "a.toml")]) == 0
+
+
+@pytest.mark.parametrize("command", ["collide", "scatter"])
+def test_a_body_is_not_replaced(tmp_path, monkeypatch, capsys, command):
+    """A job that would write over the file of one of its bodies is refused, and the file stays."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs").mkdir()
+    source = tmp_path / "runs" / "trajectory.gsd"
+    write_body(tmp_path / "one.gsd", sand.setup.grain(radius="10 nm", material="iron", moment="200 A m^2/kg"))
+    (tmp_path / "one.gsd").rename(source)
+    body = '[target]\nkind = "file"\npath = "runs/trajectory.gsd"\n'
+    other = COLLIDE[COLLIDE.index("[projectile]") :] if command == "collide" else SCATTER
+    (tmp_path / "a.toml").write_text(body + other)
+    before = source.read_bytes()
+    assert main([command, "a.toml", "--out", "runs", "--overwrite"]) == 2
+    said = capsys.readouterr().err
+    assert "--overwrite would replace runs/trajectory.gsd, the target of a.toml" in said.replace("\\", "/")
+    assert source.read_bytes() == before

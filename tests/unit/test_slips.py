@@ -1,5 +1,6 @@
 """Slips of a script: each raises BadInput with one line that says what to write instead. Nothing is compiled."""
 
+import pickle
 import sys
 import warnings
 from types import SimpleNamespace
@@ -99,7 +100,7 @@ SIMULATIONS = [
     ("sand.Simulation(grains, box='big')", "box length x = 'big' is not a quantity in m"),
     ("sand.Simulation(grains, seed='a')", "seed = 'a' must be a whole number"),
     ("sand.Simulation(grains, seed=-1)", "seed = -1 must be a whole number of at least 0"),
-    ("sand.Simulation(grains, seed=2**64)", "must be a whole number of at least 0, below 2**64"),
+    ("sand.Simulation(grains, seed=2**63)", "must be a whole number of at least 0, below 2**63"),
     ("sand.Simulation(grains, out=7)", "out = 7 must be a path"),
     ("sand.Simulation(grains, observers=7)", "observers = 7 must be a list"),
     ("sand.Simulation(grains, observers=[7])", "observers: 7 is not a sand.Observer"),
@@ -254,3 +255,5 @@ def test_all_that_is_wrong_with_settings_is_told_at_once():
         " did you mean 'velocity'?",
         " did you mean 'spin'?",
     ]
+    again = pickle.loads(pickle.dumps(caught.value))  # as a worker process sends it
+    assert again.problems == caught.value.problems and str(again) == str(caught.value)

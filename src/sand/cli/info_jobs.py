@@ -69,7 +69,7 @@ def _scatter_case(path: Path) -> Told:
     for one in flights:
         reach = f", b_max = {spoken(one.scales.capture, 'm')}" if one.scales.capture else ""
         rows.append((f"{one.speed:.4g} m/s", f"from {spoken(one.distance, 'm')}{reach}"))
-    rows.append(("run it with", f"sand scatter {path}"))
+    rows.append(("run it with", f"sand scatter {shlex.quote(str(path))}"))
     return (
         f"{path}: a scattering case without mistakes",
         rows,
@@ -97,7 +97,8 @@ def of_job_folder(path: Path) -> Told | None:
         listed.append(("boxes", f"{ends.count('finished')} finished"))
     if kind == "grow" and (path / files.GROWTH).exists():
         content = {"kind": json, "folder": str(path), "finished": True, **files.read_json(path / files.GROWTH)}
-        return f"{path}: boxes", [("state", "finished"), *listed, ("measure with", f"sand analyse {path}")], content
+        rows = [("state", "finished"), *listed, ("measure with", f"sand analyse {shlex.quote(str(path))}")]
+        return f"{path}: boxes", rows, content
     rows = [("state", "running, or cut short"), *listed, ("go on with", report.resume_line(path))]
     return f"{path}: {name}", rows, {"kind": json, "folder": str(path), "finished": False}
 

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 from ..core.errors import BadInput, FilesFailed, Interrupted
 from ..core.units import spoken
-from ..files.folder import SUMMARY, is_used, read_json
+from ..files.folder import OURS, SUMMARY, is_used, read_json, read_toml
 from ..files.lock import LOCK, refuse_locked
+from ..run.kinds import BODIES
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
 from .interrupt import Watch
@@ -144,7 +145,7 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
 
     Raises:
         BadInput: nothing can be written there; or the folder is in use and --overwrite is not given; or it holds
-            the case file itself.
+            the case file itself, or a body of it.
     """
     ground = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not ground.is_dir():
@@ -162,8 +163,13 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         if report.can_go_on(folder):
             told += f"; or go on with what is in it: {report.resume_line(folder)}"
         raise BadInput(f"folder {folder} exists and is not empty; {told}")
-    if any((folder / name).exists() and (folder / name).samefile(case) for name in report.OURS):
+    if any((folder / name).exists() and (folder / name).samefile(case) for name in OURS):
         raise BadInput(
             f"--overwrite would replace the case file {case} itself; copy it to another folder first, "
             "or give another --out"
         )
+    content = read_toml(case)
+    for body in sorted(BODIES & content.keys()):
+        path = Path(content[body].get("path", case))
+        if any((folder / name).exists() and path.exists() and (folder / name).samefile(path) for name in OURS):
+            raise BadInput(f"--overwrite would replace {path}, the {body} of {case}; give another --out")

@@ -40,7 +40,7 @@ def private_folder(name: str) -> Path:
         try:
             folder = _made(_made(base) / name)
         except (OSError, _Unsafe) as error:
-            reasons.append(f"{base} {error.strerror if isinstance(error, OSError) else error}")
+            reasons.append(f"{base} {error.strerror}" if isinstance(error, OSError) else str(error))
             # a home that cannot be written is nothing unusual, and the fallback is as good
             to_be_said |= isinstance(error, _Unsafe) or bool(wished)
             continue
@@ -81,7 +81,7 @@ def _made(folder: Path) -> Path:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     reason = unsafe(folder)
     if reason is not None:
-        raise _Unsafe(reason)
+        raise _Unsafe(f"{folder} {reason}")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(13, "cannot be written")
     return folder

@@ -29,6 +29,10 @@ class BadInput(SandError, ValueError):
         self.problems: list[str] = ["\\n".join(problem.splitlines()) for problem in given]
         super().__init__("\n".join(self.problems))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes, which would otherwise take all mistakes for one."""
+        return type(self), (self.problems,)
+
     def at(self, where: str) -> BadInput:
         """The same mistakes with the place in front, for example `iron-gas.toml: grains.radius`."""
         return BadInput(f"{where}: {problem}" for problem in self.problems)
@@ -54,6 +58,10 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, result: object):
         super().__init__()
         self.result = result
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes."""
+        return type(self), (self.result,)
 
 
 FORBID_EXTRA = {"extra": "forbid"}

@@ -47,6 +47,6 @@ def _checked(number: int | str, name: str) -> int:
     try:
         if int(number) == float(number) and int(number) >= 1:
             return int(number)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pass
     raise BadInput(f"{name} = {shown(number)}; it must be a whole number, at least 1")

@@ -160,7 +160,6 @@ HOTTEST = 1e12
 """Temperature [K] from which on there are no atoms, and no nuclei."""
 MOST_GRAINS = 100_000_000
 """More do not fit into the memory of a machine: a grain takes about a kilobyte."""
-MOST_SEED = 2**64 - 1
 
 
 def si(
@@ -221,11 +220,11 @@ def whole_number(value: Any, name: str, least: int = 1, most: int | None = None)
     return int(value)
 
 
-def seed_given(value: Any) -> int:
-    """The seed of random numbers, 0 … 2⁶⁴ − 1.  Raises BadInput."""
+def seed_given(value: Any, bits: int = 64) -> int:
+    """The seed of random numbers, below two to the power of `bits`.  Raises BadInput."""
     is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not is_whole or not 0 <= value <= MOST_SEED:
-        raise BadInput(f"seed = {shown(value)} must be a whole number of at least 0, below 2**64")
+    if not is_whole or not 0 <= value < 2**bits:
+        raise BadInput(f"seed = {shown(value)} must be a whole number of at least 0, below 2**{bits}")
     return int(value)
 
 

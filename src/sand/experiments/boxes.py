@@ -45,31 +45,45 @@ def grow(
     place = Path(folder)
     check_case(content, "case")
     places = [place / f"seed-{seed}" for seed in seeds]
-    others = [
-        there for there in boxes_of(place) if there not in places
-    ]  # those of these seeds are looked at by one_box
-    if others:
-        asked = alike(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
-        for there in others:
-            known = alike(files.read_toml(there / files.CASE))
-            if changed := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
-                raise BadInput(f"{there} holds a box with other [{changed[0]}]; give another folder")
-    _describe(place, content, seeds)
+    _refuse_other_boxes(place, places, content)
+    files.make_folder(place, shared=True)
     with writing(place):
-        _run_all(content, seeds, places, place, executor, told, observers)
+        every = _describe(place, content, seeds)
+        _run_all(content, seeds, places, executor, told, observers)
+        ends = {seed: _closed(place / f"seed-{seed}") for seed in every}
+        if all(ends.values()):
+            named = {f"seed-{seed}": end for seed, end in ends.items()}
+            files.write_json(place / files.GROWTH, {"seeds": every, "boxes": named})
     return places
+
+
+def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, Any]) -> None:
+    """Raises BadInput if a folder holds boxes of another case, before that case is replaced.
+
+    Boxes at these places are looked at by `one_box`, and here only where the description of the case has changed.
+    """
+    path = place / files.CASE
+    before = files.read_toml(path) if path.exists() else content
+    changed = any(before.get(name) != content.get(name) for name in {*before, *content} - {"run", "grow"})
+    boxes = [there for there in boxes_of(place) if changed or there not in places]
+    if not boxes:
+        return
+    asked = alike(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
+    for there in boxes:
+        known = alike(files.read_toml(there / files.CASE))
+        if others := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
+            raise BadInput(f"{there} holds a box with other [{others[0]}]; give another folder")
 
 
 def _run_all(
     content: dict[str, Any],
     seeds: Sequence[int],
     places: Sequence[Path],
-    place: Path,
     executor: Executor | None,
     told: Callable[[int, str], None] | None,
     observers: Sequence[Any],
 ) -> None:
-    """The boxes of `grow`, and growth.json when all of them are finished."""
+    """The boxes of `grow`.  Raises BadInput for those that physics stopped."""
     jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
     if executor is None:
         outcomes: Any = (one_box(*job, observers) for job in jobs)
@@ -77,19 +91,17 @@ def _run_all(
         waiting = [executor.submit(one_box, *job) for job in jobs]
         outcomes = (future.result() for future in waiting)
     wrong = []
-    for seed, outcome in zip(seeds, outcomes, strict=True):
+    for seed, one, outcome in zip(seeds, places, outcomes, strict=True):
         if told is not None:
             told(seed, outcome)
         if outcome != "finished":
-            wrong.append(f"seed {seed}: stopped ({outcome}); see {place / f'seed-{seed}' / files.SUMMARY}")
+            wrong.append(f"seed {seed}: stopped ({outcome}); see {one / files.SUMMARY}")
     if wrong:
         raise BadInput(wrong)
-    ends = {one.name: files.read_json(one / files.SUMMARY) for one in places}
-    files.write_json(place / files.GROWTH, {"seeds": list(seeds), "boxes": ends})
 
 
-def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> None:
-    """Leave the case in the folder, with the seeds of all boxes that are, or will be, in it.
+def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> list[int]:
+    """Leave the case in the folder, with the seeds of all boxes that are, or will be, in it; returns these.
 
     Raises:
         BadInput: the folder holds something else.
@@ -100,11 +112,10 @@ def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> Non
         before = files.read_toml(path).get("grow", {}).get("seeds", [])
         if not before:
             raise BadInput(f"{place} holds a run; give another folder for the boxes")
-    else:
-        files.make_folder(place, shared=True)
     (place / files.GROWTH).unlink(missing_ok=True)  # it comes when all boxes are finished
-    whole = {**content, "grow": {"seeds": sorted({*before, *seeds})}}
-    files.write_toml(path, whole, "sand grow: what was asked for; sand resume reads it")
+    every = sorted({*before, *seeds})
+    files.write_toml(path, {**content, "grow": {"seeds": every}}, "sand grow: what was asked for; sand resume reads it")
+    return every
 
 
 def boxes_of(folder: Path) -> list[Path]:
@@ -129,19 +140,20 @@ def one_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     else:
         # a folder without a checkpoint is what a kill at the very start leaves
         simulation, until = simulation_of(case, place, overwrite=True, observers=list(observers)), case.run.until
-    if until is not None and simulation.time >= until and _is_closed(place, simulation.steps):
-        return "finished"
     steps = None if case.run.steps is None else case.run.steps - simulation.steps
-    if steps is not None and steps <= 0:
+    arrived = (until is not None and simulation.time >= until) or (steps is not None and steps <= 0)
+    if arrived and _closed(place).get("steps") == simulation.steps:
         return "finished"
+    if arrived:  # a kill left it without a summary
+        until, steps = simulation.time, None
     return simulation.run(until, steps=steps).outcome.name.lower()
 
 
-def _is_closed(place: Path, steps: int) -> bool:
-    """True if the summary in a folder is that of a run which ended at this step."""
+def _closed(place: Path) -> dict[str, Any]:
+    """The summary in a folder if its run has finished, else nothing."""
     path = place / files.SUMMARY
     summary = files.read_json(path) if path.exists() else {}
-    return (summary.get("steps"), summary.get("outcome")) == (steps, "finished")
+    return summary if summary.get("outcome") == "finished" else {}
 
 
 def alike(case: dict[str, Any]) -> dict[str, Any]:

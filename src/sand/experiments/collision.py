@@ -107,10 +107,8 @@ def gone_on_with(
     simulation = resume(folder, **options)
     asked, begun = (case_of(one, math.inf, math.inf) for one in (prepared(start, forces, stepping), simulation))
     changed = [name for name in asked if name != "run" and asked[name] != begun[name]]
-    frames = Frames(Path(folder) / TRAJECTORY)
-    first = frames[0]
-    frames.close()
-    for name in ("position", "velocity"):
+    first = _first_frame(Path(folder) / TRAJECTORY)
+    for name in ("position", "velocity") if first is not None else ():
         ours, theirs = getattr(start.grains, name), getattr(first, name)
         # a trajectory holds single precision
         if ours.shape != theirs.shape or not np.allclose(ours, theirs, rtol=0.0, atol=1e-6 * float(np.abs(ours).max())):
@@ -121,6 +119,20 @@ def gone_on_with(
             "put its case back, or begin a new one in another folder"
         )
     return simulation
+
+
+def _first_frame(path: Path) -> Any:
+    """Of a trajectory; None for one that is missing or damaged, which the run that goes on mends or begins anew."""
+    try:
+        frames = Frames(path)
+    except BadInput:
+        return None
+    try:
+        return frames[0]
+    except BadInput:
+        return None
+    finally:
+        frames.close()
 
 
 def finished(start: Approach, simulation: Simulation) -> Collision:

@@ -23,6 +23,7 @@ to be kept.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
@@ -34,7 +35,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..core.errors import BadInput, FilesFailed
 from .damaged import set_aside
 from .folder import refuse_devices, replace_file
 from .state import check_state
@@ -81,7 +82,8 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     path = folder / checkpoint_name(meta["steps"])
     replace_file(path, memory.getvalue())
     for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:
-        old.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # Windows removes no file that somebody reads; the next time it goes, too
+            old.unlink(missing_ok=True)
     return path
 
 
@@ -146,6 +148,7 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
     Raises:
         NewerFormat: one of a newer version is met first.
         BadInput: there is none; no file is renamed then.
+        FilesFailed: a damaged one cannot be renamed.
     """
     problems: list[tuple[Path, str]] = []
     for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
@@ -157,7 +160,10 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
             problems.append((path, str(error)))
             continue
         for damaged, said in problems:
-            aside = set_aside(damaged)
+            try:
+                aside = set_aside(damaged)
+            except OSError as error:
+                raise FilesFailed(f"cannot rename {damaged}, which is damaged: {error.strerror}") from error
             warnings.warn(f"{said}; it is now {aside.name}, and the run goes on from {path.name}", stacklevel=2)
         return arrays, meta
     raise BadInput([*(said for _, said in problems), f"{folder} holds no checkpoint to go on from"])

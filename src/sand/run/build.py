@@ -21,6 +21,7 @@ from ..setup.frame import Start, from_frame
 from ..setup.gas import gas
 from .bodies import body_from_file
 from .case import Case, check_case, read_case
+from .ends import SHORTEST
 from .simulation import Simulation
 
 ENDS = (("run", "until"), ("run", "steps"))
@@ -152,7 +153,7 @@ def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str,
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     names = [m.name for m in materials]
     run = {
-        "until": until,
+        "until": max(until, SHORTEST),  # a run to time 0 can be gone on with, too
         "steps": last_step if last_step == float("inf") else int(last_step),
         "frame_every": simulation.frame_every,
         "seed": int(simulation.seed or 0),

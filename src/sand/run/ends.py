@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.errors import BadInput, shown
 from ..core.units import si
+from .limits import MOST_STEPS
 
 SHORTEST = 1e-21
 """Shortest time [s] that may be asked for; light passes through less than a picometre meanwhile."""
@@ -43,6 +44,8 @@ def ends_of(
         end, last = planned
     if end == last == math.inf:
         raise BadInput("run needs an end: until='5 us' or steps=1000")
+    if steps is not None and last > MOST_STEPS:
+        raise BadInput(f"steps = {shown(steps)} are more than can be counted, {MOST_STEPS:.3g}")
     if until is not None and end < time:
         raise BadInput(f"until = {until!r} lies before the present time, {time:.6g} s")
     return end, last

@@ -25,7 +25,7 @@ from ..stepping.rules import Stop
 from ..stepping.verlet import Verlet
 from .at_grains import at_grains
 from .contacts import ContactTable
-from .ends import ends_of
+from .ends import SHORTEST, ends_of
 from .fixed import Fixed, forces_given
 from .ledger import Ledger, kinetic_energies, take_stock
 from .observers import Observer, Schedule, tick_all
@@ -51,7 +51,7 @@ class Simulation(Fixed):
         box: a Box, or a length for a periodic cube; open by default.
         stepping: the integrator, `sand.Verlet()` by default, or `sand.Adaptive()`.
         neighbours: how pairs within reach are found, `sand.Neighbours()` by default.
-        seed: of random forces, 0 … 2⁶⁴ − 1; kept with the run.
+        seed: of random forces, 0 … 2⁶³ − 1; kept with the run.
         out: folder for the run's files, made at the first `run`; None keeps everything in memory.
         overwrite: allow `out` to hold an earlier run, whose files are then replaced.
         observers: objects that look on (see `sand.Observer`); they never change the physics.
@@ -81,7 +81,7 @@ class Simulation(Fixed):
     ):
         self.forces = forces_given(forces)
         self.box, self.neighbours = as_box(box), neighbours or Neighbours()
-        self.seed = None if seed is None else seed_given(seed)
+        self.seed = None if seed is None else seed_given(seed, bits=63)
         self.observers, self.frame_every = observers, frame_every
         self._chosen: dict[str, str] = {}  # what the start of a resumed run decided
         self.recipe: dict[str, Any] | None = None  # how a case file made the grains
@@ -191,7 +191,7 @@ class Simulation(Fixed):
             raise BadInput(f"this simulation cannot go on: {self._broken}")
         end, last = ends_of(until, steps, self.time, self.steps, self.planned)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
-            self.frame_every = (end - self.time) / 200.0
+            self.frame_every = max((end - self.time) / 200.0, SHORTEST)
         try:
             self._start()
             if self.record:

@@ -17,7 +17,7 @@ from .ballistic import bcca, bpca
 from .deposit import rbd
 from .diffusion import dla, dlca
 from .fractal import fractal
-from .moments import magnetised
+from .moments import magnetised, part_given
 from .population import Streams, at_home, population, rest_distances, streams, stuff_of, whole
 
 
@@ -166,6 +166,8 @@ def build(
         return grain(seed=seed, **wanted)
     if grains is None:
         raise BadInput(f"grains is missing: how many does the {kind} have?")
+    # before the aggregate grows, which may take long
+    part_given(wanted.get("moment"), wanted.get("moments", "random"), wanted.get("magnetic", 1.0))
     return KINDS[kind](grains, seed=seed, **wanted)
 
 

@@ -22,6 +22,19 @@ TOLERANCE = 1e-6
 SWEEPS = 20_000
 
 
+def part_given(moment: Any, ways: str, magnetic: Any) -> float:
+    """The part of the grains that have a moment; the arguments are those of `magnetised`.  Raises BadInput."""
+    if ways not in WAYS:
+        raise BadInput(f"moments = {ways!r}; {did_you_mean(str(ways), list(WAYS))}")
+    part = si(magnetic, "1", "magnetic", least=0.0)
+    if part > 1.0:
+        raise BadInput(f"magnetic = {magnetic!r} is the part of grains with a moment; it must not exceed 1")
+    if moment is None and (ways == "relaxed" or part < 1.0):
+        given = f"moments = {ways!r}" if ways == "relaxed" else f"magnetic = {magnetic!r}"
+        raise BadInput(f"{given} needs a moment; give one, such as moment = '200 A m^2/kg' or 'material'")
+    return part
+
+
 def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.random.Generator, axis: int = 2) -> Grains:
     """The same grains with magnetic moments, in place.
 
@@ -33,15 +46,8 @@ def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.rand
     Raises:
         BadInput: an unknown way, a part outside 0 … 1, or too many moments to be relaxed.
     """
-    if ways not in WAYS:
-        raise BadInput(f"moments = {ways!r}; {did_you_mean(str(ways), list(WAYS))}")
-    part = si(magnetic, "1", "magnetic", least=0.0)
-    if part > 1.0:
-        raise BadInput(f"magnetic = {magnetic!r} is the part of grains with a moment; it must not exceed 1")
+    part = part_given(moment, ways, magnetic)
     if moment is None:
-        if ways == "relaxed" or part < 1.0:
-            given = f"moments = {ways!r}" if ways == "relaxed" else f"magnetic = {magnetic!r}"
-            raise BadInput(f"{given} needs a moment; give one, such as moment = '200 A m^2/kg' or 'material'")
         return body
     count = len(body)
     specific = np.array([m.specific_moment for m in body.materials])[body.material]

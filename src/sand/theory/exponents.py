@@ -71,11 +71,16 @@ def exponent_fit(found: Outputs, others: tuple[Outputs, ...], sizes: int) -> Exp
     first, last = (
         _slope(*_logarithms(Outputs(found.size[part], found.rate[part]))) for part in (slice(half), slice(-half, None))
     )
-    changes = [abs(degree - _slope(*_logarithms(other))) for other in others]
+    changes = [abs(degree - _slope(*_logarithms(other))) if _positive(other) else np.inf for other in others]
     error = max(scatter, abs(last - first), *changes, (1.0 + abs(degree)) * rounding / spread)
     reach = float(stdtrit(points - 2, 0.975)) * error
     z, low, high = (1.0 / (1.0 - x) if x < 1.0 else np.inf for x in (degree, degree - reach, degree + reach))
     return ExponentFit(z, low, high, degree, error, reach, points)
+
+
+def _positive(outputs: Outputs) -> bool:
+    """False where S or dS/dt has no logarithm: then these outputs say nothing about λ."""
+    return all(bool((values > 0.0).all()) for values in outputs)
 
 
 def _logarithms(outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
