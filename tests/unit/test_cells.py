@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import sand
 from sand.core.arrays import far_arrays
-from sand.core.box import Box
+from sand.core.box import Box, as_box
 from sand.core.jit import kernel
 from sand.core.world import LISTED, MADE, PAIRS, REBUILT
 from sand.kernels import cells
@@ -158,6 +158,7 @@ def fast_gas(box, seed, contacts=False, **neighbours):
     grains = sand.setup.gas(
         120, "1 um", radius="10 nm", material=sand.SILICA, moment="20 A m^2/kg", temperature="100 K", seed=seed
     )
+    grains.arrays.position[...] = as_box(box).wrap(grains.position).T
     grains.arrays.velocity[...] = 30.0 * rng.normal(size=(3, 120))
     grains.arrays.charge[...] = 1e-18 * rng.normal(size=120)
     forces = [sand.Dipoles(cutoff="0.2 um"), *([sand.Contact()] if contacts else [])]
