@@ -114,6 +114,19 @@ def test_the_cutoff_is_stated_with_its_reason():
     assert "1.5 b_max" in large
 
 
+def test_the_automatic_cutoff_reaches_beyond_the_grains():
+    """Weak moments: 1.5 b_max lies within a grain; two diameters of the largest, 60 nm, are taken instead."""
+    grains = sand.Grains(
+        [[0, 0, 0], [1e-7, 0, 0]],
+        [1e-8, 1.5e-8],
+        sand.IRON,
+        moment="0.01 A m^2/kg",
+        velocity=[[1.0, 0, 0], [-1.0, 0, 0]],
+    )
+    chosen = sand.Simulation(grains, [sand.Dipoles()], box="1 um").choices["dipoles cut-off"]
+    assert chosen.startswith("60 nm (smooth, two grain diameters, beyond 1.5 b_max")
+
+
 @pytest.mark.compiled("contacts")
 def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
     """A fixed step in which a grain flies more than half its radius: an Outcome and a checkpoint."""
