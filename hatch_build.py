@@ -30,7 +30,7 @@ PLATFORMS = {
 }
 BUNDLE = ("grainview.js", "grainview.css", "licences.txt")
 MISSING = "missing.txt"
-PAGE = Path("src", "sand", "view", "page")
+PAGE = Path("src", "sand", "viewer", "page")
 INSTALL = (
     "ci", "--omit=dev", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier",
     "--fetch-retry-maxtimeout=10000",  # ms: who has no network waits half a minute, not two

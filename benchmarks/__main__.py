@@ -7,7 +7,7 @@ import json
 import warnings
 
 import sand
-from sand.run.record import versions
+from sand.simulation.run_writer import versions
 
 from . import files, main_job, regimes, scaling
 from .long_range import growth, savings, tell

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 import sand
-from sand.physics.tangential import roll_stiffness
+from sand.contact.tangential import roll_stiffness
 
 from . import worlds
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sand.core.jit import kernel
+from sand.compiler.jit import kernel
 
 from .timing import best
 

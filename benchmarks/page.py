@@ -12,10 +12,10 @@ from typing import Any
 from tests.browser.chromium import FLAGS, find
 from tests.browser.runs import many
 
-from sand.files.page import read_bundle
-from sand.view.page import write_page
-from sand.view.server import Server
-from sand.view.story import Story, story_of
+from sand.io.page_bundle import read_bundle
+from sand.viewer.dataset import Story, story_of
+from sand.viewer.html import write_page
+from sand.viewer.server import Server
 
 PATIENCE = 300_000
 """ms to wait for anything."""

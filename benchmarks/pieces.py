@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.core.arrays import far_arrays
-from sand.core.jit import kernel
-from sand.kernels.cells import remake_far_list
-from sand.kernels.motion import kick_and_drift_for
+from sand.compiler.jit import kernel
+from sand.integrate.motion import kick_and_drift_for
+from sand.neighbours.cell_list import remake_far_list
+from sand.state.arrays import far_arrays
 
 from . import decks, machine, worlds
 from .steps import beside

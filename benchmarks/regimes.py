@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import sand
-from sand.run.build import simulation_of
-from sand.run.case import read_case
+from sand.config.build import simulation_of
+from sand.config.case import read_case
 
 from .start_up import MAIN_JOB
 from .timing import thread

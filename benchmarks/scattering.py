@@ -10,10 +10,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.core.constants import MAGNETIC
-from sand.experiments.flights import fly
-from sand.experiments.sampling import Task
+from sand.constants import MAGNETIC
 from sand.experiments.scattering import flight, trajectory
+from sand.experiments.scattering.flights import fly
+from sand.experiments.scattering.sampling import Task
 
 from .table import row
 from .timing import in_turns, thread

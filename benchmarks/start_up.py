@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sand.run.build import simulation_of
-from sand.run.case import read_case
+from sand.config.build import simulation_of
+from sand.config.case import read_case
 
 from .table import row
 from .timing import of_command, thread
@@ -33,7 +33,7 @@ temperature = "100 K"
 BEGIN = """
 import sys, time
 from sand.cli.main import main
-from sand.run.engine import Engine
+from sand.simulation.engine import Engine
 begin = Engine.begin
 def told(self):
     begin(self)

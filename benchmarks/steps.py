@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import sand
-from sand.core.world import MOVED
+from sand.state.state import MOVED
 
 from . import decks, lammps, machine, worlds
 from .table import row
@@ -95,7 +95,7 @@ def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict
 def dipole_step(quick: bool) -> dict[str, Any]:
     """Dipoles of all pairs in a whole step.
 
-    A pair takes 81 operations (`physics.dipole.pair_load` without its energy, and `kernels.dipoles.rows_of`):
+    A pair takes 81 operations (`forces.pair.dipole_formulas.pair_load` without its energy, and `forces.pair.dipole_loops.rows_of`):
     3 for r, 5 for r², 1/r² and √ 1 each, 2 for k/r³, 15 for three products, 2 for 3k/r⁵, 2 for the product over r²,
     1 each for a and b; the force 9 + 3 + 6, each field 9; 12 to add up two forces and two fields.
     """

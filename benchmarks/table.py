@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.run.record import versions
+from sand.simulation.run_writer import versions
 
 from . import lammps, machine
 from .timing import Pair

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import sand
-from sand.core.constants import MAGNETIC
-from sand.physics.adhesion import rest_overlap, rest_radius
+from sand.constants import MAGNETIC
+from sand.contact.jkr import rest_overlap, rest_radius
 
 PEER = sand.SILICA.but(name="silica as in LAMMPS", density=2000.0, rolling_limit="2 angstrom")
 """The material of worlds that are beside LAMMPS: E* = 27.8 GPa, γ = 25 mJ/m²."""

@@ -13,8 +13,8 @@ import numpy as np
 
 import sand
 from sand.experiments import chain_impact
-from sand.view.chain_map import Map, Picture, chain_figure
-from sand.view.figure import save
+from sand.plotting.chain_map import Map, Picture, chain_figure
+from sand.plotting.run_figure import save
 
 warnings.filterwarnings("ignore", message="contacts of iron")
 

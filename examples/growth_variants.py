@@ -13,7 +13,7 @@ from pathlib import Path
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import grow
 from sand.experiments.growth_report import ensemble_in
-from sand.files.folder import read_toml
+from sand.io.run_folder import read_toml
 
 CASE = read_toml(Path(__file__).with_name("growth.toml"))
 VARIANTS = {

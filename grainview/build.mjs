@@ -6,7 +6,7 @@ import path from "node:path";
 import { fileURLToPath } from "node:url";
 
 const here = path.dirname(fileURLToPath(import.meta.url));
-const out = process.argv[2] ?? path.join(here, "..", "src", "sand", "view", "page");
+const out = process.argv[2] ?? path.join(here, "..", "src", "sand", "viewer", "page");
 
 /** Names of the packages that inputs of esbuild are from; "" is the page itself. */
 function packagesOf(inputs) {

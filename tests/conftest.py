@@ -190,7 +190,7 @@ def _no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
 def _empty_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs end with an empty figure, which costs a second less than a real one, except in tests marked `draws`."""
     if "draws" not in request.keywords:
-        monkeypatch.setattr("sand.view.figure.run_figure", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
+        monkeypatch.setattr("sand.plotting.run_figure.run_figure", lambda *_, **__: Figure(figsize=(1.0, 1.0)))
 
 
 @pytest.fixture(autouse=True)

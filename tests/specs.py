@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.run import engine
-from sand.stepping.rules import Plan
+from sand.integrate.kernel_spec import Plan
+from sand.simulation import engine
 
 BOX = "0.3 um"
 

@@ -282,8 +282,8 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 
 def fields_page() -> str:
-    """sand.core.fields.FIELDS."""
-    from sand.core import fields
+    """sand.schema.FIELDS."""
+    from sand import schema as fields
 
     rows = [
         [
@@ -308,8 +308,8 @@ def fields_page() -> str:
 
 
 def materials_page() -> str:
-    """sand.core.material.PRESETS, with what stands under each in the source."""
-    from sand.core import material
+    """sand.material.PRESETS, with what stands under each in the source."""
+    from sand import material
 
     source = inspect.getsource(material)
     notes = dict(re.findall(r'^([A-Z]+) = Material\([^\n]*\)\n"""(.*?)"""', source, re.M | re.S))
@@ -397,8 +397,8 @@ LEDGER = {
 
 
 def ledger_page() -> str:
-    """The columns of sand.run.ledger.Ledger."""
-    from sand.run import ledger
+    """The columns of sand.simulation.ledger.Ledger."""
+    from sand.simulation import ledger
 
     columns = [c for c in ledger.Ledger(["(one per force)"]).columns if c[-2:] not in ("_y", "_z")]
     if columns != list(LEDGER):
@@ -415,11 +415,12 @@ def ledger_page() -> str:
 
 
 def trajectory_page() -> str:
-    """The docstrings of sand.files.frame, and the table of a checkpoint's arrays."""
-    from sand.files import checkpoint, frame
+    """The docstrings of sand.io.frame, and the table of a checkpoint's arrays."""
+    from sand.io import checkpoint
+    from sand.io import frame
 
     return (
-        "# The trajectory\n\n" + markdown(frame.__doc__) + "\n\n`sand.files.trajectory.read_frames(path)` "
+        "# The trajectory\n\n" + markdown(frame.__doc__) + "\n\n`sand.io.trajectory.read_frames(path)` "
         "gives the frames back in SI. "
         + markdown(frame.Frame.__doc__)
         + "\n\n## Checkpoints\n\n"
@@ -430,7 +431,7 @@ def trajectory_page() -> str:
 
 def outcomes_page() -> str:
     """sand.Outcome."""
-    from sand.run.outcome import Outcome, Result
+    from sand.simulation.outcome import Outcome, Result
 
     rows = []
     for outcome in Outcome:
@@ -482,7 +483,7 @@ FORCE_PAGES = {
 
 
 def _unit_in(annotation: Any, metadata: tuple = ()) -> str:
-    """The unit of a key made by `sand.run.case.quantity`."""
+    """The unit of a key made by `sand.config.case.quantity`."""
     for note in (*metadata, *getattr(annotation, "__metadata__", ())):
         if hasattr(note, "func"):
             return inspect.getclosurevars(note.func).nonlocals.get("unit", "")
@@ -526,9 +527,9 @@ def _model_rows(section: str, model: Any, notes: dict[str, str]) -> list[list[st
 
 
 def case_page() -> str:
-    """The model of sand.run.case: sections, keys, defaults, units."""
-    from sand.core.material import Material
-    from sand.run import case
+    """The model of sand.config.case: sections, keys, defaults, units."""
+    from sand.material import Material
+    from sand.config import case
 
     head = ["key", "default", "unit", "meaning"]
     out = [

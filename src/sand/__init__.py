@@ -12,81 +12,81 @@ TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Box": "core.box",
-    "Grains": "core.grains",
-    "Material": "core.material",
-    "ICE": "core.material",
-    "SILICA": "core.material",
-    "GRAPHITE": "core.material",
-    "FORSTERITE": "core.material",
-    "IRON": "core.material",
-    "MAGNETITE": "core.material",
-    "SandError": "core.errors",
-    "BadInput": "core.errors",
-    "FilesFailed": "core.errors",
-    "Interrupted": "core.errors",
-    "Contact": "forces.contact",
-    "Dipoles": "forces.dipoles",
-    "Charges": "forces.central",
-    "Attraction": "forces.central",
-    "Gas": "forces.gas",
-    "Field": "forces.field",
-    "Gravity": "forces.gravity",
-    "ElectricField": "forces.electric",
-    "Verlet": "stepping.verlet",
-    "Adaptive": "stepping.adaptive",
-    "Neighbours": "stepping.neighbours",
-    "Simulation": "run.simulation",
-    "resume": "run.build",
-    "open": "run.opened",
-    "Observer": "run.observers",
-    "set_threads": "core.threads",
-    "Outcome": "run.outcome",
-    "Result": "run.outcome",
+    "Box": "box",
+    "Grains": "grains",
+    "Material": "material",
+    "ICE": "material",
+    "SILICA": "material",
+    "GRAPHITE": "material",
+    "FORSTERITE": "material",
+    "IRON": "material",
+    "MAGNETITE": "material",
+    "SandError": "errors",
+    "BadInput": "errors",
+    "FilesFailed": "errors",
+    "Interrupted": "errors",
+    "Contact": "contact.model",
+    "Dipoles": "forces.pair.dipoles",
+    "Charges": "forces.pair.inverse_square",
+    "Attraction": "forces.pair.inverse_square",
+    "Gas": "forces.gas.model",
+    "Field": "forces.external.magnetic_field",
+    "Gravity": "forces.external.gravity",
+    "ElectricField": "forces.external.electric_field",
+    "Verlet": "integrate.verlet",
+    "Adaptive": "integrate.adaptive",
+    "Neighbours": "neighbours.settings",
+    "Simulation": "simulation.simulation",
+    "resume": "config.build",
+    "open": "results",
+    "Observer": "simulation.observers",
+    "set_threads": "threads",
+    "Outcome": "simulation.outcome",
+    "Result": "simulation.outcome",
 }
-_ROOMS = ("setup", "theory", "analysis", "experiments", "files")
+_PACKAGES = ("setup", "theory", "analysis", "experiments", "io")
 
-__all__ = ["__version__", *_HOMES, *_ROOMS]
+__all__ = ["__version__", *_HOMES, *_PACKAGES]
 
 if TYPE_CHECKING:
     from typing import Any
 
     from . import analysis as analysis
     from . import experiments as experiments
-    from . import files as files
+    from . import io as io
     from . import setup as setup
     from . import theory as theory
-    from .core.box import Box as Box
-    from .core.errors import BadInput as BadInput
-    from .core.errors import FilesFailed as FilesFailed
-    from .core.errors import Interrupted as Interrupted
-    from .core.errors import SandError as SandError
-    from .core.grains import Grains as Grains
-    from .core.material import FORSTERITE as FORSTERITE
-    from .core.material import GRAPHITE as GRAPHITE
-    from .core.material import ICE as ICE
-    from .core.material import IRON as IRON
-    from .core.material import MAGNETITE as MAGNETITE
-    from .core.material import SILICA as SILICA
-    from .core.material import Material as Material
-    from .core.threads import set_threads as set_threads
-    from .forces.central import Attraction as Attraction
-    from .forces.central import Charges as Charges
-    from .forces.contact import Contact as Contact
-    from .forces.dipoles import Dipoles as Dipoles
-    from .forces.electric import ElectricField as ElectricField
-    from .forces.field import Field as Field
-    from .forces.gas import Gas as Gas
-    from .forces.gravity import Gravity as Gravity
-    from .run.build import resume as resume
-    from .run.observers import Observer as Observer
-    from .run.opened import open as open
-    from .run.outcome import Outcome as Outcome
-    from .run.outcome import Result as Result
-    from .run.simulation import Simulation as Simulation
-    from .stepping.adaptive import Adaptive as Adaptive
-    from .stepping.neighbours import Neighbours as Neighbours
-    from .stepping.verlet import Verlet as Verlet
+    from .box import Box as Box
+    from .config.build import resume as resume
+    from .contact.model import Contact as Contact
+    from .errors import BadInput as BadInput
+    from .errors import FilesFailed as FilesFailed
+    from .errors import Interrupted as Interrupted
+    from .errors import SandError as SandError
+    from .forces.external.electric_field import ElectricField as ElectricField
+    from .forces.external.gravity import Gravity as Gravity
+    from .forces.external.magnetic_field import Field as Field
+    from .forces.gas.model import Gas as Gas
+    from .forces.pair.dipoles import Dipoles as Dipoles
+    from .forces.pair.inverse_square import Attraction as Attraction
+    from .forces.pair.inverse_square import Charges as Charges
+    from .grains import Grains as Grains
+    from .integrate.adaptive import Adaptive as Adaptive
+    from .integrate.verlet import Verlet as Verlet
+    from .material import FORSTERITE as FORSTERITE
+    from .material import GRAPHITE as GRAPHITE
+    from .material import ICE as ICE
+    from .material import IRON as IRON
+    from .material import MAGNETITE as MAGNETITE
+    from .material import SILICA as SILICA
+    from .material import Material as Material
+    from .neighbours.settings import Neighbours as Neighbours
+    from .results import open as open
+    from .simulation.observers import Observer as Observer
+    from .simulation.outcome import Outcome as Outcome
+    from .simulation.outcome import Result as Result
+    from .simulation.simulation import Simulation as Simulation
+    from .threads import set_threads as set_threads
 
 
 def __getattr__(name: str) -> Any:
@@ -94,9 +94,9 @@ def __getattr__(name: str) -> Any:
         found = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
         globals()[name] = found
         return found
-    if name in _ROOMS:
+    if name in _PACKAGES:
         return importlib.import_module(f".{name}", __name__)
-    from .core.errors import NoSuchAttribute, did_you_mean
+    from .errors import NoSuchAttribute, did_you_mean
 
     raise NoSuchAttribute(f"module 'sand' has no '{name}'; {did_you_mean(name, __all__)}")
 

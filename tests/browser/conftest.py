@@ -12,8 +12,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from sand.core.errors import BadInput
-from sand.files.page import read_bundle
+from sand.errors import BadInput
+from sand.io.page_bundle import read_bundle
 
 from .chromium import FLAGS, find
 from .driving import SIZE, Driven, served

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sand.view.server import Server
-from sand.view.story import story_of
+from sand.viewer.dataset import story_of
+from sand.viewer.server import Server
 
 from .small_runs import FIELD
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sand.files.trajectory import read_frames
-from sand.view.page import write_page
-from sand.view.server import Server
-from sand.view.story import story_of
+from sand.io.trajectory import read_frames
+from sand.viewer.dataset import story_of
+from sand.viewer.html import write_page
+from sand.viewer.server import Server
 
 from . import runs
 from .eye import Eye

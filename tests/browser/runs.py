@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.core.box import Box
-from sand.files import folder as files
-from sand.files.ledger import LedgerFile
-from sand.files.trajectory import TrajectoryWriter
+from sand.box import Box
+from sand.io import run_folder as files
+from sand.io.ledger_table import LedgerFile
+from sand.io.trajectory import TrajectoryWriter
 
 RADIUS = 10e-9
 SUNK = 0.997

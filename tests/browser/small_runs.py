@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from sand.core.box import Box
-from sand.core.material import IRON, SILICA
-from sand.core.world import LOST
-from sand.files.folder import LEDGER, SUMMARY, TRAJECTORY, write_json
-from sand.files.frame import MODES
-from sand.files.ledger import LedgerFile
-from sand.files.trajectory import TrajectoryWriter
+from sand.box import Box
+from sand.io.frame import MODES
+from sand.io.ledger_table import LedgerFile
+from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
+from sand.io.trajectory import TrajectoryWriter
+from sand.material import IRON, SILICA
+from sand.state.state import LOST
 
 R = 10e-9
 """Radius of a grain [m]."""

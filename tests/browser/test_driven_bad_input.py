@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sand.core.box import Box
-from sand.core.errors import BadInput
-from sand.view.page import write_page
-from sand.view.server import Server
-from sand.view.story import story_of
+from sand.box import Box
+from sand.errors import BadInput
+from sand.viewer.dataset import story_of
+from sand.viewer.html import write_page
+from sand.viewer.server import Server
 
 from .driving import Driven, differ, served
 from .small_runs import FIELD, FRAMES, SIDE, R, SmallRun, contacts, grains, pairs, places, written

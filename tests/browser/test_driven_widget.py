@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from sand.core.errors import BadInput
-from sand.view.story import Story, story_of
-from sand.view.widget import answered
+from sand.errors import BadInput
+from sand.viewer.dataset import Story, story_of
+from sand.viewer.notebook import answered
 
 from .driving import Driven
 from .small_runs import FIELD, FRAMES, SmallRun

@@ -6,7 +6,7 @@ Grains are 0.3 of their size and bars 0.45 radii thick, so that bars are seen fr
 import numpy as np
 import pytest
 
-from sand.core.box import Box
+from sand.box import Box
 
 from .eye import Eye
 from .looking import SOURCES, View, agree, numbers, size

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.clusters import cluster_labels
-from sand.view.scene import scene_of
+from sand.plotting.render.scene import scene_of
 
 from .eye import Eye, inside
 from .looking import SOURCES, View, agree, size

@@ -7,7 +7,7 @@ from sand.analysis.clusters import cluster_labels, unwrapped
 from sand.analysis.fractal import FEWEST, correlation_dimension
 from sand.analysis.magnetism import aggregate_moments
 from sand.analysis.shape import gyration_radius
-from sand.core.errors import BadInput
+from sand.errors import BadInput
 
 from .looking import SOURCES, View, agree, numbers, size
 

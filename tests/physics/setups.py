@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 import sand
-from sand.forces.contact import Contact
-from sand.physics.adhesion import rest_overlap, rest_radius
+from sand.contact.jkr import rest_overlap, rest_radius
+from sand.contact.model import Contact
 
 
 def rest_distance(a: sand.Material, r1: float, r2: float, b: sand.Material | None = None) -> float:

@@ -9,11 +9,11 @@ import tomli_w
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.core.constants import MAGNETIC
-from sand.core.errors import BadInput
-from sand.core.world import CONTACTS, FLIGHT, MADE, REJECTED
-from sand.run.build import case_of, simulation_of
-from sand.run.case import check_case
+from sand.config.build import case_of, simulation_of
+from sand.config.case import check_case
+from sand.constants import MAGNETIC
+from sand.errors import BadInput
+from sand.state.state import CONTACTS, FLIGHT, MADE, REJECTED
 
 R = 1e-8
 SIZE = 200 * sand.IRON.density * 4 / 3 * math.pi * R**3

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.constants import MAGNETIC
-from sand.core.world import CONTACT_STEP
-from sand.physics import adhesion
-from sand.physics import contact as law_of
+from sand.constants import MAGNETIC
+from sand.contact import jkr as adhesion
+from sand.contact import law as law_of
+from sand.state.state import CONTACT_STEP
 
 from .setups import Imposed, random_aggregate, rest_distance, struck_chain
 
@@ -200,7 +200,7 @@ def test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls(speed, side
 
 def beyond_energy(sim):
     """k w²/12 − F²/(24 m̄) [J/s²] of a single pair, k from differences of F."""
-    bond = sand.physics.contact.bond_between(
+    bond = sand.contact.law.bond_between(
         sand.Contact().pairing(sand.IRON, sand.IRON), *sim.grains.radius, *sim.grains.mass
     )
     apart = sim.grains.position[1] - sim.grains.position[0]

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sand.core.material import ICE, IRON, SILICA
-from sand.core.vec import add, cross, dot, scale, sub
-from sand.forces.contact import Contact
-from sand.physics import adhesion, tangential
-from sand.physics import contact as law
-from sand.physics.rotation import turn, turned
+from sand.contact import jkr as adhesion
+from sand.contact import law, tangential
+from sand.contact.model import Contact
+from sand.material import ICE, IRON, SILICA
+from sand.numerics.quaternion import turn, turned
+from sand.numerics.vec import add, cross, dot, scale, sub
 
 RATIOS = st.sampled_from([1.0, 0.5, 0.2, 0.05])
 SMALL = st.floats(-1.0, 1.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.physics import tangential
-from sand.physics.adhesion import normal_stiffness, rest_overlap, rest_radius
-from sand.physics.contact import bond_between
+from sand.contact import tangential
+from sand.contact.jkr import normal_stiffness, rest_overlap, rest_radius
+from sand.contact.law import bond_between
 
 from .setups import Imposed, random_aggregate, rest_distance
 from .test_magnetics import swing
@@ -195,8 +195,8 @@ def test_rigid_motion_strains_nothing(steps):
         whole = Rotation.from_rotvec(k * angle * axis)
         here, there = whole.apply(start), (turn * whole).apply(start)
         mover.step(there - here + drift, np.tile(angle * axis, (12, 1)))
-    from sand.kernels.contacts import bond_at, pose_at
-    from sand.physics import contact as law
+    from sand.contact import law
+    from sand.contact.update import bond_at, pose_at
 
     g = mover.sim.world.grains.arrays
     for c in range(used):

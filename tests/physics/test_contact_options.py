@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import LOST, RECORDED
-from sand.physics.contact import bond_between
-from sand.physics.mixing import MIXING
+from sand.contact.law import bond_between
+from sand.contact.mixing import MIXING
+from sand.state.state import LOST, RECORDED
 
 from .setups import random_aggregate, rest_distance
 

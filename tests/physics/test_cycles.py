@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import CONTACT_STEP, CYCLE, FAR_SUMS, LEFT
+from sand.state.state import CONTACT_STEP, CYCLE, FAR_SUMS, LEFT
 
 from .setups import rest_distance
 

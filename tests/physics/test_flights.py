@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.core.constants import MAGNETIC
-from sand.experiments import scattering
-from sand.experiments.flights import BOUNCE, COLUMNS, fly
-from sand.experiments.sampling import Task
+from sand.constants import MAGNETIC
+from sand.experiments.scattering import cross_sections as scattering
+from sand.experiments.scattering.flights import BOUNCE, COLUMNS, fly
+from sand.experiments.scattering.sampling import Task
 
 END, HIT, MISS = COLUMNS.index("end"), 0, 1
 IRON = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg", "temperature": "100 K"}
@@ -129,9 +129,9 @@ def test_momenta_and_energy():
 @pytest.mark.validate
 def test_aggregates_of_one_grain_are_spheres():
     """The rigid-body kernel with one grain each: the same flights as the kernel of spheres, 1e-6 of R at the end."""
-    from sand.experiments.encounters import body_of
-    from sand.kernels.rigid import AGGREGATES, TWO_AGGREGATES, Aggregates
-    from sand.stepping.encounter import flights_of, room_for
+    from sand.experiments.scattering.encounters import body_of
+    from sand.experiments.scattering.flight_driver import flights_of, room_for
+    from sand.experiments.scattering.two_aggregates import AGGREGATES, TWO_AGGREGATES, Aggregates
 
     flying = unequal()
     one = scattering.trajectory(flying, "150 nm")

@@ -8,8 +8,8 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.files.trajectory import read_frames
-from sand.setup.frame import SINGLE, healed
+from sand.io.trajectory import read_frames
+from sand.setup.from_frame import SINGLE, healed
 
 RADIUS = 1e-8
 STIFFNESS = 100.0

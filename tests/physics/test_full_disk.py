@@ -9,9 +9,9 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.files.ledger import read_ledger
-from sand.files.lock import LOCK
-from sand.files.trajectory import read_frames
+from sand.io.ledger_table import read_ledger
+from sand.io.lock import LOCK
+from sand.io.trajectory import read_frames
 
 from ..systems import IS_ROOT
 
@@ -133,7 +133,7 @@ def test_many_small_frames(many_frames, tmp_path, limit):
 def test_a_folder_that_vanishes(whole, tmp_path):
     """Removed while the run goes on: told, with the folder's name, exit code 2; no traceback."""
     script = (
-        "import shutil, sys, sand; from sand.cli.main import main; from sand.run.ledger import Ledger\n"
+        "import shutil, sys, sand; from sand.cli.main import main; from sand.simulation.ledger import Ledger\n"
         "plain, seen = Ledger.add, []\n"
         "def add(self, row):\n"
         "    seen.append(row)\n"

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from sand.cli.exits import DONE, INTERRUPTED
-from sand.files.checkpoint import newest_checkpoint
-from sand.files.trajectory import read_frames
+from sand.io.checkpoint import newest_checkpoint
+from sand.io.trajectory import read_frames
 
 from ..systems import KILL, stops_others
 
@@ -51,7 +51,7 @@ pressure = "1 mbar"
 def sand_command(*words):
     """A `sand` process that writes checkpoints all the time."""
     script = (
-        "import sys; import sand.run.record as r; r.CHECKPOINT_EVERY = 0.05; r.Record.draw = lambda *_: None; "
+        "import sys; import sand.simulation.run_writer as r; r.CHECKPOINT_EVERY = 0.05; r.Record.draw = lambda *_: None; "
         "from sand.cli.main import main; sys.exit(main(sys.argv[1:]))"
     )
     return subprocess.Popen([sys.executable, "-c", script, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from sand.forces.gas.drag import rotation_friction, translation_friction
 
 import sand
-from sand.core.constants import BOLTZMANN, COULOMB
-from sand.core.world import KICKED, STEP
-from sand.physics.gas import rotation_friction, translation_friction
+from sand.constants import BOLTZMANN, COULOMB
+from sand.state.state import KICKED, STEP
 
 
 def passing(cut, step):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.constants import MAGNETIC
+from sand.constants import MAGNETIC
 
 from .setups import rest_distance
 

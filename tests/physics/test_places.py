@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import CONTACTS, LISTED, ORDERED, PAIRS, REBUILT, SOON
-from sand.kernels.neighbours import all_may_touch
-from sand.run import engine as engines
-from sand.run.places import inverse, order_on_curve, rearrange
-from sand.stepping.parts import SOON_PART
+from sand.integrate.step_parts import SOON_PART
+from sand.neighbours.pair_list import all_may_touch
+from sand.neighbours.spatial_sort import inverse, order_on_curve, rearrange
+from sand.simulation import engine as engines
+from sand.state.state import CONTACTS, LISTED, ORDERED, PAIRS, REBUILT, SOON
 
 from .test_sameness import state
 

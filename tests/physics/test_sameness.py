@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.threads import set_threads
-from sand.core.world import BROKEN, CONTACTS, CYCLE, FAR_SUMS, LISTED, MOVED
+from sand.state.state import BROKEN, CONTACTS, CYCLE, FAR_SUMS, LISTED, MOVED
+from sand.threads import set_threads
 
 from .setups import random_aggregate, rest_distance, struck_chain
 
@@ -100,8 +100,8 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 @pytest.mark.compiled("contacts")
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
-    from sand.core.arrays import FOR_ALL, contact_arrays, near_pairs
-    from sand.physics.contact import Bond
+    from sand.contact.law import Bond
+    from sand.state.arrays import FOR_ALL, contact_arrays, near_pairs
 
     ends = []
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
@@ -182,8 +182,8 @@ def test_the_compiler_changes_nothing_but_rounding(tmp_path):
 @pytest.mark.compiled("contacts")
 def test_kernels_against_plain_python_loops():
     """Pair list, contacts and gather of a random aggregate against double loops written out in NumPy."""
-    from sand.physics import adhesion
-    from sand.physics import contact as law
+    from sand.contact import jkr as adhesion
+    from sand.contact import law
 
     grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.stepping.control import calm_steps
+from sand.integrate.step_control import calm_steps
 
 R = 3e-7
 
@@ -14,7 +14,7 @@ R = 3e-7
 def _pair():
     contact = sand.Contact().pairing(sand.SILICA, sand.SILICA)
     mass = 4.0 / 3.0 * math.pi * R**3 * sand.SILICA.density
-    bond = sand.physics.contact.bond_between(contact, R, R, mass, mass)
+    bond = sand.contact.law.bond_between(contact, R, R, mass, mass)
     rest = bond.rest_radius**2 / (3.0 * bond.reduced_radius)
     step = 2.0 * math.pi / math.sqrt(bond.fastest) / sand.Verlet().steps_per_period
     return bond, 2.0 * R - rest, step
@@ -78,7 +78,7 @@ def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
 @pytest.mark.compiled("contacts")
 def test_a_shorter_step_is_held_for_ten_periods():
     """Two grains bounce beside a ringing pair: the step falls at once, and grows only HOLD steps after that."""
-    from sand.stepping.control import HOLD
+    from sand.integrate.step_control import HOLD
 
     bond, distance, step = _pair()
     fast = 4.0 * bond.pull_off_overlap / step

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core import threads
-from sand.core.errors import BadInput
-from sand.core.world import CONTACTS, MOVED, OUTSIDE
-from sand.run import engine, translate
-from sand.stepping.crew import INSIDE, LEAVE, TASK, WORD, crew_for, is_large, new_crew
+from sand import threads
+from sand.errors import BadInput
+from sand.integrate.task_queue import INSIDE, LEAVE, TASK, WORD, crew_for, is_large, new_crew
+from sand.simulation import assemble as translate
+from sand.simulation import engine
+from sand.state.state import CONTACTS, MOVED, OUTSIDE
 
 pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
 

@@ -1,4 +1,4 @@
-"""Points of the JKR curve, and the fit behind `sand.physics.adhesion.POLYNOMIAL`.
+"""Points of the JKR curve, and the fit behind `sand.contact.jkr.POLYNOMIAL`.
 
 The table was worked out by hand from F/Fc = 4(x³ − x^1.5), δ/δc = 6^(1/3)(2x² − (4/3)√x) and
 U/(Fcδc) = 4·6^(1/3)[(4/5)x⁵ − (4/3)x^3.5 + (1/3)x²], x = a/a0, by two independent programs.

@@ -11,7 +11,7 @@ import warnings
 from pathlib import Path
 
 import sand
-from sand.files.checkpoint import VERSION
+from sand.io.checkpoint import VERSION
 
 HERE = Path(__file__).parent
 

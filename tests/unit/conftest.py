@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.files import page as page_files
+from sand.io import page_bundle as page_files
 
 from .pages import SCRIPT
 

@@ -6,7 +6,7 @@ import json
 import re
 from pathlib import Path
 
-from sand.view.packets import decode
+from sand.viewer.packets import decode
 
 SCRIPT = "const a = '</script><!-- ${x}'; console.log(a)"
 """What a script may hold that would end its element."""

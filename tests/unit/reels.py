@@ -3,8 +3,8 @@
 import numpy as np
 
 import sand
-from sand.core.box import Box
-from sand.files.trajectory import TrajectoryWriter
+from sand.box import Box
+from sand.io.trajectory import TrajectoryWriter
 
 MODES = ("stretch", "slide", "roll", "twist")
 

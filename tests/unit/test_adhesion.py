@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sand.physics import adhesion as jkr
+from sand.contact import jkr
 
 from ..reference.jkr import E_BREAK, E_CYCLE, TABLE, fitted_polynomial, root_by_bisection
 

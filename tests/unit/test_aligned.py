@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.aligned import LANES, LINE, aligned, whole
+from sand.numerics.aligned import LANES, LINE, aligned, whole
 
 
 def begins(array):

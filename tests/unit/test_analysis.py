@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sand import BadInput
-from sand.analysis.census import COLUMNS, census, size_distribution
 from sand.analysis.fits import power_law, rate_law, separation
 from sand.analysis.fractal import box_dimension, correlation_dimension, ensemble_dimension, grains_within
+from sand.analysis.frame_statistics import COLUMNS, census, size_distribution
 from sand.analysis.magnetism import aggregate_moments
 from sand.analysis.network import network
 from sand.analysis.shape import (
@@ -23,7 +23,7 @@ from sand.analysis.shape import (
     principal_lengths,
     projected_area,
 )
-from sand.core.box import Box
+from sand.box import Box
 
 ROD = np.column_stack([2.0 * np.arange(9) - 8.0, np.zeros(9), np.zeros(9)])
 RNG = np.random.default_rng(5)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sand.core.box import Box, as_box
-from sand.core.errors import BadInput
+from sand.box import Box, as_box
+from sand.errors import BadInput
 
 coordinate = st.floats(-30, 30)
 triple = st.tuples(coordinate, coordinate, coordinate)
@@ -36,7 +36,7 @@ def test_close_pairs_of_few_points_and_of_many(box, monkeypatch):
     """Looking at all pairs and the tree of SciPy find the same, in the same order."""
     points = np.random.default_rng(4).uniform(-0.7, 0.7, (150, 3))
     few = box.close_pairs(points, 0.2)
-    monkeypatch.setattr("sand.core.box.FEW", 0)
+    monkeypatch.setattr("sand.box.FEW", 0)
     many = box.close_pairs(points, 0.2)
     assert len(few) > 100
     assert (few == many).all()

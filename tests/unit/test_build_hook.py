@@ -142,7 +142,7 @@ def test_hook_tells_and_includes(hook, tmp_path, monkeypatch, version):
     if version == "editable":
         assert names(tmp_path / hook.PAGE) == ["missing.txt"] and not data["force_include"]
     else:
-        assert list(data["force_include"].values()) == ["sand/view/page/missing.txt"]
+        assert list(data["force_include"].values()) == ["sand/viewer/page/missing.txt"]
         assert all(Path(source).is_file() for source in data["force_include"]) and not names(tmp_path)
     made.finalize(version, data, "")
     assert not any(Path(source).exists() for source in data["force_include"])

@@ -9,13 +9,13 @@ from scipy.sparse.csgraph import connected_components
 
 import sand
 from sand.cli.main import main
-from sand.files.bodies import read_body, write_body
-from sand.kernels.aggregation import returned
-from sand.kernels.crowd import gap_at, join_crowd
-from sand.physics.adhesion import rest_overlap, rest_radius
-from sand.physics.mixing import pairing_between
-from sand.run.bodies import body_from_file
+from sand.config.bodies import body_from_file
+from sand.contact.jkr import rest_overlap, rest_radius
+from sand.contact.mixing import pairing_between
+from sand.io.bodies import read_body, write_body
 from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
+from sand.setup._kernels.aggregation import returned
+from sand.setup._kernels.hash_grid import gap_at, join_crowd
 from sand.setup.aggregates import rest_distance
 from sand.setup.deposit import cut_sphere
 from sand.setup.growing import room

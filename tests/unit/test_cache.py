@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sand.core import cache
+from sand.compiler import cache
 
 needs_modes = pytest.mark.skipif(not hasattr(os, "getuid"), reason="no owners and modes on this system")
 
@@ -162,7 +162,7 @@ def test_the_package_is_as_light_as_before():
 
 def test_a_process_has_one_folder(monkeypatch, tmp_path):
     """Who asks again gets the same, named by the digest: summaries give it as `source_digest`."""
-    from sand.core import jit
+    from sand.compiler import jit
 
     assert jit.cache_folder() is jit.cache_folder()
     assert jit.cache_folder().name == jit._digest() and len(jit._digest()) == 16

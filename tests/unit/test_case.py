@@ -8,9 +8,9 @@ import pytest
 import tomli_w
 
 import sand
-from sand.core.errors import BadInput
-from sand.run.build import case_of, simulation_of
-from sand.run.case import check_case, read_case
+from sand.config.build import case_of, simulation_of
+from sand.config.case import check_case, read_case
+from sand.errors import BadInput
 
 GOOD = tomllib.loads("""
 [run]

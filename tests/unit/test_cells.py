@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sand
-from sand.core.arrays import far_arrays
-from sand.core.box import Box, as_box
-from sand.core.jit import kernel
-from sand.core.world import LISTED, MADE, PAIRS, REBUILT
-from sand.kernels import cells
-from sand.kernels.dipoles import CUT
-from sand.kernels.far import clear_far_loads
-from sand.kernels.neighbours import bond_of
-from sand.stepping.neighbours import Neighbours, share_within
+from sand.box import Box, as_box
+from sand.compiler.jit import kernel
+from sand.forces.pair.dipole_loops import CUT
+from sand.integrate.respa import clear_far_loads
+from sand.neighbours import cell_list as cells
+from sand.neighbours.pair_list import bond_of
+from sand.neighbours.settings import Neighbours, share_within
+from sand.state.arrays import far_arrays
+from sand.state.state import LISTED, MADE, PAIRS, REBUILT
 
 cut_loads = CUT.loads
 

@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.experiments import chain_impact
-from sand.view.chain_map import Map, Picture, chain_figure
+from sand.plotting.chain_map import Map, Picture, chain_figure
 
 
 def links(*pairs):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.jit import kernel
-from sand.core.least import rank, ranked
-from sand.core.world import PAIRS, SOON, SOON_LEEWAY
-from sand.kernels.neighbours import all_may_touch, list_soon
-from sand.stepping.control import calm_steps, closing_step, grain_step, pair_step
-from sand.stepping.parts import SOON_PART
+from sand.compiler.jit import kernel
+from sand.integrate.step_control import calm_steps, closing_step, grain_step, pair_step
+from sand.integrate.step_parts import SOON_PART
+from sand.neighbours.pair_list import all_may_touch, list_soon
+from sand.numerics.float_order import rank, ranked
+from sand.state.state import PAIRS, SOON, SOON_LEEWAY
 
 
 def crowd():

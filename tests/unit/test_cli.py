@@ -12,11 +12,11 @@ import pytest
 
 from sand.cli.main import main
 from sand.cli.progress import Progress
-from sand.core.errors import FilesFailed
-from sand.files.checkpoint import newest_checkpoint, read_checkpoint
-from sand.run.build import simulation_of
-from sand.run.case import read_case
-from sand.run.simulation import Simulation
+from sand.config.build import simulation_of
+from sand.config.case import read_case
+from sand.errors import FilesFailed
+from sand.io.checkpoint import newest_checkpoint, read_checkpoint
+from sand.simulation.simulation import Simulation
 
 from ..systems import IS_ROOT, keeps_modes, stops_others
 
@@ -254,7 +254,7 @@ def test_a_full_disk_is_a_line(place, capsys, monkeypatch):
     def full(*_):
         raise FilesFailed("cannot write small/summary.json: No space left on device")
 
-    monkeypatch.setattr("sand.run.record.write_json", full)
+    monkeypatch.setattr("sand.simulation.run_writer.write_json", full)
     assert main(["run", "small.toml", "--quiet"]) == 2
     assert "sand: cannot write small/summary.json: No space left" in capsys.readouterr().err
 
@@ -268,7 +268,7 @@ def test_a_fault_of_ours_is_one_line_unless_debug(place, capsys, monkeypatch):
     def broken(_path):
         raise ZeroDivisionError("float\ndivision")
 
-    monkeypatch.setattr("sand.run.case.read_case", broken)
+    monkeypatch.setattr("sand.config.case.read_case", broken)
     assert main(["run", "small.toml", "--json"]) == 1
     out, err = capsys.readouterr()
     assert err.startswith("sand: internal error (ZeroDivisionError: float division); run again with --debug")
@@ -284,7 +284,7 @@ def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
     def slow(_path):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sand.run.case.read_case", slow)
+    monkeypatch.setattr("sand.config.case.read_case", slow)
     assert main(["run", "small.toml"]) == 130
     assert capsys.readouterr().err == "sand: interrupted\n"
 
@@ -299,7 +299,7 @@ def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
         time.sleep(5.0)
 
     with monkeypatch.context() as patch:
-        patch.setattr("sand.run.simulation.Simulation.run", slow)
+        patch.setattr("sand.simulation.simulation.Simulation.run", slow)
         assert main(["run", "small.toml", "--quiet"]) == 130
         assert "interrupted before the first step" in capsys.readouterr().err
     assert main(["run", "small.toml", "--quiet"]) == 0
@@ -506,7 +506,7 @@ def test_progress_shows_time_and_numbers(place, by):
 @pytest.mark.compiled("dipoles")
 def test_progress_of_a_resumed_run_has_numbers_from_the_start(done):
     """Between two frames the last row of the ledger serves."""
-    from sand.run.build import resume
+    from sand.config.build import resume
 
     terminal = Terminal()
     simulation = resume(done)

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from sand.cli.main import main
-from sand.view.plots import HISTORY
+from sand.plotting.plots import HISTORY
 
 
 @pytest.mark.compiled("fields")

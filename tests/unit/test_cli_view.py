@@ -10,7 +10,7 @@ import pytest
 import sand
 from sand.cli import view as view_command
 from sand.cli.main import main
-from sand.view import browser
+from sand.viewer import browser
 
 from .pages import blocks
 from .reels import reel

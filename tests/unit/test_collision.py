@@ -11,7 +11,7 @@ import sand
 from sand.cli.main import main
 from sand.experiments.collision import collide, collide_many
 from sand.experiments.collision_case import read_collision, run_seeds
-from sand.files.bodies import read_body
+from sand.io.bodies import read_body
 from sand.setup import chain, grain, pca
 from sand.theory import contact
 
@@ -96,7 +96,7 @@ def test_a_case_in_processes(tmp_path):
     path = tmp_path / "hit.toml"
     path.write_text(CASE)
     read_collision(path)
-    from sand.files.folder import read_toml
+    from sand.io.run_folder import read_toml
 
     here = run_seeds(read_toml(path), [1, 2])
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:

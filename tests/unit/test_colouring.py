@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sand.view.palettes import SEQUENTIAL
-from sand.view.still import still_picture
-from sand.view.style import BIG, SINGLE, rgb
+from sand.plotting.palettes import SEQUENTIAL
+from sand.plotting.render.still import still_picture
+from sand.plotting.style import BIG, SINGLE, rgb
 
 from .stills import R, alike, at_pixel, frame_of
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.kernels.contacts import bond_at, pose_at
-from sand.physics import adhesion
-from sand.physics import contact as law
-from sand.run.contacts import COLUMNS
+from sand.contact import jkr as adhesion
+from sand.contact import law
+from sand.contact.update import bond_at, pose_at
+from sand.simulation.contact_table import COLUMNS
 
 from ..physics.setups import random_aggregate
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 import sand
+from sand.box import Box
 from sand.cli.main import main
-from sand.core.box import Box
-from sand.files import folder as files
-from sand.files.damaged import sealed
-from sand.files.following import Following
-from sand.files.gsd_index import ENTRY, read_index
-from sand.files.ledger import LedgerFile, keep_if_damaged, read_ledger
-from sand.files.trajectory import Frames, TrajectoryWriter, read_frames
-from sand.view.story import story_of
+from sand.io import run_folder as files
+from sand.io.damage import sealed
+from sand.io.gsd_index import ENTRY, read_index
+from sand.io.ledger_table import LedgerFile, keep_if_damaged, read_ledger
+from sand.io.live_trajectory import Following
+from sand.io.trajectory import Frames, TrajectoryWriter, read_frames
+from sand.viewer.dataset import story_of
 
 from .reels import contacts_of, grains_of, reel
 

@@ -3,15 +3,15 @@
 import pytest
 
 import sand
-from sand.view.dimensions import Dimensions
-from sand.view.story import story_of
+from sand.viewer.dataset import story_of
+from sand.viewer.dimensions import Dimensions
 
 from .reels import reel
 
 
 def test_dimensions(tmp_path, monkeypatch):
     """A straight chain has dimension 1; too few grains give a reason; the same grains are not measured again."""
-    from sand.view import dimensions
+    from sand.viewer import dimensions
 
     chain = [(k, k + 1) for k in range(39)]
     story = story_of(reel(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))

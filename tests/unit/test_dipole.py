@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sand.core.constants import BOLTZMANN, MAGNETIC
-from sand.physics import dipole
+from sand.constants import BOLTZMANN, MAGNETIC
+from sand.forces.pair import dipole_formulas as dipole
 
 component = st.integers(-100, 100).map(lambda n: n / 100)
 vector = st.tuples(component, component, component).filter(lambda v: np.linalg.norm(v) > 0.3)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sand.core.arrays import ContactArrays, contact_arrays
-from sand.core.world import CONTACTS, COUNT
-from sand.kernels.contacts import BROKE
-from sand.kernels.events import drop_broken
+from sand.contact.events import drop_broken
+from sand.contact.update import BROKE
+from sand.state.arrays import ContactArrays, contact_arrays
+from sand.state.state import CONTACTS, COUNT
 
 BY_GRAIN = {"side", "start", "turn"}
 """Arrays that are made anew from the pairs."""

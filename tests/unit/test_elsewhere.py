@@ -43,7 +43,7 @@ temperature = "300 K"
 """
 COMMANDS = """
 from sand.cli.main import main
-from sand.view import figure
+from sand.plotting import run_figure as figure
 figure.run_figure = figure.save = lambda *_: None  # drawing takes seconds, and is the same everywhere
 chain = ["build", "chain", "--grains", "3", "--radius", "0.1 um", "--material", "silica", "--out"]
 for words in (

@@ -7,11 +7,11 @@ import sys
 import pytest
 
 from sand.cli.main import main
-from sand.core.errors import BadInput
-from sand.core.units import in_unit, si
-from sand.files.folder import read_json, read_text, read_toml
-from sand.run.case import read_case
-from sand.run.observers import Schedule
+from sand.config.case import read_case
+from sand.errors import BadInput
+from sand.io.run_folder import read_json, read_text, read_toml
+from sand.simulation.observers import Schedule
+from sand.units import in_unit, si
 
 CASE = """
 [run]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.constants import COULOMB, GRAVITATION, MAGNETIC
-from sand.forces.cutoff import UNCUT, cutoff_for
-from sand.physics.central import central_field, central_potential, central_rate
-from sand.physics.dipole import Cutoff, cut_weight, pair_load_cut
-from sand.physics.dipole_rates import bare_rates, cut_curvature, pair_rates
+from sand.constants import COULOMB, GRAVITATION, MAGNETIC
+from sand.forces.pair.cutoff import UNCUT, cutoff_for
+from sand.forces.pair.dipole_formulas import Cutoff, cut_weight, pair_load_cut
+from sand.forces.pair.dipole_rates import bare_rates, cut_curvature, pair_rates
+from sand.forces.pair.inverse_square_formulas import central_field, central_potential, central_rate
 
 SMOOTH = cutoff_for(1.0, "smooth")
 CUTOFFS = {"none": UNCUT, "inside": cutoff_for(3.0, "smooth"), "in the shell": SMOOTH}
@@ -61,10 +61,10 @@ def test_taylor_torque_is_the_whole_product_rule():
         spin=1e8 * rng.normal(size=(3, 3)),
         moment=6e-18 * rng.normal(size=(3, 3)),
     )
-    from sand.core.arrays import far_arrays
-    from sand.core.jit import kernel
-    from sand.kernels.dipoles import CUT
-    from sand.kernels.far import clear_rates, set_paces
+    from sand.compiler.jit import kernel
+    from sand.forces.pair.dipole_loops import CUT
+    from sand.integrate.respa import clear_rates, set_paces
+    from sand.state.arrays import far_arrays
 
     sum_rates = CUT.rates
 

@@ -11,14 +11,14 @@ from PIL import Image
 
 import sand
 from sand.analysis.clusters import unwrapped
-from sand.core.box import Box
-from sand.core.constants import BOLTZMANN
-from sand.run.ledger import Ledger
-from sand.view.figure import png, run_figure, save, show
-from sand.view.panels import energy_unit, time_unit
-from sand.view.scene import camera, scene_of, side_by_side, view_window
-from sand.view.spheres import FINER, Balls, draw
-from sand.view.style import pretty, round_length, with_prefix
+from sand.box import Box
+from sand.constants import BOLTZMANN
+from sand.plotting.panels import energy_unit, time_unit
+from sand.plotting.render.scene import camera, scene_of, side_by_side, view_window
+from sand.plotting.render.spheres import FINER, Balls, draw
+from sand.plotting.run_figure import png, run_figure, save, show
+from sand.plotting.style import pretty, round_length, with_prefix
+from sand.simulation.ledger import Ledger
 
 
 def ledger_of(rows, outside=()):

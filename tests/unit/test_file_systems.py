@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.errors import FilesFailed
+from sand.errors import FilesFailed
 from sand.experiments.executors import MOST_ON_WINDOWS, executor_for
-from sand.files.bodies import contacts_of
-from sand.files.checkpoint import write_checkpoint
-from sand.files.folder import make_folder, replace_file, write_json
-from sand.files.gsd_index import make_room
-from sand.files.ledger import LedgerFile
-from sand.files.trajectory import TrajectoryWriter, read_frames
+from sand.io.bodies import contacts_of
+from sand.io.checkpoint import write_checkpoint
+from sand.io.gsd_index import make_room
+from sand.io.ledger_table import LedgerFile
+from sand.io.run_folder import make_folder, replace_file, write_json
+from sand.io.trajectory import TrajectoryWriter, read_frames
 
 from ..systems import keeps_modes
 

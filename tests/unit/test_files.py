@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.errors import FilesFailed
-from sand.core.world import STEPS
-from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.files.folder import make_folder, read_toml, replace_file, write_json, write_toml
-from sand.files.ledger import LedgerFile, read_ledger
-from sand.files.trajectory import TrajectoryWriter, read_frames
-from sand.run.record import Record
+from sand.errors import FilesFailed
+from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.io.ledger_table import LedgerFile, read_ledger
+from sand.io.run_folder import make_folder, read_toml, replace_file, write_json, write_toml
+from sand.io.trajectory import TrajectoryWriter, read_frames
+from sand.simulation.run_writer import Record
+from sand.state.state import STEPS
 
 from ..physics.setups import struck_chain
 
@@ -66,7 +66,7 @@ def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage
 
 def test_a_checkpoint_of_the_future_is_refused_politely(tmp_path, monkeypatch):
     """An older program says that it is too old."""
-    monkeypatch.setattr("sand.files.checkpoint.VERSION", 99)
+    monkeypatch.setattr("sand.io.checkpoint.VERSION", 99)
     path = write_state(tmp_path, 2)
     monkeypatch.undo()
     write_state(tmp_path, 1)

@@ -3,7 +3,7 @@
 import pytest
 
 import sand
-from sand.core.fields import FIELDS
+from sand.schema import FIELDS
 
 
 @pytest.fixture

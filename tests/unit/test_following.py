@@ -2,7 +2,7 @@
 
 import pytest
 
-from sand.files.following import Following
+from sand.io.live_trajectory import Following
 
 from .reels import reel
 

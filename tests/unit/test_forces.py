@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.jit import COMPILED, cache_folder, formula
+from sand.compiler.jit import COMPILED, cache_folder, formula
 from sand.forces.base import compose
-from sand.kernels.outside import is_ours
-from sand.physics.surroundings import One, nothing, uniform_field
-from sand.stepping.advance import driver_for
-from sand.stepping.rules import Plan
+from sand.forces.external.formulas import One, nothing, uniform_field
+from sand.forces.external.loops import is_ours
+from sand.integrate.driver import driver_for
+from sand.integrate.kernel_spec import Plan
 
 
 class Weight(NamedTuple):

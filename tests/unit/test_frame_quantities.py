@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.box import Box
-from sand.files.trajectory import TrajectoryWriter, read_frames
+from sand.box import Box
+from sand.io.trajectory import TrajectoryWriter, read_frames
 
 from .reels import contacts_of
 

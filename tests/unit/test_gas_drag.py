@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from sand.forces.gas.loops import VACUUM, GasRules, gas_kick, shortest_stopping_time
 
 import sand
-from sand.core.constants import BOLTZMANN
-from sand.core.jit import kernel
+from sand.compiler.jit import kernel
+from sand.constants import BOLTZMANN
 from sand.forces.base import Force, GrainForce
-from sand.forces.gas import Gas
-from sand.kernels.gas import VACUUM, GasRules, gas_kick, shortest_stopping_time
-from sand.physics import gas as law
+from sand.forces.gas.model import Gas
+from sand.forces.gas.model import drag as law
 
 SPEED = math.sqrt(8.0 / math.pi)
 """v̄ for k_B T/m_g = 1."""
@@ -107,7 +107,7 @@ def test_the_blows_scatter_as_the_friction_demands(accommodation):
 
 
 def test_what_the_linear_law_lacks_at_half_the_molecular_speed():
-    """At v = v̄/2 the drag is 6.2 % above −f_t v for mirrors and 4.5 % for diffuse walls, as forces/gas.py says."""
+    """At v = v̄/2 the drag is 6.2 % above −f_t v for mirrors and 4.5 % for diffuse walls, as forces/gas/model.py says."""
     velocity = np.array([0.0, 0.0, 0.5 * SPEED])
     for accommodation, excess in ((0.0, 0.062), (1.0, 0.045)):
         force = impacts(velocity, np.zeros(3), accommodation)[0]

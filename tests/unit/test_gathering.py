@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.arrays import KINDS, TURNS_FROM, contact_arrays
-from sand.core.jit import kernel
-from sand.core.world import CONTACTS, COUNT, FASTEST, QUICKEST
-from sand.kernels.gathering import BLOCK, DENSE, MOST, gather, resort_sides
-from sand.kernels.motion import gather_and_kick, kick, kick_and_drift_for
-from sand.stepping.crew import GRAINS_AT_ONCE
+from sand.compiler.jit import kernel
+from sand.contact.gather import BLOCK, DENSE, MOST, gather, resort_sides
+from sand.integrate.motion import gather_and_kick, kick, kick_and_drift_for
+from sand.integrate.task_queue import GRAINS_AT_ONCE
+from sand.state.arrays import KINDS, TURNS_FROM, contact_arrays
+from sand.state.state import CONTACTS, COUNT, FASTEST, QUICKEST
 
 GRAINS = TURNS_FROM + 37
 """Enough for an order of their own, and a last block that is not full."""

@@ -12,8 +12,8 @@ import pytest
 from sand.cli.interrupt import Watch
 from sand.cli.main import main
 from sand.experiments import collision_case
-from sand.files.checkpoint import newest_checkpoint
-from sand.files.table import GrowingOutcomes
+from sand.io.checkpoint import newest_checkpoint
+from sand.io.table import GrowingOutcomes
 
 pytestmark = pytest.mark.compiled("contacts")
 COLLISION = """
@@ -56,9 +56,9 @@ def place(tmp_path, monkeypatch):
 @pytest.fixture(autouse=True)
 def _empty_figures(monkeypatch):
     """Figures are files without content: drawing takes longer than all the rest."""
-    monkeypatch.setattr("sand.view.figure.run_figure", lambda simulation: None)
-    monkeypatch.setattr("sand.view.collisions.collision_figure", lambda results: None)
-    monkeypatch.setattr("sand.view.figure.save", lambda figure, path: path.write_bytes(b""))
+    monkeypatch.setattr("sand.plotting.run_figure.run_figure", lambda simulation: None)
+    monkeypatch.setattr("sand.plotting.collisions.collision_figure", lambda results: None)
+    monkeypatch.setattr("sand.plotting.run_figure.save", lambda figure, path: path.write_bytes(b""))
 
 
 def interrupt(patch, when):
@@ -244,7 +244,7 @@ def test_an_interrupted_run_does_not_wait_for_its_figure(place, capsys, monkeypa
         drawn.append(simulation)
         os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("sand.view.figure.run_figure", slow)
+    monkeypatch.setattr("sand.plotting.run_figure.run_figure", slow)
     assert main(["run", "box.toml", "--out", "done"]) == 0
     out, err = capsys.readouterr()
     assert "done" in out and "sand: the figure is left out" in err and len(drawn) == 1

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.fields import FIELDS
-from sand.core.grains import GrainArrays
+from sand.grains import GrainArrays
+from sand.schema import FIELDS
 
 
 def two(**changes):

@@ -4,8 +4,8 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.files.bodies import write_body
-from sand.run.kinds import command_for
+from sand.config.commands import command_for
+from sand.io.bodies import write_body
 
 RUN = """
 [run]

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from sand.core.errors import BadInput
-from sand.files.page import PAGE, read_bundle
-from sand.view.page import write_page
-from sand.view.story import story_of
+from sand.errors import BadInput
+from sand.io.page_bundle import PAGE, read_bundle
+from sand.viewer.dataset import story_of
+from sand.viewer.html import write_page
 
 from .reels import reel
 

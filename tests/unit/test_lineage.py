@@ -7,10 +7,10 @@ import weakref
 import numpy as np
 import pytest
 
-from sand.analysis import lineage
+from sand.analysis import tracking as lineage
 from sand.analysis.clusters import cluster_labels
-from sand.analysis.lineage import SINGLE, Lineage, named
-from sand.core.errors import BadInput
+from sand.analysis.tracking import SINGLE, Lineage, named
+from sand.errors import BadInput
 
 
 def names_of(before, count, pairs):

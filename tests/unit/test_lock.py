@@ -9,16 +9,16 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.core.errors import FilesFailed
-from sand.files import lock as lock_files
-from sand.files.folder import make_folder
-from sand.files.lock import LOCK, FolderLock, writing
-from sand.run.observers import Observer
+from sand.errors import FilesFailed
+from sand.io import lock as lock_files
+from sand.io.lock import LOCK, FolderLock, writing
+from sand.io.run_folder import make_folder
+from sand.simulation.observers import Observer
 
 from ..physics.setups import struck_chain
 
 HOLD = (
-    "import sys; from pathlib import Path; from sand.files.lock import FolderLock\n"
+    "import sys; from pathlib import Path; from sand.io.lock import FolderLock\n"
     "held = FolderLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()\n"
 )
 

@@ -1,4 +1,4 @@
-"""What the compiler leaves out for our code (`core/lowering.py`) must not swallow what is raised."""
+"""What the compiler leaves out for our code (`compiler/lowering.py`) must not swallow what is raised."""
 
 import gc
 import os
@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.jit import COMPILED, formula, kernel
-from sand.kernels.motion import kicked
+from sand.compiler.jit import COMPILED, formula, kernel
+from sand.integrate.motion import kicked
 
 BEYOND = """
 import numpy as np
 import sand
-from sand.core.jit import kernel
-from sand.kernels.motion import kicked
+from sand.compiler.jit import kernel
+from sand.integrate.motion import kicked
 grains = sand.Grains(np.zeros((3, 3)) + np.arange(3)[:, None], 0.1, sand.SILICA).arrays
 def kick_one(grains, i):
     return kicked(grains, i, 1.0)[0][0]

@@ -5,22 +5,22 @@ import copy
 import numpy as np
 import pytest
 
-from sand.core.arrays import contact_arrays, near_pairs
-from sand.core.box import Box
-from sand.core.grains import GrainArrays, Grains
-from sand.core.jit import kernel
-from sand.core.material import SILICA
-from sand.core.vec import axpy, load4, put, scale
-from sand.core.world import BROKEN, CONTACTS, COUNT, LOST, MOVED, ROLLING, SLIDING, TWISTING
-from sand.forces.contact import Contact
-from sand.kernels.contacts import BROKE, WAITS, YIELDED, pose_at, quiet_pass, twist_gain
-from sand.kernels.events import settle_flagged
-from sand.kernels.motion import kick_and_drift_for
-from sand.kernels.moving import book_passed, contact_pass, strain_before
-from sand.physics.contact import Bond, bond_between, strain_of
-from sand.physics.rotation import turned_back
-from sand.physics.tangential import pointers_for
-from sand.stepping.rules import ContactRules
+from sand.box import Box
+from sand.compiler.jit import kernel
+from sand.contact.events import settle_flagged
+from sand.contact.law import Bond, bond_between, strain_of
+from sand.contact.model import Contact
+from sand.contact.slip import book_passed, contact_pass, strain_before
+from sand.contact.tangential import pointers_for
+from sand.contact.update import BROKE, WAITS, YIELDED, pose_at, quiet_pass, twist_gain
+from sand.grains import GrainArrays, Grains
+from sand.integrate.kernel_spec import ContactRules
+from sand.integrate.motion import kick_and_drift_for
+from sand.material import SILICA
+from sand.numerics.quaternion import turned_back
+from sand.numerics.vec import axpy, load4, put, scale
+from sand.state.arrays import contact_arrays, near_pairs
+from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, MOVED, ROLLING, SLIDING, TWISTING
 
 PAIRS = 403
 """Contacts of a test: whole blocks, and a rest that fills no vector."""

@@ -14,12 +14,12 @@ import pytest
 import tomli_w
 
 import sand
+from sand.config.build import simulation_of
+from sand.config.case import read_case
 from sand.experiments.collision_case import read_collision
-from sand.experiments.scattering_case import read_scattering
-from sand.files.checkpoint import read_checkpoint
-from sand.files.trajectory import read_frames
-from sand.run.build import simulation_of
-from sand.run.case import read_case
+from sand.experiments.scattering.case import read_scattering
+from sand.io.checkpoint import read_checkpoint
+from sand.io.trajectory import read_frames
 
 from ..physics.test_full_disk import CASE
 

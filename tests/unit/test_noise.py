@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sand.core.jit import COMPILED, kernel
-from sand.physics.noise import LOW, normal_vector, philox, random_words, uniform
+from sand.compiler.jit import COMPILED, kernel
+from sand.numerics.random import LOW, normal_vector, philox, random_words, uniform
 
 # Random123's kat_vectors, philox4x32 with 10 rounds: counter, key, result
 KNOWN = (

@@ -7,7 +7,7 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.files.trajectory import Frames
+from sand.io.trajectory import Frames
 
 
 @pytest.mark.compiled("fields")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.setup.order import places_on_curve
+from sand.neighbours.morton_order import places_on_curve
 
 
 def test_places_interleave_the_bits():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.files.trajectory import Frames
-from sand.view.packets import decode, encode, frame_bytes, frame_packet, grains_packet
+from sand.io.trajectory import Frames
+from sand.viewer.packets import decode, encode, frame_bytes, frame_packet, grains_packet
 
 from .reels import reel
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.view import page
-from sand.view.packets import decode
-from sand.view.page import chosen_frames, fitting, write_page
-from sand.view.story import story_of
+from sand.viewer import html as page
+from sand.viewer.dataset import story_of
+from sand.viewer.html import chosen_frames, fitting, write_page
+from sand.viewer.packets import decode
 
 from .pages import blocks, elements
 from .reels import reel

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from sand.core.errors import BadInput
-from sand.files import page
+from sand.errors import BadInput
+from sand.io import page_bundle as page
 
 
 def test_bundle_is_read(tmp_path):
@@ -32,7 +32,7 @@ def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
 
 def test_remedy_fits_the_installation(tmp_path, monkeypatch):
     """In a clone the sources can be bundled; elsewhere SAND is installed again."""
-    place = tmp_path / "src" / "sand" / "view" / "page"
+    place = tmp_path / "src" / "sand" / "viewer" / "page"
     monkeypatch.setattr(page, "PAGE", place)
     with pytest.raises(BadInput, match="--force-reinstall"):
         page.read_bundle(place)
@@ -45,5 +45,5 @@ def test_remedy_fits_the_installation(tmp_path, monkeypatch):
 def test_both_sides_agree_on_the_place():
     """The hook writes where `read_bundle` reads."""
     hook = (Path(__file__).parents[2] / "hatch_build.py").read_text("utf-8")
-    assert 'PAGE = Path("src", "sand", "view", "page")' in hook
-    assert page.PAGE.parts[-3:] == ("sand", "view", "page")
+    assert 'PAGE = Path("src", "sand", "viewer", "page")' in hook
+    assert page.PAGE.parts[-3:] == ("sand", "viewer", "page")

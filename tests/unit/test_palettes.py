@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.quantities import MODES
-from sand.view.palettes import DIVERGING, LIMITS, MATERIALS, SEQUENTIAL, WITHIN, colours, palettes
+from sand.plotting.palettes import DIVERGING, LIMITS, MATERIALS, SEQUENTIAL, WITHIN, colours, palettes
 
 
 def lightness(shades):

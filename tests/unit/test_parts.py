@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.arrays import far_arrays
-from sand.core.jit import formula, kernel
+from sand.compiler.jit import formula, kernel
 from sand.forces.base import compose_far
-from sand.kernels import central, dipoles
-from sand.kernels.cells import make_far_list
-from sand.kernels.far import clear_far_loads
+from sand.forces.pair import dipole_loops as dipoles
+from sand.forces.pair import inverse_square_loops as central
+from sand.integrate.respa import clear_far_loads
+from sand.neighbours.cell_list import make_far_list
+from sand.state.arrays import far_arrays
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 

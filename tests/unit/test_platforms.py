@@ -7,7 +7,8 @@ import sys
 import pytest
 from llvmlite import binding, ir
 
-from sand.core import atomics, threads
+from sand import threads
+from sand.compiler import atomics
 
 SYSTEMS = {
     "x86_64-unknown-linux-gnu": "sched_yield",
@@ -61,8 +62,8 @@ OTHER_NUMBA = """
 import numba
 numba.version_info = numba.version_info._replace(short=({}, {}))
 numba.__version__ = "{}.{}.0"
-from sand.core import jit
-import sand.core.jit
+from sand.compiler import jit
+import sand.compiler.jit
 print(jit.CAN_SHARE, jit.LONG_VECTORS)
 """
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.run.case import check_case
-from sand.run.pace import Pace
+from sand.config.case import check_case
+from sand.simulation.pace import Pace
 
 LIGHT = 299792458.0
 TWO = [[0, 0, 0], [3e-8, 0, 0]]

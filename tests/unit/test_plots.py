@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.analysis.books import Books
-from sand.core.errors import BadInput
-from sand.files.ledger import read_ledger
-from sand.view.plots import HISTORY, grains_figure, history_figure
+from sand.analysis.ledger_columns import Books
+from sand.errors import BadInput
+from sand.io.ledger_table import read_ledger
+from sand.plotting.plots import HISTORY, grains_figure, history_figure
 
 
 @pytest.mark.compiled("fields")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.quantities import GRAIN_NAMES, cluster_rank, measured, quantity
-from sand.core.errors import BadInput
+from sand.errors import BadInput
 
 from .stills import R, frame_of
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core import roots
-from sand.core.arrays import far_arrays
-from sand.core.constants import MAGNETIC
-from sand.core.jit import COMPILED, LONG_VECTORS, kernel
-from sand.kernels import dipoles
-from sand.run.translate import WIDE_FROM
+from sand.compiler.jit import COMPILED, LONG_VECTORS, kernel
+from sand.constants import MAGNETIC
+from sand.forces.pair import dipole_loops as dipoles
+from sand.numerics import roots
+from sand.simulation.assemble import WIDE_FROM
+from sand.state.arrays import far_arrays
 
 
 def filled_by(function):

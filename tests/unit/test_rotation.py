@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sand.physics.rotation import turn, turned, turned_back
+from sand.numerics.quaternion import turn, turned, turned_back
 
 angle = st.tuples(*[st.floats(-0.1, 0.1)] * 3)
 quaternion = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)

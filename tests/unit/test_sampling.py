@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sand.experiments.sampling import CERTAIN, EMPTY, PILOT, Strata, Task, cut, wilson
+from sand.experiments.scattering.sampling import CERTAIN, EMPTY, PILOT, Strata, Task, cut, wilson
 
 
 def flown(strata, chance, relative_error, seed):

@@ -12,11 +12,11 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.experiments import scattering
 from sand.experiments.executors import executor_for
-from sand.experiments.flights import COLUMNS, fly, replay
-from sand.experiments.maps import probability_map
-from sand.experiments.sampling import Task
+from sand.experiments.scattering import cross_sections as scattering
+from sand.experiments.scattering.flights import COLUMNS, fly, replay
+from sand.experiments.scattering.maps import probability_map
+from sand.experiments.scattering.sampling import Task
 
 from ..systems import KILL, stops_others
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from sand.analysis.books import Books
-from sand.view.series import MOST, of_ledger, thinned
-from sand.view.story import story_of
+from sand.analysis.ledger_columns import Books
+from sand.viewer.dataset import story_of
+from sand.viewer.series import MOST, of_ledger, thinned
 
 from .reels import reel
 

@@ -10,11 +10,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from sand.core.errors import BadInput
-from sand.view import server as servers
-from sand.view.packets import decode
-from sand.view.server import Server
-from sand.view.story import story_of
+from sand.errors import BadInput
+from sand.viewer import server as servers
+from sand.viewer.dataset import story_of
+from sand.viewer.packets import decode
+from sand.viewer.server import Server
 
 from .reels import reel
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.view import browser, show
+from sand.viewer import browser, show
 
 from .pages import blocks
 

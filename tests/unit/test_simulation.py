@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import PAIRS, SOON
-from sand.run.observers import Schedule
+from sand.simulation.observers import Schedule
+from sand.state.state import PAIRS, SOON
 
 from ..physics.setups import rest_distance, struck_chain
 
@@ -183,7 +183,7 @@ def test_a_runaway_energy_ends_the_run(tmp_path):
     assert result.outcome is sand.Outcome.RUNAWAY
     assert result.steps <= 20_000
     assert len(result.grains) == 2
-    arrays, meta = sand.files.checkpoint.newest_checkpoint(tmp_path / "run")
+    arrays, meta = sand.io.checkpoint.newest_checkpoint(tmp_path / "run")
     assert meta["steps"] < result.steps
     assert np.abs(arrays["grains/velocity"]).max() < 1.0  # a state from before
     go_on = sand.resume(tmp_path / "run")
@@ -197,7 +197,7 @@ def test_a_short_run_cannot_finish_with_energy_from_nowhere(tmp_path):
     result = too_long_steps(tmp_path / "run").run(steps=9_000)
     assert result.outcome is sand.Outcome.RUNAWAY
     assert result.steps == 9_000
-    assert sand.files.checkpoint.newest_checkpoint(tmp_path / "run")[1]["steps"] == 0
+    assert sand.io.checkpoint.newest_checkpoint(tmp_path / "run")[1]["steps"] == 0
     assert len(list((tmp_path / "run").glob("checkpoint-*.npz"))) == 1
 
 

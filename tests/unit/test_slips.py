@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.files.bodies import write_body
-from sand.files.folder import LEDGER, TRAJECTORY
-from sand.run.contacts import ContactTable
+from sand.io.bodies import write_body
+from sand.io.run_folder import LEDGER, TRAJECTORY
+from sand.simulation.contact_table import ContactTable
 
 
 @pytest.fixture(scope="module")
@@ -189,7 +189,7 @@ EXPERIMENTS = [
     ("sand.experiments.scattering.cross_section('10 nm', 'iron', sped=1)", "did you mean 'speed'?"),
     ("sand.experiments.scattering.cross_section('10 nm', 'iron', speed=1, seed='a')", "seed = 'a'"),
     ("sand.experiments.scattering.measure(7)", "flying = 7; give"),
-    ("sand.experiments.maps.probability_map(7)", "flights = 7 must be a list"),
+    ("sand.experiments.scattering.maps.probability_map(7)", "flights = 7 must be a list"),
     ("sand.experiments.kernel_table.on_grid(7, [1.0])", "kernel = 7 must be a function"),
     ("sand.theory.contact(7, '10 nm')", "material = 7; give a sand.Material"),
     ("sand.theory.contact('iron')", "contact: radius is missing"),
@@ -209,7 +209,7 @@ EXPERIMENTS = [
     ("sand.analysis.fits.power_law('a', [1, 2])", "x = 'a' must be an array of numbers"),
     ("sand.analysis.fits.power_law([1, 2], [1, 2], groups=[1])", "groups must have one entry for each"),
     ("sand.analysis.quantities.measured(frame, np.ones(2))", "name = array of shape (2,) must be text"),
-    ("sand.analysis.census.census(7)", "frame = 7; give a frame"),
+    ("sand.analysis.frame_statistics.census(7)", "frame = 7; give a frame"),
 ]
 
 SLIPS = [*ARGUMENTS, *SIMULATIONS, *SETUPS, *EXPERIMENTS]

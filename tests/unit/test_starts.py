@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.constants import BOLTZMANN
+from sand.constants import BOLTZMANN
 from sand.experiments.scattering import flight
-from sand.kernels.pairs import DIRECTION1, DIRECTION2, SPIN1, SPIN2, sphere_pose
-from sand.kernels.rigid import ANGULAR1, TURN1, rigid_pose
-from sand.kernels.starts import R, U, draw_path
-from sand.physics.rotation import turned_back
+from sand.experiments.scattering.initial_conditions import R, U, draw_path
+from sand.experiments.scattering.two_aggregates import ANGULAR1, TURN1, rigid_pose
+from sand.experiments.scattering.two_spheres import DIRECTION1, DIRECTION2, SPIN1, SPIN2, sphere_pose
+from sand.numerics.quaternion import turned_back
 
 COUNT = 1500
 HEAT = BOLTZMANN * 100.0

@@ -9,9 +9,9 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.core.world import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
-from sand.files.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.files.state import GOALS, NUMBERS, STORED, check_state
+from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
+from sand.io.state_arrays import GOALS, NUMBERS, STORED, check_state
+from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz")))

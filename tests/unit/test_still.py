@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.errors import BadInput
-from sand.view.scene import camera
-from sand.view.still import still_picture
-from sand.view.style import rgb
+from sand.errors import BadInput
+from sand.plotting.render.scene import camera
+from sand.plotting.render.still import still_picture
+from sand.plotting.style import rgb
 
 from .stills import R, alike, at_pixel, frame_of
 
@@ -148,7 +148,7 @@ def test_grounds(dark):
 @pytest.mark.slow
 def test_the_same_frame_the_same_bits():
     """Two pictures of a frame agree byte for byte, as PNG, PDF and SVG."""
-    from sand.view.plots import picture_bytes
+    from sand.plotting.plots import picture_bytes
 
     frame = frame_of(np.arange(4)[:, None] * [2 * R, 0, 0], [(0, 1)], moment=np.eye(4, 3) * 1e-18)
     for form in ("png", "pdf", "svg"):
@@ -159,7 +159,7 @@ def test_the_same_frame_the_same_bits():
 @pytest.mark.slow
 def test_scale_bar_and_caption():
     """The bar is as long as it says; time and grains are told; the field's arrow is there if there is a field."""
-    from sand.view.style import pretty
+    from sand.plotting.style import pretty
 
     picture = still_picture(frame_of([[0, 0, 0]]), field=(0.0, 0.0, 1e-3))
     (bar,) = [line for line in picture.axes[0].get_lines() if line.get_gid() == "scale"]

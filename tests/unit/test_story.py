@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import sand
-from sand.analysis.lineage import SINGLE
 from sand.analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured
-from sand.files.gsd_index import ENTRY, read_index
-from sand.files.trajectory import TrajectoryWriter
-from sand.run.told import field_in
-from sand.view.packets import decode
-from sand.view.ranges import EXTREMES, PERCENTILES
-from sand.view.story import story_of
+from sand.analysis.tracking import SINGLE
+from sand.io.gsd_index import ENTRY, read_index
+from sand.io.trajectory import TrajectoryWriter
+from sand.viewer.dataset import story_of
+from sand.viewer.packets import decode
+from sand.viewer.ranges import EXTREMES, PERCENTILES
+from sand.viewer.simulation_view import field_in
 
 from .reels import append, contacts_of, reel
 
@@ -314,5 +314,5 @@ def test_clusters_that_end_as_the_largest_are_named(tmp_path, monkeypatch):
     bonds = [[(0, 1), (4, 5), (6, 7)], [(0, 1), (1, 2), (2, 3), (6, 7)]]
     path = reel(tmp_path / "a.gsd", bonds, 9)
     assert story_of(path).manifest()["colours"]["named"] == {"0": 0, "6": 1}
-    monkeypatch.setattr("sand.view.story.FOLLOWED", 17)
+    monkeypatch.setattr("sand.viewer.dataset.FOLLOWED", 17)
     assert story_of(path).manifest()["colours"]["named"] == {}

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sand
-from sand.core.errors import BadInput
-from sand.core.jit import kernel
+from sand.compiler.jit import kernel
+from sand.config.case import check_case
+from sand.errors import BadInput
 from sand.forces.base import GrainForce
-from sand.kernels.outside import is_ours
-from sand.physics import surroundings
-from sand.physics.surroundings import One, field_in_time, flux_density_at, uniform_field
-from sand.run.case import check_case
+from sand.forces.external import formulas as surroundings
+from sand.forces.external.formulas import One, field_in_time, flux_density_at, uniform_field
+from sand.forces.external.loops import is_ours
 
 EPS = np.finfo(float).eps
 component = st.integers(-100, 100).map(lambda n: n / 100)

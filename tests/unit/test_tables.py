@@ -2,7 +2,7 @@
 
 import csv
 
-from sand.files.table import GrowingTable, write_table
+from sand.io.table import GrowingTable, write_table
 
 ROWS = [[1, 0.1], [2, 0.2], [3, 1e-300], [4, 5e22]]
 HEAD = ("number", "size")

@@ -9,16 +9,16 @@ import sys
 import numpy as np
 import pytest
 
-from sand.core.jit import COMPILED, kernel
+from sand.compiler.jit import COMPILED, kernel
 
 if not COMPILED:
     pytest.skip("nothing is compiled", allow_module_level=True)
-from sand.core import lowering
+from sand.compiler import lowering
 
 COMPILE = """
 import json
 from numba import float64, int64
-from sand.core import jit
+from sand.compiler import jit
 
 def doubled(x):
     for i in range(x.size):

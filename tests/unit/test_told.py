@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sand
-from sand.run.told import field_in, field_of
-from sand.view.story import story_of
+from sand.viewer.dataset import story_of
+from sand.viewer.simulation_view import field_in, field_of
 
 
 @pytest.mark.compiled("fields")

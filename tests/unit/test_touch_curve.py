@@ -5,9 +5,9 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import sand
-from sand.core.stages import stage_arrays
-from sand.stepping.runge_kutta import STAGES, V, X
-from sand.stepping.touch import curve_at, first_entry, way_of_pair
+from sand.integrate.event_location import curve_at, first_entry, way_of_pair
+from sand.integrate.runge_kutta import STAGES, V, X
+from sand.state.stages import stage_arrays
 
 STEP = 0.3
 

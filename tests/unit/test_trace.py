@@ -6,9 +6,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from sand.view import trace
-from sand.view.spheres import Balls, Rods, draw
-from sand.view.trace import Canvas, Solids
+from sand.plotting.render import ray_casting as trace
+from sand.plotting.render.ray_casting import Canvas, Solids
+from sand.plotting.render.spheres import Balls, Rods, draw
 
 
 @pytest.mark.parametrize("w", [0.0, 1 / 300.0])

@@ -7,8 +7,8 @@ import sys
 import pint
 import pytest
 
-from sand.core.errors import BadInput
-from sand.core.units import in_unit, si, spoken
+from sand.errors import BadInput
+from sand.units import in_unit, si, spoken
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.core.world import (
+from sand.integrate.kernel_spec import Stop
+from sand.integrate.step_parts import SOON_PART
+from sand.neighbours.skin import farthest, largest_speeds
+from sand.simulation import assemble as translate
+from sand.state.state import (
     BROKEN,
     FAR_LEEWAY,
     FASTEST,
@@ -15,10 +19,6 @@ from sand.core.world import (
     REBUILT,
     SOON_LEEWAY,
 )
-from sand.kernels.watch import farthest, largest_speeds
-from sand.run import translate
-from sand.stepping.parts import SOON_PART
-from sand.stepping.rules import Stop
 
 
 def crowd(forces=None, margin="auto", **options):

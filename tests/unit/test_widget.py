@@ -5,10 +5,10 @@ import json
 import pytest
 
 import sand
-from sand.view import show
-from sand.view.packets import decode
-from sand.view.story import story_of
-from sand.view.widget import answered, widget
+from sand.viewer import show
+from sand.viewer.dataset import story_of
+from sand.viewer.notebook import answered, widget
+from sand.viewer.packets import decode
 
 from .pages import SCRIPT
 

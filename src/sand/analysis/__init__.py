@@ -8,9 +8,12 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ..core.errors import NoSuchAttribute, did_you_mean
+from ..errors import NoSuchAttribute, did_you_mean
 
-MODULES = ("books", "census", "clusters", "fits", "fractal", "lineage", "magnetism", "network", "quantities", "shape")
+MODULES = (
+    "clusters", "fits", "fractal", "frame_statistics", "ledger_columns", "magnetism", "network", "quantities", "shape",
+    "tracking",
+)  # fmt: skip
 """What there is to be used."""
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.box import Box
-from ..core.errors import BadInput
+from ..arguments import checked
+from ..box import Box
+from ..errors import BadInput
 
 FEW = 200
 """Grains and contacts together that are followed one by one sooner than SciPy makes its graph (130 µs)."""

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput
+from ..arguments import checked
+from ..errors import BadInput
 
 STEEPEST = 0.99
 """Degree from which on growth cannot be told from an exponential: z = 100."""

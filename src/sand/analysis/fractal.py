@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..core.arguments import checked
-from ..core.errors import BadInput
+from ..arguments import checked
+from ..errors import BadInput
 from .fits import PowerLaw, power_law
 from .shape import gyration_radius
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, did_you_mean, refuse_other
-from ..files.frame import MODES as SHARES
+from ..arguments import checked
+from ..errors import BadInput, did_you_mean, refuse_other
+from ..io.frame import MODES as SHARES
 from .clusters import cluster_labels, cluster_sizes
 from .magnetism import aggregate_moments
 from .shape import coordination

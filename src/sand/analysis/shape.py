@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput
-from ..kernels.discs import area_of_union
+from ..arguments import checked
+from ..errors import BadInput
+from .projection import area_of_union
 
 DIRECTIONS = 64
 """Of view that a projected area is averaged over; they are spread evenly over half a sphere."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
+from ..errors import BadInput
 from . import options, report
 
 
@@ -64,7 +64,7 @@ def _place(folder: Path, names: Sequence[str], overwrite: bool) -> Path:
 
 
 def _tell(content: dict[str, Any], place: Path | None) -> None:
-    from ..core.units import spoken
+    from ..units import spoken
 
     for one in content["ensembles"]:
         rows = [

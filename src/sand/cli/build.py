@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
-from ..run.limits import MOST_GRAINS
+from ..errors import BadInput
+from ..limits import MOST_GRAINS
 from . import options, report
 from .exits import DONE
 
@@ -53,7 +53,7 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -
     fractal               cluster-cluster, of a chosen dimension and prefactor
     rbd                   compact sphere cut from a random ballistic deposit
     """
-    from ..files.bodies import refuse_place, write_body
+    from ..io.bodies import refuse_place, write_body
 
     place = Path(out)
     refuse_place(place, overwrite=overwrite)
@@ -114,7 +114,7 @@ def _material(text: str) -> str | dict[str, float]:
 
 def described(body: Any) -> dict[str, Any]:
     """What is told of an aggregate: grains, radii, mass, size, dimension, contacts, energy of the moments."""
-    from ..files.bodies import contacts_of
+    from ..io.bodies import contacts_of
 
     size, dimension, error = _shape(body)
     contacts = len(contacts_of(body)["pair"])
@@ -149,7 +149,7 @@ def _shape(body: Any) -> tuple[float, float | None, float | None]:
 
 
 def _rows(content: dict[str, Any]) -> report.Rows:
-    from ..core.units import spoken
+    from ..units import spoken
 
     low, high = content["radius"]
     size = spoken(low, "m") if low == high else f"{spoken(low, 'm')} to {spoken(high, 'm')}"

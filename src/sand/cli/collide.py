@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
-from ..core.threads import set_threads
+from ..errors import BadInput
+from ..threads import set_threads
 from . import options, report
 from .exits import DONE, INTERRUPTED
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..core.errors import BadInput
+from ..errors import BadInput
 from . import options, report
 from .exits import DONE
 
@@ -27,8 +27,8 @@ def command(folder: str, form: str, out: str | None, frames: str, overwrite: boo
     vtk: a .vtp for each frame and a .pvd with their times, for ParaView; xyz: extended XYZ in ångström, for OVITO and
     ASE; lammps-dump and lammps-data: `units si`.
     """
-    from ..files.folder import TRAJECTORY
-    from ..run.opened import Opened
+    from ..io.run_folder import TRAJECTORY
+    from ..results import Opened
 
     run = Opened(folder)
     stem = Path(out) if out else Path(folder) / Path(TRAJECTORY).stem

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
-from ..core.threads import set_threads
+from ..errors import BadInput
+from ..threads import set_threads
 from . import options, report
 from .collide import read_seeds
 from .exits import DONE, INTERRUPTED
@@ -80,8 +80,8 @@ def boxes(
     """
     from concurrent.futures import BrokenExecutor
 
-    from ..experiments.boxes import grow
     from ..experiments.executors import executor_for
+    from ..experiments.growth_boxes import grow
     from .interrupt import Watch
 
     outcomes: dict[int, str] = {}

@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
-from ..files import folder as files
-from ..files.ledger import read_ledger
+from ..errors import BadInput
+from ..io import run_folder as files
+from ..io.ledger_table import read_ledger
 from . import options, report
 from .info_jobs import of_job_file, of_job_folder, of_other_case
 
@@ -74,7 +74,7 @@ def _ledger(path: Path) -> list[dict[str, float]]:
 
 def of_run(path: Path) -> Told:
     """A run's folder: how it ended or how far it is."""
-    from ..core.units import spoken
+    from ..units import spoken
 
     if not any((path / name).exists() for name in (files.CASE, files.ONE_COLLISION)):
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
@@ -112,8 +112,8 @@ def of_run(path: Path) -> Told:
 
 def of_case(path: Path) -> Told:
     """A case file, checked: what would run, and what would be chosen."""
-    from ..run.build import case_of, simulation_of
-    from ..run.case import read_case
+    from ..config.build import case_of, simulation_of
+    from ..config.case import read_case
 
     if (other := of_other_case(path)) is not None:
         return other
@@ -132,8 +132,8 @@ def of_case(path: Path) -> Told:
 
 def of_trajectory(path: Path) -> Told:
     """Frames, times and the last frame of a trajectory."""
-    from ..core.units import spoken
-    from ..files.trajectory import read_frames
+    from ..io.trajectory import read_frames
+    from ..units import spoken
 
     frames = read_frames(path)
     if not frames:
@@ -160,8 +160,8 @@ def of_trajectory(path: Path) -> Told:
 
 def of_checkpoint(path: Path) -> Told:
     """The state a checkpoint holds."""
-    from ..core.units import spoken
-    from ..files.checkpoint import read_checkpoint
+    from ..io.checkpoint import read_checkpoint
+    from ..units import spoken
 
     arrays, meta = read_checkpoint(path)
     grains, contacts = len(arrays["grains/radius"]), arrays["contacts/pair"].shape[1]
@@ -187,7 +187,7 @@ def of_summary(path: Path) -> Told:
 
 def of_ledger(path: Path) -> Told:
     """First and last row of the books."""
-    from ..core.units import spoken
+    from ..units import spoken
 
     ledger = _ledger(path)
     first, last = ledger[0], ledger[-1]

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import BadInput
-from ..files import folder as files
-from ..run.kinds import command_for
+from ..config.commands import command_for
+from ..errors import BadInput
+from ..io import run_folder as files
 from . import report
 
 UNFINISHED = {
@@ -47,9 +47,9 @@ def _collision_case(path: Path, content: dict[str, Any]) -> Told:
 
 
 def _growth_case(path: Path) -> Told:
+    from ..config.build import simulation_of
+    from ..config.case import check_case
     from ..experiments.growth_case import read_growth
-    from ..run.build import simulation_of
-    from ..run.case import check_case
 
     content, seeds = read_growth(path)
     simulation = report.with_notes(lambda: report.blame(path, lambda: simulation_of(check_case(content, ""), None)))
@@ -61,8 +61,8 @@ def _growth_case(path: Path) -> Told:
 
 
 def _scatter_case(path: Path) -> Told:
-    from ..core.units import spoken
-    from ..experiments.scattering_case import read_scattering
+    from ..experiments.scattering.case import read_scattering
+    from ..units import spoken
 
     case, flights = read_scattering(path)
     rows: report.Rows = [("job", case.measure.job)]

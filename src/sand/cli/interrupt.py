@@ -7,8 +7,8 @@ import sys
 import threading
 from typing import Any
 
-from ..run.observers import Observer
-from ..run.signals import STOPS
+from ..simulation.observers import Observer
+from ..simulation.signals import STOPS
 
 
 class Watch(Observer):

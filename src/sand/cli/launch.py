@@ -9,11 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..core.errors import BadInput, FilesFailed, Interrupted
-from ..core.units import spoken
-from ..files.folder import OURS, SUMMARY, is_used, read_json, read_toml
-from ..files.lock import LOCK, refuse_locked
-from ..run.kinds import BODIES
+from ..config.commands import BODIES
+from ..errors import BadInput, FilesFailed, Interrupted
+from ..io.lock import LOCK, refuse_locked
+from ..io.run_folder import OURS, SUMMARY, is_used, read_json, read_toml
+from ..units import spoken
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
 from .interrupt import Watch
@@ -69,7 +69,7 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
 
 def _only_drawing(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
     """The result of a run that was through when Ctrl-C came, but for its figure; None for any other."""
-    from ..run.outcome import Outcome, Result
+    from ..simulation.outcome import Outcome, Result
 
     if simulation.time < goal[0] and simulation.steps < goal[1]:
         return None
@@ -94,7 +94,7 @@ def _goal(simulation: Any, end: End | None) -> tuple[float, float]:
 
 def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
     """Tell how a run ended; returns the exit code."""
-    from ..run.outcome import Outcome
+    from ..simulation.outcome import Outcome
 
     outcome, when = result.outcome, f"t = {spoken(result.time, 's')}"
     summary = read_json(folder / SUMMARY)

@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from ..files.folder import checked_name
-from ..run.limits import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..io.run_folder import checked_name
+from ..limits import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 
 
 class PlaceName(click.ParamType):
@@ -63,7 +63,7 @@ def seconds(text: str | None, name: str = "--until") -> float | None:
     Raises:
         BadInput: wrong unit, not a number, not above 0, too short for anything to happen.
     """
-    from ..run.ends import duration
+    from ..simulation.stop import duration
 
     if text is None:
         return None

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from ..core.errors import BadInput, did_you_mean
+from ..errors import BadInput, did_you_mean
 from . import options, report
 from .exits import DONE
 
@@ -54,7 +54,7 @@ def command(
     histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with that of
     their cluster), field_alignment, material. As a colour of grains, size is the number of grains in their cluster.
     """
-    from ..files.folder import make_folder, replace_file
+    from ..io.run_folder import make_folder, replace_file
 
     place, names = _asked(Path(source), what, out, form, overwrite, how)
     drawn = report.with_notes(lambda: _drawn(_source(Path(source)), names, frame, form, how))
@@ -74,8 +74,8 @@ def _asked(
 ) -> tuple[Path, list[str]]:
     """The folder to write to and what to draw; `how` made ready for the picture.  Raises BadInput for all mistakes."""
     from ..analysis.quantities import GRAIN_NAMES
-    from ..view.plots import HISTORY
-    from ..view.still import check_picture
+    from ..plotting.plots import HISTORY
+    from ..plotting.render.still import check_picture
 
     wrong: list[str] = []
     alone = source.is_file()
@@ -115,8 +115,8 @@ def _size(text: str) -> tuple[int, int] | None:
 
 def _source(path: Path) -> Source:
     """Raises BadInput: there is nothing of ours."""
-    from ..files.trajectory import Frames
-    from ..run.opened import Opened
+    from ..io.trajectory import Frames
+    from ..results import Opened
 
     if not path.is_file():
         run = Opened(path)
@@ -129,8 +129,8 @@ def _source(path: Path) -> Source:
 
 def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """All files, in memory, so that none is written unless all can be drawn.  Raises BadInput."""
-    from ..view.plots import HISTORY, grains_figure, history_figure, picture_bytes
-    from ..view.still import still_picture
+    from ..plotting.plots import HISTORY, grains_figure, history_figure, picture_bytes
+    from ..plotting.render.still import still_picture
 
     history = _history(source) if any(name in HISTORY for name in names) else None
     one, field = None, None
@@ -150,10 +150,10 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
 
 def _history(source: Source) -> tuple[Any, int, float]:
     """The ledger, the number of grains, and their temperature at the start [K].  Raises BadInput."""
-    from ..analysis.books import Books
-    from ..files.folder import LEDGER
-    from ..files.ledger import read_ledger
-    from ..forces.dipoles import kinetic_temperature
+    from ..analysis.ledger_columns import Books
+    from ..forces.pair.dipoles import kinetic_temperature
+    from ..io.ledger_table import read_ledger
+    from ..io.run_folder import LEDGER
 
     books = Books.of(read_ledger(source.path / LEDGER))
     first = _frame(source, 0)

@@ -9,23 +9,8 @@ from collections.abc import Callable
 import click
 
 from .. import __version__
-from ..core.errors import SandError
-from . import (
-    analyse,
-    build,
-    cite,
-    collide,
-    export,
-    grow,
-    info,
-    options,
-    plot,
-    report,
-    resume,
-    run,
-    scatter,
-    view,
-)
+from ..errors import SandError
+from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
 from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
 
 COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)

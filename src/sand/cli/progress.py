@@ -6,8 +6,8 @@ import math
 import sys
 from typing import IO, Any
 
-from ..core.units import spoken
-from ..run.observers import Observer
+from ..simulation.observers import Observer
+from ..units import spoken
 
 FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
 """Fits into 80 columns."""

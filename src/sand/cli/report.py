@@ -15,9 +15,9 @@ from typing import Any, TypeVar
 
 import click
 
-from ..core.errors import BadInput
-from ..files.folder import CASE, ONE_COLLISION, OURS, plain, read_toml
-from ..run.kinds import command_for
+from ..config.commands import command_for
+from ..errors import BadInput
+from ..io.run_folder import CASE, ONE_COLLISION, OURS, plain, read_toml
 
 T = TypeVar("T")
 Rows = list[tuple[str, str]]
@@ -49,7 +49,7 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
     """Says so, once, if anything has to be compiled inside the block."""
     if quiet:
         return nullcontext()
-    jit = with_notes(lambda: import_module("sand.core.jit"))  # it may warn of the compiler or its cache
+    jit = with_notes(lambda: import_module("sand.compiler.jit"))  # it may warn of the compiler or its cache
     return jit.compiling(lambda: note("compiling the loops for this combination of forces, for this and later runs …"))
 
 
@@ -134,7 +134,7 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
     Args:
         end, last_step: time [s] and step that are to be reached, infinite where there is none.
     """
-    from ..core.units import spoken
+    from ..units import spoken
 
     every = simulation.frame_every
     if every is None:  # what `run` will choose
@@ -154,7 +154,7 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
 
 
 def _grains(grains: Any, temperature: float) -> str:
-    from ..core.units import spoken
+    from ..units import spoken
 
     def span(values: Any, say: Callable[[float], str]) -> str:
         least, most = say(float(values.min())), say(float(values.max()))
@@ -187,7 +187,7 @@ def _force(force: Any) -> str:
 
 def results(summary: dict[str, Any]) -> Rows:
     """The numbers of summary.json that people ask for first."""
-    from ..core.units import spoken
+    from ..units import spoken
 
     rate = summary["ns_per_grain_step"]
     wall = spoken_wall(summary["wall_seconds"])

@@ -7,10 +7,10 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
-from ..core.threads import set_threads
-from ..files.folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, read_json, read_toml
-from ..run.kinds import command_for
+from ..config.commands import command_for
+from ..errors import BadInput
+from ..io.run_folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, read_json, read_toml
+from ..threads import set_threads
 from . import options, report
 from .exits import DONE
 
@@ -85,7 +85,7 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
         content, seeds = read_growth(folder / CASE)
         return boxes(content, seeds or [], folder, scheduler=scheduler, **how)
     if kind == "scatter":
-        from ..experiments.scattering_case import read_scattering
+        from ..experiments.scattering.case import read_scattering
 
         del how["threads"]  # a flight is done by one
         read = read_scattering(folder / CASE)
@@ -98,7 +98,7 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
 
 def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as_json: bool) -> int:
     """Go on with a run; returns the exit code."""
-    from ..run.build import resume
+    from ..config.build import resume
     from .launch import End, launch
 
     simulation = report.with_notes(lambda: resume(place))
@@ -117,13 +117,13 @@ def _is_there(simulation: Any) -> bool:
 
 
 def _stand(simulation: Any) -> str:
-    from ..core.units import spoken
+    from ..units import spoken
 
     return spoken(simulation.time, "s")
 
 
 def _nothing_to_do(simulation: Any, folder: Path, *, quiet: bool, as_json: bool) -> int:
-    from ..files.folder import SUMMARY
+    from ..io.run_folder import SUMMARY
 
     if as_json:
         there = (folder / SUMMARY).exists()

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from ..core.errors import BadInput
-from ..core.threads import set_threads
-from ..files.folder import CASE, TRAJECTORY
+from ..errors import BadInput
+from ..io.run_folder import CASE, TRAJECTORY
+from ..threads import set_threads
 from . import options, report
 
 
@@ -52,8 +52,8 @@ def command(
     """
     end = options.seconds(until)
     set_threads(threads)
-    from ..run.build import simulation_of
-    from ..run.case import GrainsSection, read_case
+    from ..config.build import simulation_of
+    from ..config.case import GrainsSection, read_case
     from .launch import End, launch, refuse_folder
 
     if source is None and frame is not None:

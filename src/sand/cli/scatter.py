@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
+from ..errors import BadInput
 from . import options, report
 from .exits import DONE, INTERRUPTED
 
@@ -39,7 +39,7 @@ def command(
     every single flight. The numbers are the same for any number of workers and after any interruption; `sand resume`
     goes on after one.
     """
-    from ..experiments.scattering_case import read_scattering
+    from ..experiments.scattering.case import read_scattering
 
     if resume and overwrite:
         raise BadInput("--resume and --overwrite exclude each other")
@@ -74,9 +74,9 @@ def scatter(
     from concurrent.futures import BrokenExecutor
 
     from ..experiments.executors import executor_for
-    from ..experiments.scattering_job import Job
-    from ..files.folder import make_folder, read_toml
-    from ..files.lock import writing
+    from ..experiments.scattering.job import Job
+    from ..io.lock import writing
+    from ..io.run_folder import make_folder, read_toml
     from .interrupt import Watch
 
     bar = _Bar(not (quiet or as_json))
@@ -105,7 +105,7 @@ def scatter(
 
 def _refuse(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
     """What can be wrong with the folder, before anything is computed."""
-    from ..files.folder import FLIGHTS
+    from ..io.run_folder import FLIGHTS
     from .launch import refuse_folder
 
     if not resume:

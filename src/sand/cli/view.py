@@ -11,8 +11,8 @@ from typing import Any
 
 import click
 
-from ..core.errors import BadInput
-from ..files.folder import CASE, SUMMARY, TRAJECTORY
+from ..errors import BadInput
+from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
 from . import options, report
 from .exits import DONE
 from .export import chosen
@@ -59,7 +59,7 @@ def command(
     A run that is still going is followed; one that is still being compiled is waited for. The page is for this machine
     alone; Ctrl-C ends it.
     """
-    from ..view.page import chosen_frames, write_page
+    from ..viewer.html import chosen_frames, write_page
 
     target = None if html is None else Path(html)
     if target is not None:
@@ -84,9 +84,9 @@ def command(
 
 def _story(place: Path, talk: bool) -> Any:
     """Of the run in a folder, as soon as it has a frame.  Raises BadInput: there is none, or not within WAIT."""
-    from ..run.told import field_in
-    from ..view.run_files import run_folder
-    from ..view.story import story_of
+    from ..viewer.dataset import story_of
+    from ..viewer.run_files import run_folder
+    from ..viewer.simulation_view import field_in
 
     begun = time.monotonic()
     told = -TOLD_EVERY
@@ -157,8 +157,8 @@ class _Bar:
 
 def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
     """Until Ctrl-C."""
-    from ..view.browser import forget_pages, open_page
-    from ..view.server import Server
+    from ..viewer.browser import forget_pages, open_page
+    from ..viewer.server import Server
 
     server = Server(story, port)
     server.start()

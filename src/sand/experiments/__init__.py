@@ -8,9 +8,9 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from ..core.errors import NoSuchAttribute, did_you_mean
+from ..errors import NoSuchAttribute, did_you_mean
 
-MODULES = ("chain_impact", "collision", "kernel_table", "maps", "scattering")
+MODULES = ("chain_impact", "collision", "kernel_table", "scattering")
 """What there is to be used; the other modules serve these and the command line."""
 
 

@@ -13,15 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.clusters import cluster_labels
-from ..core.arguments import checked
-from ..core.errors import BadInput
-from ..core.material import Material
-from ..core.units import si
-from ..forces.contact import Contact
-from ..run.simulation import Simulation
+from ..arguments import checked
+from ..contact.model import Contact
+from ..errors import BadInput
+from ..integrate.verlet import Verlet
+from ..material import Material
 from ..setup.aggregates import chain, rest_distance
 from ..setup.encounters import joined
-from ..stepping.verlet import Verlet
+from ..simulation.simulation import Simulation
+from ..units import si
 
 SHAPES = ("T", "branched", "bent", "straight", "ring", "broken", "gone")
 PERPENDICULAR = 30.0

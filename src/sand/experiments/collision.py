@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput
-from ..core.grains import Grains
-from ..core.units import si
-from ..files.folder import TRAJECTORY
-from ..files.trajectory import Frames
+from ..arguments import checked
+from ..config.build import case_of, resume
+from ..contact.model import Contact
+from ..errors import BadInput
 from ..forces.base import Force
-from ..forces.contact import Contact
-from ..run.build import case_of, resume
-from ..run.simulation import Simulation
+from ..grains import Grains
+from ..integrate.adaptive import Adaptive
+from ..integrate.verlet import Verlet
+from ..io.run_folder import TRAJECTORY
+from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
-from ..stepping.adaptive import Adaptive
-from ..stepping.verlet import Verlet
+from ..simulation.simulation import Simulation
+from ..units import si
 from .collision_outcome import Approach, Collision, judged
 
 QUIET = 3
@@ -102,7 +102,7 @@ def gone_on_with(
     """The simulation of a collision that was interrupted, from the newest checkpoint in its folder.
 
     Raises:
-        BadInput: as `run.build.resume`; or the folder holds another collision than the one asked for.
+        BadInput: as `config.build.resume`; or the folder holds another collision than the one asked for.
     """
     simulation = resume(folder, **options)
     asked, begun = (case_of(one, math.inf, math.inf) for one in (prepared(start, forces, stepping), simulation))

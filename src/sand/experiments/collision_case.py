@@ -12,12 +12,8 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from ..core.errors import BadInput, did_you_mean
-from ..core.grains import Grains, moment_size
-from ..core.material import PRESETS, Material
-from ..files.folder import read_toml
-from ..run.bodies import body_from_file
-from ..run.case import (
+from ..config.bodies import body_from_file
+from ..config.case import (
     INTEGRATORS,
     ForcesSection,
     MaterialSection,
@@ -27,16 +23,20 @@ from ..run.case import (
     with_integrator,
     wrong_materials,
 )
-from ..run.kinds import BODIES, refuse_other_command
-from ..run.limits import MOST_GRAINS
-from ..run.mistakes import complaints
-from ..run.sections import Count, PlaceName, Seed
-from ..run.simulation import Simulation
+from ..config.commands import BODIES, refuse_other_command
+from ..config.errors import complaints
+from ..config.sections import Count, PlaceName, Seed
+from ..errors import BadInput, did_you_mean
+from ..grains import Grains, moment_size
+from ..integrate.verlet import Verlet
+from ..io.run_folder import read_toml
+from ..limits import MOST_GRAINS
+from ..material import PRESETS, Material
 from ..setup.aggregates import build
 from ..setup.encounters import offset_of
 from ..setup.moments import WAYS
 from ..setup.population import radii_of
-from ..stepping.verlet import Verlet
+from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, finished, gone_on_with, prepared
 
 Kind = Literal["grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"]

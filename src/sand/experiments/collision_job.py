@@ -8,8 +8,10 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import BadInput
-from ..files.folder import (
+from ..config.commands import command_for
+from ..errors import BadInput
+from ..io.lock import writing
+from ..io.run_folder import (
     CASE,
     COLLISION,
     FIGURE,
@@ -20,9 +22,7 @@ from ..files.folder import (
     write_json,
     write_toml,
 )
-from ..files.lock import writing
-from ..files.table import GrowingOutcomes
-from ..run.kinds import command_for
+from ..io.table import GrowingOutcomes
 from .collision import finished
 from .collision_case import CollisionCase, read_collision, run_seeds, with_whole_paths
 
@@ -103,8 +103,8 @@ class CollisionJob:
 
     def _many(self, seeds: list[int], executor: Executor | None, observers: Sequence[Any]) -> list[dict[str, Any]]:
         """Their outcomes alone, and a figure of all."""
-        from ..view.collisions import collision_figure
-        from ..view.figure import save
+        from ..plotting.collisions import collision_figure
+        from ..plotting.run_figure import save
 
         self._blamed(self.case.check)
         if not self.resume:

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels
 from ..analysis.shape import gyration_radius
-from ..core.grains import Grains
-from ..core.world import LOST
-from ..run.simulation import Simulation
+from ..grains import Grains
+from ..simulation.simulation import Simulation
+from ..state.state import LOST
 
 
 class Approach(NamedTuple):

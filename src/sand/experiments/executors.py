@@ -12,8 +12,8 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 
-from ..core.errors import BadInput
-from ..core.threads import set_threads
+from ..errors import BadInput
+from ..threads import set_threads
 
 ANSWER = 10.0
 """Seconds that a scheduler has for its first answer."""

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.census import COLUMNS, census
 from ..analysis.fits import PowerLaw, RateLaw, power_law, rate_law
 from ..analysis.fractal import Dimension, ensemble_dimension
-from ..core.errors import BadInput
-from ..files import folder as files
-from ..run.opened import Opened
-from .boxes import alike, grow, one_box
+from ..analysis.frame_statistics import COLUMNS, census
+from ..errors import BadInput
+from ..io import run_folder as files
+from ..results import Opened
+from .growth_boxes import alike, grow, one_box
 
 __all__ = ["Box", "Growth", "alike", "boxes_in", "grow", "growth_of", "one_box", "read_box"]
 

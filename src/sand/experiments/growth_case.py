@@ -7,12 +7,12 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
-from ..core.errors import BadInput
-from ..files.folder import read_toml
-from ..run.case import Case, check_case
-from ..run.kinds import refuse_other_command
-from ..run.mistakes import complaints
-from ..run.sections import Section, Seed
+from ..config.case import Case, check_case
+from ..config.commands import refuse_other_command
+from ..config.errors import complaints
+from ..config.sections import Section, Seed
+from ..errors import BadInput
+from ..io.run_folder import read_toml
 
 
 class GrowSection(Section):

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..analysis.fits import separation
-from ..core.errors import BadInput
-from ..files.folder import make_folder, write_json
-from ..files.table import write_table
+from ..errors import BadInput
+from ..io.run_folder import make_folder, write_json
+from ..io.table import write_table
 from .growth import Box, Growth, boxes_in, growth_of, read_box
 
 NAMES = ("analysis.json", "growth.csv", "aggregates.csv", "growth.png")
@@ -89,8 +89,8 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     Raises:
         FilesFailed: the disk is full, …
     """
-    from ..view.figure import save
-    from ..view.growth import growth_figure
+    from ..plotting.growth import growth_figure
+    from ..plotting.run_figure import save
 
     if not folder.exists():
         make_folder(folder)

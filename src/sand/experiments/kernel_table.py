@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput
-from ..files.folder import replace_file
-from ..files.table import write_table
+from ..arguments import checked
+from ..errors import BadInput
+from ..io.run_folder import replace_file
+from ..io.table import write_table
 from ..theory.kinetics import Kernel, Rate
 
 GRAM, CUBIC_CM = 1e3, 1e6

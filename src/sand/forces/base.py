@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from ..core.box import Box
-from ..core.grains import Grains
-from ..kernels.sums import NO_FAR_FORCE, FarSums, far_together
-from ..physics.surroundings import nothing, together
-from .cutoff import Choice
+from ..box import Box
+from ..grains import Grains
+from .external.formulas import nothing, together
+from .pair.cutoff import Choice
+from .pair.loops import NO_FAR_FORCE, FarSums, far_together
 
 
 @runtime_checkable
@@ -33,7 +33,7 @@ class Force(Protocol):
 
 @runtime_checkable
 class GrainForce(Force, Protocol):
-    """A force that acts on one grain at a time (physics/surroundings.py has the formulas).
+    """A force that acts on one grain at a time (forces/external/formulas.py has the formulas).
 
     Four more members are looked for; without them a force has neither a clock nor a place, nor a step of its own:
 
@@ -44,7 +44,7 @@ class GrainForce(Force, Protocol):
 
     Attributes:
         formula: `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], made by
-            `sand.core.jit.formula`.  The energy is one of place, moment and time, not of velocity or spin.
+            `sand.compiler.jit.formula`.  The energy is one of place, moment and time, not of velocity or spin.
     """
 
     formula: Callable
@@ -58,7 +58,7 @@ class GrainForce(Force, Protocol):
 
 @runtime_checkable
 class FarForce(Force, Protocol):
-    """A force between all grains, near and far (kernels/dipoles.py and kernels/central.py have the loops).
+    """A force between all grains, near and far (forces/pair/dipole_loops.py and forces/pair/inverse_square_loops.py have the loops).
 
     Attributes:
         column: the name of its energy in the ledger.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.errors import BadInput
-from ..core.units import si
+from ..errors import BadInput
+from ..units import si
 
 
 def components(value: Any) -> list[Any] | None:

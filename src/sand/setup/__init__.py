@@ -1,15 +1,15 @@
 """How simulations begin."""
 
+from ..neighbours.morton_order import in_space_order
 from .aggregates import KINDS, build, chain, grain, hexagonal, lattice
 from .ballistic import bcca, bpca
 from .deposit import rbd
 from .diffusion import dla, dlca
 from .encounters import Encounter, encounter, turned, turned_at_random
 from .fractal import fractal
-from .frame import Bonds, Start, from_frame
+from .from_frame import Bonds, Start, from_frame
 from .gas import gas
 from .moments import magnetic_energy, relaxed
-from .order import in_space_order
 from .population import Lognormal, PowerLaw
 
 pca = bpca

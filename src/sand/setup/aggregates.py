@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, did_you_mean, shown
-from ..core.grains import Grains
-from ..core.material import PRESETS, Material, as_material
-from ..core.units import MOST_GRAINS, si
+from ..arguments import checked
+from ..errors import BadInput, did_you_mean, shown
+from ..grains import Grains
+from ..material import PRESETS, Material, as_material
+from ..units import MOST_GRAINS, si
 from .ballistic import bcca, bpca
 from .deposit import rbd
 from .diffusion import dla, dlca

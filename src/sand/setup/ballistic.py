@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.grains import Grains
-from ..kernels.aggregation import begin_crowd, grow_ballistic
-from ..kernels.meeting import join_ballistic
+from ..arguments import checked
+from ..grains import Grains
+from ._kernels.aggregation import begin_crowd, grow_ballistic
+from ._kernels.cluster_cluster import join_ballistic
 from .growing import TRIES, halves, refuse_unmet, room
 from .moments import magnetised
 from .population import Population, at_home, population, streams, whole
@@ -67,7 +67,7 @@ def bcca(
 def joined(
     made: Population, joins: list[tuple[int, int, int]], goals: np.ndarray | None, seed: np.uint64, choices: int
 ) -> np.ndarray:
-    """Places (N, 3) [m] of grains whose clusters fly into each other, see `kernels.meeting.join_ballistic`.
+    """Places (N, 3) [m] of grains whose clusters fly into each other, see `setup._kernels.cluster_cluster.join_ballistic`.
 
     Args:
         goals: radius of gyration [m] wanted after each join; None: whatever chance gives.

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.box import Box
-from ..core.errors import BadInput
-from ..core.grains import Grains
-from ..core.material import Material
-from ..kernels.deposit import deposit
+from ..arguments import checked
+from ..box import Box
+from ..errors import BadInput
+from ..grains import Grains
+from ..material import Material
+from ._kernels.deposition import deposit
 from .ballistic import ADVICE
 from .growing import CELL, TRIES, refuse_unmet, room
 from .moments import magnetised

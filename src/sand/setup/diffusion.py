@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.grains import Grains
-from ..kernels.aggregation import begin_crowd, grow_diffusing
-from ..kernels.meeting import join_diffusing
+from ..arguments import checked
+from ..grains import Grains
+from ._kernels.aggregation import begin_crowd, grow_diffusing
+from ._kernels.cluster_cluster import join_diffusing
 from .ballistic import ADVICE
 from .growing import TRIES, halves, refuse_unmet, room
 from .moments import magnetised

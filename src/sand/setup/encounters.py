@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, shown
-from ..core.grains import Grains
-from ..core.units import MOST, in_unit, si
+from ..arguments import checked
+from ..errors import BadInput, shown
+from ..grains import Grains
+from ..units import MOST, in_unit, si
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput
-from ..core.grains import Grains
-from ..core.units import si
+from ..arguments import checked
+from ..errors import BadInput
+from ..grains import Grains
+from ..units import si
 from .ballistic import joined
 from .growing import halves
 from .moments import magnetised

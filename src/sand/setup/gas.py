@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.box import Box, Span, as_box
-from ..core.constants import BOLTZMANN, LIGHT
-from ..core.errors import BadInput, did_you_mean, warn
-from ..core.grains import Grains, moment_size, vector_for_all
-from ..core.material import Material
-from ..core.units import MELTED, MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
+from ..arguments import checked
+from ..box import Box, Span, as_box
+from ..constants import BOLTZMANN, LIGHT
+from ..errors import BadInput, did_you_mean, warn
+from ..grains import Grains, moment_size, vector_for_all
+from ..material import Material
+from ..units import MELTED, MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
 """Variance of each spin component in units of kT/I: mean rotational energy kT/2 in all, (3/2)kT, or none."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.errors import BadInput
-from ..kernels.crowd import Crowd, Stuff, places_for
+from ..errors import BadInput
+from ._kernels.hash_grid import Crowd, Stuff, places_for
 
 CELL = 3.0
 """Width of the lowest cells, in largest radii: no grain reaches over more than two of them."""

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.constants import MAGNETIC
-from ..core.errors import BadInput, did_you_mean, warn
-from ..core.grains import Grains, moment_size, vector_for_all
-from ..core.units import si
-from ..kernels.alignment import alignment_energy, relax
+from ..arguments import checked
+from ..constants import MAGNETIC
+from ..errors import BadInput, did_you_mean, warn
+from ..grains import Grains, moment_size, vector_for_all
+from ..units import si
+from ._kernels.moment_relaxation import alignment_energy, relax
 from .gas import directions
 
 WAYS = ("random", "aligned", "relaxed")

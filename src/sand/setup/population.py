@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, shown
-from ..core.grains import Grains, materials_of
-from ..core.material import Material, as_material
-from ..core.units import MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
-from ..kernels.crowd import Stuff
-from ..physics.adhesion import rest_overlap, rest_radius
-from ..physics.mixing import pairing_between
+from ..arguments import checked
+from ..contact.jkr import rest_overlap, rest_radius
+from ..contact.mixing import pairing_between
+from ..errors import BadInput, shown
+from ..grains import Grains, materials_of
+from ..material import Material, as_material
+from ..units import MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
+from ._kernels.hash_grid import Stuff
 
 WIDEST = 200.0
 """Largest radius over smallest; beyond it nearly all grains of a power law are too small to matter."""

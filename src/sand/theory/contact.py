@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, did_you_mean
-from ..core.material import Material, as_material
-from ..core.units import si
-from ..physics import adhesion
-from ..physics.contact import Bond, bond_between
-from ..physics.mixing import MIXING, pairing_between
+from ..arguments import checked
+from ..contact import jkr as adhesion
+from ..contact.law import Bond, bond_between
+from ..contact.mixing import MIXING, pairing_between
+from ..errors import BadInput, did_you_mean
+from ..material import Material, as_material
+from ..units import si
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def contact(
         material: of grain 1, or the name of a preset.
         radius: r1 [m] > 0.
         other, other_radius: of grain 2; the same as grain 1 by default.
-        mixing: rule for γ_eff, see `physics.mixing.MIXING`.
+        mixing: rule for γ_eff, see `contact.mixing.MIXING`.
         rolling_limit: ξ_c [m] instead of the materials' own.
 
     Raises:

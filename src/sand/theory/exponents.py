@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.errors import BadInput
+from ..errors import BadInput
 
 SUMS = 10
 """Sums over all sizes, at most, that rounding enters S or dS/dt through."""

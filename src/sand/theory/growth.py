@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, did_you_mean
-from ..core.units import si
+from ..arguments import checked
+from ..errors import BadInput, did_you_mean
+from ..units import si
 
 REMANENCE = 0.63
 """γ of Eq. 16: what the paper's simulations of accretional remanence gave."""

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.constants import BOLTZMANN
-from ..core.errors import BadInput, did_you_mean
-from ..core.units import si
+from ..arguments import checked
+from ..constants import BOLTZMANN
+from ..errors import BadInput, did_you_mean
+from ..units import si
 from . import growth, magnetic
 
 SPEEDS = ("impact", "thermal")

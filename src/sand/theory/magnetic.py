@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..core.arguments import checked
-from ..core.constants import BOLTZMANN, MAGNETIC
-from ..core.errors import BadInput
-from ..core.units import si
-from ..physics import dipole
+from ..arguments import checked
+from ..constants import BOLTZMANN, MAGNETIC
+from ..errors import BadInput
+from ..forces.pair import dipole_formulas as dipole
+from ..units import si
 
 
 @checked

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.arguments import checked
-from ..core.errors import BadInput, SandError, did_you_mean
-from ..core.units import si
+from ..arguments import checked
+from ..errors import BadInput, SandError, did_you_mean
+from ..units import si
 from .kinetics import Rate
 from .size_distribution import FULL, LARGE, LEFT, Growth
 

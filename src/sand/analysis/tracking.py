@@ -1,0 +1,125 @@
+"""Names of clusters that stay while clusters grow: the same aggregate has the same name in all frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import BadInput
+from .clusters import cluster_labels
+
+SINGLE = 0xFFFFFFFF
+"""Name of a grain that touches none."""
+CHECKPOINTS = 64 * 2**20
+"""Bytes of names that a `Lineage` keeps, about."""
+
+
+def named(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Names of the clusters of a frame, from the names that their grains had in the frame before.
+
+    A cluster takes the name that most of its grains had, the lower of two that are as many.  Where several claim one
+    name, the one with most grains of that name keeps it, of two that are as many the one with the lowest grain.  All
+    others get a new name: the number of their lowest grain, or the lowest number that neither is nor was a name.
+
+    Args:
+        before: names (N,) uint32, SINGLE for grains that touched none.
+        labels: cluster of each grain now (N,), 0…K−1, numbered by their lowest grain.
+
+    Returns:
+        Names (N,) uint32 below N, SINGLE for single grains.
+    """
+    count = len(labels)
+    sizes = np.bincount(labels)
+    of_cluster = np.full(len(sizes), SINGLE, dtype=np.int64)
+    voting = (sizes[labels] > 1) & (before != SINGLE)
+    if voting.any():
+        keys, votes = np.unique(labels[voting].astype(np.int64) * count + before[voting], return_counts=True)
+        cluster, name = keys // count, keys % count
+        ballot = _first(cluster, np.lexsort((name, -votes, cluster)))  # the name each cluster claims
+        cluster, name, votes = cluster[ballot], name[ballot], votes[ballot]
+        kept = _first(name, np.lexsort((cluster, -votes, name)))  # the cluster each name goes to
+        of_cluster[cluster[kept]] = name[kept]
+    new = np.flatnonzero((sizes > 1) & (of_cluster == SINGLE))
+    if new.size:
+        of_cluster[new] = _new_names(before, labels, of_cluster, new)
+    return of_cluster[labels].astype(np.uint32)
+
+
+def _first(group: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """The first of each group in an order that keeps groups together."""
+    head = np.ones(len(order), dtype=bool)
+    head[1:] = group[order][1:] != group[order][:-1]
+    return order[head]
+
+
+def _new_names(before: np.ndarray, labels: np.ndarray, taken: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Names of the clusters `new`; there are enough, because clusters then and now are at most N/2 each."""
+    count = len(labels)
+    free = np.ones(count, dtype=bool)
+    free[before[before != SINGLE]] = False
+    free[taken[taken != SINGLE]] = False
+    lowest = np.empty(len(taken), dtype=np.int64)
+    lowest[labels[::-1]] = np.arange(count)[::-1]  # the last one assigned stays
+    names = lowest[new]
+    others = ~free[names]
+    free[names] = False
+    names[others] = np.flatnonzero(free)[: others.sum()]
+    return names
+
+
+class Lineage:
+    """Names of the clusters in each of many frames, worked out from the first on.
+
+    Args:
+        count: number of grains N.
+        pairs: contacts (C, 2) of a frame by its number; BadInput for one that cannot be read, which leaves names as
+            they were before it, as one of other grains does.
+
+    Names of a frame depend on the frames before it alone, not on what was asked for before: they are kept of every m-th
+    frame, and m doubles when that takes more than CHECKPOINTS bytes.
+    """
+
+    def __init__(self, count: int, pairs: Callable[[int], np.ndarray]):
+        self.count, self._pairs = count, pairs
+        self._every = 1
+        self._most = max(CHECKPOINTS // (4 * max(count, 1)), 4)
+        self._kept: dict[int, np.ndarray] = {}
+        self._at: tuple[int, np.ndarray, np.ndarray] | None = None  # number, contacts, names of the last one asked for
+
+    def names(self, frame: int) -> np.ndarray:
+        """Names (N,) uint32 of the clusters in a frame ≥ 0, SINGLE for single grains."""
+        start, pairs, names = self._nearest(frame)
+        for number in range(start + 1, frame + 1):
+            now = self._readable(number)
+            if now is not None and (pairs is None or not np.array_equal(now, pairs)):
+                names = named(names, cluster_labels(self.count, now))
+            pairs = pairs if now is None else now
+            self._keep(number, names)
+        if pairs is not None:
+            self._at = (frame, pairs, names)
+        return names
+
+    def _readable(self, number: int) -> np.ndarray | None:
+        """Contacts of a frame; None if they cannot be had."""
+        try:
+            pairs = self._pairs(number)
+        except BadInput:
+            return None
+        return pairs if pairs.size == 0 or int(pairs.max()) < self.count else None
+
+    def _nearest(self, frame: int) -> tuple[int, np.ndarray | None, np.ndarray]:
+        """The last frame up to this one whose names are known, its contacts if they are, and its names."""
+        kept = max((k for k in self._kept if k <= frame), default=-1)
+        if self._at is not None and kept <= self._at[0] <= frame:
+            return self._at
+        if kept < 0:
+            return -1, None, np.full(self.count, SINGLE, dtype=np.uint32)
+        return kept, None, self._kept[kept]
+
+    def _keep(self, number: int, names: np.ndarray) -> None:
+        if number % self._every == 0:
+            self._kept[number] = names
+        while len(self._kept) > self._most:
+            self._every *= 2
+            self._kept = {k: v for k, v in self._kept.items() if k % self._every == 0}

@@ -1,0 +1,145 @@
+"""The space grains live in: open or periodic, axis by axis, centred on the origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .arguments import checked
+from .compiler.jit import formula
+from .errors import BadInput, shown
+from .units import si
+
+FEW = 200
+"""Points whose pairs are all looked at."""
+
+
+class Span(NamedTuple):
+    """What kernels know of a box: lengths L [m] and 1/L per axis, both 0 on an open axis."""
+
+    x: float
+    y: float
+    z: float
+    inverse_x: float
+    inverse_y: float
+    inverse_z: float
+
+
+@formula
+def nearest_image(v, span):
+    """The shortest periodic image of a separation v [m]; open axes stay as they are.
+
+    np.rint vectorises; a component of exactly L/2 may come back as either sign.
+    """
+    return (
+        v[0] - span.x * np.rint(v[0] * span.inverse_x),
+        v[1] - span.y * np.rint(v[1] * span.inverse_y),
+        v[2] - span.z * np.rint(v[2] * span.inverse_z),
+    )
+
+
+@checked
+@dataclass(frozen=True)
+class Box:
+    """Lengths of the periodic axes [m]; None for an open axis.  Build it with `open` or `periodic`."""
+
+    lengths: tuple[float | None, float | None, float | None] = (None, None, None)
+
+    def __post_init__(self) -> None:
+        if not all(length is None or (isinstance(length, (int, float)) and length > 0.0) for length in self.lengths):
+            raise BadInput(f"lengths = {shown(self.lengths)} must be lengths in m or None; see sand.Box.periodic")
+
+    @classmethod
+    def open(cls) -> Box:
+        """Free space."""
+        return cls()
+
+    @classmethod
+    @checked
+    def periodic(cls, x: Any, y: Any = "same", z: Any = "same") -> Box:
+        """A periodic box: one length for a cube, or one per axis with None for an open axis.
+
+        Raises:
+            BadInput: a length that is not positive, or of the wrong unit.
+        """
+        y = x if isinstance(y, str) and y == "same" else y
+        z = x if isinstance(z, str) and z == "same" else z
+        lengths = tuple(
+            None if v is None else si(v, "m", f"box length {axis}", above=0.0)
+            for v, axis in zip((x, y, z), "xyz", strict=True)
+        )
+        return cls(lengths)  # type: ignore[arg-type]
+
+    @property
+    def is_open(self) -> bool:
+        return all(v is None for v in self.lengths)
+
+    @property
+    def shortest(self) -> float:
+        """Length of the shortest periodic axis [m]; infinite in an open box."""
+        return min((v for v in self.lengths if v is not None), default=float("inf"))
+
+    @property
+    def volume(self) -> float:
+        """[m³]; infinite if any axis is open."""
+        return float(np.prod([v if v is not None else np.inf for v in self.lengths]))
+
+    @property
+    def span(self) -> Span:
+        """The same for kernels."""
+        return Span(
+            *(v if v is not None else 0.0 for v in self.lengths),
+            *(1.0 / v if v is not None else 0.0 for v in self.lengths),
+        )
+
+    def nearest(self, separation: np.ndarray) -> np.ndarray:
+        """Shortest images of separations (…, 3) [m]."""
+        separation = np.asarray(separation, dtype=np.float64)
+        return np.stack(nearest_image(np.moveaxis(separation, -1, 0), self.span), axis=-1)
+
+    def wrap(self, position: np.ndarray) -> np.ndarray:
+        """Positions (…, 3) [m] moved into −L/2 … L/2 on periodic axes."""
+        return self.nearest(position)
+
+    def close_pairs(self, position: np.ndarray, reach: float) -> np.ndarray:
+        """All pairs i < j of points (N, 3) [m] that are at most `reach` [m] apart, (P, 2), sorted.
+
+        On periodic axes the nearest images count; `reach` must be below half the shortest of them.
+        """
+        if len(position) <= FEW:
+            first, second = np.triu_indices(len(position), 1)
+            apart = self.nearest(position[first] - position[second])
+            return np.stack([first, second], axis=1)[(apart**2).sum(axis=1) <= reach**2]
+
+        from scipy.spatial import cKDTree  # slow to load
+
+        lengths = np.array([0.0 if v is None else v for v in self.lengths])
+        folded = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)
+        folded = np.where((lengths > 0.0) & (folded >= lengths), 0.0, folded)  # −1e-300 modulo L is L
+        pairs = cKDTree(folded, boxsize=lengths).query_pairs(reach, output_type="ndarray")
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+    def describe(self) -> str:
+        """One line for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
+        from .units import spoken
+
+        if self.is_open:
+            return "open"
+        return "periodic " + " x ".join("open" if v is None else spoken(v, "m") for v in self.lengths)
+
+
+def as_box(value: Any) -> Box:
+    """A Box from a Box, a length, or three lengths.  Raises BadInput."""
+    if isinstance(value, Box):
+        return value
+    if value is None:
+        return Box.open()
+    if isinstance(value, (list, tuple)) or np.ndim(value) == 1:
+        if len(value) != 3:
+            raise BadInput(
+                f'box = {shown(value)} must be one length or three; for an open axis give None, in a case file "open"'
+            )
+        return Box.periodic(*value)
+    return Box.periodic(value)

@@ -1,0 +1,1 @@
+"""Case files: validation, and the simulation that a case describes."""

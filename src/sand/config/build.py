@@ -1,0 +1,265 @@
+"""From a case to a simulation and back, and from a run's folder to the run that goes on."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+from ..arguments import checked
+from ..box import Box, as_box
+from ..errors import BadInput
+from ..forces.base import FarForce
+from ..grains import Grains
+from ..io.checkpoint import newest_checkpoint
+from ..io.lock import writing
+from ..io.run_folder import CASE, TRAJECTORY, read_toml
+from ..io.trajectory import Frames
+from ..material import Material
+from ..setup.from_frame import Start, from_frame
+from ..setup.gas import gas
+from ..simulation.simulation import Simulation
+from ..simulation.stop import SHORTEST
+from .bodies import body_from_file
+from .case import Case, check_case, read_case
+
+ENDS = (("run", "until"), ("run", "steps"))
+"""What may be changed in the case.toml of a run that goes on."""
+BODIES = (".xyz", ".extxyz", ".txt", ".dat")
+"""Endings of files that hold a body as text; all others are taken for trajectories."""
+
+
+def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
+    """The simulation a case describes.
+
+    Args:
+        out: folder for its files, None for none.
+        options: passed on to `Simulation` (observers, overwrite).
+
+    Raises:
+        BadInput: what only shows when grains, forces and box come together.
+    """
+    if case.grains.kind == "given":
+        raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
+    if case.grains.file is not None and out is not None:
+        _refuse_own_source(Path(case.grains.file), Path(out))
+    start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
+    simulation = Simulation(
+        start.grains,
+        case.forces.build(),
+        box=start.box,
+        stepping=case.stepping,
+        neighbours=case.neighbours,
+        seed=case.run.seed,
+        out=out,
+        frame_every=case.run.frame_every,
+        contacts=start.contacts,
+        **options,
+    )
+    simulation.recipe, simulation.origin = case.grains.recipe(), start.note
+    return simulation
+
+
+def _refuse_own_source(source: Path, out: Path) -> None:
+    """Raises BadInput where a run would write over what it starts from."""
+    own = source if source.is_dir() else source.parent
+    if out.exists() and own.exists() and out.samefile(own):
+        raise BadInput(f"{out} holds the run that grains are taken from; give another folder for the new one")
+
+
+def _of_gas(case: Case) -> Start:
+    section, library = case.grains, case.materials_by_name()
+    if not isinstance(section.material, str):
+        raise BadInput("grains.material of a gas must be one name")
+    grains = gas(
+        section.number,  # type: ignore[arg-type]
+        case.box.periodic,
+        radius=section.radius,
+        material=library[section.material],
+        moment=section.moment,
+        charge=section.charge,
+        temperature=section.temperature,
+        spins=section.spins,
+        seed=case.run.seed,
+    )
+    return Start(grains, None, as_box(case.box.periodic), "")
+
+
+def _of_file(case: Case) -> Start:
+    section, path = case.grains, Path(case.grains.file or "")
+    try:
+        if path.suffix in BODIES:
+            start = _of_body(case, path)
+        else:
+            start = from_trajectory(path, section.frame, case.materials_by_name())
+    except BadInput as error:
+        raise error.at("grains") from None
+    told = section.material if isinstance(section.material, list) else [section.material]
+    there = [m.name for m in start.grains.materials]
+    if "material" in section.model_fields_set and set(told) != set(there):
+        raise BadInput(f"grains.material: the file has {', '.join(there)}, not {', '.join(told)}; leave material out")
+    if case.box.periodic is not None and not same_box(case.box.periodic, start.box):
+        raise BadInput(
+            f"box: it is {case.box.periodic.describe()} here, but {start.box.describe()} in {section.file}; "
+            "leave [box] out, the file's is taken then"
+        )
+    return start
+
+
+def _of_body(case: Case, path: Path) -> Start:
+    """Grains of extended XYZ or of plain columns, as they lie there but for their centre of mass."""
+    section, library = case.grains, case.materials_by_name()
+    if not isinstance(section.material, str):
+        raise BadInput("material of grains in a file must be one name; several stand in the file itself")
+    own = library[section.material]
+    one = own if "material" in section.model_fields_set else None
+    body = body_from_file(path, one, section.radius, section.length, library, otherwise=own)
+    note = f"{path}, centred on the centre of mass"
+    return Start(body, None, as_box(case.box.periodic), note)
+
+
+def same_box(first: Box, second: Box) -> bool:
+    """True for the same axes, equal to the precision of a trajectory."""
+    pairs = list(zip(first.lengths, second.lengths, strict=True))
+    return all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
+
+
+def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]) -> Start:
+    """One frame of a trajectory (or of the run in a folder) as a new start, see `setup.from_frame`.
+
+    Raises:
+        BadInput: no such file or frame, or one that cannot be a start.
+    """
+    place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
+    frames = Frames(place)
+    try:
+        start = from_frame(frames[frame], materials)
+    except IndexError as error:
+        raise BadInput(f"{error}; -1 is the last") from None
+    finally:
+        frames.close()
+    return start._replace(note=f"{place}, {start.note}")
+
+
+def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str, Any]:
+    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back.
+
+    Args:
+        until: time [s] the run is to reach, or infinity.
+        last_step: number of the step it is to reach, or infinity.
+    """
+    materials = simulation.grains.materials
+    recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
+    names = [m.name for m in materials]
+    run = {
+        "until": max(until, SHORTEST),  # a run to time 0 can be gone on with, too
+        "steps": last_step if last_step == float("inf") else int(last_step),
+        "frame_every": simulation.frame_every,
+        "seed": int(simulation.seed or 0),
+    }
+    forces = {}
+    for force in simulation.forces:
+        forces[force.name] = dict(force.parameters())
+        if isinstance(force, FarForce):
+            radius = force.choose(simulation.start, simulation.box).radius
+            forces[force.name]["cutoff"] = "none" if radius is None else radius
+    lengths = ["open" if v is None else v for v in simulation.box.lengths]
+    return {
+        "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},
+        "box": {} if simulation.box.is_open else {"periodic": lengths},
+        "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
+        "materials": {
+            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
+        },
+        "forces": forces,
+        "stepping": simulation.stepping.parameters(),
+        "neighbours": simulation.neighbours.parameters(),  # as chosen at the start
+    }
+
+
+def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
+    """The case that a run began with, and in `meta` the end that its case.toml names now.
+
+    Raises:
+        BadInput: case.toml has been changed since, in more than its end.
+    """
+    path = folder / CASE
+    if "case" not in meta:  # of an early development version
+        return read_case(path)
+    begun: dict[str, Any] = meta["case"]
+    there = read_toml(path) if path.exists() else begun
+    case = check_case(there, str(path))
+
+    def fixed(content: dict[str, Any], name: str) -> Any:
+        """A table but for the end of the run, which may be changed."""
+        return {key: value for key, value in content.get(name, {}).items() if (name, key) not in ENDS}
+
+    was = check_case(begun, str(path))
+    for name in {**begun, **there}:
+        # earlier versions left out settings that are new: what counts is what is understood
+        meant = name not in {table for table, _ in ENDS} and getattr(was, name) == getattr(case, name)
+        if fixed(begun, name) != fixed(there, name) and not meant:
+            raise BadInput(
+                f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; put it "
+                f"back, or start a new run from the last frame: sand run CASE.toml --from {folder}"
+            )
+    meta["until"], meta["last_step"] = case.run.until, case.run.steps
+    return case
+
+
+@checked
+def resume(folder: str | Path, **options: Any) -> Simulation:
+    """A run's folder at its newest checkpoint as a simulation; `run()` goes on to the end once asked for.
+
+    Args:
+        folder: of an earlier run; new frames and rows are added to its files.
+        options: passed on to `Simulation` (observers).
+
+    Raises:
+        BadInput: no checkpoint, a damaged one, or a case that needs forces SAND does not know; or another process
+            writes to the folder.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise BadInput(f"there is no folder {place}")
+    if not any(place.glob("checkpoint-*.npz")):
+        raise BadInput(f"{place} holds no checkpoint to go on from")
+    with writing(place):
+        arrays, meta = newest_checkpoint(place)
+    case = _case_of_checkpoint(place, meta)
+    names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
+    library = case.materials_by_name()
+    try:
+        part = {name.split("/", 1)[1]: array for name, array in arrays.items() if name.startswith("grains/")}
+        grains = Grains(
+            part["position"].T,
+            part["radius"],
+            [library[names[i]] for i in part["material"]],
+            velocity=part["velocity"].T,
+            spin=part["spin"].T,
+            moment=part["body_moment"].T,
+            charge=part["charge"],
+            mass=part["mass"],
+        )
+    except (KeyError, IndexError) as error:
+        raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
+    if (grains.arrays.material != part["material"]).any():
+        raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
+    simulation = Simulation(
+        grains,
+        case.forces.build(),
+        box=case.box.periodic,
+        stepping=case.stepping,
+        neighbours=case.neighbours,
+        seed=case.run.seed,
+        out=place,
+        frame_every=case.run.frame_every,
+        restart=(arrays, meta),
+        **options,
+    )
+    if case.grains.kind != "given":
+        simulation.recipe = case.grains.recipe()
+    end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))
+    simulation.planned = (end, last)
+    return simulation

@@ -1,0 +1,1 @@
+"""The contact model: contact laws, and the loops that update, form, slip and break contacts."""

@@ -1,0 +1,99 @@
+"""Energies for the books.  Looked at between steps, never inside them."""
+
+from ..compiler.jit import kernel, loop
+from ..numerics.vec import across, axpy, dot, load, norm
+from ..state.state import CONTACTS
+from . import jkr as adhesion
+from . import law as law_of
+from .update import bond_at, damping_at, pose_at
+
+ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
+
+
+@loop
+def _kinetic(grains):
+    moving = spinning = 0.0
+    for i in range(grains.mass.size):
+        v, w = load(grains.velocity, i), load(grains.spin, i)
+        moving += 0.5 * grains.mass[i] * dot(v, v)
+        spinning += 0.5 * grains.inertia[i] * dot(w, w)
+    return moving, spinning
+
+
+@kernel
+def measure_energies(grains, contacts, count, span, follow, out):
+    """Fill `out` with the energies [J] named in ENERGIES."""
+    out[0], out[1] = _kinetic(grains)
+    for mode in range(4):
+        out[2 + mode] = 0.0
+    for c in range(count[CONTACTS]):
+        i, j = contacts.pair[0, c], contacts.pair[1, c]
+        r1, r2 = grains.radius[i], grains.radius[j]
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        overlap, bond = r1 + r2 - pose.distance, bond_at(contacts, c)
+        y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+        stored = law_of.energies(pose, overlap, y, r1, r2, law_of.stiffened(bond, y, follow))
+        for mode in range(4):
+            out[2 + mode] += stored[mode]
+
+
+CONTACT_ROWS = (
+    ("overlap", "m", "overlap δ, positive in compression"),
+    ("contact_radius", "m", "radius a of the contact"),
+    ("slide", "m", "size of the sliding displacement ζ"),
+    ("roll", "m", "size of the rolling displacement ξ"),
+    ("twist", "rad", "twisting angle φ"),
+    ("stretch_share", "1", "−δ over the stretch δ_c at which the contact breaks; negative in compression"),
+    ("slide_share", "1", "|ζ|/ζ_c"),
+    ("roll_share", "1", "|ξ|/ξ_c"),
+    ("twist_share", "1", "|φ|/φ_c"),
+    ("normal_force", "N", "normal force, push positive, damping included"),
+    ("slide_force", "N", "size of the sliding force"),
+    ("roll_torque", "N m", "size of the rolling torque"),
+    ("twist_torque", "N m", "twisting torque −k_t φ on grain 1 along n"),
+    ("energy_normal", "J", "stored by the normal mode"),
+    ("energy_sliding", "J", "stored by the sliding spring"),
+    ("energy_rolling", "J", "stored by the rolling spring"),
+    ("energy_twisting", "J", "stored by the twisting spring"),
+)
+"""What `measure_contacts` tells of each contact: name, unit, meaning."""
+CONTACT_VECTORS = (
+    ("slide_vector", "m", "sliding displacement ζ"),
+    ("roll_vector", "m", "rolling displacement ξ"),
+)
+CONTACT_LOADS = ("force", "torque1", "torque2")
+"""The vectors it tells after them, three rows each, and then the loads of the contact law, damping included."""
+
+
+@kernel
+def measure_contacts(grains, contacts, count, span, follow, out):
+    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
+    for c in range(count[CONTACTS]):
+        i, j = contacts.pair[0, c], contacts.pair[1, c]
+        r1, r2 = grains.radius[i], grains.radius[j]
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        overlap, plain = r1 + r2 - pose.distance, bond_at(contacts, c)
+        y = adhesion.root(adhesion.stretch(overlap, plain.pull_off_overlap))
+        bond = law_of.stiffened(plain, y, follow)
+        strain = law_of.strain_of(pose, overlap, r1, r2, bond)
+        xi = across(strain.roll, pose.n)
+        slide, roll = norm(strain.slide), norm(xi)
+        stored = law_of.energies(pose, overlap, y, r1, r2, bond)
+        out[0, c], out[1, c] = overlap, law_of.contact_radius(overlap, y, bond)
+        out[2, c], out[3, c], out[4, c] = slide, roll, strain.twist
+        out[5, c] = -overlap / bond.pull_off_overlap
+        out[6, c] = slide / bond.slide_limit if bond.slide_limit > 0.0 else 0.0
+        out[7, c] = roll / bond.roll_limit
+        out[8, c] = abs(strain.twist) / bond.twist_limit
+        out[9, c] = law_of.normal_force(overlap, y, bond) + damping_at(contacts, c)
+        out[10, c] = bond.slide_stiffness * slide
+        out[11, c] = bond.reduced_radius * bond.roll_stiffness * roll
+        out[12, c] = -bond.twist_stiffness * strain.twist
+        for mode in range(4):
+            out[13 + mode, c] = stored[mode]
+        push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, bond)
+        push = axpy(damping_at(contacts, c), pose.n, push)
+        for axis in range(3):
+            out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = push[axis], torque1[axis], torque2[axis]
+            out[17 + axis, c] = strain.slide[axis]
+            out[20 + axis, c] = xi[axis]

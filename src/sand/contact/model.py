@@ -1,0 +1,149 @@
+"""Contacts: sticking, sliding, rolling, twisting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arguments import checked
+from ..box import Box
+from ..errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..grains import Grains
+from ..material import Material
+from ..units import si, spoken
+from .jkr import rest_radius
+from .law import Pairing
+from .mixing import MIXING, pairing_between
+
+BEYOND = ("clamp", "release")
+STIFFNESS = ("frozen", "dt97")
+DAMPING = ("none", "constant", "viscoelastic")
+JKR_LIMIT = 0.3
+"""a0/R above which JKR is at the edge of its validity."""
+
+
+@checked
+@dataclass(frozen=True)
+class Contact:
+    """Grains that touch stick: JKR with sliding, rolling and twisting springs.
+
+    Args:
+        beyond: what happens to a tangential displacement beyond its limit. "clamp" leaves it at the limit;
+            "release" sets it to 0, the literal SAND (A.6), which halves the friction of rolling.
+        stiffness: of the tangential springs. "frozen" at the equilibrium radius a0, forces exact gradients;
+            "dt97" lets them follow the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³, which does not conserve
+            energy: what it makes or destroys is booked as `lost_stiffness`.
+        slide_factor, roll_factor, twist_factor: multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012 take 2.5, 8
+            and 1).
+        rolling_limit: critical rolling displacement ξ_c [m] for all contacts; None: the smaller of the two
+            materials' own.
+        damping: of the normal motion, "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013:
+            F = (2 T_vis E*/ν²) a dδ/dt; ν² is ν1 ν2 for unequal materials).
+        damping_constant: c [kg/s] ≥ 0, for "constant".
+        viscous_time: T_vis [s] ≥ 0, for "viscoelastic"; 1.25e-11 s is for silica.
+        mixing: γ_eff of unequal materials, "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
+
+    Raises:
+        BadInput: unknown words and numbers out of range, one line each.
+    """
+
+    beyond: str = "clamp"
+    stiffness: str = "frozen"
+    slide_factor: Any = 1.0
+    roll_factor: Any = 1.0
+    twist_factor: Any = 1.0
+    rolling_limit: Any = None
+    damping: str = "none"
+    damping_constant: Any = 0.0
+    viscous_time: Any = 1.25e-11
+    mixing: str = "geometric"
+
+    __pydantic_config__ = FORBID_EXTRA
+    name = "contact"
+    references = "Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997; Dominik & Nübold 2002, A.5–A.6"
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        words = {"beyond": BEYOND, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
+        for key, allowed in words.items():
+            if getattr(self, key) not in allowed:
+                given = getattr(self, key)
+                problems.append(f"contact: {key} = {given!r}; {did_you_mean(str(given), allowed)}")
+        units = {"slide_factor": "1", "roll_factor": "1", "twist_factor": "1"}
+        units |= {"damping_constant": "kg/s", "viscous_time": "s"}
+        for key, unit in units.items():
+            try:
+                object.__setattr__(self, key, si(getattr(self, key), unit, f"contact: {key}", least=0.0))
+            except BadInput as error:
+                problems += error.problems
+        try:
+            if self.rolling_limit is not None:
+                limit = si(self.rolling_limit, "m", "contact: rolling_limit", above=0.0)
+                object.__setattr__(self, "rolling_limit", limit)
+        except BadInput as error:
+            problems += error.problems
+        if not problems and self.damping == "constant" and self.damping_constant == 0.0:
+            problems.append("contact: damping = 'constant' needs a damping_constant above 0, such as '1e-9 kg/s'")
+        if problems:
+            raise BadInput(problems)
+
+    def parameters(self) -> dict[str, Any]:
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+    def pairing(self, a: Material, b: Material) -> Pairing:
+        """What two materials make together under these settings."""
+        return pairing_between(
+            a,
+            b,
+            mixing=self.mixing,
+            rolling_limit=self.rolling_limit,
+            factors=(self.slide_factor, self.roll_factor, self.twist_factor),
+            damping=self.damping_constant if self.damping == "constant" else 0.0,
+            viscous_time=self.viscous_time if self.damping == "viscoelastic" else 0.0,
+        )
+
+    def pairings(self, materials: Sequence[Material]) -> np.ndarray:
+        """The (10, M, M) table of `Pairing` for every two materials."""
+        table = [[self.pairing(a, b) for b in materials] for a in materials]
+        return np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0))
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """A warning for each pair of materials whose contacts are too wide for JKR."""
+        problems = [
+            f"material '{m.name}' has no surface energy; give one, 0 for none: "
+            f'{m.name} with surface_energy = "… J/m^2"'
+            for m in grains.materials
+            if m.surface_energy is None
+        ]
+        if self.damping == "viscoelastic":
+            problems += [
+                f"material '{m.name}' has poisson_ratio {m.poisson_ratio:g}: viscoelastic damping needs one above 0"
+                for m in grains.materials
+                if not m.poisson_ratio > 0.0
+            ]
+        if problems:
+            raise BadInput(problems)
+        smallest = [float(grains.radius[grains.material == k].min()) for k in range(len(grains.materials))]
+        return [
+            text
+            for k, a in enumerate(grains.materials)
+            for j in range(k + 1)
+            if (text := self._too_wide(a, smallest[k], grains.materials[j], smallest[j]))
+        ]
+
+    def _too_wide(self, a: Material, r1: float, b: Material, r2: float) -> str:
+        """A warning if contacts of these grains are at the edge of JKR, else nothing."""
+        reduced = r1 * r2 / (r1 + r2)
+        both = self.pairing(a, b)
+        ratio = rest_radius(both.surface_energy, reduced, both.modulus) / reduced
+        if ratio <= JKR_LIMIT:
+            return ""
+        names = a.name if a is b else f"{a.name} and {b.name}"
+        radii = spoken(r1, "m") if r1 == r2 else f"{spoken(r1, 'm')} and {spoken(r2, 'm')}"
+        return (
+            f"contacts of {names} grains of radius {radii} have a0/R = {ratio:.2f}; "
+            f"JKR assumes a0/R below {JKR_LIMIT}: take forces and energies as estimates"
+        )

@@ -1,0 +1,76 @@
+"""Sliding, rolling, twisting: displacements, springs, limits (Dominik & Tielens 1995, 1996, 1997).
+
+Contact pointers n1, n2 are unit vectors from each centre to the contact, fixed to the grains; unstrained
+n1 = −n, n2 = +n with n pointing from grain 2 to grain 1 (the paper's e_perp, Eq. 44).
+"""
+
+import math
+
+from ..compiler.jit import formula
+from ..numerics.vec import add, axpy, dot, scale, sub
+
+
+@formula
+def sliding(n1, n2, n, r1, r2):
+    """Sliding displacement ζ [m] and d·n [m] with d = r1 n1 − r2 n2 (ζ = −δ_parallel of Eq. 46)."""
+    d = sub(scale(r1, n1), scale(r2, n2))
+    along = dot(d, n)
+    return axpy(-along, n, d), along
+
+
+@formula
+def rolling(n1, n2, reduced_radius):
+    """Rolling displacement ξ = R (n1 + n2) [m] (minus Eq. 47, which points from the contact to the axis)."""
+    return scale(reduced_radius, add(n1, n2))
+
+
+@formula
+def twisting_rate(n, spin1, spin2, across_speed, distance, dt):
+    """dφ/dt = (ω1 − ω2)·n [rad/s] with n taken in the middle of the step.
+
+    n is the axis at the end of the step; half a step earlier it was n − (dt/2) v_across/D to second order.
+    """
+    turn = sub(spin1, spin2)
+    return dot(turn, n) - 0.5 * dt / distance * dot(turn, across_speed)
+
+
+@formula
+def pointers_for(slide, roll, n, r1, r2):
+    """Unit pointers n1, n2 that have just these tangential displacements; exact for any radii.
+
+    t1 = ξ/r1 + ζ/(r1+r2), t2 = ξ/r2 − ζ/(r1+r2), n1 = −n√(1−t1²) + t1, n2 = n√(1−t2²) + t2
+    """
+    shared = scale(1.0 / (r1 + r2), slide)
+    t1 = axpy(1.0 / r1, roll, shared)
+    t2 = sub(scale(1.0 / r2, roll), shared)
+    n1 = axpy(-math.sqrt(max(1.0 - dot(t1, t1), 0.0)), n, t1)
+    n2 = axpy(math.sqrt(max(1.0 - dot(t2, t2), 0.0)), n, t2)
+    return n1, n2
+
+
+@formula
+def slide_stiffness(shear, a0):
+    """k_s = 8 G* a₀ [N/m], 1/G* = Σ (2−ν)/G."""
+    return 8.0 * shear * a0
+
+
+@formula
+def roll_stiffness(pull_off, reduced_radius):
+    """k_r = 4 F_c/R = 12πγ [N/m]."""
+    return 4.0 * pull_off / reduced_radius
+
+
+@formula
+def twist_stiffness(twist_shear, a0):
+    """k_t = (16/3) G′ a₀³ [N m], 1/G′ = Σ 1/G."""
+    return 16.0 / 3.0 * twist_shear * a0 * a0 * a0
+
+
+@formula
+def slide_limit(shear, twist_shear, a0):
+    """ζ_c = a₀ G′/(16π G*) [m]; (2−ν) a₀/(16π) for equal grains."""
+    return a0 * twist_shear / (16.0 * math.pi * shear)
+
+
+TWIST_LIMIT = 1.0 / (16.0 * math.pi)
+"""φ_c [rad]"""

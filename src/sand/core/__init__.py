@@ -1,1 +1,0 @@
-"""The ground floor: compiler door, vectors, units, errors, and the data a simulation is made of."""

@@ -1,0 +1,150 @@
+"""Case files of `sand scatter`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError, field_validator
+
+from ...config.case import MaterialSection, Section
+from ...config.commands import refuse_other_command
+from ...config.errors import complaints
+from ...config.sections import PlaceName, Seed
+from ...errors import BadInput
+from ...io.run_folder import read_toml
+from ...material import PRESETS
+from ..collision_case import BodySection, Kind, wrong_bodies
+from .encounters import Flight
+from .problem import Asking, flight, impact_parameter
+
+
+class ScatterBody(BodySection):
+    """[projectile] and [target]: a grain, or an aggregate as in `sand collide`."""
+
+    kind: Kind = "grain"
+
+
+class FlightSection(Section):
+    """[flight]: how they meet; every key as in `sand.experiments.scattering.flight`."""
+
+    temperature: Any = 0.0
+    speed: Any = None
+    speed_unit: str = "m/s"
+    spin: Any = "none"
+    start: Any = "auto"
+    start_shape: str = "plane"
+    orientation: str = "random"
+    target_velocity: Any = None
+    field: Any = None
+    escape: Any = "auto"
+    outcome: str = "hit"
+    tolerance: Any = 1e-8
+
+
+class MeasureSection(Section):
+    """[measure]: what is wanted, how well."""
+
+    job: Literal["cross-section", "map", "trajectories"] = "cross-section"
+    relative_error: Any = 0.02
+    impact_parameters: list[Any] = Field(default_factory=list)
+    spins: list[Any] = Field(default_factory=list)
+    cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
+    per_cell: Annotated[int, Field(ge=1, le=10**9, strict=True)] = 64
+    seed: Seed = 0
+    out: PlaceName | None = None
+
+    @field_validator("relative_error")
+    @classmethod
+    def _error(cls, value: Any) -> Any:
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or not 1e-4 <= value <= 0.5:
+            raise ValueError(f"relative_error = {value!r} must be a number in 1e-4 … 0.5")
+        return value
+
+
+class ScatterCase(Section):
+    """A whole case file of `sand scatter`."""
+
+    projectile: ScatterBody
+    target: ScatterBody | None = None
+    flight: FlightSection
+    measure: MeasureSection = MeasureSection()
+    materials: dict[str, MaterialSection] = Field(default_factory=dict)
+
+    def flights(self) -> list[Flight]:
+        """One set-up for each speed, and for each of `spins` of trajectories.  Raises BadInput, all mistakes."""
+        ask = Asking()
+        materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
+        bodies = {
+            name: ask.take(lambda body=body, k=k: body.build(materials, 2 * self.measure.seed + k))  # type: ignore[misc]
+            for k, (name, body) in enumerate((("projectile", self.projectile), ("target", self.target)))
+            if body is not None
+        }
+        given = self.flight.model_dump()
+        speeds = _list(given.pop("speed"))
+        spins = self.measure.spins or [given.pop("spin")]
+        given.pop("spin", None)
+        if not speeds:
+            ask.problems.append("flight.speed is missing; give one, or a list of them")
+        if len(speeds) > 1 and self.measure.job == "trajectories":
+            ask.problems.append("flight.speed: trajectories are flown at one speed; give one")
+        if self.measure.job != "trajectories":
+            ask.problems += [
+                f"measure.{name} is for job = 'trajectories'; leave it out"
+                for name in ("spins", "impact_parameters")
+                if getattr(self.measure, name)
+            ]
+        found = [
+            ask.take(lambda speed=speed, spin=spin: flight(**bodies, **given, speed=speed, spin=spin))  # type: ignore[misc]
+            for spin in spins
+            for speed in speeds
+            if bodies.get("projectile") is not None
+        ]
+        b = [
+            ask.take(lambda value=value: impact_parameter(value, found[0], "measure.impact_parameters"))  # type: ignore[misc]
+            for value in self.measure.impact_parameters
+            if found and found[0] is not None
+        ]
+        if self.measure.job == "trajectories" and not b and not ask.problems:
+            ask.problems.append("measure.impact_parameters is missing: which trajectories? for example ['0.95 b_max']")
+        ask.problems = list(dict.fromkeys(ask.problems))  # once, not for every speed
+        ask.done()
+        if self.measure.job == "map":
+            found.sort(key=lambda one: one.speed)
+            if len({one.speed for one in found}) < len(found):
+                raise BadInput("flight.speed: a map needs speeds that differ")
+        return found
+
+    def impact_parameters(self, flying: Flight) -> list[float]:
+        """[m]"""
+        return [impact_parameter(value, flying) for value in self.measure.impact_parameters]
+
+
+def _list(value: Any) -> Sequence[Any]:
+    if value is None:
+        return []
+    return list(value) if isinstance(value, (list, tuple, np.ndarray)) else [value]
+
+
+def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
+    """Read and check a case file of `sand scatter`.
+
+    Raises:
+        BadInput: every mistake of the file, one line each, with its place.
+    """
+    content = read_toml(path)
+    refuse_other_command(content, path, "scatter")
+    problems = wrong_bodies(content)
+    try:
+        case = ScatterCase.model_validate(content)
+    except ValidationError as error:
+        problems += [line for slip in error.errors() for line in complaints(slip, ScatterCase, {})]
+        raise BadInput(f"{path}: {problem}" for problem in problems) from None
+    if problems:
+        raise BadInput(f"{path}: {problem}" for problem in problems)
+    try:
+        return case, case.flights()
+    except BadInput as error:
+        raise error.at(str(path)) from None

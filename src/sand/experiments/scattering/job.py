@@ -1,0 +1,177 @@
+"""What `sand scatter` does with a case: fly, keep each piece of work, put results and figure into the folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadInput
+from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_toml, write_json, write_toml
+from ...io.table import GrowingTable, write_table
+from ...plotting.run_figure import save
+from ...simulation.run_writer import versions
+from ..collision_case import with_whole_paths
+from .case import ScatterCase
+from .cross_sections import measure, seed_of
+from .encounters import Flight
+from .flights import COLUMNS, Trajectory, trajectory
+from .maps import probability_map
+
+POINTS = 1001
+"""Of a trajectory in results.csv, at equal times."""
+Watch = Callable[[str, float], None]
+"""Called with a line on how far things are, and the part that is done."""
+
+
+@dataclass
+class Job:
+    """One case in its folder.
+
+    Args:
+        case, flights: from `read_scattering`.
+        content: of the case file, as read.
+        folder: there already.
+        resume: go on with the flights that lie there.
+
+    Raises:
+        BadInput: the folder belongs to another case.
+    """
+
+    case: ScatterCase
+    flights: list[Flight]
+    content: dict[str, Any]
+    folder: Path
+    resume: bool = False
+
+    def __post_init__(self) -> None:
+        place = self.folder / CASE
+        self.content = with_whole_paths(self.content)
+        if self.resume and place.exists():
+            if with_whole_paths(read_toml(place)) != self.content:
+                raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
+        else:
+            write_toml(place, self.content, "sand scatter: what was asked for; sand resume reads it")
+        self.before: dict[int, list[list[float]]] = {}
+        self.table = None
+        if self.case.measure.job != "trajectories":
+            self.table = GrowingTable(self.folder / FLIGHTS, ("setup", *COLUMNS), resume=self.resume)
+            for row in self.table.rows:
+                self.before.setdefault(int(row[0]), []).append(row[1:])
+
+    def run(self, executor: Executor | None = None, watch: Watch | None = None) -> dict[str, Any]:
+        """All of it; returns what scattering.json holds."""
+        told = {
+            "cross-section": self._cross_sections,
+            "map": self._map,
+            "trajectories": self._trajectories,
+        }[self.case.measure.job](executor, watch or (lambda text, part: None))
+        if self.table is not None:
+            self.table.sort()
+        content = {"job": self.case.measure.job, "seed": self.case.measure.seed, "versions": versions(), **told}
+        write_json(self.folder / SCATTERING, content)
+        return content
+
+    def _keep(self, setup: int, rows: np.ndarray) -> None:
+        assert self.table is not None
+        self.table.add([setup, *row] for row in rows.tolist())
+
+    def _cross_sections(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
+        from ...plotting.scattering import sigma_figure
+
+        found = []
+        for k, one in enumerate(self.flights):
+            part = k / len(self.flights)
+            found.append(
+                measure(
+                    one,
+                    relative_error=self.case.measure.relative_error,
+                    seed=seed_of(self.case.measure.seed, k),
+                    executor=executor,
+                    known=self.before.get(k, ()),
+                    keep=lambda rows, k=k: self._keep(k, rows),  # type: ignore[misc]
+                    watch=lambda n, s, e, part=part, one=one: watch(  # type: ignore[misc]
+                        f"{one.speed:.4g} m/s: {n} flights, sigma = {s:.4g} +- {e:.1g} m^2", part
+                    ),
+                )
+            )
+        rows = [one.to_dict() for one in found]
+        flat = [{k: v for k, v in row.items() if k not in ("profile", "interval", "seconds")} for row in rows]
+        write_table(self.folder / RESULTS, flat)
+        save(sigma_figure(found, _title(self.flights)), self.folder / FIGURE)
+        return {"cross_sections": rows}
+
+    def _map(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
+        from ...plotting.scattering import map_figure
+
+        settings = self.case.measure
+        found = probability_map(
+            self.flights,
+            cells=settings.cells,
+            per_cell=settings.per_cell,
+            seed=settings.seed,
+            executor=executor,
+            known=self.before,
+            keep=self._keep,
+            watch=lambda n, total: watch(f"{n} of {total} flights", n / total),
+        )
+        rows = found.to_rows()
+        write_table(self.folder / RESULTS, rows)
+        save(map_figure(found, _title(self.flights)), self.folder / FIGURE)
+        return {"cells": rows, "r1_plus_r2": found.geometric}
+
+    def _trajectories(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
+        from ...plotting.scattering import trajectories_figure
+
+        groups: list[list[Trajectory]] = []
+        for k, one in enumerate(self.flights):
+            groups.append([])
+            for n, b in enumerate(self.case.impact_parameters(one)):
+                groups[-1].append(trajectory(one, b, seed=self.case.measure.seed, stratum=k, number=n))
+                watch(f"flight {n + 1} of set-up {k + 1}", k / len(self.flights))
+        write_table(self.folder / RESULTS, [row for k, group in enumerate(groups) for row in _path_rows(k, group)])
+        names = [str(spin) for spin in self.case.measure.spins or [self.case.flight.spin]]
+        save(trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights)), self.folder / FIGURE)
+        kept = ("end", "impact_parameter", "speed", "closest", "exchanged", "drift")
+        told = [
+            {"setup": k, **{name: getattr(one, name) for name in kept}}
+            for k, group in enumerate(groups)
+            for one in group
+        ]
+        return {"trajectories": told, "b_max": self.flights[0].scales.capture}
+
+
+def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
+    """Time and positions of both, `POINTS` times of each flight."""
+    rows = []
+    for n, one in enumerate(group):
+        times = np.linspace(0.0, one.time[-1], POINTS)
+        projectile, target = one.at(times)
+        for t, p, q in zip(times, projectile, target, strict=True):
+            row: dict[str, Any] = {"setup": setup, "flight": n, "time": float(t)}
+            row |= {f"projectile_{a}": float(p[k]) for k, a in enumerate("xyz")}
+            rows.append(row | {f"target_{a}": float(q[k]) for k, a in enumerate("xyz")})
+    return rows
+
+
+def _title(flights: list[Flight]) -> str:
+    """What is scattered, in a line."""
+    one = flights[0]
+    from ...units import spoken
+
+    def body(grains: Any) -> str:
+        names = ", ".join(m.name for m in grains.materials)
+        radius = spoken(float(grains.radius.mean()), "m")
+        return f"{names}, r = {radius}" if len(grains) == 1 else f"{len(grains)} grains of {names}, r = {radius}"
+
+    parts = [body(one.projectile)]
+    if body(one.target) != parts[0]:
+        parts.append(body(one.target))
+    heat = f", {spoken(one.temperature, 'K')}" if one.temperature > 0.0 else ""
+    shape = "sphere" if one.sphere else "plane"
+    far = [spoken(f(each.distance for each in flights), "m") for f in (min, max)]
+    return f"{' on '.join(parts)}{heat}; starts on a {shape}, {' to '.join(dict.fromkeys(far))}"

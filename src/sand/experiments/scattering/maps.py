@@ -1,0 +1,118 @@
+"""Probability to meet in the plane of speed and impact parameter (Figure 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ...arguments import checked
+from ...errors import BadInput
+from .cross_sections import addressed, flown, seed_of
+from .encounters import Flight
+from .flight_driver import HIT
+from .flights import COLUMNS
+from .sampling import HEADROOM, Task, wilson
+
+END, STRATUM = COLUMNS.index("end"), COLUMNS.index("stratum")
+
+
+@dataclass(frozen=True)
+class ProbabilityMap:
+    """P(hit | b, v); SI.
+
+    Attributes:
+        speeds: (V,) [m/s]; edges: of the cells in b, (V, B + 1) [m].
+        hits, flights: (V, B).
+        capture: b_max of each speed (V,) [m] (Eqs. 12, 13).
+        geometric: r1 + r2 [m].
+    """
+
+    speeds: np.ndarray
+    edges: np.ndarray
+    hits: np.ndarray
+    flights: np.ndarray
+    capture: np.ndarray
+    geometric: float
+
+    @property
+    def probability(self) -> np.ndarray:
+        """(V, B)"""
+        return self.hits / np.maximum(self.flights, 1)
+
+    def interval(self, z: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """Wilson's bounds (V, B)."""
+        return wilson(self.hits, self.flights, z)
+
+    def to_rows(self) -> list[dict[str, float]]:
+        """A row for each cell."""
+        low, high = self.interval()
+        return [
+            {
+                "speed": float(self.speeds[v]),
+                "b_from": float(self.edges[v, k]),
+                "b_to": float(self.edges[v, k + 1]),
+                "flights": int(self.flights[v, k]),
+                "hits": int(self.hits[v, k]),
+                "probability": float(self.probability[v, k]),
+                "low": float(low[v, k]),
+                "high": float(high[v, k]),
+                "b_max": float(self.capture[v]),
+            }
+            for v in range(self.speeds.size)
+            for k in range(self.edges.shape[1] - 1)
+        ]
+
+
+@checked
+def probability_map(
+    flights: Sequence[Flight],
+    *,
+    cells: int = 24,
+    per_cell: int = 64,
+    seed: int = 0,
+    executor: Executor | None = None,
+    known: Mapping[int, Iterable[Sequence[float]]] | None = None,
+    keep: Callable[[int, np.ndarray], None] | None = None,
+    watch: Callable[[int, int], None] | None = None,
+) -> ProbabilityMap:
+    """Fly `per_cell` pairs in each cell of speed and impact parameter; b² is spread evenly in a cell.
+
+    Args:
+        flights: one set-up for each speed.
+        cells: how many in b for each speed, up to 1.2 times the widest b that a central potential captures there.
+        seed: of the first; the others have `seed_of` it and their number.
+        known, keep: as for `scattering.flown`, with the number of the set-up.
+        watch: called with flights done and all flights.
+
+    Raises:
+        BadInput: no set-up, or a number of cells or flights below 1.
+    """
+    if not flights or cells < 1 or per_cell < 1:
+        raise BadInput(f"a map needs speeds, and cells = {cells} and per_cell = {per_cell} of at least 1")
+    most = [
+        min(HEADROOM * one.scales.widest, one.distance) if one.sphere else HEADROOM * one.scales.widest
+        for one in flights
+    ]
+    hits, done = np.zeros((len(flights), cells)), np.zeros((len(flights), cells))
+    tasks = [Task(k, 0, per_cell) for k in range(cells)]
+    for v, one in enumerate(flights):
+        before = addressed((known or {}).get(v, ()))
+        tell = None if keep is None else partial(keep, v)
+        for told in flown(one, tasks, most[v] / cells, seed_of(seed, v), executor, before, tell):
+            place = told[:, STRATUM].astype(int)
+            np.add.at(hits[v], place, told[:, END] == HIT)
+            np.add.at(done[v], place, 1)
+            if watch is not None:
+                watch(int(done.sum()), done.size * per_cell)
+    return ProbabilityMap(
+        np.array([one.speed for one in flights]),
+        np.linspace(0.0, np.array(most), cells + 1, axis=1),
+        hits,
+        done,
+        np.array([one.scales.capture for one in flights]),
+        flights[0].scales.touch,
+    )

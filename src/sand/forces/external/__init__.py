@@ -1,0 +1,1 @@
+"""External forces on single grains: fields and gravity."""

@@ -1,0 +1,50 @@
+"""A uniform electric field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...arguments import checked
+from ...box import Box
+from ...errors import FORBID_EXTRA
+from ...grains import Grains
+from ..vectors import along_z
+from .formulas import UniformElectric, uniform_electric
+
+
+@checked
+@dataclass(frozen=True)
+class ElectricField:
+    """An electric field that is the same everywhere and always: force q E, energy −q E·x.
+
+    Args:
+        strength: E, three components [V/m], or one size along +z: "1 kV/m".
+
+    Raises:
+        BadInput: not one or three finite numbers in V/m; one line each.
+    """
+
+    strength: Any
+
+    __pydantic_config__ = FORBID_EXTRA
+    name = "electric"
+    references = "Jackson 1975"
+    formula = staticmethod(uniform_electric)
+    moored = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "strength", along_z(self.strength, "V/m", "electric: strength"))
+
+    def parameters(self) -> dict[str, Any]:
+        return {"strength": list(self.strength)}
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Warns when no grain has a charge."""
+        return [] if grains.charge.any() else ["an electric field is switched on but no grain has a charge"]
+
+    def numbers(self) -> UniformElectric:
+        return UniformElectric(*self.strength)
+
+    def flux_density_size(self) -> float:
+        return 0.0

@@ -1,0 +1,128 @@
+"""Forces that act on one grain at a time: each formula gives force, torque and energy.
+
+All have the same form, `formula(time, grain, parameters)`, so that a list of them is one formula.
+"""
+
+import math
+from typing import NamedTuple
+
+from ...compiler.jit import formula
+from ...numerics.vec import add, axpy, cross, dot, scale
+
+
+class One(NamedTuple):
+    """One grain, as a per-grain force sees it."""
+
+    position: tuple  # [m]
+    velocity: tuple  # [m/s]
+    spin: tuple  # [rad/s]
+    moment: tuple  # μ [A m²], laboratory frame
+    radius: float  # [m]
+    mass: float  # [kg]
+    charge: float  # [C]
+
+
+class UniformField(NamedTuple):
+    """A magnetic flux density [T] that is the same everywhere and always."""
+
+    x: float
+    y: float
+    z: float
+
+
+@formula
+def uniform_field(time, grain, parameters):
+    """No force, torque μ×B [N m], energy −μ·B [J] (Eqs. 40, 41)."""
+    b = (parameters.x, parameters.y, parameters.z)
+    return (0.0, 0.0, 0.0), cross(grain.moment, b), -dot(grain.moment, b)
+
+
+class FieldInTime(NamedTuple):
+    """A flux density B(t) [T] that is the same everywhere; what a shape does not use is 0."""
+
+    constant: tuple  # B0 [T]
+    cosine: tuple  # C [T]
+    sine: tuple  # S [T]
+    ramp: tuple  # R [T]
+    frequency: float  # ω = 2πf [rad/s]
+    phase: float  # φ [rad]
+    start: float  # t0 [s], when the ramp begins
+    inverse_duration: float  # 1/(t1 − t0) [1/s]
+
+
+@formula
+def flux_density_at(time, field):
+    """B(t) [T] of a `FieldInTime`; outside t0 … t1 the ramp rests at its ends.
+
+        B = B0 + C cos(ωt + φ) + S sin(ωt + φ) + R p,  p = (t − t0)/(t1 − t0) clipped to 0 … 1
+
+    The sum does not know the grain, so the compiler works it out once and not for each of them.
+    """
+    angle = field.frequency * time + field.phase
+    part = min(max((time - field.start) * field.inverse_duration, 0.0), 1.0)
+    swinging = axpy(math.cos(angle), field.cosine, scale(math.sin(angle), field.sine))
+    return add(swinging, axpy(part, field.ramp, field.constant))
+
+
+@formula
+def field_in_time(time, grain, parameters):
+    """No force, torque μ×B(t) [N m], energy −μ·B(t) [J] (Eqs. 40, 41 at the time t).
+
+    The energy changes at the rate −μ·dB/dt of its own: work of what makes the field.
+    """
+    b = flux_density_at(time, parameters)
+    return (0.0, 0.0, 0.0), cross(grain.moment, b), -dot(grain.moment, b)
+
+
+class UniformGravity(NamedTuple):
+    """An acceleration g [m/s²] that is the same everywhere and always."""
+
+    x: float
+    y: float
+    z: float
+
+
+@formula
+def uniform_gravity(time, grain, parameters):
+    """Force m g [N], no torque, energy −m g·x [J], 0 at the origin."""
+    force = scale(grain.mass, (parameters.x, parameters.y, parameters.z))
+    return force, (0.0, 0.0, 0.0), -dot(force, grain.position)
+
+
+class UniformElectric(NamedTuple):
+    """An electric field E [V/m] that is the same everywhere and always."""
+
+    x: float
+    y: float
+    z: float
+
+
+@formula
+def uniform_electric(time, grain, parameters):
+    """Force q E [N], no torque, energy −q E·x [J], 0 at the origin."""
+    force = scale(grain.charge, (parameters.x, parameters.y, parameters.z))
+    return force, (0.0, 0.0, 0.0), -dot(force, grain.position)
+
+
+@formula
+def nothing(time, grain, parameters):
+    """No force at all: the end of every list."""
+    return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+
+
+def together(first, rest):
+    """One formula for two; `parameters` is the pair of theirs."""
+
+    @formula
+    def both(time, grain, parameters):
+        force1, torque1, energy1 = first(time, grain, parameters[0])
+        force2, torque2, energy2 = rest(time, grain, parameters[1])
+        return add(force1, force2), add(torque1, torque2), energy1 + energy2
+
+    return both
+
+
+@formula
+def stiffness_of_field(moment, b, inertia):
+    """ω² = μB/I [1/s²], the square of the frequency at which a moment turns about a field."""
+    return (dot(moment, moment) * dot(b, b)) ** 0.5 / inertia

@@ -1,0 +1,57 @@
+"""Uniform gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...arguments import checked
+from ...box import Box
+from ...errors import FORBID_EXTRA, BadInput
+from ...grains import Grains
+from ..vectors import along_z, components
+from .formulas import UniformGravity, uniform_gravity
+
+
+@checked
+@dataclass(frozen=True)
+class Gravity:
+    """An acceleration that is the same everywhere and always: force m g, energy −m g·x.
+
+    Args:
+        acceleration: g, three components [m/s^2], or one size ≥ 0, then along −z: "9.81 m/s^2".
+
+    Raises:
+        BadInput: not one or three finite numbers in m/s^2, or one below 0; one line each.
+    """
+
+    acceleration: Any
+
+    __pydantic_config__ = FORBID_EXTRA
+    name = "gravity"
+    references = "Newton 1687"
+    formula = staticmethod(uniform_gravity)
+    moored = True
+
+    def __post_init__(self) -> None:
+        given = self.acceleration
+        g = along_z(given, "m/s^2", "gravity: acceleration", sense=-1.0)
+        if components(given) is None and g[2] > 0.0:
+            raise BadInput(
+                f"gravity: acceleration = {given!r} is a size along −z and must be at least 0 m/s^2; "
+                "for another direction give three components"
+            )
+        object.__setattr__(self, "acceleration", g)
+
+    def parameters(self) -> dict[str, Any]:
+        return {"acceleration": list(self.acceleration)}
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Nothing to warn of: every grain has a mass."""
+        return []
+
+    def numbers(self) -> UniformGravity:
+        return UniformGravity(*self.acceleration)
+
+    def flux_density_size(self) -> float:
+        return 0.0

@@ -1,0 +1,1 @@
+"""Gas drag and Brownian motion."""

@@ -1,0 +1,134 @@
+"""A thin gas: drag and Brownian motion."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ...arguments import checked
+from ...box import Box
+from ...constants import BOLTZMANN, LIGHT
+from ...errors import FORBID_EXTRA, BadInput
+from ...grains import Grains
+from ...units import MELTED, si, spoken
+from ..vectors import three
+from . import drag as law
+from .loops import GasRules, shortest_stopping_time
+
+RAREFIED = 10.0
+"""Least mean free path, in radii, for molecules that hit a grain unaware of each other."""
+FASTEST = 0.5
+"""Speed relative to the wind, in mean molecular speeds, above which Epstein's linear law is at the edge: it then
+lacks 6 % of the drag of mirrors and 4 % of that of diffuse walls."""
+
+
+@checked
+@dataclass(frozen=True)
+class Gas:
+    """A thin gas around the grains: it brakes them (Epstein) and keeps them in Brownian motion.
+
+    Each grain feels the gas as if it were alone. It must be much smaller than the mean free path of the molecules and
+    much slower than they are; then F = −f_t (v − u) and M = −f_r ω with f_t = (4π/3) r² ρ_g v̄ (1 + (π/8) α) and
+    f_r = (2π/3) α ρ_g v̄ r⁴. What the grains give to the gas is booked as `lost_gas`, negative where it heats them.
+    The random kicks follow from the simulation's seed.
+
+    Args:
+        temperature: T [K] > 0 of the gas and of the grains' surfaces.
+        density: ρ_g [kg/m^3] > 0; this or the pressure.
+        pressure: p [Pa] > 0; this or the density.
+        molecule_mass: mean mass m_g of a molecule [kg] > 0, or "28.97 u"; 2.34 u, H2 with He, by default.
+        accommodation: α, 0 … 1, the part of the molecules that leaves diffusely, at the temperature T; the others
+            are reflected as by a mirror.
+        brownian: True: random kicks that bring the grains to the temperature T; False: drag alone.
+        wind: u, three components of the gas's own velocity [m/s]; at rest by default.
+        cross_section: of two molecules [m^2] > 0, about "2e-19 m^2" for H2; if given, the mean free path is compared
+            with the radii.
+
+    Raises:
+        BadInput: numbers out of range, and density and pressure both or neither, one line each.
+    """
+
+    temperature: Any
+    density: Any = None
+    pressure: Any = None
+    molecule_mass: Any = law.NEBULA * law.ATOMIC_MASS
+    accommodation: Any = 1.0
+    brownian: bool = True
+    wind: Any = (0.0, 0.0, 0.0)
+    cross_section: Any = None
+
+    __pydantic_config__ = FORBID_EXTRA
+    name = "gas"
+    references = "Epstein 1924; Uhlenbeck & Ornstein 1930; Salmon et al. 2011"
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        units = {"temperature": "K", "molecule_mass": "kg"}
+        optional = {"density": "kg/m^3", "pressure": "Pa", "cross_section": "m^2"}
+        units |= {key: unit for key, unit in optional.items() if getattr(self, key) is not None}
+        for key, unit in units.items():
+            try:
+                object.__setattr__(self, key, si(getattr(self, key), unit, f"gas: {key}", above=0.0))
+            except BadInput as error:
+                problems += error.problems
+        if (self.density is None) == (self.pressure is None):
+            told = "neither" if self.density is None else "both"
+            problems.append(f"gas: give either the density in kg/m^3 or the pressure in Pa; {told} is given")
+        given = self.accommodation
+        try:
+            object.__setattr__(self, "accommodation", si(given, "1", "gas: accommodation", least=0.0))
+            if self.accommodation > 1.0:
+                problems.append(f"gas: accommodation = {given!r} is a part of all molecules and must be at most 1")
+        except BadInput as error:
+            problems += error.problems
+        if not isinstance(self.brownian, bool):
+            problems.append(f"gas: brownian = {self.brownian!r} must be true or false")
+        try:
+            object.__setattr__(self, "wind", three(self.wind, "m/s", "gas: wind"))
+        except BadInput as error:
+            problems += error.problems
+        if not problems and law.mean_speed(BOLTZMANN * self.temperature, self.molecule_mass) >= LIGHT:
+            problems.append(f"gas: temperature = {self.temperature:g} K: its molecules would be faster than light")
+        if problems:
+            raise BadInput(problems)
+
+    def parameters(self) -> dict[str, Any]:
+        """Its settings in SI; of density and pressure the one that was given."""
+        given = {key: value for key, value in asdict(self).items() if value is not None}
+        return given | {"wind": list(self.wind)}
+
+    def rules(self) -> GasRules:
+        """The gas as the kernels take it."""
+        energy = BOLTZMANN * self.temperature
+        density = self.density or law.density_of(self.pressure, energy, self.molecule_mass)
+        speed = law.mean_speed(energy, self.molecule_mass)
+        return GasRules(True, density, speed, energy if self.brownian else 0.0, self.accommodation, *self.wind)
+
+    def shortest_time(self, grains: Grains) -> float:
+        """The shortest time [s] in which a grain loses its motion through the gas, or its spin, to 1/e."""
+        return shortest_stopping_time(grains.arrays, self.rules())
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Warns of a gas too hot for solids, and of grains too fast for the linear law or too large for free flow."""
+        rules, warnings = self.rules(), []
+        if self.temperature > MELTED:
+            warnings.append(f"gas: temperature = {self.temperature:g} K: no material is solid above {MELTED:g} K")
+        speed = np.linalg.norm(grains.velocity - np.array(self.wind), axis=1)
+        fastest = int(np.argmax(speed))
+        if speed[fastest] > FASTEST * rules.mean_speed:
+            warnings.append(
+                f"gas: grain {fastest} moves at {spoken(speed[fastest], 'm/s')} through a gas of mean molecular speed "
+                f"{spoken(rules.mean_speed, 'm/s')}; Epstein's law assumes far less than that: "
+                "its drag is then too weak"
+            )
+        if self.cross_section is not None:
+            path = law.mean_free_path(rules.density, self.molecule_mass, self.cross_section)
+            largest = float(grains.radius.max())
+            if path < RAREFIED * largest:
+                warnings.append(
+                    f"gas: the mean free path is {spoken(path, 'm')}, the largest radius {spoken(largest, 'm')}; "
+                    f"Epstein's law assumes a path above {RAREFIED:g} radii: its drag is then too strong"
+                )
+        return warnings

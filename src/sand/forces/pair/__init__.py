@@ -1,0 +1,1 @@
+"""Long-range forces between pairs of grains."""

@@ -1,0 +1,133 @@
+"""Long-range forces together: one sum of loads, of rates and of energies."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from ...compiler.jit import kernel, loop
+from ...numerics.vec import add
+
+
+@loop
+def _no_sum(grains, far, span, numbers):
+    """Neither loads nor rates, and nothing before or after blocks."""
+
+
+@loop
+def _nothing_in(grains, far, span, numbers, place):
+    """Neither a block nor energies."""
+
+
+@loop
+def _no_blocks(grains):
+    return 0
+
+
+CREW_FROM = 1000
+"""Fewest grains for which large loops are cut into blocks; below, a block is less work than to share it."""
+ALL_BLOCKS = 8
+"""Blocks of a sum over all pairs, then."""
+
+
+@loop
+def all_blocks(grains):
+    """Blocks of a sum over all pairs."""
+    return ALL_BLOCKS if grains.mass.size >= CREW_FROM else 1
+
+
+class Parts(NamedTuple):
+    """The sum of loads in blocks that threads may share; `loads` of FarSums is their sum but for rounding."""
+
+    begin: Callable  # (grains, far, span, numbers): before the blocks
+    block: Callable  # the same and the number of the block
+    end: Callable  # as begin, after them
+    blocks: Callable  # (grains,): how many there are, by the number of grains alone
+
+
+class FarSums(NamedTuple):
+    """The loops of one long-range force; each gets (grains, far, span, its numbers)."""
+
+    loads: Callable  # adds to far.force and far.torque
+    rates: Callable  # adds to far.force_rate and far.torque_rate
+    energies: Callable  # adds half the energy of each pair to each grain's entry of a fifth argument, (N,)
+    pair: Callable  # (grains, span, numbers, i, j): force on i, torques on i and on j, of one pair
+    shared: Parts | None = None  # for threads; None: `loads` is done by one
+    many: Any = None  # the same sums by loops that are faster for many grains; None: by these
+
+    @property
+    def parts(self) -> Parts:
+        """In blocks; or all of it after the blocks of others, which need what it would overwrite."""
+        return self.shared or Parts(_no_sum, _nothing_in, self.loads, _no_blocks)
+
+
+@loop
+def _no_pair(grains, span, numbers, i, j):
+    return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+
+NO_FAR_FORCE = FarSums(_no_sum, _no_sum, _nothing_in, _no_pair)
+
+
+@functools.cache
+def far_together(first: FarSums, rest: FarSums) -> FarSums:
+    """The sums of two; `numbers` is the pair of theirs.  Energies are asked for one by one (`shares_for`)."""
+    first_loads, rest_loads, first_rates, rest_rates = first.loads, rest.loads, first.rates, rest.rates
+    first_pair, rest_pair = first.pair, rest.pair
+
+    @loop
+    def loads(grains, far, span, numbers):
+        first_loads(grains, far, span, numbers[0])
+        rest_loads(grains, far, span, numbers[1])
+
+    @loop
+    def rates(grains, far, span, numbers):
+        first_rates(grains, far, span, numbers[0])
+        rest_rates(grains, far, span, numbers[1])
+
+    @loop
+    def pair(grains, span, numbers, i, j):
+        force1, here1, there1 = first_pair(grains, span, numbers[0], i, j)
+        force2, here2, there2 = rest_pair(grains, span, numbers[1], i, j)
+        return add(force1, force2), add(here1, here2), add(there1, there2)
+
+    return FarSums(loads, rates, _nothing_in, pair, parts_together(first.parts, rest.parts))
+
+
+@functools.cache
+def parts_together(first: Parts, rest: Parts) -> Parts:
+    """The parts of two; block b of both is one block."""
+    first_begin, first_block, first_end, first_blocks = first
+    rest_begin, rest_block, rest_end, rest_blocks = rest
+
+    @loop
+    def begin(grains, far, span, numbers):
+        first_begin(grains, far, span, numbers[0])
+        rest_begin(grains, far, span, numbers[1])
+
+    @loop
+    def block(grains, far, span, numbers, b):
+        if b < first_blocks(grains):
+            first_block(grains, far, span, numbers[0], b)
+        if b < rest_blocks(grains):
+            rest_block(grains, far, span, numbers[1], b)
+
+    @loop
+    def end(grains, far, span, numbers):
+        first_end(grains, far, span, numbers[0])
+        rest_end(grains, far, span, numbers[1])
+
+    @loop
+    def blocks(grains):
+        return max(first_blocks(grains), rest_blocks(grains))
+
+    return Parts(begin, block, end, blocks)
+
+
+@functools.cache
+def shares_for(energies: Callable) -> Callable:
+    """The compiled sum of each grain's part of the energy [J] of one long-range force."""
+
+    def fill_shares(grains, far, span, numbers, shares):
+        energies(grains, far, span, numbers, shares)
+
+    return kernel(fill_shares)

@@ -1,0 +1,251 @@
+"""The grains: spheres with position, spin and magnetic moment."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .arguments import checked
+from .box import Box
+from .constants import LIGHT
+from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
+from .material import Material, as_material
+from .schema import BY_NAME, FIELDS, blank, public, stored
+from .units import in_unit
+
+ROUNDING = 1e-7
+"""Gap that still is a contact, as a part of the sum of radii: coordinates of seven digits; no adhesion."""
+
+
+NAMES = (*BY_NAME, "material", "id")
+"""Quantities of grains that a user can read."""
+
+
+class GrainArrays(NamedTuple):
+    """Every array of the field table in stored shape, (N,) or (width, N); what kernels read and write."""
+
+    radius: np.ndarray
+    mass: np.ndarray
+    inertia: np.ndarray
+    charge: np.ndarray
+    body_moment: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    orientation: np.ndarray
+    spin: np.ndarray
+    moment: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+    field: np.ndarray
+    material: np.ndarray  # index into Grains.materials, uint32
+    id: np.ndarray  # number the user knows the grain by, uint32
+
+
+def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.ndarray]:
+    """The distinct materials and each grain's index among them.
+
+    Args:
+        material: a Material or preset name for all grains, or a sequence of N of them.
+    """
+    several = isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str)
+    each: Sequence[Any] = list(material) if several else [as_material(material)] * count
+    if len(each) != count:
+        raise BadInput(f"material has {len(each)} entries but there are {count} grains")
+    index: dict[Material, int] = {}
+    numbers = np.empty(count, dtype=np.uint32)
+    for i, given in enumerate(each):
+        found = as_material(given, f"material of grain {i}")
+        numbers[i] = index.setdefault(found, len(index))
+    names = [m.name for m in index]
+    if doubles := sorted({name for name in names if names.count(name) > 1}):
+        raise BadInput(f"two different materials are called '{doubles[0]}'; name one anew: material.but(name='…')")
+    return tuple(index), numbers
+
+
+SMALLEST = 1e-10
+"""Radius [m] below which a grain is no longer made of atoms."""
+
+
+@checked
+class Grains:
+    """N spheres.  What they are is fixed once they are made; a simulation works on a copy.
+
+    Args:
+        position: (N, 3) [m], laboratory frame.
+        radius: scalar or (N,) [m] ≥ 1e-10, an atom.
+        material: one `sand.Material` (or preset name) for all, or a sequence of N.
+        velocity: (N, 3) or, the same for all, (3,) [m/s], slower than light; at rest by default.
+        spin: (N, 3) or (3,) [rad/s], laboratory frame, surfaces slower than light; none by default.
+        moment: (N, 3) or (3,) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
+            "6.6e-18 A m^2" or per mass "200 A m^2/kg"; "material" takes each material's own specific moment; none
+            by default.
+        charge: scalar or (N,) [C]; none by default.
+        mass: scalar or (N,) [kg] > 0; by default density × volume.
+
+    All numbers may be SI floats, text with a unit, or pint/astropy quantities.
+
+    Raises:
+        BadInput: one line for each quantity that is wrong.
+    """
+
+    def __init__(
+        self,
+        position: Any,
+        radius: Any,
+        material: Any,
+        *,
+        velocity: Any = None,
+        spin: Any = None,
+        moment: Any = None,
+        charge: Any = None,
+        mass: Any = None,
+    ):
+        count = _count(position)
+        problems: list[str] = []
+        arrays = {field.name: blank(field, count) for field in FIELDS}
+        given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
+        for name, values in given.items():
+            if values is None and name not in ("position", "radius"):
+                continue
+            try:
+                arrays[name] = stored(BY_NAME[name], values, count, positive=name == "radius")
+            except BadInput as error:
+                problems += error.problems
+        try:
+            self.materials, index = materials_of(material, count)
+            density = np.array([m.density for m in self.materials])[index]
+            sphere = density * (4.0 / 3.0) * np.pi * arrays["radius"] ** 3
+            arrays["mass"] = sphere if mass is None else stored(BY_NAME["mass"], mass, count, positive=True)
+            if moment is not None:
+                specific = np.array([m.specific_moment for m in self.materials])[index]
+                arrays["body_moment"] = _moments(moment, arrays["mass"], specific, count)
+        except BadInput as error:
+            problems += error.problems
+        if problems := problems or _impossible(arrays):
+            raise BadInput(problems)
+        arrays["inertia"] = 0.4 * arrays["mass"] * arrays["radius"] ** 2
+        arrays["orientation"][3] = 1.0
+        arrays["moment"] = arrays["body_moment"].copy()
+        self.arrays = GrainArrays(**arrays, material=index, id=np.arange(count, dtype=np.uint32))
+
+    def __len__(self) -> int:
+        return self.arrays.radius.size
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """Any quantity of the field table, (N,) or (N, width), read only."""
+        if name not in NAMES:
+            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
+        return public(getattr(self.arrays, name))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refused, since neither the arrays nor what follows from them would know."""
+        if name == "arrays" or (name == "materials" and name not in self.__dict__):
+            object.__setattr__(self, name, value)
+        elif name in NAMES or name == "materials":
+            key = "material" if name == "materials" else name
+            raise NoSuchAttribute(
+                f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}=…), "
+                "and build a new Simulation from them"
+            )
+        elif type(self).__module__.startswith("sand."):
+            raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
+        else:
+            object.__setattr__(self, name, value)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *NAMES]
+
+    def __repr__(self) -> str:
+        names = ", ".join(m.name for m in self.materials)
+        return f"<{len(self)} grains of {names}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+
+    def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
+        """Overlap δ [m] of each pair of grains (P, 2); negative for surfaces apart."""
+        i, j = np.asarray(pairs).T
+        apart = box.nearest(self.position[i] - self.position[j])
+        return self.radius[i] + self.radius[j] - np.linalg.norm(apart, axis=1)
+
+    def copy(self) -> Grains:
+        """An independent copy: a snapshot."""
+        twin = copy.copy(self)
+        twin.arrays = GrainArrays(*(a.copy() for a in self.arrays))
+        return twin
+
+
+def _count(position: Any) -> int:
+    array = in_unit(position, "m")
+    if array is None or np.ndim(array) != 2 or np.shape(array)[1] != 3 or np.shape(array)[0] == 0:
+        shape = "" if array is None else f", not {np.shape(array)}"
+        raise BadInput(f"position must be an array of shape (N, 3) in m with N ≥ 1{shape}")
+    return int(np.shape(array)[0])
+
+
+def _impossible(arrays: dict[str, np.ndarray]) -> list[str]:
+    """Complaints about radii, speeds and spins that no grain can have."""
+    radius, speed, spin = arrays["radius"], _sizes(arrays["velocity"]), _sizes(arrays["spin"])
+    small, fast, whirling = int(np.argmin(radius)), int(np.argmax(speed)), int(np.argmax(spin * radius))
+    problems = []
+    if radius[small] < SMALLEST:
+        problems.append(f"radius of grain {small} is {radius[small]:g} m, less than that of an atom, {SMALLEST:g} m")
+    if speed[fast] >= LIGHT:
+        problems.append(
+            f"velocity of grain {fast} is {speed[fast]:g} m/s; it must be below that of light, {LIGHT:.4g} m/s"
+        )
+    if spin[whirling] * radius[whirling] >= LIGHT:
+        surface = f"{spin[whirling] * radius[whirling]:g} m/s"
+        problems.append(
+            f"spin of grain {whirling} moves its surface at {surface}; it must be below that of light, {LIGHT:.4g} m/s"
+        )
+    return problems
+
+
+def _sizes(vectors: np.ndarray) -> np.ndarray:
+    """Sizes (N,) of vectors (3, N), whose squares may be out of range."""
+    return np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
+
+
+def vector_for_all(moment: Any) -> np.ndarray | None:
+    """The moment (3,) [A m²] that all grains are given, or None where sizes or (N, 3) are given.  Raises BadInput."""
+    vector = None if isinstance(moment, str) else in_unit(moment, "A m^2")
+    if vector is None or np.shape(vector) != (3,):
+        return None
+    return stored(BY_NAME["body_moment"], moment, 1)[:, 0]
+
+
+def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) -> np.ndarray:
+    """(3, N) [A m²] from vectors, or from a size (absolute or per mass), then along +z."""
+    if not isinstance(moment, str) and np.ndim(in_unit(moment, "A m^2")) > 0:
+        return stored(BY_NAME["body_moment"], moment, count, called="moment")
+    vectors = np.zeros((3, count))
+    vectors[2] = moment_size(moment, mass, specific)
+    return vectors
+
+
+def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.0) -> np.ndarray:
+    """Sizes (N,) [A m²] of moments given as one number [A m²], or as text, absolute or per mass.
+
+    Args:
+        specific: moment per mass [A m²/kg] of each grain's material, for "material".
+    """
+    if isinstance(moment, str) and moment == "material":
+        return specific * mass
+    size = in_unit(moment, "A m^2")
+    if size is None:
+        per_mass = in_unit(moment, "A m^2/kg")
+        size = None if per_mass is None else per_mass * mass
+    fits = size is not None and np.shape(size) in ((), mass.shape)
+    if not fits or not np.all(np.isfinite(size)) or np.any(np.asarray(size) < 0.0):
+        raise BadInput(
+            f"moment = {shown(moment)} must be (N, 3) or three numbers in A m^2, or a size ≥ 0 such as '6.6e-18 A m^2' "
+            "or, per mass, '200 A m^2/kg', or 'material'"
+        )
+    return np.broadcast_to(np.asarray(size, dtype=np.float64), mass.shape)

@@ -1,0 +1,1 @@
+"""Integrators, choice of the step, and the compiled driver."""

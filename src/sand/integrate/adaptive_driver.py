@@ -1,0 +1,198 @@
+"""The compiled driver of adaptive runs: Runge–Kutta steps while nothing touches, velocity Verlet otherwise.
+
+One step:  list of pairs made anew if need be → trial step → again and shorter if its error is too large → again up to
+the first touch if two grains come to touch in it → orientations normalised, positions wrapped, work booked.  A touch
+ends the step and is handed over as the second half of a Verlet step of 0 s, which forms the contact.
+"""
+
+import functools
+import math
+from collections.abc import Callable
+
+from ..box import nearest_image
+from ..compiler.jit import kernel, loop
+from ..forces.external.loops import outside_energy, outside_wrap
+from ..neighbours.cell_list import FULL, make_far_list
+from ..neighbours.skin import begin_watch, farthest, forget_speeds, forget_ways
+from ..numerics.vec import dot, load, put
+from ..state.state import (
+    CONTACTS,
+    CYCLE,
+    FLIGHT,
+    GRAIN1,
+    GRAIN2,
+    GROWN,
+    LEFT,
+    LOOKED,
+    OUTSIDE,
+    REJECTED,
+    STAGE,
+    STEP,
+    STEPS,
+    TIME,
+)
+from .driver import halves_for
+from .event_location import NEVER, first_touch
+from .kernel_spec import Plan, Stop
+from .runge_kutta import GROW, error_of, loads_at_stage, next_factor, normalise_all, place_stage, trial_for, work_of
+from .step_control import GROW_EVERY, calm_steps
+from .step_parts import no_gas, stir_gas
+from .task_queue import dismiss, nobody_to_dismiss
+
+ORDER = 5.0
+"""The error of a step goes as this power of its length."""
+STALE_PART = 0.25
+"""Part of the list's margin that grains may have moved when a step begins."""
+STRIDE_PART = 0.9
+"""Of the longest way, for the way foretold."""
+TRIES = 30
+"""Most attempts to end a step at a touch; each squares the error of the last, so that five are many."""
+
+
+@loop
+def refreshed(grains, far, count, rules):
+    """Make the far list anew where a quarter of its margin is used up; FULL asks for longer arrays."""
+    search = rules.search
+    if search.listed and not farthest(grains, far.anchor, rules.span) <= STALE_PART * search.margin:
+        return make_far_list(grains, far, count, rules.span, search)
+    return 0
+
+
+@loop
+def first_trial(grains, contacts, far, clock, count, rules):
+    """The step to try [s]: what the last one left, or Verlet's own after a start or a parting; 0 if not finite."""
+    dt = clock[FLIGHT]
+    if not dt > 0.0:
+        dt, _ = calm_steps(grains, far, contacts.start, count, rules.control)
+    fastest = 0.0
+    for i in range(grains.mass.size):
+        v = load(grains.velocity, i)
+        fastest = max(fastest, dot(v, v))
+    stride = STRIDE_PART * rules.precision.stride
+    if fastest * dt * dt > stride * stride:
+        dt = stride / math.sqrt(fastest)
+    return dt
+
+
+@loop
+def wrap_all(grains, span):
+    """Bring all grains back into a periodic box."""
+    for i in range(grains.mass.size):
+        put(grains.position, i, nearest_image(load(grains.position, i), span))
+
+
+@functools.cache
+def step_for(plan: Plan) -> Callable:
+    """The loop that finds the length of a Runge–Kutta step and takes it: (length [s], touched?, stop)."""
+    sum_stage = loads_at_stage(plan.outside, plan.far.loads)
+    begin_step, try_step = trial_for(plan.outside, plan.far.loads)
+
+    @loop
+    def fitting_step(grains, contacts, far, stages, clock, count, rules):
+        dt = wish = first_trial(grains, contacts, far, clock, count, rules)
+        if not dt > 0.0:
+            return 0.0, False, Stop.NOT_FINITE
+        begin_step(grains, stages, rules, clock[TIME])
+        growth, tries = GROW, 0
+        while True:
+            if tries == 0 and clock[TIME] + dt == clock[TIME]:
+                place_stage(grains, stages, 0, 0.0)
+                sum_stage(grains, far, count, rules, clock[TIME])
+                return 0.0, False, Stop.NO_STEP
+            error, stray = math.inf, -1
+            if try_step(grains, far, stages, count, rules, clock[TIME], dt):
+                error, stray = error_of(stages, dt, rules.precision)
+            if not error <= 1.0:
+                count[GRAIN1], count[GRAIN2] = stray, -1
+                count[REJECTED] += 1
+                dt *= next_factor(error, ORDER)
+                growth, tries = 1.0, 0
+                continue
+            if tries == 0:
+                wish = dt * min(growth, next_factor(error, ORDER))
+            touch = first_touch(grains, far, stages, rules, dt) if rules.contact.on else NEVER
+            if touch >= 1.0 or tries == TRIES:
+                clock[FLIGHT] = min(wish, rules.control.longest)
+                return dt, touch <= 1.0, Stop.STEPS_DONE
+            dt *= touch
+            tries += 1
+
+    return fitting_step
+
+
+@functools.cache
+def flight_for(plan: Plan) -> Callable:
+    """The loop that takes one Runge–Kutta step and books it."""
+    fitting_step, sum_stage = step_for(plan), loads_at_stage(plan.outside, plan.far.loads)
+    energy, wrap_booked = outside_energy(plan.outside), outside_wrap(plan.outside)
+    stir = stir_gas if plan.gas else no_gas
+
+    @loop
+    def fly(grains, contacts, near, far, stages, clock, count, lost, rules):
+        if refreshed(grains, far, count, rules) == FULL:
+            return Stop.LIST_FULL
+        before = energy(grains, clock[TIME], rules.outside) if rules.books.timed else 0.0
+        dt, touched, stop = fitting_step(grains, contacts, far, stages, clock, count, rules)
+        if stop != Stop.STEPS_DONE:
+            return stop
+        normalise_all(grains)
+        forget_speeds(near)
+        forget_ways(near)
+        clock[TIME] += dt
+        if rules.books.timed:
+            lost[OUTSIDE] -= energy(grains, clock[TIME], rules.outside) - before + work_of(stages, dt)
+        if rules.books.moored:
+            lost[OUTSIDE] -= wrap_booked(grains, rules.span, clock[TIME], rules.outside)
+            sum_stage(grains, far, count, rules, clock[TIME])
+        else:
+            wrap_all(grains, rules.span)
+        clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
+        if touched:
+            # what is left is the second half of a step of 0 s, with new lists and then a new choice of the step
+            near.anchor[0, 0] = math.inf
+            clock[FLIGHT] = 0.0
+            count[LOOKED] = count[GROWN] = count[STEPS] - GROW_EVERY
+            count[STAGE] = 1
+            return Stop.STEPS_DONE
+        clock[STEP] = dt
+        count[STEPS] += 1
+        stir(grains, clock, count, lost, rules)
+        return Stop.STEPS_DONE
+
+    return fly
+
+
+@functools.cache
+def flight_driver_for(plan: Plan) -> Callable:
+    """The compiled `advance` of an adaptive run; as `advance.driver_for`, with the stages besides."""
+    first_half, second_half = halves_for(plan)
+    fly = flight_for(plan)
+    leave = dismiss if plan.crew else nobody_to_dismiss
+
+    @loop
+    def steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
+        """Steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
+        begin_watch(near, count)
+        while True:
+            stop = Stop.STEPS_DONE
+            if count[STAGE] == 0:
+                if clock[LEFT] == 0.0:
+                    if clock[TIME] >= until:
+                        return Stop.TIME_REACHED
+                    if count[STEPS] >= last:
+                        return Stop.STEPS_DONE
+                if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
+                    stop = fly(grains, contacts, near, far, stages, clock, count, lost, rules)
+                else:
+                    stop = first_half(grains, contacts, near, far, clock, count, lost, rules)
+            if stop == Stop.STEPS_DONE and count[STAGE] == 1:
+                stop = second_half(grains, contacts, near, far, clock, count, lost, rules)
+            if stop != Stop.STEPS_DONE:
+                return stop
+
+    def advance(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
+        stop = steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last)
+        leave(rules)
+        return stop
+
+    return kernel(advance, keep=plan.keep, alone=plan.crew, wide=plan.wide)

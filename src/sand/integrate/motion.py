@@ -1,0 +1,106 @@
+"""Kick, drift, turn: velocity Verlet for translation and rotation (Eqs. 28, 29, 31–33 with 1/m and 1/I)."""
+
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..box import Span, nearest_image
+from ..compiler.jit import loop
+from ..contact.gather import BLOCK, gather
+from ..numerics.float_order import rank, rank_for_most, ranked
+from ..numerics.quaternion import turn, turned
+from ..numerics.vec import axpy, dot, load, load4, put, put4, scale
+
+OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A box without walls, for moves that are wrapped later."""
+AT_ONCE = np.uint64(4 * BLOCK)
+"""Grains whose loads are gathered before they are kicked, whole blocks; their forces stay in the first cache."""
+
+
+@loop
+def kicked(grains, i, dt):
+    """Velocity and spin of grain i after v += F dt/m, ω += M dt/I; kept there."""
+    v = axpy(dt / grains.mass[i], load(grains.force, i), load(grains.velocity, i))
+    w = axpy(dt / grains.inertia[i], load(grains.torque, i), load(grains.spin, i))
+    put(grains.velocity, i, v)
+    put(grains.spin, i, w)
+    return v, w
+
+
+@loop
+def kick_some(grains, first, last, dt):
+    """Velocities and spins of the grains first…last − 1 (uint64); ranks of the largest squares of speed and spin."""
+    fastest = quickest = rank(0.0)
+    for k in range(last - first):
+        v, w = kicked(grains, first + k, dt)
+        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
+    return fastest, quickest
+
+
+@loop
+def kick(grains, dt):
+    """All velocities and spins; returns squares of the largest speed [m²/s²] and spin [1/s²]."""
+    fastest, quickest = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
+    return ranked(fastest), ranked(quickest)
+
+
+@loop
+def gather_and_kick(grains, contacts, first, last, dt):
+    """Loads of contacts, the only ones, and the kick that they give, few grains at a time; as `kick_some`."""
+    fastest = quickest = rank(0.0)
+    while first < last:
+        end = min(first + AT_ONCE, last)
+        gather(grains, contacts, first, end)
+        v, w = kick_some(grains, first, end, dt)
+        fastest, quickest, first = max(fastest, v), max(quickest, w), end
+    return fastest, quickest
+
+
+@loop
+def _moment_follows(grains, i, q):
+    put(grains.moment, i, turned(q, load(grains.body_moment, i)))
+
+
+@loop
+def _no_moment(grains, i, q):
+    """There is none."""
+
+
+@functools.cache
+def drift_for(magnetic: bool) -> Callable:
+    """The loop of the first half of a step, with moments that turn with their grains or without any."""
+    follow = _moment_follows if magnetic else _no_moment
+
+    @loop
+    def drift_some(grains, first, last, span, dt):
+        """Grains first…last − 1 (uint64): kick for dt/2; x += v dt, wrapped into its box, ϱ turned by ω dt.
+
+        Returns the rank of the largest square of a speed.
+        """
+        fastest = rank(0.0)
+        for k in range(last - first):
+            i = first + k
+            v, w = kicked(grains, i, 0.5 * dt)
+            fastest = max(fastest, rank_for_most(dot(v, v)))
+            put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
+            q = turn(load4(grains.orientation, i), scale(dt, w))
+            put4(grains.orientation, i, q)
+            follow(grains, i, q)
+        return fastest
+
+    return drift_some
+
+
+@functools.cache
+def kick_and_drift_for(magnetic: bool) -> Callable:
+    """The same for all grains; returns the longest way [m]."""
+    drift_some = drift_for(magnetic)
+
+    @loop
+    def kick_and_drift(grains, span, dt):
+        fastest = drift_some(grains, np.uint64(0), np.uint64(grains.mass.size), span, dt)
+        return dt * math.sqrt(ranked(fastest))
+
+    return kick_and_drift

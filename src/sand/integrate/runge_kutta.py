@@ -1,0 +1,217 @@
+"""Dormand and Prince's Runge–Kutta pair 5(4), and the loops that take one trial step with it.
+
+Dormand, J. R. & Prince, P. J. 1980, J. Comput. Appl. Math. 6, 19.  The state of a grain is (x, v, ϱ, ω), 13 numbers:
+
+    ẋ = v,  v̇ = F/m,  ϱ̇ = ½ ω∘ϱ,  ω̇ = M/I
+
+The right-hand side takes ϱ/|ϱ|, so that it does not matter to the method when ϱ is normalised.  The last of the seven
+stages is the new state, and its loads serve as the first of the next step.
+"""
+
+import functools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..compiler.jit import formula, loop, rare
+from ..forces.external.loops import grain_at, outside_loads
+from ..numerics.quaternion import normalised, turned, turning_rate
+from ..numerics.vec import dot, load, load4, put, put4
+from ..state.state import FAR_SUMS
+from .respa import add_far_loads, clear_far_loads
+
+STAGES = 7
+TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
+"""When each stage is, in steps."""
+WEIGHTS = np.zeros((STAGES, STAGES))
+"""What the rates of the earlier stages count for in each stage; the last row gives the step, of order 5."""
+WEIGHTS[1, :1] = [1 / 5]
+WEIGHTS[2, :2] = [3 / 40, 9 / 40]
+WEIGHTS[3, :3] = [44 / 45, -56 / 15, 32 / 9]
+WEIGHTS[4, :4] = [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729]
+WEIGHTS[5, :5] = [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656]
+WEIGHTS[6, :6] = [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]
+ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+"""Weights of order 5 less those of order 4: the error of the latter."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
+"""Of the next step: part of what would just do, least and largest factor."""
+X, V, Q, W = 0, 3, 6, 10
+"""Rows where position, velocity, orientation and spin begin."""
+
+
+@formula
+def next_factor(error, order):
+    """What the next step should be, in parts of this one: 0.9 err^(−1/order), within 0.2 … 5; 5 without any error."""
+    if error == 0.0:
+        return GROW
+    return min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / order)))
+
+
+@formula
+def rows3(array, first, i):
+    """Three rows of column i."""
+    return array[first, i], array[first + 1, i], array[first + 2, i]
+
+
+@loop
+def blended(rate, weights, stages, row, i):
+    """Σ w_s k_s of one row over the first stages."""
+    total = 0.0
+    for s in range(stages):
+        total += weights[s] * rate[s, row, i]
+    return total
+
+
+@loop
+def keep_start(grains, stages):
+    """Remember the state of all grains."""
+    for i in range(grains.mass.size):
+        for row in range(3):
+            stages.start[X + row, i] = grains.position[row, i]
+            stages.start[V + row, i] = grains.velocity[row, i]
+            stages.start[W + row, i] = grains.spin[row, i]
+        for row in range(4):
+            stages.start[Q + row, i] = grains.orientation[row, i]
+
+
+@rare
+def place_stage(grains, stages, s, dt):
+    """Bring all grains to stage s of a step of dt seconds; the square of the longest way any of them went [m²].
+
+    Stage 0 is the start.
+    """
+    farthest = 0.0
+    start, rate, weights = stages.start, stages.rate, WEIGHTS[s]
+    for i in range(grains.mass.size):
+        way = 0.0
+        for row in range(3):
+            moved = dt * blended(rate, weights, s, X + row, i)
+            way += moved * moved
+            grains.position[row, i] = start[X + row, i] + moved
+            grains.velocity[row, i] = start[V + row, i] + dt * blended(rate, weights, s, V + row, i)
+            grains.spin[row, i] = start[W + row, i] + dt * blended(rate, weights, s, W + row, i)
+        for row in range(4):
+            grains.orientation[row, i] = start[Q + row, i] + dt * blended(rate, weights, s, Q + row, i)
+        put(grains.moment, i, turned(normalised(load4(grains.orientation, i)), load(grains.body_moment, i)))
+        # written so that what is not a number counts as far
+        farthest = farthest if way <= farthest else way
+        farthest = farthest if way < math.inf else math.inf
+    return farthest
+
+
+@rare
+def note_rates(grains, stages, s):
+    """The rates of change at stage s, from the loads there."""
+    rate = stages.rate
+    for i in range(grains.mass.size):
+        for row in range(3):
+            rate[s, X + row, i] = grains.velocity[row, i]
+            rate[s, V + row, i] = grains.force[row, i] / grains.mass[i]
+            rate[s, W + row, i] = grains.torque[row, i] / grains.inertia[i]
+        turning = turning_rate(load4(grains.orientation, i), load(grains.spin, i))
+        for row in range(4):
+            rate[s, Q + row, i] = turning[row]
+
+
+@loop
+def normalise_all(grains):
+    """|ϱ| = 1, to rounding; the moments are those already."""
+    for i in range(grains.mass.size):
+        put4(grains.orientation, i, normalised(load4(grains.orientation, i)))
+
+
+@loop
+def error_of(stages, dt, precision):
+    """The largest error of the step over what is allowed, and the grain that has it; infinite if not a number.
+
+    The error of an angle is twice that of the rotation parameters.
+    """
+    rate = stages.rate
+    worst, worst_grain = 0.0, 0
+    for i in range(stages.start.shape[1]):
+        x = v = w = q = 0.0
+        for row in range(3):
+            x += blended(rate, ERROR, STAGES, X + row, i) ** 2
+            v += blended(rate, ERROR, STAGES, V + row, i) ** 2
+            w += blended(rate, ERROR, STAGES, W + row, i) ** 2
+        for row in range(4):
+            q += blended(rate, ERROR, STAGES, Q + row, i) ** 2
+        mine = max(math.sqrt(x) / precision.position, math.sqrt(v) / precision.velocity)
+        mine = max(mine, 2.0 * math.sqrt(q) / precision.turn, math.sqrt(w) / precision.spin)
+        if not (x + v + w + q < math.inf):
+            return math.inf, i
+        if dt * mine > worst:
+            worst, worst_grain = dt * mine, i
+    return worst, worst_grain
+
+
+@functools.cache
+def loads_at_stage(outside: Callable, far_loads: Callable) -> Callable:
+    """The loop that sums all loads of free grains where they are."""
+    add_outside = outside_loads(outside)
+
+    @rare
+    def sum_stage(grains, far, count, rules, time):
+        for i in range(grains.mass.size):
+            put(grains.force, i, (0.0, 0.0, 0.0))
+            put(grains.torque, i, (0.0, 0.0, 0.0))
+        add_outside(grains, time, rules.outside)
+        clear_far_loads(far)
+        far_loads(grains, far, rules.span, rules.far)
+        add_far_loads(grains, far)
+        count[FAR_SUMS] += 1
+
+    return sum_stage
+
+
+@functools.cache
+def outside_power(formula_of_grain: Callable) -> Callable:
+    """The loop that sums F·v + M·ω [W] of one composed formula over all grains."""
+
+    @loop
+    def sum_power(grains, time, parameters):
+        total = 0.0
+        for i in range(grains.mass.size):
+            force, torque, _ = formula_of_grain(time, grain_at(grains, i), parameters)
+            total += dot(force, load(grains.velocity, i)) + dot(torque, load(grains.spin, i))
+        return total
+
+    return sum_power
+
+
+@functools.cache
+def trial_for(outside: Callable, far_loads: Callable) -> tuple[Callable, Callable]:
+    """The loops that begin a step, and that go through its stages; False as soon as a grain strays too far."""
+    sum_stage, power = loads_at_stage(outside, far_loads), outside_power(outside)
+
+    @loop
+    def begin_step(grains, stages, rules, begin):
+        keep_start(grains, stages)
+        note_rates(grains, stages, 0)
+        if rules.books.timed:
+            stages.power[0] = power(grains, begin, rules.outside)
+
+    @loop
+    def try_step(grains, far, stages, count, rules, begin, dt):
+        stride = rules.precision.stride
+        for s in range(1, STAGES):
+            if not place_stage(grains, stages, s, dt) <= stride * stride:
+                return False
+            time = begin + TIMES[s] * dt
+            sum_stage(grains, far, count, rules, time)
+            note_rates(grains, stages, s)
+            if rules.books.timed:
+                stages.power[s] = power(grains, time, rules.outside)
+        return True
+
+    return begin_step, try_step
+
+
+@loop
+def work_of(stages, dt):
+    """∫ P dt [J] of the outside forces over the step, of the same order as the step."""
+    total = 0.0
+    for s in range(STAGES - 1):
+        total += WEIGHTS[STAGES - 1, s] * stages.power[s]
+    return dt * total

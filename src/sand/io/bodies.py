@@ -1,0 +1,199 @@
+"""Bodies in files: extended XYZ, GSD, or plain columns."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..box import Box
+from ..errors import BadInput, FilesFailed, did_you_mean
+from ..grains import ROUNDING, Grains
+from ..material import PRESETS, Material
+from ..units import in_unit
+from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
+from .frame import MODES
+from .run_folder import read_text, replace_file
+from .trajectory import Frames, TrajectoryWriter
+
+MOST_GRAINS = 1_000_000
+TOLD = 10
+"""Grains that are named one by one."""
+ENDINGS = (".xyz", ".extxyz", ".gsd")
+
+
+def read_body(
+    path: str | Path,
+    material: Material | None = None,
+    radius: Any = None,
+    length: str | None = None,
+    materials: Mapping[str, Material] = PRESETS,
+    otherwise: Material | None = None,
+) -> Grains:
+    """Grains at rest, centred on their centre of mass.
+
+    Args:
+        path: extended XYZ, whose last frame is taken; a `.gsd`, of SAND or of others, whose last frame is taken; or
+            text with one grain a line, `x y z` or `x y z r`, blank lines and `#` comments allowed.
+        material: of all grains; None: those that the file names.
+        radius: [m] of all grains of a file without radii.
+        length: what one unit of the file's numbers is, "1 nm" for example; by default 1 Å in extended XYZ (or what
+            its `length_unit` says), 1 m in columns and in GSD that is not SAND's.
+        materials: those that the file may name; otherwise: of all grains of a file that names none.
+
+    Raises:
+        BadInput: a missing or foreign file, lines that are not numbers, grains without a place (the first ten by
+            number), no radii, or materials that are not known.
+    """
+    place = Path(path)
+    found = _of_gsd(place) if place.suffix == ".gsd" else _of_text(path)
+    unit = found.unit if length is None else _unit(length)
+    if found.radius is None and radius is None:
+        raise BadInput(f"{path} has no radii; give a radius for all grains")
+    size = radius if found.radius is None else found.radius * unit
+    _refuse_numbers(path, found)
+    kinds = _materials(path, found, material or (otherwise if found.names is None else None), materials)
+    body = Grains(found.position * unit, size, kinds, moment=found.moment)
+    middle = np.average(body.position, axis=0, weights=body.mass)
+    body.arrays.position[...] -= middle[:, None]
+    return body
+
+
+def _refuse_numbers(path: str | Path, found: Columns) -> None:
+    """Raises BadInput naming the first ten grains whose numbers cannot be."""
+    parts = {"position": found.position, "radius": found.radius, "moment": found.moment}
+    problems = []
+    for name, values in parts.items():
+        if values is None:
+            continue
+        rows = values.reshape(len(values), -1)
+        wrong = ~np.isfinite(rows).all(axis=1) | ((rows <= 0.0).any(axis=1) if name == "radius" else False)
+        want = "a number above 0" if name == "radius" else "finite"
+        problems += [f"{path}: {name} of grain {k} is {values[k]}; it must be {want}" for k in np.flatnonzero(wrong)]
+    if problems:
+        raise BadInput(first_ten(problems))
+
+
+def first_ten(problems: list[str]) -> list[str]:
+    """The first ten lines, and how many there are more."""
+    more = len(problems) - TOLD
+    return problems if more <= 0 else [*problems[:TOLD], f"… and {more} more"]
+
+
+def _materials(
+    path: str | Path, found: Columns, material: Material | None, known: Mapping[str, Material]
+) -> Material | list[Material]:
+    if material is not None:
+        return material
+    if found.names is None:
+        raise BadInput(f"{path} does not say what its grains are made of; give a material")
+    if unknown := [name for name in dict.fromkeys(found.names) if name not in known]:
+        raise BadInput(f"{path}: unknown material '{unknown[0]}'; {did_you_mean(unknown[0], list(known))}")
+    return [known[name] for name in found.names]
+
+
+def _unit(length: str) -> float:
+    factor = in_unit(length, "m")
+    if factor is None or np.ndim(factor) != 0 or not 0.0 < factor < np.inf:
+        raise BadInput(f"length = {length!r} must be a length such as '1 nm'")
+    return float(factor)
+
+
+def _of_gsd(path: Path) -> Columns:
+    """The last frame, of a trajectory of SAND or of another program.  Raises BadInput."""
+    frames = Frames(path)
+    try:
+        if not len(frames):
+            raise BadInput(f"{path} holds no frame")
+        if frames.is_ours:
+            frame = frames[-1]
+            names = [frame.materials[k] for k in frame.material]
+            return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0)
+        stored = frames.stored(-1)
+        size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
+        return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)
+    finally:
+        frames.close()
+
+
+def _of_text(path: str | Path) -> Columns:
+    lines = read_text(path).splitlines()
+    return read_xyz(path, lines) if is_xyz(lines) else _of_columns(path, lines)
+
+
+def _of_columns(path: str | Path, lines: list[str]) -> Columns:
+    """Columns x y z or x y z r.  Raises BadInput."""
+    rows: list[list[float]] = []
+    problems: list[str] = []
+    for number, line in enumerate(lines, start=1):
+        words = line.split("#", 1)[0].split()
+        if not words:
+            continue
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if len(row) not in (3, 4) or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
+            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} is not x y z or x y z r, alike in all lines")
+        rows.append(row)
+        if len(problems) == TOLD or len(rows) > MOST_GRAINS:
+            break
+    if problems or not rows:
+        raise BadInput(problems or f"{path} holds no grain")
+    table = np.array(rows)
+    return Columns(table[:, :3], table[:, 3] if table.shape[1] == 4 else None, None, None, 1.0)
+
+
+def refuse_place(place: Path, *, overwrite: bool) -> None:
+    """Raises BadInput where no body can be written, before one is made."""
+    if place.suffix not in ENDINGS:
+        raise BadInput(f"{place}: the ending says in which form a body is written; allowed: {', '.join(ENDINGS)}")
+    if not place.parent.is_dir():
+        raise BadInput(f"there is no folder {place.parent}; make it first")
+    if place.is_dir() or (place.exists() and not overwrite):
+        raise BadInput(f"{place} exists; give another name, or say that it may be overwritten (--overwrite)")
+
+
+def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> Path:
+    """Write a body: extended XYZ for `.xyz` and `.extxyz`, a trajectory of one frame for `.gsd`.
+
+    Places are written to rounding, so that contacts at rest stay so; `read_body`, `sand collide`, `sand run`,
+    OVITO and ASE read both.
+
+    Raises:
+        BadInput: another ending, no such folder, or a file that is there already.
+        FilesFailed: the disk is full, …
+    """
+    place = Path(path)
+    refuse_place(place, overwrite=overwrite)
+    if place.suffix != ".gsd":
+        replace_file(place, xyz_text(grains).encode())
+        return place
+    beside = place.with_name(f".{place.stem}.building.gsd")
+    try:
+        writer = TrajectoryWriter(beside)
+        writer.write(0, 0.0, grains, Box.open(), contacts_of(grains), exact=True)
+        writer.flush()
+        writer.close()
+        replace_file(place, beside.read_bytes())
+    except OSError as error:
+        raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+    return place
+
+
+def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
+    """The unstrained contacts of grains in open space as a table, by column: what a frame wants to know of them."""
+    pair = Box.open().close_pairs(grains.position, 2.0 * float(grains.radius.max()) * (1.0 + ROUNDING))
+    overlap = grains.overlaps(pair, Box.open())
+    near = overlap >= -ROUNDING * grains.radius[pair].sum(axis=1)
+    pair, overlap = pair[near], np.maximum(overlap[near], 0.0)
+    none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
+    shares = {f"{mode}_share": none for mode in MODES}
+    vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)
+    return {"pair": pair, "overlap": overlap, "formed": none, "twist": none, **vectors_of, **shares}

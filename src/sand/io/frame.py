@@ -1,0 +1,213 @@
+"""One frame of trajectory.gsd: what it holds, and back in SI; frames in a row.
+
+Positions, diameters and box are in units of a reference radius (float32 would not do in metres); the rest is
+SI.  Orientations are scalar first, as GSD has them.
+
+| chunk | meaning |
+|---|---|
+| configuration/step, log/time | step number; true time of the frame [s] |
+| log/scale/length | the reference radius [m] |
+| log/periodic | 1 for each periodic axis, 0 for an open one, whose length in the box is only for drawing |
+| log/lengths | lengths of the box to the last bit, as drawn [m] |
+| particles/position, diameter; configuration/box | in reference radii |
+| particles/velocity, mass, charge | m/s, kg, C |
+| particles/orientation | rotation parameters, scalar first |
+| particles/typeid, types | materials |
+| log/particles/moment, spin | A m² and rad/s, laboratory frame |
+| log/particles/position, radius | to the last bit [m]; in bodies, not in runs |
+| bonds/group | grains in contact |
+| log/bonds/overlap, formed | δ [m] and time of first touch [s] |
+| log/bonds/force | force on the first grain of each contact [N] |
+| log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
+| log/bonds/share | stretch, slide, roll and twist as shares of what the contact can bear |
+| log/crc32 | check sum over all numbers of a frame but its step; a second one over step, names of materials and these |
+
+Vectors are in the laboratory frame.  Files of development versions lack some of the last rows, and the second check
+sum; they are read all the same.
+"""
+
+from __future__ import annotations
+
+import zlib
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+
+from ..box import Box
+from ..errors import BadInput, shown
+from ..grains import Grains
+
+OPEN_MARGIN = 4.0
+"""An open axis is drawn this much longer than the cloud of grains, because the format needs a box."""
+LOGGED = (
+    "time",
+    "scale/length",
+    "periodic",
+    "particles/moment",
+    "particles/spin",
+    "bonds/overlap",
+    "bonds/formed",
+    "bonds/force",
+    "lengths",
+    "bonds/slide",
+    "bonds/roll",
+    "bonds/twist",
+    "bonds/share",
+    "particles/position",
+    "particles/radius",
+)
+"""Logged arrays that the check sum is over, in its order."""
+MODES = ("stretch", "slide", "roll", "twist")
+"""Columns of log/bonds/share."""
+
+
+def stored_frame(
+    step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray], *, exact: bool = False
+) -> Any:
+    """A GSD frame of these grains and contacts (a `ContactTable`, by column); lengths to the last bit if `exact`."""
+    import gsd.hoomd
+
+    scale = float(grains.radius.mean())
+    frame = gsd.hoomd.Frame()
+    frame.configuration.step = step
+    cloud = 2.0 * np.abs(grains.position).max(axis=0) + 2.0 * grains.radius.max()
+    lengths = [v if v is not None else OPEN_MARGIN * cloud[axis] for axis, v in enumerate(box.lengths)]
+    frame.configuration.box = [*(np.array(lengths) / scale), 0.0, 0.0, 0.0]
+    p = frame.particles
+    p.N = len(grains)
+    p.types = [m.name.encode("ascii", "backslashreplace").decode() for m in grains.materials]
+    p.typeid = grains.material
+    p.position = grains.position / scale
+    p.diameter = 2.0 * grains.radius / scale
+    p.velocity, p.mass, p.charge = grains.velocity, grains.mass, grains.charge
+    p.orientation = np.roll(grains.orientation, 1, axis=1)
+    frame.bonds.N = len(contacts["pair"])
+    frame.bonds.types = ["contact"]
+    frame.bonds.typeid = np.zeros(frame.bonds.N, dtype=np.uint32)
+    frame.bonds.group = contacts["pair"]
+    frame.log = {
+        "time": np.array([time]),
+        "scale/length": np.array([scale]),
+        "periodic": np.array([v is not None for v in box.lengths], dtype=np.uint8),
+        "particles/moment": np.ascontiguousarray(grains.moment),
+        "particles/spin": np.ascontiguousarray(grains.spin),
+        "bonds/overlap": contacts["overlap"],
+        "bonds/formed": contacts["formed"],
+        "bonds/force": contacts["force"].astype(np.float32),
+        "lengths": np.array(lengths, dtype=np.float64),
+        "bonds/slide": contacts["slide_vector"].astype(np.float32),
+        "bonds/roll": contacts["roll_vector"].astype(np.float32),
+        "bonds/twist": contacts["twist"].astype(np.float32),
+        "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
+    }
+    if exact:
+        frame.log["particles/position"] = np.ascontiguousarray(grains.position)
+        frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
+    frame.log["crc32"] = np.array([_crc32(frame, b""), _crc32(frame, _head_of(frame))], dtype=np.uint32)
+    return frame
+
+
+def code_of(stored: Any) -> int:
+    """The check sum over the numbers of a frame that it was stored with.  Raises KeyError if there is none."""
+    return int(stored.log["crc32"][0])
+
+
+def _refuse_changed(stored: Any) -> None:
+    """Raises ValueError if a check sum tells that a frame is not as it was written; the first files have none."""
+    codes = stored.log.get("crc32", ())
+    if any(int(code) != _crc32(stored, head) for code, head in zip(codes, (b"", _head_of(stored)), strict=False)):
+        raise ValueError("its check sum is wrong")
+
+
+def _head_of(stored: Any) -> bytes:
+    """Step and names of materials."""
+    return f"{int(stored.configuration.step)} {list(stored.particles.types)}".encode()
+
+
+def _crc32(stored: Any, head: bytes) -> int:
+    """CRC-32 over what stands at the head of a frame, and all its numbers as the file holds them."""
+    p, code = stored.particles, zlib.crc32(head)
+    single = (p.position, p.diameter, p.velocity, p.mass, p.charge, p.orientation)
+    parts = [np.asarray(part, np.float32) for part in single]
+    parts += [np.asarray(part, np.uint32) for part in (p.typeid, stored.bonds.group)]
+    for part in [*parts, *(stored.log[name] for name in LOGGED if name in stored.log)]:
+        # + 0 makes −0 and 0 the same, which GSD takes for no change
+        with np.errstate(invalid="ignore"):  # a damaged file may hold anything
+            code = zlib.crc32((np.ascontiguousarray(part) + np.zeros(1, part.dtype)).tobytes(), code)
+    return code
+
+
+class Frame:
+    """One stored frame, back in SI: arrays (N, …) named as in the field table.
+
+    `material` (N,) counts in `materials`, their names.  Of the contacts: `pair` (C, 2), `overlap` [m], `formed` [s],
+    `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3) and `share` (C, 4) as in MODES; NaN where the file has
+    none.
+    """
+
+    def __init__(self, stored: Any):
+        _refuse_changed(stored)
+        self.step = int(stored.configuration.step)
+        self.time = float(stored.log["time"][0])
+        scale = float(stored.log["scale/length"][0])
+        p = stored.particles
+        rounded_places = np.asarray(p.position, dtype=np.float64) * scale
+        self.position = np.array(stored.log.get("particles/position", rounded_places))
+        self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
+        self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
+        self.charge = np.asarray(p.charge)
+        names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
+        self.materials, self.material = names, np.asarray(p.typeid)
+        self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
+        self.orientation = np.roll(np.asarray(p.orientation), -1, axis=1)
+        self.pair = np.asarray(stored.bonds.group).reshape(-1, 2)
+        self.overlap, self.formed = stored.log["bonds/overlap"], stored.log["bonds/formed"]
+
+        def of_contacts(name: str, *width: int) -> np.ndarray:
+            missing = np.full((len(self.pair), *width), np.nan)
+            return np.asarray(stored.log.get(f"bonds/{name}", missing), np.float64)
+
+        self.force, self.slide, self.roll = (of_contacts(name, 3) for name in ("force", "slide", "roll"))
+        self.twist, self.share = of_contacts("twist"), of_contacts("share", len(MODES))
+        periodic = stored.log["periodic"].astype(bool)
+        rounded = np.asarray(stored.configuration.box[:3], dtype=np.float64) * scale
+        lengths = stored.log.get("lengths", rounded)
+        x, y, z = (float(v) if on else None for v, on in zip(lengths, periodic, strict=True))
+        self.box = Box((x, y, z))
+        self.drawn = tuple(float(v) for v in lengths)
+        """Lengths of the box as drawn [m], open axes too."""
+
+    def __len__(self) -> int:
+        """Number of grains."""
+        return len(self.radius)
+
+
+class NoSuchFrame(BadInput, IndexError):
+    """There is no frame of this number; an IndexError, so that loops over frames end."""
+
+
+class FrameSequence(Sequence[Frame]):
+    """Frames of a file at `path`, by number or slice; a subclass says how many (`__len__`) and reads one (`_frame`)."""
+
+    path: Path
+
+    @abstractmethod
+    def _frame(self, number: int) -> Frame:
+        """A frame from 0 to the last.  Raises BadInput for one that is not whole."""
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if not isinstance(index, (int, np.integer)):
+            raise NoSuchFrame(f"frame {shown(index)} must be a whole number, from 0 to {len(self) - 1}")
+        if not -len(self) <= index < len(self):
+            raise NoSuchFrame(f"{self.path} has {len(self)} frames, from 0 to {len(self) - 1}; there is no {index}")
+        return self._frame(index % len(self))

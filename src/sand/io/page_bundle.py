@@ -1,0 +1,111 @@
+"""The bundle of the page that shows a run, which may be missing where it could not be built; pages written as files."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from ..errors import BadInput, FilesFailed
+
+PAGE = Path(__file__).parents[1] / "viewer" / "page"
+"""Where `hatch_build.py` puts the bundle, or `missing.txt` with the reason why there is none."""
+
+
+def read_bundle(folder: Path | None = None) -> tuple[str, str]:
+    """Script and style sheet of the page, as text.
+
+    Args:
+        folder: where they lie; PAGE by default.
+
+    Raises:
+        BadInput: they are not there; says why, and what to do.
+    """
+    folder = PAGE if folder is None else folder
+    try:
+        script, sheet = ((folder / name).read_text("utf-8") for name in ("grainview.js", "grainview.css"))
+    except (OSError, UnicodeDecodeError):
+        raise BadInput(f"the page is not part of this installation. {_why(folder)} {_remedy(folder)}") from None
+    return script, sheet
+
+
+def _why(folder: Path) -> str:
+    try:
+        return (folder / "missing.txt").read_text("utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        return "It was not made when SAND was built."
+
+
+def _remedy(folder: Path) -> str:
+    """A clone has the sources of the page beside `src`."""
+    clone = PAGE.parents[3]
+    if (clone / "grainview" / "package.json").is_file():
+        return f"With node: cd {clone / 'grainview'} && npm ci && npm run build; without: pip install -e {clone}"
+    return "Install SAND again with access to the network, with pip's --force-reinstall --no-deps --no-cache-dir"
+
+
+def private_page(text: str) -> Path:
+    """A new temporary page that nobody but this user can read; whoever asks for it removes it.
+
+    Raises:
+        FilesFailed: it cannot be written.
+    """
+    try:
+        handle, name = tempfile.mkstemp(prefix="sand-", suffix=".html")  # of mode 0600
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise FilesFailed(f"cannot write a temporary page: {error.strerror}") from error
+    return Path(name)
+
+
+class Written:
+    """A large text file written bit by bit: beside, and renamed when it is whole.
+
+    Args:
+        path: of the file; what is there is replaced, but only when the new one is whole.
+
+    Raises:
+        FilesFailed: it cannot be written; also later.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path, self.size = Path(path), 0
+        self._beside = self.path.with_name(f".{self.path.name}.new")
+        try:
+            self._file: Any = open(self._beside, "wb")  # noqa: SIM115
+        except OSError as error:
+            raise self._failed(error) from error
+
+    def _failed(self, error: OSError) -> FilesFailed:
+        return FilesFailed(f"cannot write {self.path}: {error.strerror}; what was there is untouched")
+
+    def write(self, text: str | bytes) -> None:
+        """Raises FilesFailed."""
+        part = text.encode() if isinstance(text, str) else text
+        try:
+            self._file.write(part)
+        except OSError as error:
+            raise self._failed(error) from error
+        self.size += len(part)
+
+    def __enter__(self) -> Written:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, _: object, __: TracebackType | None) -> None:
+        try:
+            if kind is None:
+                self._file.flush()
+                os.fsync(self._file.fileno())
+                self._file.close()
+                os.replace(self._beside, self.path)
+        except OSError as error:
+            raise self._failed(error) from error
+        finally:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            with contextlib.suppress(OSError):
+                self._beside.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""Neighbour search: cell lists, Verlet lists with a skin, spatial sorting."""

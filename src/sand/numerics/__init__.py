@@ -1,0 +1,1 @@
+"""Small numerical tools: vectors, quaternions, random numbers, roots, alignment and vectorisation."""

@@ -1,0 +1,13 @@
+"""Rows as long as whole vectors of the processor: what is left over of a row is slow one by one."""
+
+import numpy as np
+
+from ..compiler.jit import loop
+from .aligned import LANES
+
+
+@loop
+def filled_up(number, few):
+    """A row's length (uint64), rounded up to whole vectors where `few` or more are left over (uint64)."""
+    lanes = np.uint64(LANES)
+    return (number + lanes - np.uint64(1)) // lanes * lanes if number % lanes >= few else number

@@ -1,1 +1,0 @@
-"""Formulas: pure functions of floats and 3-tuples.  No arrays, no loops, no files."""

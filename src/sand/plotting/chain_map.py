@@ -1,0 +1,88 @@
+"""The figure of struck chains: the shapes before and after, and the map of where they arise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch
+
+from .run_figure import DPI, RunFigure
+from .style import styled
+
+COLOURS = {
+    "T": "#D55E00",
+    "branched": "#E69F00",
+    "bent": "#0072B2",
+    "straight": "#56B4E9",
+    "ring": "#CC79A7",
+    "broken": "#444444",
+    "gone": "#DDDDDD",
+}
+
+
+class Map(NamedTuple):
+    """Names of shapes (speeds, places) for one material and law."""
+
+    title: str
+    speeds: Sequence[float]  # [m/s]
+    places: Sequence[float]  # [r]
+    names: np.ndarray
+
+
+class Picture(NamedTuple):
+    """Grains seen along z."""
+
+    title: str
+    position: np.ndarray  # (N, 3) [m], the projectile last
+    radius: float  # [m]
+
+
+def chain_figure(pictures: Sequence[Picture], maps: Sequence[Map]) -> Figure:
+    """Pictures in the upper row, maps in the lower one, with one legend for all maps."""
+    with styled():
+        figure = RunFigure(figsize=(3.2 * max(len(maps), len(pictures)), 5.6), dpi=DPI, layout="constrained")
+        upper, lower = np.atleast_1d(figure.subfigures(2, 1, height_ratios=(1.0, 1.35)))  # type: ignore[arg-type]
+        for axes, picture in zip(np.atleast_1d(upper.subplots(1, len(pictures))), pictures, strict=True):
+            _draw_grains(axes, picture)
+        for axes, one in zip(np.atleast_1d(lower.subplots(1, len(maps))), maps, strict=True):
+            _draw_map(axes, one)
+        used = {str(name) for one in maps for name in np.unique(one.names)}
+        handles = [Patch(color=colour, label=name) for name, colour in COLOURS.items() if name in used]
+        lower.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def _draw_grains(axes: Axes, picture: Picture) -> None:
+    x = picture.position / picture.radius
+    x = x - x[:-1].mean(axis=0)
+    for k in np.argsort(x[:, 2]):
+        colour = "#D55E00" if k == len(x) - 1 else "#0072B2" if k == len(x) - 2 else "#9FB7C9"
+        axes.add_patch(Circle((x[k, 0], x[k, 1]), 1.0, facecolor=colour, edgecolor="white", linewidth=0.6))
+    axes.set_xlim(x[:, 0].min() - 2, x[:, 0].max() + 2)
+    axes.set_ylim(x[:, 1].min() - 2, x[:, 1].max() + 2)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_title(picture.title, size=8)
+
+
+def _draw_map(axes: Axes, one: Map) -> None:
+    order = list(COLOURS)
+    numbers = np.vectorize(order.index)(one.names)
+    colours: Any = ListedColormap(list(COLOURS.values()))
+    axes.pcolormesh(
+        np.asarray(one.places),
+        np.arange(len(one.speeds)),
+        numbers,
+        cmap=colours,
+        norm=BoundaryNorm(np.arange(len(order) + 1) - 0.5, len(order)),
+        shading="nearest",
+    )
+    axes.set_yticks(np.arange(len(one.speeds)), [f"{v:g}" for v in one.speeds])
+    axes.set_xlabel("place of impact (radii from the end grain)")
+    axes.set_ylabel("speed (m/s)")
+    axes.set_title(one.title, size=8)

@@ -1,0 +1,44 @@
+"""The figure of many collisions: what is left, and where the energy went."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .run_figure import DPI, RunFigure
+from .style import styled
+
+COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00", "miss": "#999999"}
+
+
+def collision_figure(results: list[dict[str, Any]]) -> Figure:
+    """Largest remnant of each collision (left) and mean losses by channel in impact energies (right).
+
+    Args:
+        results: dictionaries of `experiments.collision.Collision`.
+    """
+    with styled():
+        figure = RunFigure(figsize=(9.0, 3.6), dpi=DPI, layout="constrained")
+        left, right = figure.subplots(1, 2)
+        outcomes = np.array([r["outcome"] for r in results])
+        masses = np.array([r["largest_remnant"] for r in results])
+        order = np.argsort(-masses, kind="stable")
+        for name, colour in COLOURS.items():
+            here = outcomes[order] == name
+            if here.any():
+                left.plot(np.flatnonzero(here) + 1, masses[order][here], "o", color=colour, markersize=4, label=name)
+        left.set_ylim(0.0, 1.05)
+        left.set_xlabel("collision, by largest remnant")
+        left.set_ylabel("mass of the largest remnant / all mass")
+        left.legend(loc="lower left")
+        channels = [c for c in results[0]["lost"] if any(r["lost"][c] for r in results)]
+        share = np.array([[r["lost"][c] / r["impact_energy"] for c in channels] for r in results])
+        if channels:
+            right.barh(channels, share.mean(axis=0), xerr=share.std(axis=0), color="#56B4E9", ecolor="#555555")
+        right.invert_yaxis()
+        right.set_xlabel("energy lost / impact energy (mean and spread)")
+        speed = results[0]["speed"]
+        figure.suptitle(f"{len(results)} collisions at {speed:g} m/s", x=0.01, ha="left")
+    return figure

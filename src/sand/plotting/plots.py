@@ -1,0 +1,173 @@
+"""One quantity, one figure: what the figure of a run has in panels, contacts over time, and how grains are spread."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ..analysis.clusters import cluster_labels
+from ..analysis.frame_statistics import size_distribution
+from ..analysis.ledger_columns import Books
+from ..analysis.quantities import material_names, measured, quantity
+from ..errors import BadInput
+from .panels import (
+    Unit,
+    draw_balance,
+    draw_clusters,
+    draw_contacts,
+    draw_energies,
+    draw_losses,
+    draw_time,
+    energy_unit,
+    time_unit,
+)
+from .render.colouring import DECADES
+from .run_figure import DPI, RunFigure
+from .style import BLUE, CHALK, INK, MIST, NIGHT, pretty, styled, with_prefix
+
+SIZE = (5.6, 3.5)
+"""Inches: a column of a journal and a half."""
+_DRAW: dict[str, Callable[[Axes, Any, Unit, Unit], None]] = {
+    "size": lambda axes, books, time, _: draw_clusters(axes, books, time),
+    "energies": draw_energies,
+    "losses": draw_losses,
+    "contacts": lambda axes, books, time, _: draw_contacts(axes, books, time),
+    "balance": draw_balance,
+}
+HISTORY = tuple(_DRAW)
+"""Figures over time."""
+
+
+def history_figure(books: Books, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
+    """One figure over time, of those in HISTORY.
+
+    Args:
+        books: rows of a run's ledger.
+        grains: their number; temperature: kinetic, of the start [K]: energies are in N k_B T, in joules if it is 0.
+
+    Raises:
+        BadInput: there is no row, or a column is missing.
+    """
+    if not books.rows:
+        raise BadInput("the ledger has no row yet, so that there is nothing to plot over time")
+    try:
+        with styled():
+            figure, axes = _figure(SIZE)
+            time = time_unit(books)
+            _DRAW[name](axes, books, time, energy_unit(books, temperature, grains))
+            draw_time([axes], time, books)
+            _darkened(figure, dark)
+    except KeyError as error:
+        raise BadInput(f"the ledger has no column {error}: it is of another version of SAND") from None
+    return figure
+
+
+def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: bool = False) -> Figure:
+    """How a quantity is spread over the grains of a frame; of clusters, how many there are of each size.
+
+    Args:
+        name: see `analysis.quantities.GRAINS`.
+        field: flux density of outside (3,) [T].
+
+    Raises:
+        BadInput: the frame has no number for it.
+    """
+    what = quantity(name)
+    values = measured(frame, name, field)
+    with styled():
+        figure, axes = _figure(SIZE)
+        if name == "cluster":
+            sizes, numbers = size_distribution(cluster_labels(len(values), frame.pair))
+            _bars(axes, sizes, numbers)
+            axes.set(xlabel="grains in a cluster", ylabel="clusters")
+        elif what.kind == "categorical":
+            names = material_names(frame)
+            axes.bar(names, np.bincount(values.astype(int), minlength=len(names)), width=0.6, color=BLUE)
+            axes.set(xlabel=what.meaning, ylabel="grains")
+        else:
+            _histogram(axes, values[np.isfinite(values)], what.meaning, what.unit)
+        axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
+        note = f"{len(values)} grains, t = {pretty(frame.time, 's')}"
+        axes.text(1.0, 1.02, note, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
+        _darkened(figure, dark)
+    return figure
+
+
+def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
+    one, prefixed = (1.0, "") if unit == "1" else with_prefix(float(np.abs(values).max(initial=0.0)), unit)
+    shown = values / one
+    axes.set(xlabel=f"{meaning} ({prefixed})" if prefixed else meaning, ylabel="grains")
+    levels = np.unique(shown)
+    if unit == "1" and len(levels) <= 40 and np.all(levels == np.round(levels)):
+        _bars(axes, *np.unique(shown, return_counts=True))
+        return
+    low, high = float(shown.min()), float(shown.max())
+    if high - low <= 1e-6 * abs(high):  # also where all are 0
+        half = 0.5 * abs(low) or 0.5
+        low, high = low - half, high + half
+    bins = int(np.clip(np.sqrt(len(shown)) * 1.5, 5, 60))
+    if low > 0.0 and high > DECADES * low:
+        axes.set_xscale("log")
+        edges = np.geomspace(low, high, bins + 1)
+    else:
+        edges = np.linspace(low, high, bins + 1)
+    axes.hist(shown, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
+
+
+def _bars(axes: Axes, places: np.ndarray, numbers: np.ndarray) -> None:
+    span = float(np.ptp(places)) if len(places) > 1 else 1.0
+    axes.bar(places, numbers, width=max(0.7, span / 120.0), color=BLUE)
+    axes.xaxis.set_major_locator(MaxNLocator(10, integer=True))
+
+
+def _figure(size: tuple[float, float]) -> tuple[RunFigure, Axes]:
+    figure = RunFigure(figsize=size, dpi=DPI, layout="constrained")
+    return figure, figure.subplots()
+
+
+def _darkened(figure: Figure, dark: bool) -> None:
+    """Text and frames light, the ground dark."""
+    if not dark:
+        return
+    figure.set_facecolor(NIGHT)
+    for axes in figure.axes:
+        axes.tick_params(colors=CHALK, which="both")
+        for spine in axes.spines.values():
+            spine.set_color(MIST)
+        legend = axes.get_legend()
+        for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label, *(legend.get_texts() if legend else ())):
+            text.set_color(CHALK)
+        for line in axes.get_lines():
+            if line.get_color() == INK:
+                line.set_color(CHALK)
+
+
+def picture_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
+    """The figure as a file: the same figure gives the same bytes.
+
+    Args:
+        form: "png", "pdf" or "svg".
+        transparent: without a ground.
+    """
+    import matplotlib
+
+    dates: dict[str, dict[str, Any]] = {
+        "png": {"Software": "SAND"},
+        "pdf": {"CreationDate": None, "Creator": "SAND", "Producer": "SAND"},
+        "svg": {"Date": None, "Creator": "SAND"},
+    }
+    with styled(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
+        figure.savefig(
+            content := io.BytesIO(),
+            format=form,
+            dpi=DPI,
+            facecolor="none" if transparent else "auto",
+            metadata=dates[form],
+        )
+    return content.getvalue()

@@ -1,0 +1,1 @@
+"""Still pictures of grains, rendered without a browser."""

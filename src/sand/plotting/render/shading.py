@@ -1,0 +1,188 @@
+"""Light and shade on what a canvas holds: a key lamp with shadows, a soft fill, dark clefts, haze over what is far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from .ray_casting import Canvas, Solids
+
+KEY = np.array([-0.46, 0.62, 0.64])
+"""To the lamp: from the upper left, in front."""
+FILL = np.array([0.75, -0.15, 0.45])
+"""To the weak second lamp."""
+PATTERN = 4
+"""Pixels of a square of this edge look in different directions for what darkens them."""
+LOOKS = 9
+"""Places that each pixel looks at."""
+NO_SHADOW = 0.5
+"""Rods that are `lit` no more than this throw no shadow."""
+LARGEST_MAP = 3000
+"""Samples along an edge of what the key lamp sees."""
+MOST_ROWS = 400_000
+"""Samples that are coloured in one go."""
+
+
+@dataclass(frozen=True)
+class Lamps:
+    """How bright it is: the sum is the brightness of a surface that faces the key lamp.
+
+    Attributes:
+        sky: from everywhere, more from above; clefts and hollows see less of it.
+        key, fill: of the two lamps.
+        glint: how bright the key lamp's reflection is.
+        haze: share of the background in what is farthest.
+        background: (3,) colour that haze fades to.
+    """
+
+    sky: float = 0.60
+    key: float = 0.54
+    fill: float = 0.12
+    glint: float = 0.20
+    haze: float = 0.34
+    background: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+def shaded(canvas: Canvas, finer: int, radius: float, lamps: Lamps) -> np.ndarray:
+    """The picture (rows/finer, columns/finer, 4): red, green, blue, opacity from 0 to 1.
+
+    Args:
+        finer: samples per pixel and direction, averaged.
+        radius: of a typical grain [samples], for the size of clefts.
+    """
+    height, width = canvas.shape[0] // finer, canvas.shape[1] // finer
+    dim, lamp = _shade(canvas, finer, radius)
+    picture = np.zeros((height, width, 4), dtype=np.float32)
+    rows_at_once = max(MOST_ROWS // (canvas.shape[1] * finer), 1)
+    for first in range(0, height, rows_at_once):
+        last = min(first + rows_at_once, height)
+        strip = canvas.nearest[first * finer : last * finer]
+        rows, columns = np.nonzero(strip)
+        colour = np.zeros((*strip.shape, 4), dtype=np.float32)
+        at = (first + rows // finer, columns // finer)
+        colour[rows, columns, :3] = _coloured(canvas, rows + first * finer, columns, dim[at], lamp[at], radius, lamps)
+        colour[rows, columns, 3] = 1.0
+        mean = colour.reshape(last - first, finer, width, finer, 4).mean(axis=(1, 3))
+        mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
+        picture[first:last] = mean
+    return picture
+
+
+def _coloured(
+    canvas: Canvas,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    dim: np.ndarray,
+    lamp: np.ndarray,
+    radius: float,
+    lamps: Lamps,
+) -> np.ndarray:
+    """(K, 3) colours of covered samples; `dim`: how much sky each sees, `lamp`: how much of the key lamp."""
+    which, point, normal = canvas.surface(rows, columns)
+    key, fill = (v.astype(np.float32) / np.float32(np.linalg.norm(v)) for v in (KEY, FILL))
+    facing = np.maximum(normal @ key, 0.0)
+    soft = np.clip(0.3 + 0.7 * (normal @ key), 0.0, 1.0)  # light creeps round the edge
+    half = key + np.array([0.0, 0.0, 1.0], dtype=np.float32)
+    glint = np.maximum(normal @ (half / np.linalg.norm(half)), 0.0) ** 48 * lamp
+    power = lamps.sky * (0.80 + 0.20 * normal[:, 1]) * dim + lamps.fill * np.maximum(normal @ fill, 0.0) * dim
+    power += lamps.key * (0.45 * soft * dim * (0.6 + 0.4 * lamp) + 0.55 * facing * lamp)
+    lit = canvas.solids.lit[which].astype(np.float32)
+    base = canvas.solids.colour[which].astype(np.float32)
+    power *= 0.74 + 0.26 * np.clip(normal[:, 2] / 0.55, 0.0, 1.0)  # a rim parts what has one colour
+    power = 1.0 + lit * (power - 1.0)
+    colour = base * power[:, None] + (lamps.glint * lit * glint * dim)[:, None]
+    extent = canvas.range
+    haze = lamps.haze * extent / (extent + 14.0 * radius) * (1.0 - (point[:, 2] - canvas.far) / extent) * lit
+    colour = colour * (1.0 - haze[:, None]) + np.array(lamps.background, dtype=np.float32) * haze[:, None]
+    return np.clip(colour, 0.0, 1.0)
+
+
+def _shade(canvas: Canvas, finer: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """For each pixel the share of the sky it sees, and of the key lamp, 0 to 1."""
+    few = slice(finer // 2, None, finer)
+    there = canvas.nearest[few, few] > 0
+    rows, columns = np.nonzero(there)
+    if not rows.size:
+        return np.ones(there.shape, np.float32), np.ones(there.shape, np.float32)
+    _, point, normal = canvas.surface(rows * finer + finer // 2, columns * finer + finer // 2)
+    depth = np.full(there.shape, -np.inf, np.float32)
+    depth[there] = point[:, 2] / finer
+    facing = np.zeros((*there.shape, 3), np.float32)
+    facing[there] = normal
+    dim = np.exp(-2.3 * _hidden(depth, facing, radius / finer))
+    lamp = np.ones(there.shape, np.float32)
+    lamp[there] = _lamp(canvas.solids, point, normal, finer, radius)
+    weight = np.maximum(uniform_filter(there.astype(np.float32), PATTERN), 1e-3)
+    return tuple(uniform_filter(np.where(there, each, 0.0), PATTERN) / weight for each in (dim, lamp))
+
+
+def _hidden(depth: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
+    """How much of the sky is hidden by what is near, from the depths around each pixel [pixels], 0 to 1.
+
+    Each pixel looks at a few places at distances from a pixel to some radii; what rises there above its horizon, by
+    no more than about that distance, hides sky.  Neighbours look in other directions; averaging over the pattern is
+    left to the caller.
+    """
+    near, far = 1.0, float(np.clip(4.0 * radius, 4.0, 90.0))
+    reach = int(far) + 2
+    padded = np.pad(depth, reach + PATTERN, constant_values=-np.inf)
+    hidden = np.zeros(depth.shape, np.float32)
+    for i in range(PATTERN):
+        for j in range(PATTERN):
+            own = (slice(i, None, PATTERN), slice(j, None, PATTERN))
+            z, n = depth[own], normal[own]
+            turn = (7 * (i * PATTERN + j)) % PATTERN**2 / PATTERN**2
+            total = np.zeros(z.shape, np.float32)
+            for k in range(LOOKS):
+                away = near * (far / near) ** ((k + turn) / LOOKS)
+                angle = 2.0 * np.pi * (k * 0.618034 + turn)
+                dx, dy = round(away * np.cos(angle)), round(away * np.sin(angle))
+                if dx == dy == 0:
+                    dx = 1
+                top, left = reach + PATTERN + i + dy, reach + PATTERN + j + dx
+                seen = padded[top::PATTERN, left::PATTERN][: z.shape[0], : z.shape[1]]
+                with np.errstate(invalid="ignore"):
+                    dz = np.where(np.isfinite(z), seen - z, -np.inf)
+                flat = np.float32(dx * dx + dy * dy)
+                dz = np.maximum(dz, np.float32(-1e6))
+                long = flat + dz * dz
+                rise = (n[..., 0] * dx + n[..., 1] * dy + n[..., 2] * dz) / np.sqrt(long)
+                total += np.maximum(rise - 0.08, 0.0) / (1.0 + (long / (5.0 * flat)) ** 2)
+            hidden[own] = total / LOOKS
+    return hidden
+
+
+def _lamp(solids: Solids, point: np.ndarray, normal: np.ndarray, finer: int, radius: float) -> np.ndarray:
+    """How much of the key lamp points see (K,), 0 to 1: from the depths that the lamp sees."""
+    forward = KEY / np.linalg.norm(KEY)
+    right = np.cross([0.0, 1.0, 0.0], forward)
+    right /= np.linalg.norm(right)
+    frame = np.array([right, np.cross(forward, right), forward])
+    shown = solids.lit[len(solids.radius) :] > NO_SHADOW
+    turned = [p @ frame.T for p in (solids.centre, solids.start[shown], solids.end[shown])]
+    reach = 2.0 * (
+        max(float(np.abs(p[:, :2]).max(initial=0.0)) for p in turned) + float(solids.radius.max(initial=0.0))
+    )
+    scale = min(1.0 / finer, LARGEST_MAP / (reach + 1.0))
+    size = int(reach * scale) + 8
+    girth = solids.girth[shown] * scale
+    blank = np.zeros((0, 3)), np.zeros(0)
+    centre, start, end = (p * scale for p in turned)
+    lamp = Canvas((size, size), Solids(centre, solids.radius * scale, start, end, girth, *blank))
+    grazing = 1.0 - np.clip(normal @ forward.astype(np.float32), 0.0, 1.0)
+    lifted = (point + normal * (0.02 * radius + (1.0 + 2.0 * grazing[:, None]) / scale)) @ (frame.T * scale).astype(
+        np.float32
+    )
+    soft = max(0.10 * radius * scale, 0.75)
+    seen = np.zeros(len(point), np.float32)
+    taps = [(np.sqrt((k + 0.5) / 8), 2.399963 * k) for k in range(8)]
+    z = lifted[:, 2] + 0.5
+    for away, angle in taps:
+        column = (lifted[:, 0] + (size / 2 + soft * away * np.cos(angle))).astype(np.int32)
+        row = (lifted[:, 1] + (size / 2 + soft * away * np.sin(angle))).astype(np.int32)
+        key = lamp.nearest[np.clip(row, 0, size - 1), np.clip(column, 0, size - 1)]
+        depth = (key >> np.uint64(32)).astype(np.uint32).view(np.float32) * lamp.range + lamp.far
+        seen += (z >= depth) | (key == 0)
+    return np.asarray(seen / len(taps))

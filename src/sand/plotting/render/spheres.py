@@ -1,0 +1,126 @@
+"""Shaded spheres, arrows and rods: what is in front hides the rest.
+
+Screen coordinates: x to the right, y up, z towards the eye.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..style import INK, rgb
+from .ray_casting import Canvas, Solids
+from .shading import NO_SHADOW, Lamps, shaded
+
+FINER = 2
+"""Samples per pixel and direction, averaged at the end."""
+SHAFT, HEAD_WIDTH, HEAD_LENGTH = 0.11, 0.34, 0.75
+"""Half widths and length of an arrow's parts, in radii of its grain."""
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Spheres to be drawn, all lengths [m].
+
+    Attributes:
+        centre: (N, 3) in screen coordinates.
+        radius: (N,).
+        colour: (N, 3), 0 to 1.
+        arrow: (N, 3) half an arrow, in screen coordinates and in radii: at most 1 long, 0 for none.
+    """
+
+    centre: np.ndarray
+    radius: np.ndarray
+    colour: np.ndarray
+    arrow: np.ndarray
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of everything [m]."""
+        low = (self.centre[:, :2] - self.radius[:, None]).min(axis=0)
+        high = (self.centre[:, :2] + self.radius[:, None]).max(axis=0)
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+@dataclass(frozen=True)
+class Rods:
+    """Cones cut flat at both ends, cylinders among them, all lengths [m], screen coordinates.
+
+    Attributes:
+        start, end: (M, 3) middles of the ends.
+        girth: (M, 2) radii of the ends.
+        colour: (M, 3), 0 to 1.
+        lit: (M,) 1 for light and shade, 0 for a flat colour.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    girth: np.ndarray
+    colour: np.ndarray
+    lit: np.ndarray
+
+    @classmethod
+    def joined(cls, *parts: Rods) -> Rods:
+        """All rods of several."""
+        names = ("start", "end", "girth", "colour", "lit")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def draw(
+    balls: Balls,
+    window: tuple[float, float, float, float],
+    width: int,
+    height: int,
+    *,
+    rods: Rods | None = None,
+    arrows: tuple[float, float, float] | None = None,
+    eye: float | None = None,
+    lamps: Lamps | None = None,
+    finer: int = FINER,
+) -> np.ndarray:
+    """The picture, (height, width, 4) red, green, blue, opacity from 0 to 1; its first row is the lowest.
+
+    Args:
+        window: left, right, bottom, top of what is seen [m].
+        rods: to be drawn besides.
+        arrows: their colour; that of text by default.
+        eye: its distance from the plane z = 0 [m]; parallel rays by default.
+        finer: samples per pixel and direction.
+    """
+    left, right, bottom, top = window
+    scale = width * finer / (right - left)  # samples per metre
+    w = 0.0 if eye is None else 1.0 / eye
+    middle = np.array([(left + right) / 2, (bottom + top) / 2, 0.0])
+    found = [_arrows(balls, middle, w, rgb(INK) if arrows is None else np.array(arrows))]
+    every = Rods.joined(*found, *([rods] if rods is not None else []))
+    solids = Solids(
+        (balls.centre - middle) * scale,
+        np.maximum(balls.radius * scale, 1.0 * finer),  # no grain vanishes between samples
+        (every.start - middle) * scale,
+        (every.end - middle) * scale,
+        every.girth * scale,
+        np.concatenate([balls.colour, every.colour]),
+        np.concatenate([np.ones(len(balls.radius)), every.lit]),
+    )
+    canvas = Canvas((height * finer, width * finer), solids, w / scale)
+    return shaded(canvas, finer, float(np.median(solids.radius)), lamps or Lamps())
+
+
+def _arrows(balls: Balls, middle: np.ndarray, w: float, colour: np.ndarray) -> Rods:
+    """Arrows, each laid on the front of its grain: grains nearer to the eye still hide it."""
+    which = np.flatnonzero(np.any(balls.arrow != 0.0, axis=1))
+    radius, half = balls.radius[which, None], balls.arrow[which] * balls.radius[which, None]
+    size = np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-300)
+    forward = np.array([0.0, 0.0, 1.0]) - w * (balls.centre[which] - middle)  # to the eye
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    place = balls.centre[which] + forward * (1.05 * radius + np.abs((half * forward).sum(axis=1, keepdims=True)))
+    neck = place + half * (1.0 - np.minimum(HEAD_LENGTH * radius, 1.2 * size) / size)
+    narrow, wide, point = SHAFT * radius, HEAD_WIDTH * radius, 0.0 * radius
+    return Rods(
+        np.concatenate([place - half, neck]),
+        np.concatenate([neck, place + half]),
+        np.concatenate([np.hstack([narrow, narrow]), np.hstack([wide, point])]),
+        np.tile(colour, (2 * len(which), 1)),
+        np.full(2 * len(which), NO_SHADOW),
+    )

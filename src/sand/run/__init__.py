@@ -1,1 +1,0 @@
-"""Running: the simulation object, its books, its case files."""

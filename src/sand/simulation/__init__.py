@@ -1,0 +1,1 @@
+"""The simulation object: composition, stepping, ledger, observers, output."""

@@ -1,0 +1,268 @@
+"""From objects to the numbers the compiled driver takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from ..box import Box
+from ..contact.law import Bond
+from ..contact.model import Contact
+from ..errors import BadInput
+from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
+from ..forces.external.loops import is_ours
+from ..forces.gas.loops import VACUUM
+from ..forces.gas.model import Gas
+from ..forces.pair.loops import NO_FAR_FORCE, FarSums, all_blocks
+from ..grains import Grains
+from ..integrate.adaptive import Adaptive
+from ..integrate.kernel_spec import Books, ContactRules, Plan, Rules, Stirring
+from ..integrate.step_control import IMPACT_PART, Control
+from ..integrate.task_queue import is_large
+from ..integrate.verlet import Verlet
+from ..material import SILICA
+from ..neighbours.settings import Found, Neighbours
+from ..setup.from_frame import Bonds
+from ..state.arrays import (
+    ALWAYS,
+    FOR_CELLS,
+    FOR_FORCES,
+    FOR_IMPULSES,
+    FOR_LIST,
+    FOR_RATES,
+    SPARE,
+    contact_arrays,
+    far_arrays,
+    near_pairs,
+)
+from ..state.stages import stage_arrays
+from ..state.state import RECORDED, World
+from .checks import impossible, unusual
+from .engine import Engine
+from .initial_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
+
+MATES = 4
+"""Room per grain for neighbours in the list to begin with; it grows when needed."""
+IN_REACH = 1000
+"""Room for the neighbours of one grain, where they are forgotten once those that may touch are picked."""
+WIDE_FROM = 64
+"""Fewest grains for the longest vectors: of less, much is left over that fills none."""
+IDLE = 1e5
+"""Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
+STIR_PART = 0.05
+"""Time between two kicks of the gas, in shortest stopping times.
+
+Kicks come at ends of steps or cycles, 2/3 to 4/3 of it apart; free grains diffuse h²/12τ² too fast, at most 4e-4.
+"""
+
+
+class Given(NamedTuple):
+    """The forces by kind."""
+
+    contact: Contact | None
+    distant: list[FarForce]  # those that some grain feels
+    outside: list[GrainForce]
+    gas: list[Gas]  # one or none
+
+
+def build_engine(
+    grains: Grains,
+    forces: Sequence[Force],
+    box: Box,
+    stepping: Verlet | Adaptive,
+    neighbours: Neighbours,
+    seed: int = 0,
+    *,
+    fresh: bool = True,
+    contacts: Bonds | None = None,
+) -> Engine:
+    """Check that everything fits together and translate it.
+
+    Args:
+        seed: of random kicks.
+        fresh: a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
+        contacts: that are there from the start, with what they remember.
+
+    Raises:
+        BadInput: every problem at once.
+    """
+    warnings = _checked(grains, forces, box, fresh=fresh)
+    given = _given(forces, grains)
+    reach = float(grains.radius.min())
+    cutoffs = [f.choose(grains, box).radius for f in given.distant]
+    flights = isinstance(stepping, Adaptive)
+    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], flights=flights)
+    far = _far(given, grains, box, [found.search.listed and r is not None for r in cutoffs])
+    verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
+    control = _control(grains, verlet, given, reach)
+    if isinstance(stepping, Adaptive):
+        stepping = stepping.settled(grains, control)
+    composed, numbers = compose(given.outside)
+    sums, far_numbers = compose_far([sums for _, sums, _ in far], [own for _, _, own in far])
+    rules = Rules(
+        box.span,
+        _contact_rules(given.contact, grains, verlet),
+        far_numbers,
+        numbers,
+        found.search,
+        verlet.beat(bool(far)),
+        _books(given.outside, box),
+        _stirring(given.gas, grains, seed),
+        control,
+        stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
+    )
+    plan = _plan(grains, given, composed, sums, verlet, isinstance(stepping, Adaptive))
+    here = grains.copy()
+    here.arrays.position[...] = box.wrap(grains.position).T
+    start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
+    room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
+    world = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
+    chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
+    search = found.reason + ("; in memory along a curve through space" if chosen.along_curve(len(grains)) else "")
+    engine = Engine(world, rules, warnings, given.outside, far, search, stepping, chosen, plan)
+    held = seed_contacts(engine, given.contact, contacts)
+    if given.contact is not None:
+        refuse_overlaps(here, given.contact, start, held)
+    return engine
+
+
+def _far(given: Given, grains: Grains, box: Box, listed: Sequence[bool]) -> list[tuple[FarForce, FarSums, Any]]:
+    """Each long-range force with its loops and numbers."""
+    sums = [force.sums(box, own) for force, own in zip(given.distant, listed, strict=True)]
+    if len(grains) >= WIDE_FROM:
+        sums = [own.many or own for own in sums]
+    return [(f, own, f.numbers(grains, box)) for f, own in zip(given.distant, sums, strict=True)]
+
+
+def _given(forces: Sequence[Force], grains: Grains) -> Given:
+    return Given(
+        next((f for f in forces if isinstance(f, Contact)), None),
+        [f for f in forces if isinstance(f, FarForce) and f.acts_on(grains)],
+        [f for f in forces if isinstance(f, GrainForce)],
+        [f for f in forces if isinstance(f, Gas)],
+    )
+
+
+def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
+    """What the driver is compiled from."""
+    # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
+    way = verlet.far if given.distant and given.contact and verlet.most_steps > 1 else "every step"
+    return Plan(
+        outside,
+        sums,
+        split=way == "impulse",
+        impulse=way == "impulse",
+        foretell=way.startswith("taylor"),
+        gas=bool(given.gas),
+        adaptive=adaptive,
+        crew=is_large(len(grains)),
+        keep=all(is_ours(f.formula) for f in given.outside),
+        magnetic=bool(grains.body_moment.any()),
+        wide=len(grains) >= WIDE_FROM,
+    )
+
+
+def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all_pairs: bool) -> World:
+    """The grains in their box, with `room` for contacts and pairs, and for whatever else plan and rules need."""
+    count, listed, alike = len(grains), rules.search.listed, rules.contact.alike
+    channels = len(RECORDED) if rules.contact.damped or rules.contact.follow else ALWAYS
+    blocks = all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0
+    needed = set(FOR_LIST if listed else FOR_CELLS if rules.search.celled else ())
+    needed |= set(FOR_IMPULSES if plan.impulse else ())
+    needed |= set(FOR_RATES if plan.foretell else ())
+    needed |= {"here", "source"} if blocks else set()
+    needed |= set(FOR_FORCES if plan.far is not NO_FAR_FORCE or plan.adaptive else ())
+    return World(
+        grains,
+        box,
+        contact_arrays(count, room, len(Bond._fields), alike=alike, channels=channels),
+        near_pairs(count, room, alike=alike),
+        far_arrays(
+            count,
+            MATES * count if listed else IN_REACH if rules.search.celled else 0,
+            blocks,
+            needless={*FOR_FORCES, *FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
+        ),
+        stages=stage_arrays(count if plan.adaptive else 0),
+        alike=alike,
+    )
+
+
+def _stride(grains: Grains, box: Box, found: Found) -> float:
+    """The longest way [m] that a grain may go in one Runge–Kutta step, so that no pair is missed.
+
+    With a list, Δr/4, as `integrate.event_location.first_touch` argues.  And an image of a grain other than the nearest must not
+    come to touch: it is half a box side away, and two grains close that less r1 + r2 together.  A tenth is kept back
+    for what lies between two stages.
+    """
+    images = 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
+    return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images
+
+
+def _books(outside: Sequence[GrainForce], box: Box) -> Books:
+    moored = any(getattr(f, "moored", False) for f in outside)
+    return Books(any(getattr(f, "timed", False) for f in outside), moored and not box.is_open)
+
+
+def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> Stirring:
+    if not gas:
+        return Stirring(math.inf, seed, VACUUM)
+    return Stirring(STIR_PART * gas[0].shortest_time(grains), seed, gas[0].rules())
+
+
+def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
+    """Warnings of what is unusual.  Raises BadInput for everything that does not fit together."""
+    problems = impossible(grains, forces, box) if fresh else []
+    warnings: list[str] = []
+    for force in forces:
+        try:
+            warnings += force.check(grains, box)
+        except BadInput as error:
+            problems += error.problems
+    least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
+    if box.shortest < least:
+        problems.append(
+            f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
+            "or a grain would meet two images of its neighbour"
+        )
+    if problems:
+        raise BadInput(problems)
+    return warnings + (unusual(grains, forces, box) if fresh else [])
+
+
+def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> Control:
+    """What the choice of the step needs."""
+    steps = [own() for f in given.outside if (own := getattr(f, "longest_step", None)) is not None]
+    idle = IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials)))
+    return Control(
+        fixed=0.0 if stepping.step == "auto" else stepping.step,
+        reach=reach,
+        energy_scale=max((f.energy_scale(grains) for f in given.distant), default=0.0),
+        accuracy=stepping.accuracy,
+        outer_field=math.fsum(f.flux_density_size() for f in given.outside),
+        impact=IMPACT_PART / stepping.steps_per_period,
+        longest=min([idle, *steps, *(STIR_PART * gas.shortest_time(grains) for gas in given.gas)]),
+    )
+
+
+def sound_crossing(grains: Grains, number: int) -> float:
+    """r √(ρ/E) [s] of the smallest grain of one material."""
+    material = grains.materials[number]
+    radius = float(grains.radius[grains.material == number].min())
+    return radius * math.sqrt(material.density / material.young_modulus)
+
+
+def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactRules:
+    law = contact or Contact()
+    # without a Contact nothing ever touches, and materials may lack what contacts need
+    pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
+    return ContactRules(
+        on=contact is not None,
+        pairings=pairings,
+        release=law.beyond == "release",
+        follow=law.stiffness == "dt97",
+        damped=law.damping != "none",
+        per_period=stepping.steps_per_period,
+        alike=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
+    )

@@ -1,0 +1,91 @@
+"""The contacts as a table anyone can read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
+from ..errors import NoSuchKey, did_you_mean, shown
+from ..optional import optional
+from ..state.state import CONTACTS, RECORDED, World
+
+COLUMNS = (
+    ("pair", "", "the two grains"),
+    ("formed", "s", "time of first touch; the start for contacts that were there"),
+    *CONTACT_ROWS,
+    *CONTACT_VECTORS,
+    ("force", "N", "force on the first grain; the second one's is the opposite"),
+    ("torque1", "N m", "torque on the first grain"),
+    ("torque2", "N m", "torque on the second grain"),
+    *((f"lost_{name}", "J", f"dissipated so far: {name}") for name in RECORDED),
+)
+"""Name, unit and meaning of every column."""
+
+
+class ContactTable(Mapping[str, np.ndarray]):
+    """One row per contact, columns by name (see COLUMNS): `table["roll_share"]`; a snapshot, not a view.
+
+    Columns are (C,), but `pair` is (C, 2) and vectors are (C, 3), laboratory frame.
+    """
+
+    def __init__(self, world: World, follow: bool):
+        used = int(world.count[CONTACTS])
+        contacts = world.contacts
+        scalars = len(CONTACT_ROWS)
+        names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
+        rows = np.zeros((scalars + 3 * len(names), used))
+        measure_contacts(world.grains.arrays, contacts, world.count, world.box.span, follow, rows)
+        self._columns: dict[str, np.ndarray] = {
+            "pair": contacts.pair[:, :used].T.copy(),
+            "formed": contacts.formed[:used].copy(),
+        }
+        self._columns |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
+        vectors = rows[scalars:].reshape(len(names), 3, used)
+        self._columns |= {name: vectors[k].T.copy() for k, name in enumerate(names)}
+        for k, name in enumerate(RECORDED):
+            there = k < len(contacts.lost)
+            self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if there else np.zeros(used)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._columns:
+            raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self._columns))}")
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        """Number of columns; the number of contacts is `len(table["pair"])`."""
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        return f"<{len(self['pair'])} contacts: {', '.join(self)}>"
+
+    def _flat(self) -> dict[str, np.ndarray]:
+        """Columns of one dimension: vectors are split into components, pairs into grain1 and grain2."""
+        flat: dict[str, np.ndarray] = {}
+        for name, column in self.items():
+            if name == "pair":
+                flat |= {"grain1": column[:, 0], "grain2": column[:, 1]}
+            elif column.ndim == 2:
+                flat |= {f"{name}_{axis}": column[:, k] for k, axis in enumerate("xyz")}
+            else:
+                flat[name] = column
+        return flat
+
+    def to_pandas(self) -> Any:
+        """A pandas DataFrame; pandas has to be installed."""
+        return optional("pandas", "to_pandas").DataFrame(self._flat())
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset with dimension `contact` and units as attributes; xarray has to be installed."""
+        xarray = optional("xarray", "to_xarray")
+        units = {name: unit for name, unit, _ in COLUMNS}
+        variables = {
+            name: ("contact", column, {"units": units.get(name, units.get(name[:-2], ""))})
+            for name, column in self._flat().items()
+        }
+        return xarray.Dataset(variables)

@@ -1,0 +1,229 @@
+"""A world and the compiled code that moves it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..contact.gather import resort_sides
+from ..contact.initial import seed_contacts
+from ..forces.base import FarForce, GrainForce
+from ..forces.external.loops import outside_shares_for
+from ..forces.pair.loops import shares_for
+from ..integrate.adaptive import Adaptive
+from ..integrate.adaptive_driver import flight_driver_for
+from ..integrate.driver import driver_for
+from ..integrate.kernel_spec import Plan, Rules, Stop
+from ..integrate.step_control import GROW_EVERY
+from ..integrate.task_queue import crew_for, new_crew, send_away, wants_help
+from ..integrate.verlet import Verlet
+from ..integrate.worker_threads import Hands
+from ..neighbours.cell_list import FULL, remake_far_list
+from ..neighbours.settings import Neighbours
+from ..neighbours.spatial_sort import RENEWED_EVERY, inverse, order_on_curve, rearrange, sort_columns
+from ..state.arrays import SPARE
+from ..state.state import (
+    CONTACT_STEP,
+    CONTACTS,
+    FAR_SUMS,
+    GRAIN1,
+    GRAIN2,
+    GROWN,
+    LOOKED,
+    MADE,
+    MOVED,
+    ORDERED,
+    PAIRS,
+    STAGE,
+    STEPS,
+    World,
+)
+
+
+@dataclass
+class Engine:
+    """A world and the compiled code that moves it.
+
+    Attributes:
+        world: the state, its grains numbered as the user knows them.
+        rules: everything that does not change, as the kernels take it.
+        warnings: what the forces had to say about these grains.
+        far: the long-range forces that some grain feels, with their loops and numbers.
+        outside: the per-grain forces.
+        search: how neighbours are found, in words.
+        stepping: the integrator, with a number for everything that depends on the grains at the start.
+        neighbours: their settings, likewise, unless they are those of an earlier run.
+    """
+
+    _world: World
+    rules: Rules
+    warnings: list[str]
+    outside: Sequence[GrainForce]
+    far: Sequence[tuple[FarForce, Any, Any]]
+    search: str
+    stepping: Verlet | Adaptive
+    neighbours: Neighbours
+    _plan: Plan
+    _away: bool = field(init=False, default=False)  # are grains at places of their own now?
+    _advance: Callable = field(init=False)
+    _hands: Hands | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        self._advance = flight_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
+        if self._plan.crew:
+            self._hands = Hands(crew_for(self._plan)[1])
+
+    @property
+    def world(self) -> World:
+        """The state, its grains numbered as the user knows them."""
+        self.come_home()
+        return self._world
+
+    @world.setter
+    def world(self, other: World) -> None:
+        self._world, self._away = other, False
+
+    def come_home(self) -> None:
+        """Give every grain the number back that the user knows it by, until the next step is taken."""
+        if self._away:
+            rearrange(self._world, inverse(self._world.order))
+            self._away = False
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return self._world.time
+
+    @property
+    def steps(self) -> int:
+        """Taken so far."""
+        return self._world.steps
+
+    def _to_places(self) -> None:
+        """Grains where steps are fast, if that is not where they are."""
+        if not self._world.order.size or self.steps >= self._world.count[ORDERED] + RENEWED_EVERY:
+            w = self.world
+            w.order, w.count[ORDERED] = order_on_curve(w), w.steps
+            rearrange(w, w.order)
+            sort_columns(w)
+            self._remake_list()
+        elif not self._away:
+            rearrange(self._world, self._world.order)
+        self._away = True
+
+    def advance(self, until: float, most_steps: float) -> Stop:
+        """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
+        last = min(self.steps + most_steps, 2**62)
+        if not self.neighbours.along_curve(len(self._world.grains)):
+            return self._drive(until, last)
+        while True:
+            if self.time < until and self.steps < last:
+                self._to_places()
+            renewed = self._world.count[ORDERED] + RENEWED_EVERY
+            stop = self._drive(until, min(last, renewed))
+            if not (stop is Stop.STEPS_DONE and renewed <= self.steps < last):
+                return stop
+
+    def _drive(self, until: float, last: float) -> Stop:
+        """On to a time [s] or a step, as the grains stand now."""
+        w = self._world
+        while True:
+            stages = (w.stages,) if self._plan.adaptive else ()
+            arrays = (w.grains.arrays, w.contacts, w.near, w.far, *stages, w.clock, w.count, w.lost)
+            rules = self._rules_with_crew()
+            try:
+                stop = Stop(self._advance(*arrays, rules, float(until), int(last)))
+            except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
+                if self._hands is not None:
+                    send_away(rules.crew)
+                raise
+            if stop is Stop.CONTACTS_FULL:
+                w.grow_contacts()
+            elif stop is Stop.PAIRS_FULL:
+                found, w.count[PAIRS] = int(w.count[PAIRS]), 0  # none of the list holds
+                w.grow_pairs(int(SPARE * found))
+            elif stop is Stop.LIST_FULL:
+                w.grow_rows()
+            else:
+                return stop
+
+    def _rules_with_crew(self) -> Rules:
+        """The rules for one call of the driver, with a crew at work if there is one."""
+        if self._hands is None:
+            return self.rules
+        w = self._world
+        rules = self.rules._replace(crew=new_crew(len(w.grains), w.contacts.flag.size))
+        if wants_help(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
+            self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
+        return rules
+
+    def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
+        """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""
+        w = self.world
+        if w.contacts.pair.shape[1] < len(pair):
+            w.grow_contacts(len(pair))
+        given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
+        pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
+        return int(seed_contacts(w.grains.arrays, w.contacts, w.count, w.box.span, self.rules.contact, pairs, *given))
+
+    def begin(self) -> None:
+        """Contacts of grains that touch at the start, nothing booked, and the first loads."""
+        w = self.world
+        w.count[STAGE] = 1
+        w.count[LOOKED] = w.count[GROWN] = -GROW_EVERY
+        w.clock[CONTACT_STEP] = math.inf
+        self._drive(-math.inf, 1)
+        w.count[STEPS] = w.count[MADE] = w.count[MOVED] = w.count[FAR_SUMS] = 0
+        w.lost[:] = 0.0
+        w.contacts.lost[:] = 0.0
+
+    def take_up(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
+        w = self.world
+        w.from_arrays(saved)
+        if w.order.size:  # lists depend on it
+            rearrange(w, w.order)
+            self._away = True
+        elif w.contacts.turn.size:
+            resort_sides(w.contacts, w.count, len(w.grains))
+        if self.rules.search.listed and not self._list_lasts():
+            w.far.anchor[...] = w.grains.arrays.position
+        self._remake_list()
+
+    def _remake_list(self) -> None:
+        """The list of the anchors, if there is one, for the numbers that grains have now."""
+        w, search = self._world, self.rules.search
+        while search.listed and remake_far_list(w.far, w.box.span, search.reach) == FULL:
+            w.grow_rows()
+
+    def _list_lasts(self) -> bool:
+        """False if a run of an earlier version had no list, or a wider one, for which grains may have gone farther."""
+        w = self._world
+        if not np.isfinite(w.far.anchor).all():
+            return False
+        moved = w.box.nearest((w.grains.arrays.position - w.far.anchor).T)
+        return bool((moved**2).sum(axis=1).max() <= (0.5 * self.rules.search.margin) ** 2)
+
+    def energies_at_grains(self) -> dict[str, np.ndarray]:
+        """Energy [J] of each grain, (N,), by force: half of each pair's, and what per-grain forces give."""
+        w = self.world
+        shares = {force.column: np.zeros(len(w.grains)) for force, _, _ in self.far}
+        for force, sums, numbers in self.far:
+            shares_for(sums.energies)(w.grains.arrays, w.far, self.rules.span, numbers, shares[force.column])
+        for outer in self.outside:
+            shares[outer.name] = np.zeros(len(w.grains))
+            fill = outside_shares_for(outer.formula)
+            fill(w.grains.arrays, w.time, outer.numbers(), shares[outer.name])
+        return shares
+
+    def force_energies(self) -> dict[str, float]:
+        """Energy [J] of all long-range and per-grain forces by column of the ledger."""
+        return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
+
+    def culprits(self) -> tuple[int, ...]:
+        """The grains that the last stop was about."""
+        return tuple(sorted({int(self.world.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))

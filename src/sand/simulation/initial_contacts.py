@@ -1,0 +1,85 @@
+"""Contacts at the start: those of grains that overlap, and those of an earlier run."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..box import Box
+from ..contact.jkr import rest_overlap, rest_radius
+from ..contact.model import Contact
+from ..errors import BadInput
+from ..grains import Grains
+from ..setup.checks import most_overlap
+from ..setup.from_frame import Bonds
+from .engine import Engine
+
+TOLD = 10
+
+
+class Touching(NamedTuple):
+    """Pairs of grains that overlap."""
+
+    pair: np.ndarray  # (P, 2), the lower number first, sorted
+    overlap: np.ndarray  # (P,) [m] > 0
+
+
+NOTHING_TOUCHES = Touching(np.zeros((0, 2), np.int64), np.zeros(0))
+
+
+def touching(grains: Grains, box: Box) -> Touching:
+    """All pairs that overlap."""
+    pair = box.close_pairs(grains.position, 2.0 * float(grains.radius.max()))
+    overlap = grains.overlaps(pair, box)
+    return Touching(pair[overlap > 0.0], overlap[overlap > 0.0])
+
+
+def seed_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> np.ndarray:
+    """Put the contacts of an earlier run into the world; returns their pairs (C, 2), sorted.  Raises BadInput."""
+    if contacts is None or not len(contacts.pair):
+        return NOTHING_TOUCHES.pair
+    count, pair = len(engine.world.grains), np.asarray(contacts.pair)
+    if contact is None:
+        raise BadInput(f"{len(pair)} contacts are given, but there is no sand.Contact() among the forces; add it")
+    shapes = tuple(np.shape(part) for part in contacts)
+    if shapes != ((len(pair), 2), (len(pair), 3), (len(pair), 3), (len(pair),)):
+        raise BadInput(f"contacts have shapes {shapes}; they must be (C, 2), (C, 3), (C, 3), (C,)")
+    if pair.min() < 0 or pair.max() >= count or (pair[:, 0] == pair[:, 1]).any():
+        raise BadInput(f"contacts name grains that are not there; grains are 0 to {count - 1}, two different ones each")
+    held = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
+    if len(held) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
+        raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
+    wrong = engine.seed(pair, contacts.slide, contacts.roll, contacts.twist)
+    if wrong >= 0:
+        i, j = pair[wrong]
+        raise BadInput(
+            f"the contact of grains {i} and {j} is stretched beyond its break; these materials and radii do not hold it"
+        )
+    return held
+
+
+def refuse_overlaps(grains: Grains, contact: Contact, found: Touching, held: np.ndarray) -> None:
+    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start.
+
+    Args:
+        found: the pairs that overlap.
+        held: pairs of contacts from an earlier run, sorted, (C, 2); they may be in the middle of an impact.
+    """
+    (i, j), radius = found.pair.T, grains.radius
+    count = np.int64(len(grains))
+    reduced = radius[i] * radius[j] / (radius[i] + radius[j])
+    gamma, modulus = contact.pairings(grains.materials)[:2, grains.material[i], grains.material[j]]
+    rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
+    limit = most_overlap(rest, np.minimum(radius[i], radius[j]))
+    is_new = ~np.isin(i * count + j, held[:, 0] * count + held[:, 1])
+    wrong = np.flatnonzero((found.overlap > limit) & is_new)
+    problems = [
+        f"grains {i[k]} and {j[k]} overlap by {found.overlap[k]:.3g} m at the start; at most {limit[k]:.3g} m may be: "
+        "move them apart"
+        for k in wrong[:TOLD]
+    ]
+    if len(wrong) > TOLD:
+        problems.append(f"… and {len(wrong) - TOLD} more overlapping pairs")
+    if problems:
+        raise BadInput(problems)

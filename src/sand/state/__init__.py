@@ -1,0 +1,1 @@
+"""The state of a simulation: time, grains, contacts and box as arrays."""

@@ -1,1 +1,0 @@
-"""What a run looks like.  matplotlib, which is heavy, is imported nowhere else."""

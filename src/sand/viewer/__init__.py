@@ -1,0 +1,1 @@
+"""The interactive viewer: its data, server, pages and notebook widget."""

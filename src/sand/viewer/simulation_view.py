@@ -1,0 +1,74 @@
+"""A run told to those who look at it: its magnetic field, and what `view()` shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import BadInput
+from ..forces.external.magnetic_field import Field
+from ..io.run_folder import CASE, TRAJECTORY, read_toml
+from ..numerics.vec import norm
+from ..units import spoken
+
+if TYPE_CHECKING:
+    from ..simulation.simulation import Simulation
+
+Told = tuple[str, Callable[[float], Sequence[float]]]
+
+
+def field_of(forces: Iterable[Any]) -> Told | None:
+    """Magnetic fields among forces in words, and their flux density together [T] at a time [s]; None without one."""
+    fields = [f for f in forces if hasattr(f, "flux_density_at") and f.flux_density_size() > 0.0]
+    if not fields:
+        return None
+    text = " + ".join(_said(f) if isinstance(f, Field) else f.name for f in fields)
+    return text, lambda time: np.sum([f.flux_density_at(time) for f in fields], axis=0)
+
+
+def field_in(folder: Path) -> Told | None:
+    """The same of the case in a run's folder; None, too, where there is no case, or one that cannot be read."""
+    try:
+        given = read_toml(folder / CASE).get("forces", {}).get("field")
+        return None if given is None else field_of([Field(**given)])
+    except (BadInput, TypeError, AttributeError):
+        return None
+
+
+def _said(field: Field) -> str:
+    constant = spoken(norm(field.flux_density), "T")
+    if field.shape == "constant":
+        return f"{constant}, constant"
+    if field.shape == "ramp":
+        return f"from {constant} at {spoken(field.start, 's')} to {spoken(norm(field.final), 'T')} at " + spoken(
+            field.end, "s"
+        )
+    swing = f"{spoken(norm(field.amplitude), 'T')}, {field.shape} at {spoken(field.frequency, 'Hz')}"
+    return f"{constant}, constant, and {swing}" if norm(field.flux_density) > 0.0 else swing
+
+
+def view_simulation(simulation: Simulation, path: str | Path | None) -> Any:
+    """What `Simulation.view` gives: of the frames in its folder, or of its state of now where there are none."""
+    from .dataset import story_of
+    from .show import show_story
+    from .snapshot import story_of_now
+
+    record, field = simulation.record, field_of(simulation.forces)
+    folder = None if record is None else record.folder
+    if record is not None and (record.folder / TRAJECTORY).exists():
+        record.flush()
+        story = story_of(record.folder, field)
+    else:
+        story = story_of_now(simulation, field)
+    return show_story(story, path, folder, simulation.figure)
+
+
+def view_folder(folder: Path, path: str | Path | None, instead: Callable[[], Any]) -> Any:
+    """What `sand.open(DIR).view` gives; `instead` where the installation lacks the page."""
+    from .dataset import story_of
+    from .show import show_story
+
+    return show_story(story_of(folder, field_in(folder)), path, folder, instead)
