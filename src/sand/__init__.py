@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import importlib
 
+from .entry_points import register
+from .version import __version__
+
+register()
+
 TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 
-__version__ = "0.1.0"
 
 _HOMES = {
     "Box": "box",

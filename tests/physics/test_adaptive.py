@@ -9,10 +9,11 @@ import tomli_w
 from scipy.integrate import solve_ivp
 
 import sand
-from sand.config.build import case_of, simulation_of
+from sand.config.build import simulation_of
 from sand.config.case import check_case
 from sand.constants import MAGNETIC
 from sand.errors import BadInput
+from sand.simulation.serialise import case_of
 from sand.state.state import CONTACTS, FLIGHT, MADE, REJECTED
 
 R = 1e-8

@@ -8,7 +8,7 @@ import pytest
 
 import sand
 from sand.constants import MAGNETIC
-from sand.contact import jkr as adhesion
+from sand.contact import jkr
 from sand.contact import law as law_of
 from sand.state.state import CONTACT_STEP
 
@@ -208,7 +208,7 @@ def beyond_energy(sim):
     w = (sim.grains.velocity[1] - sim.grains.velocity[0]) @ apart / distance
 
     def force(overlap):
-        y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+        y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
         return law_of.normal_force(overlap, y, bond)
 
     overlap, h = sim.grains.radius.sum() - distance, 1e-4 * bond.pull_off_overlap

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sand.contact import jkr as adhesion
-from sand.contact import law, tangential
+from sand.contact import jkr, law, tangential
 from sand.contact.model import Contact
 from sand.material import ICE, IRON, SILICA
 from sand.numerics.quaternion import turn, turned
@@ -64,7 +63,7 @@ class Pair:
         return np.array(law.energies(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.bond))
 
     def y(self):
-        return adhesion.root(adhesion.stretch(self.overlap(), self.bond.pull_off_overlap))
+        return jkr.root(jkr.stretch(self.overlap(), self.bond.pull_off_overlap))
 
     def load(self):
         return law.contact_load(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.bond)
@@ -140,10 +139,10 @@ def test_each_mode_alone(ratio, push, turn1, turn2):
         pair.q2 = turn(pair.q2, scale(t / pair.r1, d2))
         pair.twist += t / pair.r1 * dot(sub(d1, d2), pose.n)
 
-    y = adhesion.root(adhesion.stretch(pair.overlap(), b.pull_off_overlap))
+    y = jkr.root(jkr.stretch(pair.overlap(), b.pull_off_overlap))
     bend = scale(b.reduced_radius**2 * b.roll_stiffness, cross(pose.n1, pose.n2))
     works = (
-        adhesion.force_at(y, b.pull_off_force) * dot(pose.n, dx),
+        jkr.force_at(y, b.pull_off_force) * dot(pose.n, dx),
         b.slide_stiffness * along / pose.distance * dot(zeta, dx)
         - b.slide_stiffness * dot(cross(pose.n1, zeta), d1)
         + b.slide_stiffness * pair.r2 / pair.r1 * dot(cross(pose.n2, zeta), d2),
@@ -178,7 +177,7 @@ def test_swapping_the_grains_swaps_the_loads(ratio, push, turn1, turn2):
     force, torque1, torque2 = pair.load()
     p = pair.pose()
     swapped = law.Pose(scale(-1.0, p.n), p.distance, p.n2, p.n1, p.twist)
-    y = adhesion.root(adhesion.stretch(pair.overlap(), pair.bond.pull_off_overlap))
+    y = jkr.root(jkr.stretch(pair.overlap(), pair.bond.pull_off_overlap))
     back, other1, other2 = law.contact_load(swapped, pair.overlap(), y, pair.r2, pair.r1, pair.bond)
     assert back == pytest.approx(scale(-1.0, force), rel=1e-9, abs=1e-22)
     assert other1 == pytest.approx(torque2, rel=1e-9, abs=1e-29)
@@ -252,7 +251,7 @@ def test_constants_of_equal_grains():
     r1, _, b = contact_of(1.0, (IRON, IRON))
     g, nu, gamma = IRON.shear_modulus, IRON.poisson_ratio, IRON.surface_energy
     same = Contact().pairing(IRON, IRON)
-    a0 = adhesion.rest_radius(same.surface_energy, r1 / 2, same.modulus)
+    a0 = jkr.rest_radius(same.surface_energy, r1 / 2, same.modulus)
     assert b.slide_stiffness == pytest.approx(8 * a0 * g / (2 * (2 - nu)), rel=1e-6, abs=0.0)
     assert b.slide_limit == pytest.approx((2 - nu) * a0 / (16 * math.pi), rel=1e-6, abs=0.0)
     assert b.slide_stiffness * b.slide_limit == pytest.approx(g * a0**2 / (4 * math.pi), rel=1e-6, abs=0.0)
@@ -271,7 +270,7 @@ def test_periods_of_20_nm_iron():
     assert 2 * math.pi / math.sqrt(b.fastest) == pytest.approx(1.9e-11, rel=0.02, abs=0.0)
     assert b.fastest == pytest.approx(7 * b.slide_stiffness / mass, rel=1e-6, abs=0.0)
     same = Contact().pairing(IRON, IRON)
-    a0 = adhesion.rest_radius(same.surface_energy, r / 2, same.modulus)
-    k_n = adhesion.normal_stiffness(a0, same.modulus)
+    a0 = jkr.rest_radius(same.surface_energy, r / 2, same.modulus)
+    k_n = jkr.normal_stiffness(a0, same.modulus)
     assert 2 * math.pi / math.sqrt(2 * k_n / mass) == pytest.approx(4.3e-11, rel=0.02, abs=0.0)
     assert a0 / (r / 2) == pytest.approx(0.53, rel=1e-6, abs=0.005)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from sand.forces.gas.drag import rotation_friction, translation_friction
 
 import sand
 from sand.constants import BOLTZMANN, COULOMB
+from sand.forces.gas.drag import rotation_friction, translation_friction
 from sand.state.state import KICKED, STEP
 
 

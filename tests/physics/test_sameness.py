@@ -182,8 +182,7 @@ def test_the_compiler_changes_nothing_but_rounding(tmp_path):
 @pytest.mark.compiled("contacts")
 def test_kernels_against_plain_python_loops():
     """Pair list, contacts and gather of a random aggregate against double loops written out in NumPy."""
-    from sand.contact import jkr as adhesion
-    from sand.contact import law
+    from sand.contact import jkr, law
 
     grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])
@@ -209,7 +208,7 @@ def test_kernels_against_plain_python_loops():
         n2 = Rotation.from_quat(g.orientation[j]).apply(w.contacts.pointer2[:, c])
         pose = law.Pose(tuple(apart / distance), distance, tuple(n1), tuple(n2), w.contacts.twist[c])
         overlap = g.radius[i] + g.radius[j] - distance
-        y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+        y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
         f, t1, t2 = law.contact_load(pose, overlap, y, g.radius[i], g.radius[j], bond)
         force[i] += f
         force[j] -= f

@@ -8,9 +8,10 @@ import pytest
 import tomli_w
 
 import sand
-from sand.config.build import case_of, simulation_of
+from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.errors import BadInput
+from sand.simulation.serialise import case_of
 
 GOOD = tomllib.loads("""
 [run]

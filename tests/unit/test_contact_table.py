@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact import jkr as adhesion
-from sand.contact import law
+from sand.contact import jkr, law
 from sand.contact.update import bond_at, pose_at
 from sand.simulation.contact_table import COLUMNS
 
@@ -34,7 +33,7 @@ def test_every_column_row_by_row(stiffness):
         pose = pose_at(w.grains.arrays, w.contacts, sim.box.span, c, w.contacts.twist[c])
         r1, r2 = sim.grains.radius[i], sim.grains.radius[j]
         overlap = r1 + r2 - np.linalg.norm(sim.grains.position[i] - sim.grains.position[j])
-        y = adhesion.root(adhesion.stretch(overlap, plain.pull_off_overlap))
+        y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
         bond = law.stiffened(plain, y, stiffness == "dt97")
         n = np.array(pose.n)
         d = r1 * np.array(pose.n1) - r2 * np.array(pose.n2)

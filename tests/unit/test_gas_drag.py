@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from sand.forces.gas.loops import VACUUM, GasRules, gas_kick, shortest_stopping_time
 
 import sand
 from sand.compiler.jit import kernel
 from sand.constants import BOLTZMANN
 from sand.forces.base import Force, GrainForce
+from sand.forces.gas import drag as law
+from sand.forces.gas.loops import VACUUM, GasRules, gas_kick, shortest_stopping_time
 from sand.forces.gas.model import Gas
-from sand.forces.gas.model import drag as law
 
 SPEED = math.sqrt(8.0 / math.pi)
 """v̄ for k_B T/m_g = 1."""

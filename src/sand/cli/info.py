@@ -112,8 +112,9 @@ def of_run(path: Path) -> Told:
 
 def of_case(path: Path) -> Told:
     """A case file, checked: what would run, and what would be chosen."""
-    from ..config.build import case_of, simulation_of
+    from ..config.build import simulation_of
     from ..config.case import read_case
+    from ..simulation.serialise import case_of
 
     if (other := of_other_case(path)) is not None:
         return other

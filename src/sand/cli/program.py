@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import click
 
-from .. import __version__
 from ..errors import SandError
+from ..version import __version__
 from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
 from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 from ..arguments import checked
 from ..box import Box, as_box
 from ..errors import BadInput
-from ..forces.base import FarForce
 from ..grains import Grains
 from ..io.checkpoint import newest_checkpoint
 from ..io.lock import writing
@@ -20,7 +18,6 @@ from ..material import Material
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
 from ..simulation.simulation import Simulation
-from ..simulation.stop import SHORTEST
 from .bodies import body_from_file
 from .case import Case, check_case, read_case
 
@@ -140,42 +137,6 @@ def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]
     finally:
         frames.close()
     return start._replace(note=f"{place}, {start.note}")
-
-
-def case_of(simulation: Simulation, until: float, last_step: float) -> dict[str, Any]:
-    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back.
-
-    Args:
-        until: time [s] the run is to reach, or infinity.
-        last_step: number of the step it is to reach, or infinity.
-    """
-    materials = simulation.grains.materials
-    recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
-    names = [m.name for m in materials]
-    run = {
-        "until": max(until, SHORTEST),  # a run to time 0 can be gone on with, too
-        "steps": last_step if last_step == float("inf") else int(last_step),
-        "frame_every": simulation.frame_every,
-        "seed": int(simulation.seed or 0),
-    }
-    forces = {}
-    for force in simulation.forces:
-        forces[force.name] = dict(force.parameters())
-        if isinstance(force, FarForce):
-            radius = force.choose(simulation.start, simulation.box).radius
-            forces[force.name]["cutoff"] = "none" if radius is None else radius
-    lengths = ["open" if v is None else v for v in simulation.box.lengths]
-    return {
-        "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},
-        "box": {} if simulation.box.is_open else {"periodic": lengths},
-        "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
-        "materials": {
-            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
-        },
-        "forces": forces,
-        "stepping": simulation.stepping.parameters(),
-        "neighbours": simulation.neighbours.parameters(),  # as chosen at the start
-    }
 
 
 def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:

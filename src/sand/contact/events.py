@@ -4,7 +4,6 @@ import math
 
 from ..box import nearest_image
 from ..compiler.jit import loop, rare
-from ..neighbours.pair_list import all_may_touch, bond_of, forget_touch
 from ..numerics.quaternion import turned_back
 from ..numerics.vec import accrue, axpy, dot, load, load4, put, scale, sub
 from ..state.state import (
@@ -19,14 +18,15 @@ from ..state.state import (
     ROLLING,
     SLIDING,
     SOON,
+    SOON_LEEWAY,
     STIFFNESS,
     TIME,
     TWISTING,
 )
-from . import jkr as adhesion
+from . import jkr, tangential
 from . import law as law_of
-from . import tangential
-from .impact import speed_gained
+from .law import speed_gained
+from .pair_types import bond_of
 from .slip import record_of, strain_before
 from .update import BROKE, WAITS, alike, bond_at, damping_at, pose_at, write_loads
 
@@ -71,7 +71,7 @@ def damp(grains, contacts, span, c, dt):
     pull = sub(scale(1.0 / grains.mass[i], load(grains.force, i)), scale(1.0 / grains.mass[j], load(grains.force, j)))
     closing = -dot(axpy(0.5 * dt, pull, moving), n)
     overlap = grains.radius[i] + grains.radius[j] - distance
-    y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+    y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
     force = law_of.damping_force(overlap, y, closing, bond)
     accrue(contacts.push, c, scale(force, n))
     earlier = axpy(-dt, moving, apart)
@@ -104,7 +104,7 @@ def book_stiffness(grains, contacts, count, lost, span, dt):
 @loop
 def stiffened_at(overlap, bond):
     """The bond with the stiffnesses that follow this overlap."""
-    return law_of.stiffened(bond, adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap)), True)
+    return law_of.stiffened(bond, jkr.root(jkr.stretch(overlap, bond.pull_off_overlap)), True)
 
 
 @loop
@@ -154,7 +154,7 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
         strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         if law_of.beyond_limits(strain, pose.n, bond):
             before = strain_before(grains, contacts, c, pose, bond, dt)
-            y = adhesion.root(adhesion.stretch(strain.overlap, bond.pull_off_overlap))
+            y = jkr.root(jkr.stretch(strain.overlap, bond.pull_off_overlap))
             now = law_of.stiffened(bond, y, law.follow)
             if strain.overlap < -bond.break_overlap:
                 zero = (0.0, 0.0, 0.0)
@@ -288,3 +288,20 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
         book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts, c)))
         near.touching[p] = 1
         count[MADE] += 1
+
+
+@loop
+def all_may_touch(near, count):
+    """Are all near pairs to be looked at, instead of the first watch[SOON] of `soon`?"""
+    return near.watch[SOON] == count[PAIRS]
+
+
+@rare
+def forget_touch(near, count, i, j):
+    """Mark the pair (i, j) of the list as no longer in contact; it may touch again soon."""
+    near.watch[SOON_LEEWAY] = 0.0
+    for p in range(count[PAIRS]):
+        a, b = near.pair[0, p], near.pair[1, p]
+        if (a == i and b == j) or (a == j and b == i):
+            near.touching[p] = 0
+            return

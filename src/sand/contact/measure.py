@@ -3,7 +3,7 @@
 from ..compiler.jit import kernel, loop
 from ..numerics.vec import across, axpy, dot, load, norm
 from ..state.state import CONTACTS
-from . import jkr as adhesion
+from . import jkr
 from . import law as law_of
 from .update import bond_at, damping_at, pose_at
 
@@ -31,7 +31,7 @@ def measure_energies(grains, contacts, count, span, follow, out):
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         overlap, bond = r1 + r2 - pose.distance, bond_at(contacts, c)
-        y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+        y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
         stored = law_of.energies(pose, overlap, y, r1, r2, law_of.stiffened(bond, y, follow))
         for mode in range(4):
             out[2 + mode] += stored[mode]
@@ -73,7 +73,7 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         overlap, plain = r1 + r2 - pose.distance, bond_at(contacts, c)
-        y = adhesion.root(adhesion.stretch(overlap, plain.pull_off_overlap))
+        y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
         bond = law_of.stiffened(plain, y, follow)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
         xi = across(strain.roll, pose.n)

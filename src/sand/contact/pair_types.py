@@ -1,7 +1,65 @@
 """Where near pairs keep the numbers of their kind: one place for all where all grains are equal."""
 
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
 from ..compiler.jit import loop
 from ..state.state import PAIRS
+from .law import Pairing, bond_between
+
+
+class Kind(NamedTuple):
+    """What the constants of a pair's contact depend on, and what the list keeps of them."""
+
+    grains: Any  # material, radius [m] and mass [kg] of each
+    step: Any  # the step that a contact needs [s]
+    length: Any  # δ at which it breaks [m]
+
+
+NO_GRAIN = (np.uint32(0), -1.0, -1.0)
+NO_KIND = Kind((NO_GRAIN, NO_GRAIN), 0.0, 0.0)
+
+
+@loop
+def pairing_of(pairings, a, b):
+    """What materials a and b make together, from the (10, M, M) table."""
+    return Pairing(
+        pairings[0, a, b],
+        pairings[1, a, b],
+        pairings[2, a, b],
+        pairings[3, a, b],
+        pairings[4, a, b],
+        pairings[5, a, b],
+        pairings[6, a, b],
+        pairings[7, a, b],
+        pairings[8, a, b],
+        pairings[9, a, b],
+    )
+
+
+@loop
+def bond_of(grains, pairings, i, j):
+    """The constants of a contact between grains i and j."""
+    pairing = pairing_of(pairings, grains.material[i], grains.material[j])
+    return bond_between(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
+
+
+@loop
+def make_of(grains, i):
+    """All that the bonds of grain i depend on."""
+    return grains.material[i], grains.radius[i], grains.mass[i]
+
+
+@loop
+def kind_of(grains, law, i, j, last):
+    """The kind of a pair: the `last` one if it is the same, as its powers cost more than all else."""
+    a, b = make_of(grains, i), make_of(grains, j)
+    if (a, b) == last.grains:
+        return last
+    bond = bond_of(grains, law.pairings, i, j)
+    return Kind((a, b), 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period, bond.break_overlap)
 
 
 @loop

@@ -14,9 +14,8 @@ from ..numerics.quaternion import turned_back, turned_by
 from ..numerics.vec import axpy, dot, load, load4, put, scale, sub
 from ..state.arrays import BLOCK as JUDGED_TOGETHER
 from ..state.state import BREAKING, MOVED, ROLLING, SLIDING, TWISTING
-from . import jkr as adhesion
+from . import jkr, tangential
 from . import law as law_of
-from . import tangential
 from .update import WAITS, YIELDED, alike, bond_in, pose_after, quiet_pass, twist_gain, whole_vectors
 
 BLOCK = np.uint64(JUDGED_TOGETHER)
@@ -92,11 +91,11 @@ def _busy_pass(grains, contacts, first, last, column, span, law, dt):
         pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
         pose = pose_after(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
-        s = adhesion.stretch(overlap, bond.pull_off_overlap)
-        y = adhesion.root_in_reach(s)
+        s = jkr.stretch(overlap, bond.pull_off_overlap)
+        y = jkr.root_in_reach(s)
         now = law_of.stiffened(bond, y, law.follow)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
-        odd = (overlap < -bond.break_overlap) | (s > adhesion.STRETCH_OF_POLYNOMIAL)
+        odd = (overlap < -bond.break_overlap) | (s > jkr.STRETCH_OF_POLYNOMIAL)
         moves = law_of.beyond_limits(strain, pose.n, bond) & (not odd)
         # all is worked out for all and chosen from at the end: a branch, or a store under a condition, stops SIMD
         before = _strain_at_start(grains, contacts, c, pose, contacts.twist[c], bond, dt)

@@ -10,9 +10,8 @@ from ..numerics.quaternion import turned
 from ..numerics.simd import filled_up
 from ..numerics.vec import across, dot, load, load4, put, scale, sub
 from ..state.state import CONTACT_STEP, CONTACTS
-from . import jkr as adhesion
+from . import jkr, tangential
 from . import law as law_of
-from . import tangential
 from .pair_types import kinds
 
 FEW = 4
@@ -109,12 +108,12 @@ def quiet_pass(grains, contacts, first, last, used, column, span, law, dt):
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_after(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
-        s = adhesion.stretch(overlap, bond.pull_off_overlap)
-        y = adhesion.root_in_reach(s)
+        s = jkr.stretch(overlap, bond.pull_off_overlap)
+        y = jkr.root_in_reach(s)
         now = law_of.stiffened(bond, y, law.follow)
         push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
         strain = law_of.strain_of(pose, overlap, r1, r2, bond)
-        beyond = law_of.beyond_limits(strain, pose.n, bond) | (s > adhesion.STRETCH_OF_POLYNOMIAL)
+        beyond = law_of.beyond_limits(strain, pose.n, bond) | (s > jkr.STRETCH_OF_POLYNOMIAL)
         contacts.twist[c] = pose.twist
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
@@ -142,7 +141,7 @@ def write_loads(grains, contacts, span, law, c):
     bond = bond_at(contacts, c)
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
-    y = adhesion.root(adhesion.stretch(overlap, bond.pull_off_overlap))
+    y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
     now = law_of.stiffened(bond, y, law.follow)
     push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
     put(contacts.push, c, push)

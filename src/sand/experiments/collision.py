@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import checked
-from ..config.build import case_of, resume
+from ..config.build import resume
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import Force
@@ -21,6 +21,7 @@ from ..integrate.verlet import Verlet
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
+from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
 from ..units import si
 from .collision_outcome import Approach, Collision, judged

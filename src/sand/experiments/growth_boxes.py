@@ -8,11 +8,12 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from ..config.build import case_of, resume, simulation_of
+from ..config.build import resume, simulation_of
 from ..config.case import check_case
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.lock import writing
+from ..simulation.serialise import case_of
 
 
 def grow(

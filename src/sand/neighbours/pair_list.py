@@ -1,42 +1,16 @@
 """The list of pairs that may touch soon."""
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..box import nearest_image
 from ..compiler.jit import loop, rare
-from ..contact.law import Pairing, bond_between
-from ..contact.pair_types import kind_at
+from ..contact.pair_types import NO_KIND, kind_at, kind_of
 from ..numerics.vec import dot, load, put, sub
 from ..state.state import PAIRS, REBUILT, SOON, SOON_LEEWAY
 from .cell_list import FULL, Grid, grid_of, list_place
 from .skin import SPARED
-
-
-@loop
-def pairing_of(pairings, a, b):
-    """What materials a and b make together, from the (10, M, M) table."""
-    return Pairing(
-        pairings[0, a, b],
-        pairings[1, a, b],
-        pairings[2, a, b],
-        pairings[3, a, b],
-        pairings[4, a, b],
-        pairings[5, a, b],
-        pairings[6, a, b],
-        pairings[7, a, b],
-        pairings[8, a, b],
-        pairings[9, a, b],
-    )
-
-
-@loop
-def bond_of(grains, pairings, i, j):
-    """The constants of a contact between grains i and j."""
-    pairing = pairing_of(pairings, grains.material[i], grains.material[j])
-    return bond_between(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
 
 
 @loop
@@ -49,35 +23,9 @@ def in_contact(contacts, i, j):
     return False
 
 
-class Kind(NamedTuple):
-    """What the constants of a pair's contact depend on, and what the list keeps of them."""
-
-    grains: Any  # material, radius [m] and mass [kg] of each
-    step: Any  # the step that a contact needs [s]
-    length: Any  # δ at which it breaks [m]
-
-
 ROW_FULL = -2
 """Answer of the maker of the list of near pairs when there is no room for the neighbours of one grain."""
 NO_GRID = Grid((0, 0, 0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 0.0, 0.0)
-NO_GRAIN = (np.uint32(0), -1.0, -1.0)
-NO_KIND = Kind((NO_GRAIN, NO_GRAIN), 0.0, 0.0)
-
-
-@loop
-def make_of(grains, i):
-    """All that the bonds of grain i depend on."""
-    return grains.material[i], grains.radius[i], grains.mass[i]
-
-
-@loop
-def kind_of(grains, law, i, j, last):
-    """The kind of a pair: the `last` one if it is the same, as its powers cost more than all else."""
-    a, b = make_of(grains, i), make_of(grains, j)
-    if (a, b) == last.grains:
-        return last
-    bond = bond_of(grains, law.pairings, i, j)
-    return Kind((a, b), 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period, bond.break_overlap)
 
 
 @loop
@@ -153,20 +101,3 @@ def list_soon(grains, near, count, span, gap):
         found += 1 if (near.touching[p] == 0) & (dot(apart, apart) < limit * limit) else 0
     near.watch[SOON] = found if found <= room else count[PAIRS]
     near.watch[SOON_LEEWAY] = SPARED * 0.5 * gap
-
-
-@loop
-def all_may_touch(near, count):
-    """Are all near pairs to be looked at, instead of the first watch[SOON] of `soon`?"""
-    return near.watch[SOON] == count[PAIRS]
-
-
-@rare
-def forget_touch(near, count, i, j):
-    """Mark the pair (i, j) of the list as no longer in contact; it may touch again soon."""
-    near.watch[SOON_LEEWAY] = 0.0
-    for p in range(count[PAIRS]):
-        a, b = near.pair[0, p], near.pair[1, p]
-        if (a == i and b == j) or (a == j and b == i):
-            near.touching[p] = 0
-            return

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from .outcome import Result
-    from .simulation import Simulation
+from .outcome import Result
+
+Simulation = Any
+"""`sand.Simulation`, which imports this module."""
 
 
 class Observer:

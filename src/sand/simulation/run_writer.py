@@ -8,7 +8,7 @@ import platform
 import time as wall
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
@@ -20,11 +20,13 @@ from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
 from ..state.state import CLOCK, COUNT, LOST, STAGE
+from ..version import __version__
+from .displays import display
 from .outcome import Outcome, Result
+from .serialise import case_of
 
-if TYPE_CHECKING:
-    from .simulation import Simulation
-
+Simulation = Any
+"""`sand.Simulation`, which imports this module."""
 CHECKPOINT_EVERY = 60.0
 """Seconds of wall time between checkpoints, at most."""
 AT_OUTPUT_EVERY = 1.0
@@ -62,8 +64,6 @@ class Record:
             BadInput: another process or simulation writes to the folder, or has written to it since this one did.
             FilesFailed: nothing can be written.
         """
-        from ..config.build import case_of
-
         lock = FolderLock(self.folder)
         try:
             self._refuse_others_files(simulation.steps)
@@ -202,15 +202,11 @@ class Record:
     def draw(self, simulation: Simulation) -> None:
         """The figure of the run so far."""
         if simulation.ledger.rows:
-            from ..plotting.run_figure import run_figure, save
-
-            save(run_figure(simulation), self.folder / files.FIGURE)
+            display("save figure", simulation, self.folder / files.FIGURE)
 
 
 def summary_of(simulation: Simulation, result: Result) -> dict[str, Any]:
     """Everything a table of many runs wants to know of one."""
-    from .. import __version__
-
     last = simulation.ledger.rows[-1]
     grain_steps = result.steps * len(simulation.grains)
     return {

@@ -25,6 +25,7 @@ from ..state.state import World
 from ..units import seed_given, spoken
 from .assemble import build_engine
 from .contact_table import ContactTable
+from .displays import display
 from .grain_table import at_grains
 from .ledger import Ledger, kinetic_energies, take_stock
 from .observers import Observer, Schedule, tick_all
@@ -222,17 +223,13 @@ class Simulation(Fixed):
 
         Returns the widget, or the path of the page; the figure, with a warning, where the installation lacks the page.
         """
-        from ..viewer.simulation_view import view_simulation
-
         self._start()
-        return view_simulation(self, path)
+        return display("view", self, path)
 
     def figure(self) -> Any:
         """The figure of the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
-        from ..plotting.run_figure import run_figure, show
-
         self._start()
-        return show(run_figure(self))
+        return display("figure", self)
 
     def _start(self) -> None:
         if not self._begun:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..arguments import checked
-from ..contact import jkr as adhesion
+from ..contact import jkr
 from ..contact.law import Bond, bond_between
 from ..contact.mixing import MIXING, pairing_between
 from ..errors import BadInput, did_you_mean
@@ -109,12 +109,12 @@ def contact(
 def _numbers(bond: Bond, modulus: float, radii: tuple[float, float], masses: tuple[float, float]) -> ContactNumbers:
     """From the constants the program itself uses."""
     unit = bond.pull_off_force * bond.pull_off_overlap
-    at = {y: adhesion.energy_at(y, 1.0, 1.0) for y in (1.0, adhesion.ROOT_AT_TOUCH, adhesion.ROOT_AT_BREAK)}
-    cycle = unit * (at[adhesion.ROOT_AT_BREAK] - at[adhesion.ROOT_AT_TOUCH])
+    at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
+    cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
     light = sum(1.0 / m for m in masses)
     turns = sum(2.5 / (m * r * r) for m, r in zip(masses, radii, strict=True))
     slides = light + sum(2.5 / m for m in masses)
-    k_n = adhesion.normal_stiffness(bond.rest_radius, modulus)
+    k_n = jkr.normal_stiffness(bond.rest_radius, modulus)
     rolled = bond.roll_stiffness * bond.roll_limit * math.pi * bond.reduced_radius
     periods = (k_n * light, bond.slide_stiffness * slides, bond.roll_stiffness * bond.reduced_radius**2 * turns)
     normal, slide, roll, twist = (2.0 * math.pi / math.sqrt(w) for w in (*periods, bond.twist_stiffness * turns))
@@ -123,9 +123,9 @@ def _numbers(bond: Bond, modulus: float, radii: tuple[float, float], masses: tup
         rest_radius=bond.rest_radius,
         jkr_ratio=bond.rest_radius / bond.reduced_radius,
         pull_off_force=bond.pull_off_force,
-        rest_overlap=adhesion.rest_overlap(bond.rest_radius, bond.reduced_radius),
+        rest_overlap=jkr.rest_overlap(bond.rest_radius, bond.reduced_radius),
         pull_off_overlap=bond.pull_off_overlap,
-        break_energy=unit * (at[adhesion.ROOT_AT_BREAK] - at[1.0]),
+        break_energy=unit * (at[jkr.ROOT_AT_BREAK] - at[1.0]),
         cycle_energy=cycle,
         normal_stiffness=k_n,
         slide_stiffness=bond.slide_stiffness,

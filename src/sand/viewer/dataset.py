@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..analysis.ledger_columns import Books
 from ..analysis.tracking import SINGLE, Lineage
 from ..errors import BadInput
@@ -17,6 +16,7 @@ from ..io import run_folder as files
 from ..io.live_trajectory import Following
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import BIG
+from ..version import __version__
 from . import dimensions
 from .packets import frame_bytes, frame_packet, grains_packet
 from .ranges import ranges_of

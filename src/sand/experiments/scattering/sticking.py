@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
-from ...contact import jkr as adhesion
+from ...contact import jkr
 from ...contact.model import Contact
 from ...forces.external.magnetic_field import Field
 from ...forces.pair.dipoles import Dipoles
@@ -73,8 +73,8 @@ def slowest_period(flying: Flight) -> float:
             hertz = 2.87 * (reduced**2 / (radius * pairing.modulus**2 * flying.relative_speed)) ** 0.2
             longest = max(longest, hertz)
             if pairing.surface_energy > 0.0:
-                a0 = adhesion.rest_radius(pairing.surface_energy, radius, pairing.modulus)
-                stiffness = adhesion.normal_stiffness(a0, pairing.modulus)
+                a0 = jkr.rest_radius(pairing.surface_energy, radius, pairing.modulus)
+                stiffness = jkr.normal_stiffness(a0, pairing.modulus)
                 longest = max(longest, 2.0 * math.pi * math.sqrt(reduced / stiffness))
     return longest
 

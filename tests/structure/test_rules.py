@@ -1,7 +1,8 @@
-"""The rules of the house: which room may open which door, how long things may be, who names the compiler."""
+"""Rules that keep the structure: order of imports, docstrings, and which packages use numba, files and the network."""
 
 import ast
 import functools
+import graphlib
 import re
 import shutil
 import subprocess
@@ -10,29 +11,10 @@ from pathlib import Path
 
 import pytest
 
-TOP = Path(__file__).parents[2]
-HOUSE = TOP / "src" / "sand"
-SOURCES = sorted(HOUSE.rglob("*.py"))
+from .layers import LAYERS, PLAN, SOURCE, TOP, rank, written
+
+SOURCES = sorted(SOURCE.rglob("*.py"))
 PAGE = sorted((TOP / "grainview" / "src").rglob("*.*"))
-EVERYTHING = {"core", "physics", "kernels", "forces", "stepping", "theory", "setup", "run", "files",
-              "analysis", "experiments", "view"}  # fmt: skip
-MAY_IMPORT = {
-    "core": set(),
-    "physics": {"core"},
-    "kernels": {"core", "physics"},
-    "forces": {"core", "physics", "kernels"},
-    "stepping": {"core", "physics", "kernels"},
-    "theory": {"core", "physics"},
-    "files": {"core"},
-    "setup": {"core", "physics", "kernels", "theory"},
-    "analysis": {"core", "physics", "kernels", "forces", "files"},
-    "run": {"core", "physics", "kernels", "forces", "stepping", "setup", "analysis", "files", "theory"},
-    "experiments": EVERYTHING,
-    "view": {"core", "files", "analysis"},
-    "cli": EVERYTHING,
-}
-# A simulation shows itself: `view()`, `figure()` and the figure at the end import `view` when called.
-LATE = {("run", "view")}
 
 
 @functools.cache
@@ -41,73 +23,63 @@ def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text("utf-8"))
 
 
-def room_of(path: Path) -> str:
-    return path.relative_to(HOUSE).parts[0]
+def package_of(path: Path) -> str:
+    """The package or module directly under `sand` that a file belongs to."""
+    return path.relative_to(SOURCE).with_suffix("").parts[0]
 
 
-def imports(path: Path) -> list[tuple[str, bool]]:
-    """(room or package, at the top level of the module?) of every import; typing-only ones are left out."""
-    tree = tree_of(path)
-    typing_only = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
-        for inner in ast.walk(node)
-    }
-    top = {id(node) for node in tree.body}
+def imports(path: Path) -> list[str]:
+    """Full names of the modules that a file imports, wherever in the file; `sand.` ones as far as they are modules."""
+    package = ["sand", *path.relative_to(SOURCE).parts[:-1]]
     found = []
-    for node in ast.walk(tree):
-        if id(node) in typing_only:
-            continue
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ImportFrom):
-            if node.level == 0:
-                found.append(((node.module or "").split(".")[0], id(node) in top))
-            elif node.level == 2:
-                names = [node.module.split(".")[0]] if node.module else [a.name for a in node.names]
-                found += [(f"sand.{name}", id(node) in top) for name in names]
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *((node.module or "").split(".") if node.module else [])])
+            names = [f"{module}.{alias.name}" for alias in node.names]
+            found += [name if name in MODULES else module for name in names]
         elif isinstance(node, ast.Import):
-            found += [(alias.name.split(".")[0], id(node) in top) for alias in node.names]
+            found += [alias.name for alias in node.names]
     return found
 
 
+def name_of(path: Path) -> str:
+    """`sand.io.lock` of `src/sand/io/lock.py`."""
+    parts = path.relative_to(SOURCE).with_suffix("").parts
+    return ".".join(["sand", *(parts[:-1] if parts[-1] == "__init__" else parts)])
+
+
+MODULES = {name_of(path): path for path in SOURCES}
+
+
 @pytest.mark.slow
-def test_nobody_imports_upstairs():
-    """Rooms import only what ARCHITECTURE.md allows."""
+def test_imports_go_one_way():
+    """A package imports only from packages above it in `layers.LAYERS`, also within functions and for types."""
     wrong = [
-        f"{path.relative_to(HOUSE)} imports {name}"
+        f"{path.relative_to(SOURCE)} imports {name}"
         for path in SOURCES
-        if room_of(path) in MAY_IMPORT
-        for name, top in imports(path)
-        if name.startswith("sand.")
-        and (room := name.split(".")[1]) in MAY_IMPORT
-        and room != room_of(path)
-        and room not in MAY_IMPORT[room_of(path)]
-        and not ((room_of(path), room) in LATE and not top)
+        for name in imports(path)
+        if name.startswith("sand.") or name == "sand"
+        if (other := [*name.split("."), ""][1]) != package_of(path)
+        and rank(other) >= rank(package_of(path))
+        and rank(package_of(path)) < len(LAYERS)
     ]
     assert not wrong, wrong
 
 
-def test_every_room_is_on_the_plan():
-    """A new folder needs a place in the table here and in ARCHITECTURE.md."""
-    rooms = {p.name for p in HOUSE.iterdir() if p.is_dir() and p.name != "__pycache__" and any(p.glob("*.py"))}
-    assert rooms <= set(MAY_IMPORT), rooms - set(MAY_IMPORT)
-    plan = (TOP / "ARCHITECTURE.md").read_text("utf-8")
-    assert all(f"{room}/" in plan for room in rooms)
-
-
 @pytest.mark.slow
-def test_files_and_functions_stay_short():
-    """Under 300 lines, under 60 lines."""
-    long = [str(p.relative_to(TOP)) for p in SOURCES if len(p.read_text("utf-8").splitlines()) >= 300]
-    assert not long, long
-    for path in SOURCES:
-        for node in ast.walk(tree_of(path)):
-            nested = isinstance(node, ast.FunctionDef) and any(
-                isinstance(inner, ast.FunctionDef) for inner in node.body
-            )
-            if isinstance(node, ast.FunctionDef) and not nested:
-                length = (node.end_lineno or 0) - node.lineno
-                assert length < 60, f"{path.relative_to(TOP)}: {node.name} has {length} lines"
+def test_no_circular_imports():
+    """Sorting all modules by their imports succeeds; `graphlib` raises CycleError, with the cycle, otherwise."""
+    graph = {name: {other for other in imports(path) if other in MODULES} for name, path in MODULES.items()}
+    order = list(graphlib.TopologicalSorter(graph).static_order())
+    assert len(order) == len(MODULES)
+
+
+def test_every_package_has_a_layer_and_stands_in_the_documentation():
+    """A new package or top-level module needs a row of `layers.LAYERS`; ARCHITECTURE.md holds the table as it is."""
+    names = {package_of(path) for path in SOURCES} - {"__init__", "__main__"}
+    assert names == {name for row in LAYERS for name in row}
+    assert PLAN.read_text("utf-8") == written(), "run: python -m tests.structure.layers"
 
 
 @pytest.mark.slow
@@ -140,31 +112,34 @@ def test_the_compiler_is_one_that_was_tried():
 
 
 @pytest.mark.slow
-def test_only_the_door_names_the_compiler():
-    """numba is imported in core/jit, lowering, convention and atomics, and in kernels/gpu, alone."""
-    core = HOUSE / "core"
-    allowed = {core / f"{name}.py" for name in ("jit", "lowering", "convention", "atomics")}
-    allowed |= {HOUSE / "kernels" / "gpu.py"}
-    wrong = [str(p) for p in SOURCES if p not in allowed and any(n == "numba" for n, _ in imports(p))]
+def test_numba_is_imported_in_one_package():
+    """numba and llvmlite are imported in `compiler/` alone."""
+    wrong = [
+        f"{path.relative_to(SOURCE)} imports {name}"
+        for path in SOURCES
+        if package_of(path) != "compiler"
+        for name in imports(path)
+        if name.split(".")[0] in ("numba", "llvmlite")
+    ]
     assert not wrong, wrong
 
 
 @pytest.mark.slow
-def test_only_files_opens_files_and_only_cli_prints():
-    """`open`, `read_text`, `write_text` and friends live in files/ (and the compiler's digest); print in cli/."""
+def test_only_io_opens_files_and_only_cli_prints():
+    """`open`, `read_text`, `write_text` and the like are called in io/ (and for the digest of the sources); print in cli/."""
     for path in SOURCES:
-        room = room_of(path)
+        package = package_of(path)
         for node in ast.walk(tree_of(path)):
             if not isinstance(node, ast.Call):
                 continue
             name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
             where = f"{path.relative_to(TOP)}:{node.lineno} calls {name}"
             if name == "print" or (name == "echo" and isinstance(node.func, ast.Attribute)):
-                assert room == "cli", where
+                assert package == "cli", where
             if name in {"read_text", "write_text", "read_bytes", "write_bytes"} or (
                 isinstance(node.func, ast.Name) and name == "open"
             ):
-                assert room == "files" or path == HOUSE / "core" / "jit.py", where
+                assert package == "io" or path == SOURCE / "compiler" / "jit.py", where
 
 
 def loads_of_numpy(tree: ast.AST) -> list[ast.Call]:
@@ -202,11 +177,11 @@ def test_calls_that_load_arrays_are_found():
 @pytest.mark.slow
 def test_no_pickle_no_network():
     """Neither pickle nor sockets anywhere but in the server of `sand view`; NumPy files with allow_pickle=False."""
-    server = HOUSE / "view" / "server.py"
+    server = SOURCE / "viewer" / "server.py"
     network = {"socket", "socketserver", "urllib", "requests", "http", "asyncio", "aiohttp", "ssl"}
     loads = []
     for path in SOURCES:
-        names = {name for name, _ in imports(path)}
+        names = {name.split(".")[0] for name in imports(path)}
         assert not names & {"pickle", "dill", "cloudpickle"}, path
         assert not names & (network - {"http", "socketserver"} if path == server else network), path
         loads += [(path, call) for call in loads_of_numpy(tree_of(path))]

@@ -1,0 +1,45 @@
+"""The case of a simulation: what its case.toml holds."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from ..forces.base import FarForce
+from .stop import SHORTEST
+
+
+def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
+    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back.
+
+    Args:
+        until: time [s] the run is to reach, or infinity.
+        last_step: number of the step it is to reach, or infinity.
+    """
+    materials = simulation.grains.materials
+    recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
+    names = [m.name for m in materials]
+    run = {
+        "until": max(until, SHORTEST),  # a run to time 0 can be gone on with, too
+        "steps": last_step if last_step == float("inf") else int(last_step),
+        "frame_every": simulation.frame_every,
+        "seed": int(simulation.seed or 0),
+    }
+    forces = {}
+    for force in simulation.forces:
+        forces[force.name] = dict(force.parameters())
+        if isinstance(force, FarForce):
+            radius = force.choose(simulation.start, simulation.box).radius
+            forces[force.name]["cutoff"] = "none" if radius is None else radius
+    lengths = ["open" if v is None else v for v in simulation.box.lengths]
+    return {
+        "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},
+        "box": {} if simulation.box.is_open else {"periodic": lengths},
+        "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
+        "materials": {
+            m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
+        },
+        "forces": forces,
+        "stepping": simulation.stepping.parameters(),
+        "neighbours": simulation.neighbours.parameters(),  # as chosen at the start
+    }
