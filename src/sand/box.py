@@ -61,8 +61,10 @@ class Box:
     def periodic(cls, x: Any, y: Any = "same", z: Any = "same") -> Box:
         """A periodic box: one length for a cube, or one per axis with None for an open axis.
 
-        Raises:
-            BadInput: a length that is not positive, or of the wrong unit.
+        Raises
+        ------
+        BadInput
+            a length that is not positive, or of the wrong unit.
         """
         y = x if isinstance(y, str) and y == "same" else y
         z = x if isinstance(z, str) and z == "same" else z

@@ -19,8 +19,10 @@ class SandError(Exception):
 class BadInput(SandError, ValueError):
     """The user's mistakes, one line each: what, where, unit, what is allowed, what to do.
 
-    Args:
-        problems: one sentence, or several when a file holds several mistakes.
+    Parameters
+    ----------
+    problems : str or Iterable[str]
+        one sentence, or several when a file holds several mistakes.
     """
 
     def __init__(self, problems: str | Iterable[str]):

@@ -47,8 +47,10 @@ class GrainArrays(NamedTuple):
 def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.ndarray]:
     """The distinct materials and each grain's index among them.
 
-    Args:
-        material: a Material or preset name for all grains, or a sequence of N of them.
+    Parameters
+    ----------
+    material
+        a Material or preset name for all grains, or a sequence of N of them.
     """
     several = isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str)
     each: Sequence[Any] = list(material) if several else [as_material(material)] * count
@@ -73,22 +75,33 @@ SMALLEST = 1e-10
 class Grains:
     """N spheres.  What they are is fixed once they are made; a simulation works on a copy.
 
-    Args:
-        position: (N, 3) [m], laboratory frame.
-        radius: scalar or (N,) [m] ≥ 1e-10, an atom.
-        material: one `sand.Material` (or preset name) for all, or a sequence of N.
-        velocity: (N, 3) or, the same for all, (3,) [m/s], slower than light; at rest by default.
-        spin: (N, 3) or (3,) [rad/s], laboratory frame, surfaces slower than light; none by default.
-        moment: (N, 3) or (3,) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
-            "6.6e-18 A m^2" or per mass "200 A m^2/kg"; "material" takes each material's own specific moment; none
-            by default.
-        charge: scalar or (N,) [C]; none by default.
-        mass: scalar or (N,) [kg] > 0; by default density × volume.
+    Parameters
+    ----------
+    position
+        (N, 3) [m], laboratory frame.
+    radius
+        scalar or (N,) [m] ≥ 1e-10, an atom.
+    material
+        one `sand.Material` (or preset name) for all, or a sequence of N.
+    velocity : optional
+        (N, 3) or, the same for all, (3,) [m/s], slower than light; at rest by default.
+    spin : optional
+        (N, 3) or (3,) [rad/s], laboratory frame, surfaces slower than light; none by default.
+    moment : optional
+        (N, 3) or (3,) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
+        "6.6e-18 A m^2" or per mass "200 A m^2/kg"; "material" takes each material's own specific moment; none
+        by default.
+    charge : optional
+        scalar or (N,) [C]; none by default.
+    mass : optional
+        scalar or (N,) [kg] > 0; by default density × volume.
 
     All numbers may be SI floats, text with a unit, or pint/astropy quantities.
 
-    Raises:
-        BadInput: one line for each quantity that is wrong.
+    Raises
+    ------
+    BadInput
+        one line for each quantity that is wrong.
     """
 
     def __init__(
@@ -233,8 +246,10 @@ def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) ->
 def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.0) -> np.ndarray:
     """Sizes (N,) [A m²] of moments given as one number [A m²], or as text, absolute or per mass.
 
-    Args:
-        specific: moment per mass [A m²/kg] of each grain's material, for "material".
+    Parameters
+    ----------
+    specific : ndarray or float, optional
+        moment per mass [A m²/kg] of each grain's material, for "material".
     """
     if isinstance(moment, str) and moment == "material":
         return specific * mass

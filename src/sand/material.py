@@ -25,18 +25,28 @@ _UNITS = {
 class Material:
     """One material.  Numbers are SI or text with a unit; all problems are reported at once.
 
-    Args:
-        name: how case files and tables call it.
-        density: ρ [kg/m³] > 0.
-        surface_energy: γ of one free surface [J/m²] ≥ 0; None where no value can be recommended (then the
-            user has to give one before grains may touch).
-        young_modulus: E [Pa] > 0.
-        poisson_ratio: ν, −1 < ν ≤ 0.5.
-        rolling_limit: critical rolling displacement ξ_c [m] > 0; 10 Å in SAND (Dominik & Nübold 2002, A.5).
-        specific_moment: magnetic moment per mass [A m²/kg] ≥ 0.
+    Parameters
+    ----------
+    name : str
+        how case files and tables call it.
+    density
+        ρ [kg/m³] > 0.
+    surface_energy
+        γ of one free surface [J/m²] ≥ 0; None where no value can be recommended (then the
+        user has to give one before grains may touch).
+    young_modulus
+        E [Pa] > 0.
+    poisson_ratio
+        ν, −1 < ν ≤ 0.5.
+    rolling_limit : optional
+        critical rolling displacement ξ_c [m] > 0; 10 Å in SAND (Dominik & Nübold 2002, A.5).
+    specific_moment : optional
+        magnetic moment per mass [A m²/kg] ≥ 0.
 
-    Raises:
-        BadInput: one line for each number that cannot be right.
+    Raises
+    ------
+    BadInput
+        one line for each number that cannot be right.
     """
 
     name: str

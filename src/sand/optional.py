@@ -11,11 +11,15 @@ from .errors import BadInput
 def optional(package: str, purpose: str) -> Any:
     """The module of an optional package.
 
-    Args:
-        purpose: the function that needs it, for the message.
+    Parameters
+    ----------
+    purpose : str
+        the function that needs it, for the message.
 
-    Raises:
-        BadInput: it is not installed.
+    Raises
+    ------
+    BadInput
+        it is not installed.
     """
     try:
         return importlib.import_module(package)

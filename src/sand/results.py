@@ -41,11 +41,15 @@ class Opened:
 
     A run that is still going can be looked at: open it again to see what has come since.
 
-    Args:
-        folder: of a run.
+    Parameters
+    ----------
+    folder : str or Path
+        of a run.
 
-    Raises:
-        BadInput: there is no run in it.
+    Raises
+    ------
+    BadInput
+        there is no run in it.
     """
 
     def __init__(self, folder: str | Path):
@@ -90,8 +94,10 @@ class Opened:
 
         Its `loads()`, `at_grains()` and `contacts` say what a frame does not hold: energies, fields, torques.
 
-        Raises:
-            BadInput: see `setup.from_frame`; or a force that a case file cannot name.
+        Raises
+        ------
+        BadInput
+            see `setup.from_frame`; or a force that a case file cannot name.
         """
         case = read_case(self.folder / files.CASE)
         start = from_frame(self.frames[frame], case.materials_by_name())
@@ -109,11 +115,15 @@ class Opened:
     def view(self, path: str | Path | None = None) -> Any:
         """The grains in motion, as `Simulation.view`.
 
-        Args:
-            path: of the page; view.html in the run's folder by default.
+        Parameters
+        ----------
+        path : str or Path or None, optional
+            of the page; view.html in the run's folder by default.
 
-        Raises:
-            BadInput: there is no frame yet, or the trajectory is broken.
+        Raises
+        ------
+        BadInput
+            there is no frame yet, or the trajectory is broken.
         """
         return view_folder(self.folder, path, lambda: self.at(-1).figure())
 
@@ -127,11 +137,15 @@ class Opened:
     def picture(self, frame: int = -1, **how: Any) -> Still:
         """A still picture of a frame, with the outside field of the case; it shows itself in a notebook.
 
-        Args:
-            how: see `plotting.render.still.still_picture`: colour, bonds, arrows, view, size, dark, transparent, cluster, …
+        Parameters
+        ----------
+        how
+            see `plotting.render.still.still_picture`: colour, bonds, arrows, view, size, dark, transparent, cluster, …
 
-        Raises:
-            BadInput: no such frame, an unknown quantity or view, one line for each mistake.
+        Raises
+        ------
+        BadInput
+            no such frame, an unknown quantity or view, one line for each mistake.
         """
         from .plotting.render.still import still_picture
 
@@ -142,13 +156,19 @@ class Opened:
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
         """Write frames for another program; returns the files.
 
-        Args:
-            form: "xyz", "lammps-dump", "lammps-data" or "vtk".
-            stem: path without ending; "trajectory" in the run's folder by default.
-            frames: which.
+        Parameters
+        ----------
+        form : str
+            "xyz", "lammps-dump", "lammps-data" or "vtk".
+        stem : str or Path or None, optional
+            path without ending; "trajectory" in the run's folder by default.
+        frames : slice, optional
+            which.
 
-        Raises:
-            BadInput: an unknown format, no frame, no such folder.
+        Raises
+        ------
+        BadInput
+            an unknown format, no frame, no such folder.
         """
         place = self.folder / "trajectory" if stem is None else Path(stem)
         return export_frames(self.frames[frames], place, form, cluster_labels)

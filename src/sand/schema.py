@@ -58,15 +58,22 @@ def public(array: np.ndarray) -> np.ndarray:
 def stored(field: Field, values: Any, count: int, *, positive: bool = False, called: str = "") -> np.ndarray:
     """`values` in the stored shape, or one line for what is wrong with them.
 
-    Args:
-        values: SI numbers, text with a unit, or a quantity; one value serves all grains where width is 1, one vector
-            where width is 3.
-        count: number of grains N.
-        positive: every number must be above 0.
-        called: what the user calls it, if that is not the name of the field.
+    Parameters
+    ----------
+    values
+        SI numbers, text with a unit, or a quantity; one value serves all grains where width is 1, one vector
+        where width is 3.
+    count : int
+        number of grains N.
+    positive : bool, optional
+        every number must be above 0.
+    called : str, optional
+        what the user calls it, if that is not the name of the field.
 
-    Raises:
-        BadInput: wrong unit, shape (N, width) or a value that is not finite, with the first grain concerned.
+    Raises
+    ------
+    BadInput
+        wrong unit, shape (N, width) or a value that is not finite, with the first grain concerned.
     """
     name = called or field.name
     array = in_unit(values, field.unit)

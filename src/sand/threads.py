@@ -24,8 +24,10 @@ def set_threads(number: int | None) -> None:
 
     No result depends on it, to the last bit. Small simulations use one thread, whatever is set.
 
-    Raises:
-        BadInput: less than 1.
+    Raises
+    ------
+    BadInput
+        less than 1.
     """
     global _wished
     _wished = None if number is None else _checked(number, "threads")
@@ -34,8 +36,10 @@ def set_threads(number: int | None) -> None:
 def threads() -> int:
     """Threads that a large simulation uses.
 
-    Raises:
-        BadInput: `$SAND_THREADS` is not a whole number above 0.
+    Raises
+    ------
+    BadInput
+        `$SAND_THREADS` is not a whole number above 0.
     """
     if _wished is not None:
         return _wished

@@ -173,15 +173,22 @@ def si(
 ) -> float:
     """One finite number in SI.
 
-    Args:
-        value: float in SI, text with a unit, or a pint or astropy quantity.
-        unit: the SI unit, e.g. "m", "A m^2/kg"; "1" for a pure number.
-        name: how the user called it, for the message.
-        above, least, below: the number must be > above, ≥ least, < below.
+    Parameters
+    ----------
+    value
+        float in SI, text with a unit, or a pint or astropy quantity.
+    unit : str
+        the SI unit, e.g. "m", "A m^2/kg"; "1" for a pure number.
+    name : str
+        how the user called it, for the message.
+    above, least, below : float or None, optional
+        the number must be > above, ≥ least, < below.
 
-    Raises:
-        BadInput: wrong unit, not a number, not finite, or out of range, a temperature above `HOTTEST`, a speed above
-            that of light unless `below` is given; one line.
+    Raises
+    ------
+    BadInput
+        wrong unit, not a number, not finite, or out of range, a temperature above `HOTTEST`, a speed above
+        that of light unless `below` is given; one line.
     """
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sand
+from sand.contact.events import all_may_touch
 from sand.integrate.step_parts import SOON_PART
-from sand.neighbours.pair_list import all_may_touch
 from sand.neighbours.spatial_sort import inverse, order_on_curve, rearrange
 from sand.simulation import engine as engines
 from sand.state.state import CONTACTS, LISTED, ORDERED, PAIRS, REBUILT, SOON

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 import sand
 from sand.box import Box, as_box
 from sand.compiler.jit import kernel
+from sand.contact.pair_types import bond_of
 from sand.forces.pair.dipole_loops import CUT
 from sand.integrate.respa import clear_far_loads
 from sand.neighbours import cell_list as cells
-from sand.neighbours.pair_list import bond_of
 from sand.neighbours.settings import Neighbours, share_within
 from sand.state.arrays import far_arrays
 from sand.state.state import LISTED, MADE, PAIRS, REBUILT

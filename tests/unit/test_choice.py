@@ -7,9 +7,10 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
+from sand.contact.events import all_may_touch
 from sand.integrate.step_control import calm_steps, closing_step, grain_step, pair_step
 from sand.integrate.step_parts import SOON_PART
-from sand.neighbours.pair_list import all_may_touch, list_soon
+from sand.neighbours.pair_list import list_soon
 from sand.numerics.float_order import rank, ranked
 from sand.state.state import PAIRS, SOON, SOON_LEEWAY
 

@@ -16,11 +16,16 @@ FEW = 200
 def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     """The cluster each grain belongs to, numbered by their lowest grain.
 
-    Args:
-        count: number of grains N.
-        pairs: contacts, (C, 2) grain numbers.
+    Parameters
+    ----------
+    count : int
+        number of grains N.
+    pairs : ndarray
+        contacts, (C, 2) grain numbers.
 
-    Returns:
+    Returns
+    -------
+    ndarray
         (N,) integers 0…K−1.
     """
     ends = np.asarray(pairs, dtype=np.int64)

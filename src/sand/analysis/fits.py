@@ -37,12 +37,17 @@ class PowerLaw(NamedTuple):
 def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) -> PowerLaw:
     """Fit y ∝ x^exponent; errors by a jackknife over groups.
 
-    Args:
-        x, y: (K,), all above 0, K ≥ 2.
-        groups: (K,) number of the box, or run, that a point is from; each point is its own group by default.
+    Parameters
+    ----------
+    x, y : ndarray
+        (K,), all above 0, K ≥ 2.
+    groups : ndarray or None, optional
+        (K,) number of the box, or run, that a point is from; each point is its own group by default.
 
-    Raises:
-        BadInput: fewer than two different x, or values that have no logarithm.
+    Raises
+    ------
+    BadInput
+        fewer than two different x, or values that have no logarithm.
     """
     x, y = np.asarray(x, float), np.asarray(y, float)
     if x.shape != y.shape or x.ndim != 1 or not ((x > 0) & (y > 0) & np.isfinite(x) & np.isfinite(y)).all():
@@ -113,11 +118,15 @@ def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
     Unlike a straight line through ln S over ln t this knows that S begins at 1, which bends the line for long: where
     S ∝ t² in the end, the local slope z(1 − S^(−1/z)) is 0.6 at S = 2 and 1.4 at S = 10.
 
-    Args:
-        time: (K,) [s] > 0; sizes: S (boxes, K) ≥ 1.
+    Parameters
+    ----------
+    time : ndarray
+        (K,) [s] > 0; sizes: S (boxes, K) ≥ 1.
 
-    Raises:
-        BadInput: fewer than three times, or S that does not grow.
+    Raises
+    ------
+    BadInput
+        fewer than three times, or S that does not grow.
     """
     t, s = np.asarray(time, float), np.asarray(sizes, float)
     fits = t.ndim == 1 and len(t) >= 3 and s.shape[1:] == t.shape
@@ -168,11 +177,15 @@ def _rate(time: np.ndarray, size: np.ndarray) -> tuple[float, float]:
 def separation(first: np.ndarray, second: np.ndarray) -> float:
     """How far the mean of `first` lies above that of `second`, in standard errors of the difference (Welch).
 
-    Args:
-        first, second: values of independent boxes, at least two each.
+    Parameters
+    ----------
+    first, second : ndarray
+        values of independent boxes, at least two each.
 
-    Raises:
-        BadInput: fewer.
+    Raises
+    ------
+    BadInput
+        fewer.
     """
     a, b = np.asarray(first, float), np.asarray(second, float)
     if a.size < 2 or b.size < 2:

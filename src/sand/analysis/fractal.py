@@ -50,15 +50,23 @@ def ensemble_dimension(
 ) -> Dimension:
     """D of N = k (r_g/a)^D.
 
-    Args:
-        sizes: N (K,) of the aggregates.
-        gyration: r_g (K,) [m].
-        grain_radius: a [m].
-        groups: (K,) box or run of each, for errors; each its own by default.
-        least: aggregates of fewer grains are left out.
+    Parameters
+    ----------
+    sizes : ndarray
+        N (K,) of the aggregates.
+    gyration : ndarray
+        r_g (K,) [m].
+    grain_radius : float
+        a [m].
+    groups : ndarray or None, optional
+        (K,) box or run of each, for errors; each its own by default.
+    least : int, optional
+        aggregates of fewer grains are left out.
 
-    Raises:
-        BadInput: fewer than two different sizes from `least` on.
+    Raises
+    ------
+    BadInput
+        fewer than two different sizes from `least` on.
     """
     n, r = np.asarray(sizes, float), np.asarray(gyration, float)
     used = n >= least
@@ -88,12 +96,17 @@ def _one(position: np.ndarray) -> tuple[np.ndarray, float, float]:
 def correlation_dimension(position: np.ndarray, window: tuple[float, float] | None = None) -> Dimension:
     """D of n(r) ∝ r^D, the mean number of grains within r of a grain that is not at the rim, itself counted.
 
-    Args:
-        position: (N, 3) [m], N ≥ 32, of a whole aggregate.
-        window: distances [m] to fit between; 2 grain distances to 0.7 r_g by default.
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m], N ≥ 32, of a whole aggregate.
+    window : tuple[float, float] or None, optional
+        distances [m] to fit between; 2 grain distances to 0.7 r_g by default.
 
-    Raises:
-        BadInput: too few grains, or a window without room.
+    Raises
+    ------
+    BadInput
+        too few grains, or a window without room.
 
     The error is the scatter of the slope between thirds of the window: fractals of this size are no straight lines.
     """
@@ -114,13 +127,19 @@ def grains_within(centres: np.ndarray, place: np.ndarray, radii: np.ndarray) -> 
 def box_dimension(position: np.ndarray, window: tuple[float, float] | None = None, seed: int = 0) -> Dimension:
     """D of box counting: n(s) ∝ s^−D boxes of side s are needed, the fewest over shifted and turned grids.
 
-    Args:
-        position: (N, 3) [m], N ≥ 32, of a whole aggregate.
-        window: sides [m] to fit between; 2 grain distances to half r_g by default.
-        seed: of shifts and turns.
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m], N ≥ 32, of a whole aggregate.
+    window : tuple[float, float] or None, optional
+        sides [m] to fit between; 2 grain distances to half r_g by default.
+    seed : int, optional
+        of shifts and turns.
 
-    Raises:
-        BadInput: too few grains, or a window without room.
+    Raises
+    ------
+    BadInput
+        too few grains, or a window without room.
     """
     place, unit, size = _one(position)
     low, high = window or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))

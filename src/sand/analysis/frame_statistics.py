@@ -34,9 +34,12 @@ COLUMNS = {
 def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
     """The aggregates of a frame, the largest first: columns (K,) as in COLUMNS.
 
-    Args:
-        frame: of a trajectory, or anything with position, radius, mass, moment, pair (C, 2) and box.
-        least: aggregates of fewer grains are left out.
+    Parameters
+    ----------
+    frame
+        of a trajectory, or anything with position, radius, mass, moment, pair (C, 2) and box.
+    least : int, optional
+        aggregates of fewer grains are left out.
     """
     refuse_other(frame, "position", "pair", "moment", "box")
     labels = cluster_labels(len(frame.position), frame.pair)

@@ -28,9 +28,12 @@ def dissipated_in(row: Mapping[str, float]) -> float:
 class Books:
     """Rows, oldest first, and their columns by name.
 
-    Args:
-        columns: names, in the order of the file.
-        rows: each a number for every column.
+    Parameters
+    ----------
+    columns : Sequence[str]
+        names, in the order of the file.
+    rows : Iterable[dict[str, float]], optional
+        each a number for every column.
     """
 
     def __init__(self, columns: Sequence[str], rows: Iterable[dict[str, float]] = ()):

@@ -8,9 +8,12 @@ import numpy as np
 def aggregate_moments(moment: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Vector sums (K, 3) [A m²] of the moments of each cluster, and their alignment |Σμ|/Σ|μ| (K,), 0 without moments.
 
-    Args:
-        moment: (N, 3) [A m²].
-        labels: cluster of each grain (N,), 0…K−1.
+    Parameters
+    ----------
+    moment : ndarray
+        (N, 3) [A m²].
+    labels : ndarray
+        cluster of each grain (N,), 0…K−1.
     """
     mu = np.asarray(moment, float)
     sums = np.column_stack([np.bincount(labels, mu[:, axis]) for axis in range(3)])

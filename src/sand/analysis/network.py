@@ -26,9 +26,12 @@ class Network(NamedTuple):
 def network(count: int, pairs: np.ndarray) -> Network:
     """Ends, junctions, rings and chains of one aggregate.
 
-    Args:
-        count: grains N ≥ 1, all connected.
-        pairs: contacts (C, 2), each once.
+    Parameters
+    ----------
+    count : int
+        grains N ≥ 1, all connected.
+    pairs : ndarray
+        contacts (C, 2), each once.
 
     `longest` is exact for trees, and the way between two far ends (found by two searches) where there are rings.
     """

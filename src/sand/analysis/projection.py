@@ -77,9 +77,12 @@ def _union(x, y, r, reach, start, end):
 def area_of_union(x: np.ndarray, y: np.ndarray, r: np.ndarray, reach: float) -> float:
     """Area [m²] of the union of discs.
 
-    Args:
-        x, y, r: (N,) centres, sorted by x, and radii [m].
-        reach: the largest radius [m].
+    Parameters
+    ----------
+    x, y, r : ndarray
+        (N,) centres, sorted by x, and radii [m].
+    reach : float
+        the largest radius [m].
     """
     room = 2 * len(x) + 2
     return float(_union(x, y, np.ascontiguousarray(r), reach, np.empty(room), np.empty(room)))

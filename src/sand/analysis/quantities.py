@@ -148,13 +148,19 @@ def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
 def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarray:
     """The numbers of a quantity in a frame, SI: (N,) of grains or (C,) of contacts, NaN where there is none.
 
-    Args:
-        frame: of a trajectory, or anything that has its attributes.
-        name: see GRAINS and CONTACTS.
-        field: flux density of outside (3,) [T].
+    Parameters
+    ----------
+    frame
+        of a trajectory, or anything that has its attributes.
+    name : str
+        see GRAINS and CONTACTS.
+    field : ndarray or None, optional
+        flux density of outside (3,) [T].
 
-    Raises:
-        BadInput: no such quantity, or the frame has no number for it.
+    Raises
+    ------
+    BadInput
+        no such quantity, or the frame has no number for it.
     """
     found = quantity(name, GRAIN_NAMES + CONTACT_NAMES)
     refuse_other(frame, "radius", "pair")

@@ -30,10 +30,14 @@ def gyration_radius(
 ) -> float:
     """r_g = √(Σ m (|x − x̄|² + ⅗r²)/Σ m) [m].
 
-    Args:
-        position: (N, 3) [m], of a whole aggregate (see `clusters.unwrapped`).
-        mass: (N,) [kg]; equal by default.
-        radius: (N,) [m] of the grains, to count their own extent; left out by default: centres only.
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m], of a whole aggregate (see `clusters.unwrapped`).
+    mass : ndarray or None, optional
+        (N,) [kg]; equal by default.
+    radius : ndarray or float or None, optional
+        (N,) [m] of the grains, to count their own extent; left out by default: centres only.
     """
     return math.sqrt(np.trace(gyration_tensor(position, mass, radius)))
 
@@ -108,9 +112,12 @@ def projected_area(
 
     Each shadow is a union of discs, whose area is exact (by its boundary arcs).
 
-    Args:
-        position: (N, 3) [m]; radius: (N,) [m].
-        directions: (K, 3) unit vectors, or how many of them, evenly over the sphere.
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m]; radius: (N,) [m].
+    directions : ndarray or int, optional
+        (K, 3) unit vectors, or how many of them, evenly over the sphere.
     """
     place, _ = _centred(position, None)
     size = np.broadcast_to(np.asarray(radius, float), len(place)).copy()

@@ -22,11 +22,16 @@ def named(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
     name, the one with most grains of that name keeps it, of two that are as many the one with the lowest grain.  All
     others get a new name: the number of their lowest grain, or the lowest number that neither is nor was a name.
 
-    Args:
-        before: names (N,) uint32, SINGLE for grains that touched none.
-        labels: cluster of each grain now (N,), 0…K−1, numbered by their lowest grain.
+    Parameters
+    ----------
+    before : ndarray
+        names (N,) uint32, SINGLE for grains that touched none.
+    labels : ndarray
+        cluster of each grain now (N,), 0…K−1, numbered by their lowest grain.
 
-    Returns:
+    Returns
+    -------
+    ndarray
         Names (N,) uint32 below N, SINGLE for single grains.
     """
     count = len(labels)
@@ -71,10 +76,13 @@ def _new_names(before: np.ndarray, labels: np.ndarray, taken: np.ndarray, new: n
 class Lineage:
     """Names of the clusters in each of many frames, worked out from the first on.
 
-    Args:
-        count: number of grains N.
-        pairs: contacts (C, 2) of a frame by its number; BadInput for one that cannot be read, which leaves names as
-            they were before it, as one of other grains does.
+    Parameters
+    ----------
+    count : int
+        number of grains N.
+    pairs : Callable[[int], ndarray]
+        contacts (C, 2) of a frame by its number; BadInput for one that cannot be read, which leaves names as
+        they were before it, as one of other grains does.
 
     Names of a frame depend on the frames before it alone, not on what was asked for before: they are kept of every m-th
     frame, and m doubles when that takes more than CHECKPOINTS bytes.

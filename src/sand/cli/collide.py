@@ -47,8 +47,10 @@ def command(
 def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> int:
     """Do a `CollisionJob`, tell how it ended; returns the exit code.
 
-    Raises:
-        BadInput: as the job; or a worker process has died.
+    Raises
+    ------
+    BadInput
+        as the job; or a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 

@@ -75,8 +75,10 @@ def boxes(
 ) -> int:
     """Run the boxes of a case, or go on with them; returns the exit code.
 
-    Raises:
-        BadInput: as `experiments.boxes.grow`; or a worker process has died.
+    Raises
+    ------
+    BadInput
+        as `experiments.boxes.grow`; or a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 

@@ -30,10 +30,14 @@ class End(NamedTuple):
 def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None, *, quiet: bool, as_json: bool) -> int:
     """Make a simulation, run it and tell; returns the exit code.
 
-    Args:
-        make: returns the simulation, its files in `folder`.
-        heading: of what is told before the start.
-        end: of the run; None: the end that the simulation has in its plans.
+    Parameters
+    ----------
+    make : Callable[[], Any]
+        returns the simulation, its files in `folder`.
+    heading : str
+        of what is told before the start.
+    end : End or None
+        of the run; None: the end that the simulation has in its plans.
     """
     talk = not (quiet or as_json)
     bar = None
@@ -143,9 +147,11 @@ def _listed(folder: Path) -> str:
 def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
     """What can be wrong with --out, in words of the command line, before anything is computed.
 
-    Raises:
-        BadInput: nothing can be written there; or the folder is in use and --overwrite is not given; or it holds
-            the case file itself, or a body of it.
+    Raises
+    ------
+    BadInput
+        nothing can be written there; or the folder is in use and --overwrite is not given; or it holds
+        the case file itself, or a body of it.
     """
     ground = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not ground.is_dir():

@@ -17,8 +17,10 @@ INTERRUPTED = 130
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code.
 
-    Args:
-        argv: words after `sand`; those of the command line by default.
+    Parameters
+    ----------
+    argv : Sequence[str] or None, optional
+        words after `sand`; those of the command line by default.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     for stream in (sys.stdout, sys.stderr):
@@ -41,8 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 class _Interrupts:
     """Ctrl-C raises KeyboardInterrupt in the block, and is remembered: what is being imported may swallow it.
 
-    Args:
-        to_the_end: the program ends with the block; Ctrl-C then ends it at once, without a word.
+    Parameters
+    ----------
+    to_the_end : bool
+        the program ends with the block; Ctrl-C then ends it at once, without a word.
     """
 
     def __init__(self, to_the_end: bool):

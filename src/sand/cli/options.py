@@ -60,8 +60,10 @@ def end_of_run(text: str) -> Any:
 def seconds(text: str | None, name: str = "--until") -> float | None:
     """A time from the command line [s], checked as in a case file; a bare number is SI there and here.
 
-    Raises:
-        BadInput: wrong unit, not a number, not above 0, too short for anything to happen.
+    Raises
+    ------
+    BadInput
+        wrong unit, not a number, not above 0, too short for anything to happen.
     """
     from ..simulation.stop import duration
 

@@ -37,9 +37,12 @@ for _module in COMMANDS:
 def run_command(words: list[str], asked: Callable[[], bool]) -> int:
     """One command; returns the exit code.
 
-    Args:
-        words: after `sand`.
-        asked: says whether Ctrl-C has been pressed.
+    Parameters
+    ----------
+    words : list[str]
+        after `sand`.
+    asked : Callable[[], bool]
+        says whether Ctrl-C has been pressed.
     """
     try:
         return _call(words, asked)

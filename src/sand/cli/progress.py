@@ -16,10 +16,14 @@ FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
 class Progress(Observer):
     """A bar over physical time: rate, time left, clusters, S and energy drift.
 
-    Args:
-        end: of the run [s]; infinite if it ends at a number of steps, over which the bar then goes.
-        last_step: that number.
-        file: a terminal.
+    Parameters
+    ----------
+    end : float
+        of the run [s]; infinite if it ends at a number of steps, over which the bar then goes.
+    last_step : float
+        that number.
+    file : IO[str] or None, optional
+        a terminal.
     """
 
     looks_in_ticks = False

@@ -131,8 +131,10 @@ def files_of(folder: Path) -> list[str]:
 def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:
     """What is about to run, and what was chosen for the user.
 
-    Args:
-        end, last_step: time [s] and step that are to be reached, infinite where there is none.
+    Parameters
+    ----------
+    end, last_step : float
+        time [s] and step that are to be reached, infinite where there is none.
     """
     from ..units import spoken
 

@@ -64,12 +64,17 @@ def scatter(
 ) -> int:
     """Fly what a case asks for, tell what came of it; returns the exit code.
 
-    Args:
-        read: what `read_scattering` gives for the case.
-        resume: go on with the flights in the folder.
+    Parameters
+    ----------
+    read : tuple[Any, Any]
+        what `read_scattering` gives for the case.
+    resume : bool
+        go on with the flights in the folder.
 
-    Raises:
-        BadInput: the folder belongs to another case, or a worker process has died.
+    Raises
+    ------
+    BadInput
+        the folder belongs to another case, or a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 

@@ -112,8 +112,10 @@ def _story(place: Path, talk: bool) -> Any:
 def _is_beginning(place: Path, watched: bool) -> bool:
     """Whether a run may be about to write its first frame: its folder is empty, or holds a case and no frames.
 
-    Args:
-        watched: it was so a moment ago; its trajectory then may be there, but without a frame.
+    Parameters
+    ----------
+    watched : bool
+        it was so a moment ago; its trajectory then may be there, but without a frame.
     """
     if not place.is_dir() or (place / SUMMARY).exists():
         return False

@@ -83,7 +83,9 @@ _YIELDS = dict.fromkeys(_WINDOWS, "SwitchToThread") | dict.fromkeys(_POSIX, "sch
 def yield_function(triple: str) -> str | None:
     """Name of the function by which a thread lets others run, for a target such as "x86_64-pc-windows-msvc".
 
-    Returns:
+    Returns
+    -------
+    str or None
         None for systems that we know no such function of: there a waiting thread goes on looking at the board.
     """
     return next((name for part in triple.split("-")[1:] for s, name in _YIELDS.items() if part.startswith(s)), None)

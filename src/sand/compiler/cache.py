@@ -31,8 +31,10 @@ def private_folder(name: str) -> Path:
     cannot be used, it is a folder of this user among the temporary files, and if that is unsafe too, a new temporary
     folder that is deleted at the end of the process.  A warning says why the wished folder is not used.
 
-    Args:
-        name: of the folder in the cache.
+    Parameters
+    ----------
+    name : str
+        of the folder in the cache.
     """
     wished = os.environ.get("SAND_CACHE")
     reasons, to_be_said = [], False
@@ -73,9 +75,12 @@ def unsafe(folder: Path) -> str | None:
 def _made(folder: Path) -> Path:
     """The folder, new ones for this user alone.
 
-    Raises:
-        OSError: it cannot be made or written.
-        _Unsafe: another user could write into it.
+    Raises
+    ------
+    OSError
+        it cannot be made or written.
+    _Unsafe
+        another user could write into it.
     """
     if not os.path.lexists(folder):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -181,10 +181,14 @@ def kernel(function: Callable, *, keep: bool = True, alone: bool = False, wide: 
 
     numba's global cache folder is put back at once: a user's own kernels go where the user wants.
 
-    Args:
-        keep: False for code that reaches formulas from outside SAND, whose edits our digest does not see.
-        alone: True for code that other Python threads may run beside.
-        wide: True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
+    Parameters
+    ----------
+    keep : bool, optional
+        False for code that reaches formulas from outside SAND, whose edits our digest does not see.
+    alone : bool, optional
+        True for code that other Python threads may run beside.
+    wide : bool, optional
+        True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
     """
     if wide and LONG_VECTORS:  # what is kept is found by its name; where both are the same, it is compiled once
         name = f"{function.__qualname__}_wide"

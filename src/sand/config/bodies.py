@@ -14,9 +14,11 @@ from ..setup.checks import refuse_unsound
 def body_from_file(path: str | Path, material: Material | None = None, *others: Any, **named: Any) -> Grains:
     """`io.bodies.read_body`, and a body in one piece; takes what that takes.
 
-    Raises:
-        BadInput: as `read_body`; also for grains that overlap by more than a simulation allows at its start, and for
-            gaps: grains without a contact to the rest.  The first ten are named.
+    Raises
+    ------
+    BadInput
+        as `read_body`; also for grains that overlap by more than a simulation allows at its start, and for
+        gaps: grains without a contact to the rest.  The first ten are named.
     """
     body = read_body(path, material, *others, **named)
     refuse_unsound(body, str(path))

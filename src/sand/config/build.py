@@ -30,12 +30,17 @@ BODIES = (".xyz", ".extxyz", ".txt", ".dat")
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
     """The simulation a case describes.
 
-    Args:
-        out: folder for its files, None for none.
-        options: passed on to `Simulation` (observers, overwrite).
+    Parameters
+    ----------
+    out : str or Path or None
+        folder for its files, None for none.
+    options
+        passed on to `Simulation` (observers, overwrite).
 
-    Raises:
-        BadInput: what only shows when grains, forces and box come together.
+    Raises
+    ------
+    BadInput
+        what only shows when grains, forces and box come together.
     """
     if case.grains.kind == "given":
         raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
@@ -125,8 +130,10 @@ def same_box(first: Box, second: Box) -> bool:
 def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]) -> Start:
     """One frame of a trajectory (or of the run in a folder) as a new start, see `setup.from_frame`.
 
-    Raises:
-        BadInput: no such file or frame, or one that cannot be a start.
+    Raises
+    ------
+    BadInput
+        no such file or frame, or one that cannot be a start.
     """
     place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
     frames = Frames(place)
@@ -142,8 +149,10 @@ def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]
 def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     """The case that a run began with, and in `meta` the end that its case.toml names now.
 
-    Raises:
-        BadInput: case.toml has been changed since, in more than its end.
+    Raises
+    ------
+    BadInput
+        case.toml has been changed since, in more than its end.
     """
     path = folder / CASE
     if "case" not in meta:  # of an early development version
@@ -173,13 +182,18 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
 def resume(folder: str | Path, **options: Any) -> Simulation:
     """A run's folder at its newest checkpoint as a simulation; `run()` goes on to the end once asked for.
 
-    Args:
-        folder: of an earlier run; new frames and rows are added to its files.
-        options: passed on to `Simulation` (observers).
+    Parameters
+    ----------
+    folder : str or Path
+        of an earlier run; new frames and rows are added to its files.
+    options
+        passed on to `Simulation` (observers).
 
-    Raises:
-        BadInput: no checkpoint, a damaged one, or a case that needs forces SAND does not know; or another process
-            writes to the folder.
+    Raises
+    ------
+    BadInput
+        no checkpoint, a damaged one, or a case that needs forces SAND does not know; or another process
+        writes to the folder.
     """
     place = Path(folder)
     if not place.is_dir():

@@ -246,8 +246,10 @@ def _unknown_materials(content: dict[str, Any]) -> list[str]:
 def read_case(path: str | Path) -> Case:
     """Read and check a case file.
 
-    Raises:
-        BadInput: every mistake of the file, one line each, with its place.
+    Raises
+    ------
+    BadInput
+        every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "run")

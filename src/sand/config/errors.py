@@ -14,10 +14,14 @@ from ..errors import did_you_mean
 def complaints(slip: Any, whole: type, extra: dict[type, list[str]]) -> list[str]:
     """pydantic's error as our lines: place, what is wrong, what to do.
 
-    Args:
-        slip: one entry of `ValidationError.errors()`.
-        whole: the model of the whole file, to know which keys are allowed where.
-        extra: keys that some settings classes accept besides their own.
+    Parameters
+    ----------
+    slip
+        one entry of `ValidationError.errors()`.
+    whole : type
+        the model of the whole file, to know which keys are allowed where.
+    extra : dict[type, list[str]]
+        keys that some settings classes accept besides their own.
     """
     place = ".".join(str(part) for part in slip["loc"] if not str(part).startswith("function-"))
     if slip["type"] in ("extra_forbidden", "unexpected_keyword_argument"):

@@ -16,10 +16,14 @@ from .update import bond_at, write_loads
 def seed_contacts(grains, contacts, count, span, law, pair, slide, roll, twist):
     """Append contacts with given displacements; returns the first one stretched beyond its break, or −1.
 
-    Args:
-        pair: (2, C) grains; the arrays of contacts must have room for them.
-        slide, roll: (3, C) ζ and ξ [m], laboratory frame; what is not perpendicular to n is left out.
-        twist: (C,) φ [rad].
+    Parameters
+    ----------
+    pair
+        (2, C) grains; the arrays of contacts must have room for them.
+    slide, roll
+        (3, C) ζ and ξ [m], laboratory frame; what is not perpendicular to n is left out.
+    twist
+        (C,) φ [rad].
     """
     wrong = -1
     for k in range(twist.size):

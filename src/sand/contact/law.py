@@ -163,9 +163,12 @@ def contact_load(pose, overlap, y, r1, r2, bond):
 
     The factor (d·n)/D makes M1 + M2 + (x1−x2)×F1 = 0 exact.
 
-    Args:
-        y: √(a/a₀) of this overlap, from `jkr.root` or `root_in_reach`.
-        bond: with the stiffnesses in force, see `stiffened`.
+    Parameters
+    ----------
+    y
+        √(a/a₀) of this overlap, from `jkr.root` or `root_in_reach`.
+    bond
+        with the stiffnesses in force, see `stiffened`.
     """
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
     normal = normal_force(overlap, y, bond)
@@ -273,9 +276,12 @@ def lost_to_stiffness(before, reached, earlier, bond):
     Zero for frozen stiffnesses.  Negative where the springs stiffen: "dt97" is not conservative, and this is
     what it makes or destroys.
 
-    Args:
-        earlier: the bond with the stiffnesses at the start of the step.
-        bond: the bond with those at its end.
+    Parameters
+    ----------
+    earlier
+        the bond with the stiffnesses at the start of the step.
+    bond
+        the bond with those at its end.
     """
     slide = (earlier.slide_stiffness - bond.slide_stiffness) * dot(before.slide, reached.slide)
     roll = (earlier.roll_stiffness - bond.roll_stiffness) * dot(before.roll, reached.roll)

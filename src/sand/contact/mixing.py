@@ -28,11 +28,16 @@ def pairing_between(
 ) -> Pairing:
     """1/E* = Σ(1−ν²)/E, 1/G* = Σ(2−ν)/G, 1/G′ = Σ 1/G, the smaller ξ_c, γ_eff by the mixing rule.
 
-    Args:
-        rolling_limit: ξ_c [m] instead of the materials' own.
-        factors: multipliers on k_s, k_r, k_t.
-        damping: c [kg/s] of a constant damping.
-        viscous_time: T_vis [s] of viscoelastic damping, c/a = 2 T_vis E*/(ν1 ν2) (Krijt et al. 2013); 0: none.
+    Parameters
+    ----------
+    rolling_limit : float or None, optional
+        ξ_c [m] instead of the materials' own.
+    factors : tuple[float, float, float], optional
+        multipliers on k_s, k_r, k_t.
+    damping : float, optional
+        c [kg/s] of a constant damping.
+    viscous_time : float, optional
+        T_vis [s] of viscoelastic damping, c/a = 2 T_vis E*/(ν1 ν2) (Krijt et al. 2013); 0: none.
     """
     modulus = 1.0 / sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in (a, b))
     viscous = 2.0 * viscous_time * modulus / (a.poisson_ratio * b.poisson_ratio) if viscous_time > 0.0 else 0.0

@@ -30,24 +30,35 @@ JKR_LIMIT = 0.3
 class Contact:
     """Grains that touch stick: JKR with sliding, rolling and twisting springs.
 
-    Args:
-        beyond: what happens to a tangential displacement beyond its limit. "clamp" leaves it at the limit;
-            "release" sets it to 0, the literal SAND (A.6), which halves the friction of rolling.
-        stiffness: of the tangential springs. "frozen" at the equilibrium radius a0, forces exact gradients;
-            "dt97" lets them follow the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³, which does not conserve
-            energy: what it makes or destroys is booked as `lost_stiffness`.
-        slide_factor, roll_factor, twist_factor: multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012 take 2.5, 8
-            and 1).
-        rolling_limit: critical rolling displacement ξ_c [m] for all contacts; None: the smaller of the two
-            materials' own.
-        damping: of the normal motion, "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013:
-            F = (2 T_vis E*/ν²) a dδ/dt; ν² is ν1 ν2 for unequal materials).
-        damping_constant: c [kg/s] ≥ 0, for "constant".
-        viscous_time: T_vis [s] ≥ 0, for "viscoelastic"; 1.25e-11 s is for silica.
-        mixing: γ_eff of unequal materials, "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
+    Parameters
+    ----------
+    beyond : str, optional
+        what happens to a tangential displacement beyond its limit. "clamp" leaves it at the limit;
+        "release" sets it to 0, the literal SAND (A.6), which halves the friction of rolling.
+    stiffness : str, optional
+        of the tangential springs. "frozen" at the equilibrium radius a0, forces exact gradients;
+        "dt97" lets them follow the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³, which does not conserve
+        energy: what it makes or destroys is booked as `lost_stiffness`.
+    slide_factor, roll_factor, twist_factor : optional
+        multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012 take 2.5, 8
+        and 1).
+    rolling_limit : optional
+        critical rolling displacement ξ_c [m] for all contacts; None: the smaller of the two
+        materials' own.
+    damping : str, optional
+        of the normal motion, "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013:
+        F = (2 T_vis E*/ν²) a dδ/dt; ν² is ν1 ν2 for unequal materials).
+    damping_constant : optional
+        c [kg/s] ≥ 0, for "constant".
+    viscous_time : optional
+        T_vis [s] ≥ 0, for "viscoelastic"; 1.25e-11 s is for silica.
+    mixing : str, optional
+        γ_eff of unequal materials, "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
 
-    Raises:
-        BadInput: unknown words and numbers out of range, one line each.
+    Raises
+    ------
+    BadInput
+        unknown words and numbers out of range, one line each.
     """
 
     beyond: str = "clamp"

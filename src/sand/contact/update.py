@@ -96,9 +96,12 @@ def pose_after(grains, contacts, span, c, dt):
 def quiet_pass(grains, contacts, first, last, used, column, span, law, dt):
     """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises.
 
-    Args:
-        column: of the constants of the first; the others' follow.
-        used: number of contacts in use (uint64); columns beyond it may be passed over, to no effect.
+    Parameters
+    ----------
+    column
+        of the constants of the first; the others' follow.
+    used
+        number of contacts in use (uint64); columns beyond it may be passed over, to no effect.
     """
     waiting = 0.0
     for k in range(last - first):

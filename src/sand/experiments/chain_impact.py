@@ -58,15 +58,22 @@ def strike(
 ) -> Simulation:
     """Run one impact: a chain at rest along x, a grain flying along −y onto its end.
 
-    Args:
-        radius: r [m] of all grains; speed: [m/s] > 0.
-        place: where the projectile's line of flight crosses the chain, in radii from the centre of the end grain,
-            positive beyond the end.
-        grains: N ≥ 4 of the chain.
-        options: passed on to `Simulation` (out, observers, frame_every).
+    Parameters
+    ----------
+    radius
+        r [m] of all grains; speed: [m/s] > 0.
+    place : float
+        where the projectile's line of flight crosses the chain, in radii from the centre of the end grain,
+        positive beyond the end.
+    grains : int, optional
+        N ≥ 4 of the chain.
+    options
+        passed on to `Simulation` (out, observers, frame_every).
 
-    Raises:
-        BadInput: numbers out of range.
+    Raises
+    ------
+    BadInput
+        numbers out of range.
     """
     r, v = si(radius, "m", "radius", above=0.0), si(speed, "m/s", "speed", above=0.0)
     if not grains >= 4:
@@ -97,8 +104,10 @@ def shape(position: np.ndarray, pairs: np.ndarray, grains: int) -> Shape:
     any other node of three; "ring": a closed loop; "bent" and "straight": a chain still; "broken"; "gone": the
     projectile missed or left again.
 
-    Args:
-        position: (N + 1, 3) [m], the projectile last; pairs: (C, 2) contacts; grains: N of the chain.
+    Parameters
+    ----------
+    position : ndarray
+        (N + 1, 3) [m], the projectile last; pairs: (C, 2) contacts; grains: N of the chain.
     """
     labels = cluster_labels(grains + 1, pairs)
     neighbours: list[list[int]] = [[] for _ in range(grains + 1)]

@@ -49,18 +49,28 @@ def collide(
 ) -> tuple[Collision, Simulation]:
     """Let a projectile hit a target in open space and wait until nothing happens any more.
 
-    Args:
-        target, projectile: bodies at rest, from `sand.setup` or of one's own.
-        speed, impact_parameter, along: see `sand.setup.encounter`.
-        seed: turn both bodies at random first; None leaves them as they are.
-        forces: `[sand.Contact()]` by default.
-        stepping, out, overwrite, observers: as for `sand.Simulation`.
+    Parameters
+    ----------
+    target, projectile : Grains
+        bodies at rest, from `sand.setup` or of one's own.
+    speed, impact_parameter, along
+        see `sand.setup.encounter`.
+    seed : int or None, optional
+        turn both bodies at random first; None leaves them as they are.
+    forces : Sequence[Force] or None, optional
+        `[sand.Contact()]` by default.
+    stepping, out, overwrite, observers : optional
+        as for `sand.Simulation`.
 
-    Returns:
+    Returns
+    -------
+    tuple[Collision, Simulation]
         The outcome, and the simulation as it ended.
 
-    Raises:
-        BadInput: see `encounter` and `Simulation`.
+    Raises
+    ------
+    BadInput
+        see `encounter` and `Simulation`.
     """
     start = approach(target, projectile, speed=speed, impact_parameter=impact_parameter, along=along, seed=seed)
     simulation = prepared(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
@@ -102,8 +112,10 @@ def gone_on_with(
 ) -> Simulation:
     """The simulation of a collision that was interrupted, from the newest checkpoint in its folder.
 
-    Raises:
-        BadInput: as `config.build.resume`; or the folder holds another collision than the one asked for.
+    Raises
+    ------
+    BadInput
+        as `config.build.resume`; or the folder holds another collision than the one asked for.
     """
     simulation = resume(folder, **options)
     asked, begun = (case_of(one, math.inf, math.inf) for one in (prepared(start, forces, stepping), simulation))
@@ -139,9 +151,12 @@ def _first_frame(path: Path) -> Any:
 def finished(start: Approach, simulation: Simulation) -> Collision:
     """Run a collision on to its end, from wherever it stands, and judge it.
 
-    Raises:
-        BadInput: the physics stopped it.
-        Interrupted: Ctrl-C; `gone_on_with` goes on.
+    Raises
+    ------
+    BadInput
+        the physics stopped it.
+    Interrupted
+        Ctrl-C; `gone_on_with` goes on.
     """
     before = len(simulation.contacts["pair"]) if simulation.steps == 0 else int(simulation.ledger.rows[0]["contacts"])
     record = simulation.record
@@ -188,11 +203,16 @@ def collide_many(
 ) -> list[Collision]:
     """The same collision for many seeds: other aggregates, other orientations.
 
-    Args:
-        build: makes target and projectile for a seed; a module-level function if processes are to run it.
-        seeds: one collision each; results come in their order, whatever the executor.
-        executor: any `concurrent.futures.Executor`; None: one after the other here.
-        options: passed on to `collide`.
+    Parameters
+    ----------
+    build : Callable[[int], tuple[Grains, Grains]]
+        makes target and projectile for a seed; a module-level function if processes are to run it.
+    seeds : Sequence[int]
+        one collision each; results come in their order, whatever the executor.
+    executor : Executor or None, optional
+        any `concurrent.futures.Executor`; None: one after the other here.
+    options
+        passed on to `collide`.
     """
     if executor is None:
         return [_one(build, seed, options) for seed in seeds]

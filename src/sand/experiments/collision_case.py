@@ -163,8 +163,10 @@ class CollisionCase(Section):
     def check(self) -> Simulation:
         """The first collision at its start, in memory, so that all that can be wrong with it is found.
 
-        Raises:
-            BadInput: what only shows when bodies, forces and materials come together.
+        Raises
+        ------
+        BadInput
+            what only shows when bodies, forces and materials come together.
         """
         return self.prepared(self.approach(self.impact.seeds[0]))
 
@@ -201,8 +203,10 @@ def with_whole_paths(content: dict[str, Any]) -> dict[str, Any]:
 def read_collision(path: str | Path) -> CollisionCase:
     """Read and check a case file of `sand collide`.
 
-    Raises:
-        BadInput: every mistake of the file, one line each, with its place.
+    Raises
+    ------
+    BadInput
+        every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "collide")
@@ -239,11 +243,16 @@ def run_seeds(
 ) -> list[dict[str, Any]]:
     """The outcomes for many seeds in their order, on any `concurrent.futures.Executor` or here.
 
-    Args:
-        case: content of a case file that `read_collision` has accepted.
-        known: outcomes by seed that need not be computed again.
-        keep: called with each seed and its outcome as soon as it is there, in any order.
-        observers: of the simulations, where there is no executor.
+    Parameters
+    ----------
+    case : dict[str, Any]
+        content of a case file that `read_collision` has accepted.
+    known : dict[int, dict[str, Any]] or None, optional
+        outcomes by seed that need not be computed again.
+    keep : Callable[[int, dict[str, Any]], None] or None, optional
+        called with each seed and its outcome as soon as it is there, in any order.
+    observers : Sequence[Any], optional
+        of the simulations, where there is no executor.
     """
     own: dict[str, Any] = {} if executor is not None else {"observers": observers}
     work, found = partial(run_seed, json.dumps(case), **own), dict(known or {})

@@ -38,15 +38,23 @@ def description_in(folder: Path) -> Path | None:
 class CollisionJob:
     """The collisions of one case, in a folder.
 
-    Args:
-        path: of the case file.
-        folder: where the files go; by default as the case says, or by its name.
-        seeds: instead of those in the case.
-        resume: go on with what lies there.
-        overwrite: replace what lies there.
+    Parameters
+    ----------
+    path : str or Path
+        of the case file.
+    folder : Path or None, optional
+        where the files go; by default as the case says, or by its name.
+    seeds : list[int] or None, optional
+        instead of those in the case.
+    resume : bool, optional
+        go on with what lies there.
+    overwrite : bool, optional
+        replace what lies there.
 
-    Raises:
-        BadInput: every mistake of the case, or a folder that is in use.
+    Raises
+    ------
+    BadInput
+        every mistake of the case, or a folder that is in use.
     """
 
     def __init__(
@@ -69,13 +77,19 @@ class CollisionJob:
     def run(self, executor: Executor | None = None, observers: Sequence[Any] = ()) -> dict[str, Any]:
         """All collisions that are not finished yet; returns what collision.json holds.
 
-        Args:
-            executor: for many seeds; by default they are computed here, one after the other.
-            observers: of simulations in this process.
+        Parameters
+        ----------
+        executor : Executor or None, optional
+            for many seeds; by default they are computed here, one after the other.
+        observers : Sequence[Any], optional
+            of simulations in this process.
 
-        Raises:
-            BadInput: what only shows when bodies, forces and materials come together, or while they collide.
-            Interrupted: Ctrl-C; a job with `resume` goes on.
+        Raises
+        ------
+        BadInput
+            what only shows when bodies, forces and materials come together, or while they collide.
+        Interrupted
+            Ctrl-C; a job with `resume` goes on.
         """
         seeds = self.case.impact.seeds
         results = [self._one(seeds[0], observers)] if len(seeds) == 1 else self._many(seeds, executor, observers)

@@ -40,17 +40,28 @@ class Approach(NamedTuple):
 class Collision:
     """The outcome of one collision; SI.
 
-    Attributes:
-        outcome: "stick" (one body), "bounce" (two bodies of the same grains as before), "miss", or "fragment".
-        speed, impact_parameter: as asked; seed: of the orientations, None for as given.
-        fragments: grains of each body at the end, largest first.
-        largest_remnant: mass of the largest body over all mass.
-        made, moved, broken: contacts formed, moved (a limit passed in a step), broken during the collision.
-        contacts_before, contacts_after: their numbers.
-        lost: energy dissipated per channel [J]; impact_energy: m̄v²/2 [J].
-        gyration_before: radii of gyration of target and projectile [m]; gyration_after: of the largest remnant.
-        rebound: relative speed of the two largest bodies at the end [m/s], 0 if there is one.
-        time, steps: of the simulation; drift: of its ledger; quiet: False if it was stopped while still busy.
+    Attributes
+    ----------
+    outcome : str
+        "stick" (one body), "bounce" (two bodies of the same grains as before), "miss", or "fragment".
+    speed, impact_parameter : float
+        as asked; seed: of the orientations, None for as given.
+    fragments : tuple[int, ...]
+        grains of each body at the end, largest first.
+    largest_remnant : float
+        mass of the largest body over all mass.
+    made, moved, broken : int
+        contacts formed, moved (a limit passed in a step), broken during the collision.
+    contacts_before, contacts_after : int
+        their numbers.
+    lost : dict[str, float]
+        energy dissipated per channel [J]; impact_energy: m̄v²/2 [J].
+    gyration_before : tuple[float, float]
+        radii of gyration of target and projectile [m]; gyration_after: of the largest remnant.
+    rebound : float
+        relative speed of the two largest bodies at the end [m/s], 0 if there is one.
+    time, steps
+        of the simulation; drift: of its ledger; quiet: False if it was stopped while still busy.
     """
 
     outcome: str
@@ -82,11 +93,16 @@ class Collision:
 def judged(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
     """What became of two bodies.
 
-    Args:
-        simulation: at its end.
-        start: what it began with.
-        before: contacts at the start.
-        quiet: False if it was stopped while still busy.
+    Parameters
+    ----------
+    simulation : Simulation
+        at its end.
+    start : Approach
+        what it began with.
+    before : int
+        contacts at the start.
+    quiet : bool
+        False if it was stopped while still busy.
     """
     target, projectile, begun, speed = start.target, start.projectile, start.grains, start.speed
     grains, row = simulation.grains, simulation.ledger.rows[-1]

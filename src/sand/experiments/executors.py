@@ -30,14 +30,20 @@ def executor_for(
 
     An exception in the block, Ctrl-C among them, ends the processes: each run in them writes its checkpoint first.
 
-    Args:
-        workers: processes to start, each a new interpreter.
-        threads: of each of them; one by default, because they share the cores.
-        scheduler: address of a running dask scheduler, "tcp://host:port", instead. Work of a worker that dies is done
-            again by another.
+    Parameters
+    ----------
+    workers : int, optional
+        processes to start, each a new interpreter.
+    threads : int or None, optional
+        of each of them; one by default, because they share the cores.
+    scheduler : str or None, optional
+        address of a running dask scheduler, "tcp://host:port", instead. Work of a worker that dies is done
+        again by another.
 
-    Raises:
-        BadInput: no address, no `distributed`, no answer, or more workers than Windows allows.
+    Raises
+    ------
+    BadInput
+        no address, no `distributed`, no answer, or more workers than Windows allows.
     """
     if scheduler is not None:
         with _dask(scheduler) as executor:

@@ -44,8 +44,10 @@ class Box(NamedTuple):
 def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
     """S(t) and the aggregates of one run.
 
-    Raises:
-        BadInput: there is no run, or one that cannot be read.
+    Raises
+    ------
+    BadInput
+        there is no run, or one that cannot be read.
     """
     run = Opened(folder)
     frames, ledger = run.frames, run.ledger
@@ -79,8 +81,10 @@ def _usual(moments: np.ndarray) -> float:
 def boxes_in(folder: str | Path) -> list[Path]:
     """The run in a folder, or the runs in its folders, in the order of their numbers.
 
-    Raises:
-        BadInput: there is none.
+    Raises
+    ------
+    BadInput
+        there is none.
     """
     place = Path(folder)
     if (place / files.TRAJECTORY).exists():
@@ -120,13 +124,18 @@ class Growth(NamedTuple):
 def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -> Growth:
     """S(t), z, the exponent of moments and the fractal dimension of an ensemble.
 
-    Args:
-        boxes: alike but for their seeds.
-        window: values of S for z: from where the mean over boxes is at the first until any box is at the second; by
-            default 2 and 0.15 N, where a box runs out of partners.
+    Parameters
+    ----------
+    boxes : Sequence[Box]
+        alike but for their seeds.
+    window : tuple[float, float] or None, optional
+        values of S for z: from where the mean over boxes is at the first until any box is at the second; by
+        default 2 and 0.15 N, where a box runs out of partners.
 
-    Raises:
-        BadInput: no box, or boxes that are not alike.
+    Raises
+    ------
+    BadInput
+        no box, or boxes that are not alike.
     """
     if not boxes:
         raise BadInput("an ensemble needs at least one box")

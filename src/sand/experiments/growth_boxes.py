@@ -28,20 +28,32 @@ def grow(
 
     case.toml in the folder says what was asked for, growth.json at the end how each box ended.
 
-    Args:
-        content: a case as for `sand run`, as read from TOML.
-        seeds: one box each.
-        folder: that holds their folders, seed-1 and so on.
-        executor: where; one after the other in this process by default.
-        told: called with a seed and how its run ended.
-        observers: of the simulations, where there is no executor.
+    Parameters
+    ----------
+    content : dict[str, Any]
+        a case as for `sand run`, as read from TOML.
+    seeds : Sequence[int]
+        one box each.
+    folder : str or Path
+        that holds their folders, seed-1 and so on.
+    executor : Executor or None, optional
+        where; one after the other in this process by default.
+    told : Callable[[int, str], None] or None, optional
+        called with a seed and how its run ended.
+    observers : Sequence[Any], optional
+        of the simulations, where there is no executor.
 
-    Returns:
+    Returns
+    -------
+    list[Path]
         The folders, in the order of the seeds.
 
-    Raises:
-        BadInput: a case with mistakes, a folder that holds something else, a run stopped by physics.
-        Interrupted: Ctrl-C; calling again goes on.
+    Raises
+    ------
+    BadInput
+        a case with mistakes, a folder that holds something else, a run stopped by physics.
+    Interrupted
+        Ctrl-C; calling again goes on.
     """
     place = Path(folder)
     check_case(content, "case")
@@ -104,8 +116,10 @@ def _run_all(
 def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> list[int]:
     """Leave the case in the folder, with the seeds of all boxes that are, or will be, in it; returns these.
 
-    Raises:
-        BadInput: the folder holds something else.
+    Raises
+    ------
+    BadInput
+        the folder holds something else.
     """
     path = place / files.CASE
     before: list[int] = []
@@ -127,8 +141,10 @@ def boxes_of(folder: Path) -> list[Path]:
 def one_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence[Any] = ()) -> str:
     """Run one box to its end, from its newest checkpoint if it has one; returns the name of the outcome.
 
-    Raises:
-        BadInput: the folder holds a run of another case.
+    Raises
+    ------
+    BadInput
+        the folder holds a run of another case.
     """
     place, case = Path(folder), check_case(content, "case")
     case.run.seed = seed

@@ -30,11 +30,15 @@ class GrowthCase(Case):
 def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     """Read and check a case file of `sand grow`, which may be one of `sand run`.
 
-    Returns:
+    Returns
+    -------
+    tuple[dict[str, Any], list[int] or None]
         The case of a box as `growth.grow` takes it, and the seeds if the file has [grow].
 
-    Raises:
-        BadInput: every mistake of the file, one line each, with its place.
+    Raises
+    ------
+    BadInput
+        every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "grow")

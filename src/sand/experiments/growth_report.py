@@ -29,12 +29,17 @@ class Ensemble(NamedTuple):
 def ensemble_in(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
     """The runs in a folder as one ensemble.
 
-    Args:
-        folder: of a run, or of runs.
-        window: values of S between which z is fitted.
+    Parameters
+    ----------
+    folder : str or Path
+        of a run, or of runs.
+    window : tuple[float, float] or None, optional
+        values of S between which z is fitted.
 
-    Raises:
-        BadInput: no run, or runs that are not alike.
+    Raises
+    ------
+    BadInput
+        no run, or runs that are not alike.
     """
     boxes = [read_box(one) for one in boxes_in(folder)]
     try:
@@ -86,8 +91,10 @@ def compared(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
 def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any]) -> None:
     """analysis.json, S(t) and all aggregates as tables, and the figure.
 
-    Raises:
-        FilesFailed: the disk is full, …
+    Raises
+    ------
+    FilesFailed
+        the disk is full, …
     """
     from ..plotting.growth import growth_figure
     from ..plotting.run_figure import save

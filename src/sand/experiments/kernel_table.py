@@ -26,15 +26,20 @@ GRAM, CUBIC_CM = 1e3, 1e6
 def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Kernel:
     """K = σ v of any two masses, from some.
 
-    Args:
-        rows: (m1, m2, σ, v) each, in kg, kg, m², m/s, all above 0, in either order of the masses: at least two masses
-            and all three pairs of them.  `(m1, m2, found.sigma, found.speed)` of what `scattering.cross_section` found
-            where the target is at rest, or moves by chance (then σ v is the mean of σ(u) u).
-        extrapolate: beyond the measured masses go on as the power law that fits all rows best; else refuse.
+    Parameters
+    ----------
+    rows : Iterable[Sequence[Any]]
+        (m1, m2, σ, v) each, in kg, kg, m², m/s, all above 0, in either order of the masses: at least two masses
+        and all three pairs of them.  `(m1, m2, found.sigma, found.speed)` of what `scattering.cross_section` found
+        where the target is at rest, or moves by chance (then σ v is the mean of σ(u) u).
+    extrapolate : bool, optional
+        beyond the measured masses go on as the power law that fits all rows best; else refuse.
 
-    Raises:
-        BadInput: rows that are no such rows, contradict each other, or do not span a range of masses; when called, for
-            masses beyond it.
+    Raises
+    ------
+    BadInput
+        rows that are no such rows, contradict each other, or do not span a range of masses; when called, for
+        masses beyond it.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
@@ -82,13 +87,19 @@ def on_grid(kernel: Rate, masses: Any) -> np.ndarray:
 def write_csv(path: str | Path, kernel: Rate, masses: Any) -> None:
     """A line for each pair m1 ≤ m2: `mass1` [kg], `mass2` [kg], `kernel` [m³/s].
 
-    Args:
-        kernel: K(m1, m2) [m³/s].
-        masses: (K,) [kg] > 0, rising.
+    Parameters
+    ----------
+    kernel : Rate
+        K(m1, m2) [m³/s].
+    masses
+        (K,) [kg] > 0, rising.
 
-    Raises:
-        BadInput: masses out of range or order.
-        FilesFailed: it cannot be written.
+    Raises
+    ------
+    BadInput
+        masses out of range or order.
+    FilesFailed
+        it cannot be written.
     """
     m, table = _masses(masses), on_grid(kernel, masses)
     pairs = [(i, j) for i in range(len(m)) for j in range(i, len(m))]
@@ -116,15 +127,22 @@ def for_dustpy(table: Any, scale_heights: Any) -> np.ndarray:
     DustPy integrates over the height of a disk of Gaussian layers, sums over pairs j ≤ i, and takes the ½ of two equal
     masses into the kernel.
 
-    Args:
-        table: K (Nm, Nm) [cm³/s] on the masses of `grid.m`.
-        scale_heights: H (Nr, Nm) [cm] > 0, `dust.H`.
+    Parameters
+    ----------
+    table
+        K (Nm, Nm) [cm³/s] on the masses of `grid.m`.
+    scale_heights
+        H (Nr, Nm) [cm] > 0, `dust.H`.
 
-    Returns:
+    Returns
+    -------
+    ndarray
         (Nr, Nm, Nm) [cm²/s]; the first and last radius, its boundaries, hold 0.
 
-    Raises:
-        BadInput: shapes that do not fit.
+    Raises
+    ------
+    BadInput
+        shapes that do not fit.
     """
     k, height = np.asarray(table, float), np.asarray(scale_heights, float)
     if height.ndim != 2 or k.shape != (height.shape[1], height.shape[1]) or not (height > 0.0).all():

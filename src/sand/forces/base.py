@@ -16,9 +16,12 @@ from .pair.loops import NO_FAR_FORCE, FarSums, far_together
 class Force(Protocol):
     """Anything in `Simulation(forces=[…])`.
 
-    Attributes:
-        name: its key in case files, ledger and summary.
-        references: where its equations come from.
+    Attributes
+    ----------
+    name : str
+        its key in case files, ledger and summary.
+    references : str
+        where its equations come from.
     """
 
     name: str
@@ -42,9 +45,11 @@ class GrainForce(Force, Protocol):
     `flux_density_at(time)`  the flux density it brings [T], for `Simulation.at_grains`.
     `longest_step()`  longest step [s] that resolves how the force itself varies in time; `math.inf` if it does not.
 
-    Attributes:
-        formula: `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], made by
-            `sand.compiler.jit.formula`.  The energy is one of place, moment and time, not of velocity or spin.
+    Attributes
+    ----------
+    formula : Callable
+        `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], made by
+        `sand.compiler.jit.formula`.  The energy is one of place, moment and time, not of velocity or spin.
     """
 
     formula: Callable
@@ -58,10 +63,13 @@ class GrainForce(Force, Protocol):
 
 @runtime_checkable
 class FarForce(Force, Protocol):
-    """A force between all grains, near and far (forces/pair/dipole_loops.py and forces/pair/inverse_square_loops.py have the loops).
+    """A force between all grains, near and far (forces/pair/dipole_loops.py and forces/pair/inverse_square_loops.py
+    have the loops).
 
-    Attributes:
-        column: the name of its energy in the ledger.
+    Attributes
+    ----------
+    column : str
+        the name of its energy in the ledger.
     """
 
     column: str

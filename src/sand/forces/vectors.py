@@ -21,13 +21,19 @@ def components(value: Any) -> list[Any] | None:
 def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
     """Three finite components in SI.
 
-    Args:
-        value: three numbers in SI, texts with a unit or quantities, one for each axis.
-        unit: the SI unit, "1" for pure numbers.
-        name: how the user called it, for the message.
+    Parameters
+    ----------
+    value
+        three numbers in SI, texts with a unit or quantities, one for each axis.
+    unit : str
+        the SI unit, "1" for pure numbers.
+    name : str
+        how the user called it, for the message.
 
-    Raises:
-        BadInput: not three, or one line for each component that is wrong.
+    Raises
+    ------
+    BadInput
+        not three, or one line for each component that is wrong.
     """
     parts = components(value)
     if parts is None or len(parts) != 3:
@@ -47,8 +53,10 @@ def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
 def along_z(value: Any, unit: str, name: str, sense: float = 1.0) -> tuple[float, float, float]:
     """Three finite components in SI, or one size along +z, or along −z if `sense` is −1.
 
-    Raises:
-        BadInput: neither one nor three, or one line for each component that is wrong.
+    Raises
+    ------
+    BadInput
+        neither one nor three, or one line for each component that is wrong.
     """
     parts = components(value)
     if parts is None:

@@ -37,19 +37,28 @@ class Adaptive:
     A step is taken again, shorter, if the error of any quantity of any grain exceeds what is prescribed, and ends
     where two grains come to touch.  Momentum is kept to rounding, energy and angular momentum to the errors.
 
-    Args:
-        tolerance: the errors that are "auto" are this part, below 1, of the problem's own scales.
-        position_error: largest error of a position in one step [m], or "auto": of the smallest radius.
-        velocity_error: of a velocity [m/s], or "auto": of the fastest start, or of √(U/m) if that is more, U the
-            far energy of two grains at touch, m the largest mass; at least a radius in the longest step.
-        turn_error: of an orientation [rad], or "auto": of 1 rad.
-        spin_error: of a spin [rad/s], or "auto": of the fastest spin at the start, or of √(U/I) if that is more, U
-            the larger of the far energy at touch and of μB, I the largest moment of inertia; at least 1 rad in the
-            longest step.
-        touching: the `sand.Verlet` that takes over while grains touch; a table of its keys in a case file.
+    Parameters
+    ----------
+    tolerance : optional
+        the errors that are "auto" are this part, below 1, of the problem's own scales.
+    position_error : optional
+        largest error of a position in one step [m], or "auto": of the smallest radius.
+    velocity_error : optional
+        of a velocity [m/s], or "auto": of the fastest start, or of √(U/m) if that is more, U the
+        far energy of two grains at touch, m the largest mass; at least a radius in the longest step.
+    turn_error : optional
+        of an orientation [rad], or "auto": of 1 rad.
+    spin_error : optional
+        of a spin [rad/s], or "auto": of the fastest spin at the start, or of √(U/I) if that is more, U
+        the larger of the far energy at touch and of μB, I the largest moment of inertia; at least 1 rad in the
+        longest step.
+    touching : Verlet, optional
+        the `sand.Verlet` that takes over while grains touch; a table of its keys in a case file.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
 
     tolerance: Any = 1e-9

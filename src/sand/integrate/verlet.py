@@ -24,25 +24,33 @@ FAR = ("every step", "impulse", "taylor", "taylor-literal")
 class Verlet:
     """Velocity Verlet for translation, spin and rotation parameters; second order, keeps momenta exactly.
 
-    Args:
-        steps_per_period: steps per fastest period of any contact, ≥ 10 (25: frequencies come out 0.26 % high).
-        step: a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
-            otherwise.
-        accuracy: part, below 1, of the largest energy that a long-range force puts at stake, |U_min| for dipoles,
-            that a step away from contacts may misplace.
-        far: how long-range forces act while grains touch. "impulse" sums them once in a cycle of steps; what of them
-            changes acts at the two ends of the cycle (r-RESPA), what lasts in every step, as does the force between
-            two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
-            bound grains with their mean motion; "taylor-literal" is SAND's own, bound grains with the velocity and
-            spin of the moment, ringing included; "every step" sums them in every step.
-        far_steps: most steps in a cycle, k_max ≥ 1, counted in steps of the contacts' own where a fixed `step` is
-            longer; or "auto": as many as stay below half the fastest period of a contact, 12 of 25, for "impulse";
-            70, the paper's, for the Taylor series. Impulses at the ends of longer cycles meet the ringing in step
-            and slowly heat it. A cycle is shorter where grains that touch nothing need it, by their long-range
-            loads, spins and moments, and has one step where nothing touches.
+    Parameters
+    ----------
+    steps_per_period : optional
+        steps per fastest period of any contact, ≥ 10 (25: frequencies come out 0.26 % high).
+    step : optional
+        a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
+        otherwise.
+    accuracy : optional
+        part, below 1, of the largest energy that a long-range force puts at stake, |U_min| for dipoles,
+        that a step away from contacts may misplace.
+    far : str, optional
+        how long-range forces act while grains touch. "impulse" sums them once in a cycle of steps; what of them
+        changes acts at the two ends of the cycle (r-RESPA), what lasts in every step, as does the force between
+        two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
+        bound grains with their mean motion; "taylor-literal" is SAND's own, bound grains with the velocity and
+        spin of the moment, ringing included; "every step" sums them in every step.
+    far_steps : optional
+        most steps in a cycle, k_max ≥ 1, counted in steps of the contacts' own where a fixed `step` is
+        longer; or "auto": as many as stay below half the fastest period of a contact, 12 of 25, for "impulse";
+        70, the paper's, for the Taylor series. Impulses at the ends of longer cycles meet the ringing in step
+        and slowly heat it. A cycle is shorter where grains that touch nothing need it, by their long-range
+        loads, spins and moments, and has one step where nothing touches.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
 
     steps_per_period: Any = 25.0

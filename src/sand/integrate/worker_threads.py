@@ -16,8 +16,10 @@ from ..threads import threads
 class Hands:
     """Threads that run a kernel beside the driver whenever it is called; started when first needed.
 
-    Args:
-        help_along: the kernel, which ends when the driver says so.
+    Parameters
+    ----------
+    help_along : Callable
+        the kernel, which ends when the driver says so.
     """
 
     def __init__(self, help_along: Callable):

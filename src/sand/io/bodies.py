@@ -35,18 +35,26 @@ def read_body(
 ) -> Grains:
     """Grains at rest, centred on their centre of mass.
 
-    Args:
-        path: extended XYZ, whose last frame is taken; a `.gsd`, of SAND or of others, whose last frame is taken; or
-            text with one grain a line, `x y z` or `x y z r`, blank lines and `#` comments allowed.
-        material: of all grains; None: those that the file names.
-        radius: [m] of all grains of a file without radii.
-        length: what one unit of the file's numbers is, "1 nm" for example; by default 1 Å in extended XYZ (or what
-            its `length_unit` says), 1 m in columns and in GSD that is not SAND's.
-        materials: those that the file may name; otherwise: of all grains of a file that names none.
+    Parameters
+    ----------
+    path : str or Path
+        extended XYZ, whose last frame is taken; a `.gsd`, of SAND or of others, whose last frame is taken; or
+        text with one grain a line, `x y z` or `x y z r`, blank lines and `#` comments allowed.
+    material : Material or None, optional
+        of all grains; None: those that the file names.
+    radius : optional
+        [m] of all grains of a file without radii.
+    length : str or None, optional
+        what one unit of the file's numbers is, "1 nm" for example; by default 1 Å in extended XYZ (or what
+        its `length_unit` says), 1 m in columns and in GSD that is not SAND's.
+    materials : Mapping[str, Material], optional
+        those that the file may name; otherwise: of all grains of a file that names none.
 
-    Raises:
-        BadInput: a missing or foreign file, lines that are not numbers, grains without a place (the first ten by
-            number), no radii, or materials that are not known.
+    Raises
+    ------
+    BadInput
+        a missing or foreign file, lines that are not numbers, grains without a place (the first ten by
+        number), no radii, or materials that are not known.
     """
     place = Path(path)
     found = _of_gsd(place) if place.suffix == ".gsd" else _of_text(path)
@@ -163,9 +171,12 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     Places are written to rounding, so that contacts at rest stay so; `read_body`, `sand collide`, `sand run`,
     OVITO and ASE read both.
 
-    Raises:
-        BadInput: another ending, no such folder, or a file that is there already.
-        FilesFailed: the disk is full, …
+    Raises
+    ------
+    BadInput
+        another ending, no such folder, or a file that is there already.
+    FilesFailed
+        the disk is full, …
     """
     place = Path(path)
     refuse_place(place, overwrite=overwrite)

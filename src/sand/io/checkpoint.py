@@ -68,12 +68,17 @@ def checkpoint_name(steps: int) -> str:
 def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Path:
     """Write one checkpoint, then drop all but the newest two.
 
-    Args:
-        arrays: the state by name.
-        meta: plain numbers and text that go with it; must hold `steps`.
+    Parameters
+    ----------
+    arrays : dict[str, ndarray]
+        the state by name.
+    meta : dict[str, Any]
+        plain numbers and text that go with it; must hold `steps`.
 
-    Raises:
-        FilesFailed: nothing is lost, the older checkpoints stay.
+    Raises
+    ------
+    FilesFailed
+        nothing is lost, the older checkpoints stay.
     """
     header = {"format": "SAND checkpoint", "version": VERSION, "sha256": _checksum(arrays), **meta}
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
@@ -90,8 +95,10 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
 def _refuse_impossible_sizes(path: Path) -> None:
     """Look at the sizes in the archive before memory is taken: ours are stored as they are, so none exceeds the file.
 
-    Raises:
-        ValueError: an array larger than the file, or than its part of it.
+    Raises
+    ------
+    ValueError
+        an array larger than the file, or than its part of it.
     """
     refuse_devices(path)
     size = path.stat().st_size
@@ -114,9 +121,12 @@ class NewerFormat(BadInput):
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Arrays and meta of one checkpoint, fit to go on from.
 
-    Raises:
-        NewerFormat: of a newer version.
-        BadInput: not a checkpoint, damaged, or with numbers that a state cannot have.
+    Raises
+    ------
+    NewerFormat
+        of a newer version.
+    BadInput
+        not a checkpoint, damaged, or with numbers that a state cannot have.
     """
     try:
         _refuse_impossible_sizes(path)
@@ -145,10 +155,14 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """The newest checkpoint that is whole; newer ones that are not are renamed, with a warning that says so.
 
-    Raises:
-        NewerFormat: one of a newer version is met first.
-        BadInput: there is none; no file is renamed then.
-        FilesFailed: a damaged one cannot be renamed.
+    Raises
+    ------
+    NewerFormat
+        one of a newer version is met first.
+    BadInput
+        there is none; no file is renamed then.
+    FilesFailed
+        a damaged one cannot be renamed.
     """
     problems: list[tuple[Path, str]] = []
     for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):

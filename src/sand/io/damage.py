@@ -28,8 +28,10 @@ def digest_of(content: dict[str, Any]) -> str:
 def set_aside(path: Path, *, copy: bool = False) -> Path:
     """Rename a damaged file to a free name that nothing reads, or copy it to one; returns that.
 
-    Raises:
-        OSError: it cannot be renamed or copied.
+    Raises
+    ------
+    OSError
+        it cannot be renamed or copied.
     """
     aside, number = path.with_name(path.name + DAMAGED), 1
     while aside.exists():

@@ -185,14 +185,21 @@ FORMATS: dict[str, Writer] = {
 def export_frames(frames: Sequence[Frame], stem: str | Path, form: str, clusters: Clusters) -> list[Path]:
     """Write frames for another program; returns the files.
 
-    Args:
-        stem: path without ending; "run/pictures" makes run/pictures.xyz, or run/pictures-000000000100.vtp and so on.
-        form: "xyz", "lammps-dump", "lammps-data" or "vtk".
-        clusters: numbers the clusters of so many grains (N,) by their contacts (C, 2), `analysis.cluster_labels`.
+    Parameters
+    ----------
+    stem : str or Path
+        path without ending; "run/pictures" makes run/pictures.xyz, or run/pictures-000000000100.vtp and so on.
+    form : str
+        "xyz", "lammps-dump", "lammps-data" or "vtk".
+    clusters : Clusters
+        numbers the clusters of so many grains (N,) by their contacts (C, 2), `analysis.cluster_labels`.
 
-    Raises:
-        BadInput: an unknown format, no frames, or no such folder.
-        FilesFailed: the disk is full, …
+    Raises
+    ------
+    BadInput
+        an unknown format, no frames, or no such folder.
+    FilesFailed
+        the disk is full, …
     """
     if form not in FORMATS:
         raise BadInput(f"format = {form!r}; allowed: {', '.join(FORMATS)}")

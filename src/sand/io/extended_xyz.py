@@ -53,8 +53,10 @@ def is_xyz(lines: list[str]) -> bool:
 def read_xyz(path: Any, lines: list[str]) -> Columns:
     """The last frame of extended XYZ.
 
-    Raises:
-        BadInput: a frame that is cut off, no positions, or lines that are not numbers (the first ten).
+    Raises
+    ------
+    BadInput
+        a frame that is cut off, no positions, or lines that are not numbers (the first ten).
     """
     first, count = _last_frame(path, lines)
     head = dict(re.findall(r'(\w+)=("[^"]*"|\S+)', lines[first + 1]))

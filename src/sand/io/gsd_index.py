@@ -42,8 +42,10 @@ WIDTHS = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1] + [10**9] * 244, np.float
 def read_index(path: Path) -> tuple[int, np.ndarray]:
     """Place of the index in the file and its entries, those in use being the first; a damaged one may be among them.
 
-    Raises:
-        BadInput: it lies outside the file.
+    Raises
+    ------
+    BadInput
+        it lies outside the file.
     """
     size = path.stat().st_size
     with open(path, "rb") as file:
@@ -74,11 +76,15 @@ def make_room(path: Path, wanted: int, pending: int) -> None:
 
     GSD (up to 5.0 at least) goes on after it failed to lengthen its index, and writes entries over the first frames.
 
-    Args:
-        wanted: entries that the index is to hold, at most; pending: bytes [B] of data that wait to be written.
+    Parameters
+    ----------
+    wanted : int
+        entries that the index is to hold, at most; pending: bytes [B] of data that wait to be written.
 
-    Raises:
-        OSError: there is no room.
+    Raises
+    ------
+    OSError
+        there is no room.
     """
     with open(path, "r+b") as file:
         allocated = int(np.frombuffer(file.read(24), np.uint64)[2])
@@ -109,8 +115,10 @@ def _impossible(path: Path, entries: np.ndarray) -> np.ndarray:
 def refuse_impossible_sizes(path: Path) -> None:
     """A broken index may ask for petabytes.
 
-    Raises:
-        BadInput: an entry lies outside the file.
+    Raises
+    ------
+    BadInput
+        an entry lies outside the file.
     """
     _, entries = read_index(path)
     if _impossible(path, entries).any():
@@ -122,11 +130,15 @@ def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
 
     A disk that fills up, or a power cut, can leave an index that promises more than there is.
 
-    Returns:
+    Returns
+    -------
+    dict[int, tuple[int, int]]
         Number and check sum of each whole frame after `step`, by its step.
 
-    Raises:
-        BadInput: it is no trajectory.
+    Raises
+    ------
+    BadInput
+        it is no trajectory.
     """
     import gsd.hoomd
 
@@ -155,12 +167,17 @@ def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[
 
     What was written before the first frame that is there, to a file that has gone since, is not missed.
 
-    Returns:
+    Returns
+    -------
+    tuple[dict[int, tuple[int, int]], str]
         What `mend` gives, and what is to be said, empty if no frame up to `step` is lost.
 
-    Raises:
-        BadInput: it is no trajectory, or holds data but no frame; it is as it was then.
-        OSError: it cannot be copied or mended.
+    Raises
+    ------
+    BadInput
+        it is no trajectory, or holds data but no frame; it is as it was then.
+    OSError
+        it cannot be copied or mended.
     """
     import gsd.hoomd
 

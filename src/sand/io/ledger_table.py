@@ -23,10 +23,14 @@ Row = dict[str, float]
 class LedgerFile:
     """ledger.csv: one row per entry, numbers to the last bit; opened anew for each row, so nothing is held.
 
-    Args:
-        path: of the file; what it held before is replaced.
-        columns: names, the first being `step`.
-        rows: that it begins with.
+    Parameters
+    ----------
+    path : Path
+        of the file; what it held before is replaced.
+    columns : Sequence[str]
+        names, the first being `step`.
+    rows : Iterable[Row], optional
+        that it begins with.
     """
 
     def __init__(self, path: Path, columns: Sequence[str], rows: Iterable[Row] = ()):
@@ -65,8 +69,10 @@ def keep_if_damaged(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> 
 
     A file that is missing, or has only some of the rows, or more of them, is no reason.
 
-    Raises:
-        OSError: it cannot be renamed.
+    Raises
+    ------
+    OSError
+        it cannot be renamed.
     """
     if not path.exists():
         return
@@ -88,8 +94,10 @@ def read_ledger(path: Path) -> list[Row]:
 
     A warning is given where there are fewer rows than the run has written.
 
-    Raises:
-        BadInput: no ledger, or one whose numbers are not those that were written.
+    Raises
+    ------
+    BadInput
+        no ledger, or one whose numbers are not those that were written.
     """
     rows, note = read_rows(path)
     if note:
@@ -148,8 +156,10 @@ def _wrong(row: Row, before: Row | None, *, last: bool) -> str:
 def _fewer(path: Path, lines: Sequence[str]) -> str:
     """What is to be said of a ledger beside the summary of its run, if there is one that has ended.
 
-    Raises:
-        BadInput: its rows are not those that the summary's digest was taken of.
+    Raises
+    ------
+    BadInput
+        its rows are not those that the summary's digest was taken of.
     """
     place = path.with_name(SUMMARY)
     if path.name != LEDGER or not place.exists():

@@ -20,11 +20,15 @@ TORN_AT_MOST = 64
 class Following(FrameSequence):
     """Frames of a trajectory that grows; safe to be read from several threads.
 
-    Args:
-        path: of the file.
+    Parameters
+    ----------
+    path : str or Path
+        of the file.
 
-    Raises:
-        BadInput: a missing, foreign or broken file, or one without a frame.
+    Raises
+    ------
+    BadInput
+        a missing, foreign or broken file, or one without a frame.
 
     `times` (K,) [s], `steps` (K,) and `contacts` (K,), numbers, of all frames are kept; `torn` counts frames at the end
     that are not whole, and are not among them; `generation` goes up when the file has become another one.

@@ -25,13 +25,19 @@ LOOKS, LOOKING = 5, 0.1
 class FolderLock:
     """The right to write to a folder, held from now to `release` or to the end of the process.
 
-    Args:
-        folder: there already.
-        told: whether the number of this process is written to the lock file, for those who are refused.
+    Parameters
+    ----------
+    folder : Path
+        there already.
+    told : bool, optional
+        whether the number of this process is written to the lock file, for those who are refused.
 
-    Raises:
-        BadInput: another process holds it, or another simulation of this one.
-        FilesFailed: the folder has vanished, or nothing can be written there.
+    Raises
+    ------
+    BadInput
+        another process holds it, or another simulation of this one.
+    FilesFailed
+        the folder has vanished, or nothing can be written there.
 
     Where the file system knows no locks (some network file systems), it is granted with a warning.
     """

@@ -18,11 +18,15 @@ PAGE = Path(__file__).parents[1] / "viewer" / "page"
 def read_bundle(folder: Path | None = None) -> tuple[str, str]:
     """Script and style sheet of the page, as text.
 
-    Args:
-        folder: where they lie; PAGE by default.
+    Parameters
+    ----------
+    folder : Path or None, optional
+        where they lie; PAGE by default.
 
-    Raises:
-        BadInput: they are not there; says why, and what to do.
+    Raises
+    ------
+    BadInput
+        they are not there; says why, and what to do.
     """
     folder = PAGE if folder is None else folder
     try:
@@ -50,8 +54,10 @@ def _remedy(folder: Path) -> str:
 def private_page(text: str) -> Path:
     """A new temporary page that nobody but this user can read; whoever asks for it removes it.
 
-    Raises:
-        FilesFailed: it cannot be written.
+    Raises
+    ------
+    FilesFailed
+        it cannot be written.
     """
     try:
         handle, name = tempfile.mkstemp(prefix="sand-", suffix=".html")  # of mode 0600
@@ -65,11 +71,15 @@ def private_page(text: str) -> Path:
 class Written:
     """A large text file written bit by bit: beside, and renamed when it is whole.
 
-    Args:
-        path: of the file; what is there is replaced, but only when the new one is whole.
+    Parameters
+    ----------
+    path : str or Path
+        of the file; what is there is replaced, but only when the new one is whole.
 
-    Raises:
-        FilesFailed: it cannot be written; also later.
+    Raises
+    ------
+    FilesFailed
+        it cannot be written; also later.
     """
 
     def __init__(self, path: str | Path):

@@ -45,11 +45,15 @@ OURS = (
 def checked_name(text: str, name: str) -> str:
     """The name of a file or folder as a user gives it.
 
-    Args:
-        name: of the option or setting, for the message.
+    Parameters
+    ----------
+    name : str
+        of the option or setting, for the message.
 
-    Raises:
-        BadInput: it is empty, or no system takes it.
+    Raises
+    ------
+    BadInput
+        it is empty, or no system takes it.
     """
     if not text.strip() or "\0" in text:
         raise BadInput(f"{name} = {text!r} is not the name of a file or folder")
@@ -62,13 +66,18 @@ def checked_name(text: str, name: str) -> str:
 def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = False) -> Path:
     """Make the folder of a new run.
 
-    Args:
-        shared: the folder may hold other things, which stay.
+    Parameters
+    ----------
+    shared : bool, optional
+        the folder may hold other things, which stay.
 
-    Raises:
-        BadInput: it exists and is not empty (unless `overwrite`, which removes an earlier run's own files and
-            nothing else); or another process writes to it.
-        FilesFailed: it cannot be made or written to.
+    Raises
+    ------
+    BadInput
+        it exists and is not empty (unless `overwrite`, which removes an earlier run's own files and
+        nothing else); or another process writes to it.
+    FilesFailed
+        it cannot be made or written to.
     """
     folder = Path(path)
     try:
@@ -107,8 +116,10 @@ def is_used(folder: Path) -> bool:
 def replace_file(path: Path, content: bytes) -> None:
     """Write beside, sync, rename: the file is the old one or the new one, never half of it.
 
-    Raises:
-        FilesFailed: the disk is full, the folder has vanished, …
+    Raises
+    ------
+    FilesFailed
+        the disk is full, the folder has vanished, …
     """
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -164,8 +175,10 @@ def plain(value: Any) -> Any:
 def read_json(path: Path) -> dict[str, Any]:
     """What a JSON file holds.
 
-    Raises:
-        BadInput: it is missing, broken, or not what was written: the digest in it is wrong.
+    Raises
+    ------
+    BadInput
+        it is missing, broken, or not what was written: the digest in it is wrong.
     """
     text = read_text(path)
     try:
@@ -192,11 +205,15 @@ def refuse_devices(path: str | Path) -> None:
 def read_text(path: str | Path, most: int | None = None) -> str:
     """The text of a UTF-8 file, with or without a byte-order mark, lines ending with "\\n".
 
-    Args:
-        most: bytes that are read at most, from a file of any kind; by default all of an ordinary file.
+    Parameters
+    ----------
+    most : int or None, optional
+        bytes that are read at most, from a file of any kind; by default all of an ordinary file.
 
-    Raises:
-        BadInput: a missing, unreadable or larger file, or none of text.
+    Raises
+    ------
+    BadInput
+        a missing, unreadable or larger file, or none of text.
     """
     if most is None:
         refuse_devices(path)

@@ -98,12 +98,17 @@ TABLES = {"choices": dict, "case": dict, "ledger": list}
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
     """See that a state can be gone on from: every array is there, of the right type and shape, every index in range.
 
-    Args:
-        arrays: of a checkpoint, by name.
-        meta: what goes with it.
+    Parameters
+    ----------
+    arrays : Mapping[str, ndarray]
+        of a checkpoint, by name.
+    meta : Mapping[str, Any]
+        what goes with it.
 
-    Raises:
-        BadInput: the first thing that is wrong, in one line.
+    Raises
+    ------
+    BadInput
+        the first thing that is wrong, in one line.
     """
     _check_meta(meta)
     sizes = _sizes(arrays)

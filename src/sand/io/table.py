@@ -26,14 +26,21 @@ def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 class GrowingTable:
     """Rows of numbers that are added piece by piece; a row that a kill tore in two is dropped when it is read again.
 
-    Args:
-        path: of the file; made anew unless `resume`.
-        columns: names.
-        resume: keep what is there.
+    Parameters
+    ----------
+    path : Path
+        of the file; made anew unless `resume`.
+    columns : Sequence[str]
+        names.
+    resume : bool, optional
+        keep what is there.
 
-    Raises:
-        BadInput: the file has other columns, or is no table.
-        FilesFailed: it cannot be written.
+    Raises
+    ------
+    BadInput
+        the file has other columns, or is no table.
+    FilesFailed
+        it cannot be written.
     """
 
     def __init__(self, path: Path, columns: Sequence[str], *, resume: bool = False):
@@ -70,14 +77,21 @@ class GrowingTable:
 class GrowingOutcomes:
     """Outcomes of the parts of a job, one JSON object a line; a line that a kill tore in two is dropped.
 
-    Args:
-        path: of the file; made anew unless `resume`.
-        case: what the outcomes are of, the first line of the file.
-        resume: keep what is there.
+    Parameters
+    ----------
+    path : Path
+        of the file; made anew unless `resume`.
+    case : dict[str, Any]
+        what the outcomes are of, the first line of the file.
+    resume : bool, optional
+        keep what is there.
 
-    Raises:
-        BadInput: the file is no such list, or one of another case.
-        FilesFailed: it cannot be written.
+    Raises
+    ------
+    BadInput
+        the file is no such list, or one of another case.
+    FilesFailed
+        it cannot be written.
     """
 
     def __init__(self, path: Path, case: dict[str, Any], *, resume: bool = False):

@@ -31,14 +31,20 @@ SINGLE_PER_GRAIN = 64
 class TrajectoryWriter:
     """Appends frames to trajectory.gsd.
 
-    Args:
-        path: of the file; made if missing.
-        resume_at: number of the step from which an existing file is gone on with: later frames it holds already are not
-            written twice, but those that are not whole are dropped, and so is what turns out to be of another history.
-        written: steps of the frames that the run has written up to that step.
+    Parameters
+    ----------
+    path : Path
+        of the file; made if missing.
+    resume_at : int or None, optional
+        number of the step from which an existing file is gone on with: later frames it holds already are not
+        written twice, but those that are not whole are dropped, and so is what turns out to be of another history.
+    written : Sequence[float], optional
+        steps of the frames that the run has written up to that step.
 
-    Raises:
-        FilesFailed: the file cannot be written.
+    Raises
+    ------
+    FilesFailed
+        the file cannot be written.
 
     A file that is beyond mending is moved aside, and of one that has lost frames a copy is kept, with a warning: frames
     are for looking, the checkpoint is what counts.
@@ -78,8 +84,10 @@ class TrajectoryWriter:
     ) -> None:
         """Append one frame; `contacts` is a `ContactTable`, by column; lengths to the last bit if `exact`.
 
-        Raises:
-            FilesFailed: the frame could not be written; earlier ones stay.
+        Raises
+        ------
+        FilesFailed
+            the frame could not be written; earlier ones stay.
         """
         frame = stored_frame(step, time, grains, box, contacts, exact=exact)
         if self._is_there(step, code_of(frame)):
@@ -111,8 +119,10 @@ class TrajectoryWriter:
     def flush(self, sync: bool = False) -> None:
         """Everything written so far survives a kill, and a power cut if it is to be in `sync` with the disk.
 
-        Raises:
-            FilesFailed: frames since the last flush may be lost; earlier ones stay.
+        Raises
+        ------
+        FilesFailed
+            frames since the last flush may be lost; earlier ones stay.
         """
         if self._file is None:
             return
@@ -161,11 +171,15 @@ def _opened(path: Path, go_on: bool) -> Any:
 class Frames(FrameSequence):
     """The frames of a trajectory, each read when asked for.
 
-    Args:
-        path: of the file.
+    Parameters
+    ----------
+    path : str or Path
+        of the file.
 
-    Raises:
-        BadInput: a missing, foreign or broken file; also later, for a frame that is not whole.
+    Raises
+    ------
+    BadInput
+        a missing, foreign or broken file; also later, for a frame that is not whole.
     """
 
     def __init__(self, path: str | Path):
@@ -212,8 +226,10 @@ class Frames(FrameSequence):
     def pairs(self, index: int) -> np.ndarray:
         """Grains in contact (C, 2) in a frame ≥ 0, and nothing else of it; its check sum is not looked at.
 
-        Raises:
-            BadInput: the frame is not whole, or names grains that it does not have.
+        Raises
+        ------
+        BadInput
+            the frame is not whole, or names grains that it does not have.
         """
         file = self._file.file
         try:

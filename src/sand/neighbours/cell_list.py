@@ -213,8 +213,10 @@ def list_place(far, here, grid, span, reach, s, found):
 
     The first row of `source` serves meanwhile, for distances.
 
-    Args:
-        here: (3, N) the anchors by place [m], from `grid_of`.
+    Parameters
+    ----------
+    here
+        (3, N) the anchors by place [m], from `grid_of`.
     """
     nx, ny, nz = grid.counts
     widest = (1.0 + SLACK) * reach * reach

@@ -40,10 +40,14 @@ def in_space_order(grains: Grains) -> Grains:
     Where numbers come at random, grains that touch lie far apart in memory; along the curve they lie close. Large
     simulations do so by themselves (`Neighbours.order`), and keep the numbers. Nothing else changes.
 
-    Args:
-        grains: at their places.
+    Parameters
+    ----------
+    grains : Grains
+        at their places.
 
-    Returns:
+    Returns
+    -------
+    Grains
         A copy; grain k of it is `order[k]` of the old ones, order = argsort of `places_on_curve`.
     """
     order = np.argsort(places_on_curve(grains.position), kind="stable")

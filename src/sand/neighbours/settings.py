@@ -37,8 +37,10 @@ SAMPLES = 64, 4096
 def share_within(position: np.ndarray, box: Box, reach: float) -> float:
     """Which part of the other grains is closer than `reach` [m] to a grain, on average; from a sample of them.
 
-    Args:
-        position: (N, 3) [m], N ≥ 2.
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m], N ≥ 2.
     """
     some, others = (np.unique(np.linspace(0, len(position) - 1, most).astype(int)) for most in SAMPLES)
     apart = box.nearest(position[some][:, None] - position[others])
@@ -58,22 +60,28 @@ class Found(NamedTuple):
 class Neighbours:
     """How pairs within reach are found, for contacts and for long-range forces alike.
 
-    Args:
-        search: "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
-            "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if at the start no
-            more than 0.4 of the others are within reach of a grain, on average.
-        margin: how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
-            the list limits the steps (Runge–Kutta). The list is made anew when a grain is more than Δr/2 from where
-            it was; a wide margin makes long but lasting lists. Where no force has a cut-off, "auto" makes none but
-            that of the pairs that may touch soon, straight from the cells.
-        order: where grains stand in memory while steps are taken; "curve": along one that fills space, made anew every
-            2000 steps, so that neighbours are close; "as given": by their numbers; "auto": along a curve from
-            4000 grains on. All that is looked at or written has the numbers of the start.
+    Parameters
+    ----------
+    search : str, optional
+        "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
+        "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if at the start no
+        more than 0.4 of the others are within reach of a grain, on average.
+    margin : optional
+        how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
+        the list limits the steps (Runge–Kutta). The list is made anew when a grain is more than Δr/2 from where
+        it was; a wide margin makes long but lasting lists. Where no force has a cut-off, "auto" makes none but
+        that of the pairs that may touch soon, straight from the cells.
+    order : str, optional
+        where grains stand in memory while steps are taken; "curve": along one that fills space, made anew every
+        2000 steps, so that neighbours are close; "as given": by their numbers; "auto": along a curve from
+        4000 grains on. All that is looked at or written has the numbers of the start.
 
     No choice changes a result by more than rounding.
 
-    Raises:
-        BadInput: an unknown word, or a margin that is not a length above 0.
+    Raises
+    ------
+    BadInput
+        an unknown word, or a margin that is not a length above 0.
     """
 
     search: str = "auto"
@@ -115,10 +123,14 @@ class Neighbours:
     ) -> Found:
         """The search for these grains.
 
-        Args:
-            reach: gap [m] up to which pairs count as near a contact.
-            cutoffs: radii [m] of the long-range forces that have one.
-            flights: whether steps may be as long as the list lasts.
+        Parameters
+        ----------
+        reach : float
+            gap [m] up to which pairs count as near a contact.
+        cutoffs : Sequence[float]
+            radii [m] of the long-range forces that have one.
+        flights : bool, optional
+            whether steps may be as long as the list lasts.
         """
         touch = 2.0 * float(grains.radius.max()) + reach
         widest = max(cutoffs, default=0.0)

@@ -38,11 +38,16 @@ def philox(counter, key):
 def random_words(seed, number, grain, stream):
     """Four random words (uint64 below 2³²) that belong to one address.
 
-    Args:
-        seed: 0 ≤ seed < 2⁶⁴.
-        number: of the kick, 0 ≤ number < 2⁶⁴.
-        grain: id of the grain, below 2³².
-        stream: what the words are for, below 2³².
+    Parameters
+    ----------
+    seed
+        0 ≤ seed < 2⁶⁴.
+    number
+        of the kick, 0 ≤ number < 2⁶⁴.
+    grain
+        id of the grain, below 2³².
+    stream
+        what the words are for, below 2³².
     """
     seed, number = np.uint64(seed), np.uint64(number)
     counter = (number & LOW, number >> HALF, np.uint64(grain), np.uint64(stream))

@@ -16,8 +16,10 @@ COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00", "miss
 def collision_figure(results: list[dict[str, Any]]) -> Figure:
     """Largest remnant of each collision (left) and mean losses by channel in impact energies (right).
 
-    Args:
-        results: dictionaries of `experiments.collision.Collision`.
+    Parameters
+    ----------
+    results : list[dict[str, Any]]
+        dictionaries of `experiments.collision.Collision`.
     """
     with styled():
         figure = RunFigure(figsize=(9.0, 3.6), dpi=DPI, layout="constrained")

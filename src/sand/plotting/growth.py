@@ -21,9 +21,11 @@ PAPER = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
 def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figure:
     """S(t), μ(N) and N(r_g) of one or more ensembles.
 
-    Args:
-        ensembles: name, `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment` [A m²] and
-            `unit_radius` [m] of a grain.
+    Parameters
+    ----------
+    ensembles : Sequence[tuple[str, Any, dict[str, Any]]]
+        name, `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment` [A m²] and
+        `unit_radius` [m] of a grain.
     """
     with styled():
         figure = Figure(figsize=(9.6, 3.3), layout="constrained")

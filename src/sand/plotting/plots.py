@@ -47,12 +47,17 @@ HISTORY = tuple(_DRAW)
 def history_figure(books: Books, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
     """One figure over time, of those in HISTORY.
 
-    Args:
-        books: rows of a run's ledger.
-        grains: their number; temperature: kinetic, of the start [K]: energies are in N k_B T, in joules if it is 0.
+    Parameters
+    ----------
+    books : Books
+        rows of a run's ledger.
+    grains : int
+        their number; temperature: kinetic, of the start [K]: energies are in N k_B T, in joules if it is 0.
 
-    Raises:
-        BadInput: there is no row, or a column is missing.
+    Raises
+    ------
+    BadInput
+        there is no row, or a column is missing.
     """
     if not books.rows:
         raise BadInput("the ledger has no row yet, so that there is nothing to plot over time")
@@ -71,12 +76,17 @@ def history_figure(books: Books, name: str, grains: int, temperature: float, dar
 def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: bool = False) -> Figure:
     """How a quantity is spread over the grains of a frame; of clusters, how many there are of each size.
 
-    Args:
-        name: see `analysis.quantities.GRAINS`.
-        field: flux density of outside (3,) [T].
+    Parameters
+    ----------
+    name : str
+        see `analysis.quantities.GRAINS`.
+    field : ndarray or None, optional
+        flux density of outside (3,) [T].
 
-    Raises:
-        BadInput: the frame has no number for it.
+    Raises
+    ------
+    BadInput
+        the frame has no number for it.
     """
     what = quantity(name)
     values = measured(frame, name, field)
@@ -151,9 +161,12 @@ def _darkened(figure: Figure, dark: bool) -> None:
 def picture_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
     """The figure as a file: the same figure gives the same bytes.
 
-    Args:
-        form: "png", "pdf" or "svg".
-        transparent: without a ground.
+    Parameters
+    ----------
+    form : str
+        "png", "pdf" or "svg".
+    transparent : bool, optional
+        without a ground.
     """
     import matplotlib
 

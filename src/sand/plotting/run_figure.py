@@ -201,8 +201,10 @@ def png(figure: Figure) -> bytes:
 def save(figure: Figure, path: str | Path) -> None:
     """Write the figure as a PNG; the file is whole or not there.
 
-    Raises:
-        FilesFailed: the disk is full, the folder has vanished, …
+    Raises
+    ------
+    FilesFailed
+        the disk is full, the folder has vanished, …
     """
     replace_file(Path(path), png(figure))
 

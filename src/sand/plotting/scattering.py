@@ -26,10 +26,14 @@ def trajectories_figure(
 ) -> Figure:
     """A panel for each kind of spin: lines of both bodies in the plane of the flight, dots at equal times.
 
-    Args:
-        groups: `Trajectory`s of each panel; names: of the panels.
-        scales: `Scales`, whose `capture` lengths are told in.
-        window: half the width shown [b_max].
+    Parameters
+    ----------
+    groups : Sequence[Sequence[Any]]
+        `Trajectory`s of each panel; names: of the panels.
+    scales
+        `Scales`, whose `capture` lengths are told in.
+    window : float, optional
+        half the width shown [b_max].
     """
     unit = scales.capture or scales.touch
     with styled():
@@ -68,8 +72,10 @@ def _draw_flight(axes: Axes, one: Any, colour: str, unit: float, window: float) 
 def map_figure(found: Any, title: str) -> Figure:
     """Left the probability over speed and impact parameter, with b_max; right as discs for four speeds, in b_max.
 
-    Args:
-        found: a `ProbabilityMap`.
+    Parameters
+    ----------
+    found
+        a `ProbabilityMap`.
     """
     with styled():
         figure = RunFigure(figsize=(9.6, 4.4), dpi=DPI, layout="constrained")
@@ -127,8 +133,10 @@ def _draw_disc(axes: Axes, found: Any, k: int, shades: Any) -> None:
 def sigma_figure(found: Sequence[Any], title: str) -> Figure:
     """Left σ against speed with Eq. 14 and the geometric cross-section, or for one speed P(b); right c = σ/σ_Eq14.
 
-    Args:
-        found: `CrossSection`s.
+    Parameters
+    ----------
+    found : Sequence[Any]
+        `CrossSection`s.
     """
     with styled():
         figure = RunFigure(figsize=(9.0, 3.9), dpi=DPI, layout="constrained")

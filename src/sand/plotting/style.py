@@ -92,8 +92,10 @@ def styled() -> AbstractContextManager[None]:
 def with_prefix(size: float, unit: str) -> tuple[float, str]:
     """One of the prefixed unit in SI units, and its name: of 3e-7 m, (1e-9, 'nm').
 
-    Args:
-        size: the largest number to be shown [SI].
+    Parameters
+    ----------
+    size : float
+        the largest number to be shown [SI].
     """
     if not (math.isfinite(size) and size > 0.0):
         return 1.0, unit

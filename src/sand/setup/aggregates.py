@@ -42,13 +42,19 @@ def chain(
 ) -> Grains:  # fmt: skip
     """A straight chain along x, contacts at rest, its centre of mass at the origin.
 
-    Args:
-        grains: N ≥ 1.
-        moments: "aligned": along the chain, head to tail; "random" or "relaxed".
-        radius, material, moment, magnetic, seed: as for `bpca`.
+    Parameters
+    ----------
+    grains : int
+        N ≥ 1.
+    moments : str, optional
+        "aligned": along the chain, head to tail; "random" or "relaxed".
+    radius, material, moment, magnetic, seed
+        as for `bpca`.
 
-    Raises:
-        BadInput: a chain of length 0, a radius that is not positive, or grains so small that their neighbours touch.
+    Raises
+    ------
+    BadInput
+        a chain of length 0, a radius that is not positive, or grains so small that their neighbours touch.
     """
     count, chance = whole(grains, "grains of a chain"), streams(seed)
     made = population(count, radius, material, chance.population)
@@ -69,8 +75,10 @@ def lattice(
 ) -> Grains:  # fmt: skip
     """A cubic lattice of nx × ny × nz equal grains, contacts at rest, centred (a cube if only nx is given).
 
-    Raises:
-        BadInput: sides that are not whole numbers, or grains that are not equal, for which no lattice can be at rest.
+    Raises
+    ------
+    BadInput
+        sides that are not whole numbers, or grains that are not equal, for which no lattice can be at rest.
     """
     grid, chance = _sites(nx, ny, nz), streams(seed)
     return _regular(grid, radius, material, moment, moments, magnetic, chance)
@@ -85,8 +93,10 @@ def hexagonal(
 
     Inside each grain has twelve contacts, and 0.74 of space is filled; nz = 1 gives one triangular layer.
 
-    Raises:
-        BadInput: as for `lattice`.
+    Raises
+    ------
+    BadInput
+        as for `lattice`.
     """
     i, j, k = _sites(nx, ny, nz).T
     i, j, k = i - i.min(), j - j.min(), k - k.min()
@@ -140,13 +150,19 @@ def build(
 ) -> Grains:
     """An aggregate of a kind that is named, as case files and `sand build` do.
 
-    Args:
-        kind: a name of KINDS.
-        grains: N; for lattices a cube number, or None with a `shape` [nx, ny, nz].
-        given: what else the builder takes; what is None is left to its default.
+    Parameters
+    ----------
+    kind : str
+        a name of KINDS.
+    grains : int or None, optional
+        N; for lattices a cube number, or None with a `shape` [nx, ny, nz].
+    given
+        what else the builder takes; what is None is left to its default.
 
-    Raises:
-        BadInput: an argument that this kind has no use for, with the reason, and all that the builder refuses.
+    Raises
+    ------
+    BadInput
+        an argument that this kind has no use for, with the reason, and all that the builder refuses.
     """
     if kind not in KINDS:
         advice = f"a material; allowed: {', '.join(KINDS)}" if kind in PRESETS else did_you_mean(kind, list(KINDS))

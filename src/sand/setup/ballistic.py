@@ -26,18 +26,28 @@ def bpca(
 
     A dense ball with a fractal dimension near 3: N − 1 contacts, each at rest.
 
-    Args:
-        grains: N ≥ 1.
-        radius: [m], one, (N,), or a law: `Lognormal`, `PowerLaw`, or text as for `radii_of`.
-        material: one, N of them, or parts of each, {"silica": 0.7, "iron": 0.3}.
-        moment: size of each moment, as for `sand.Grains`, or one vector (3,) [A m²], which all then have whatever
-            `moments` says, but for "relaxed"; none by default.
-        moments: "random", "aligned" (along z) or "relaxed" (in each other's field, a minimum of the energy).
-        magnetic: part of the grains that have the moment, 0 … 1.
-        seed: same seed, same aggregate.
+    Parameters
+    ----------
+    grains : int
+        N ≥ 1.
+    radius
+        [m], one, (N,), or a law: `Lognormal`, `PowerLaw`, or text as for `radii_of`.
+    material
+        one, N of them, or parts of each, {"silica": 0.7, "iron": 0.3}.
+    moment : optional
+        size of each moment, as for `sand.Grains`, or one vector (3,) [A m²], which all then have whatever
+        `moments` says, but for "relaxed"; none by default.
+    moments : str, optional
+        "random", "aligned" (along z) or "relaxed" (in each other's field, a minimum of the energy).
+    magnetic : optional
+        part of the grains that have the moment, 0 … 1.
+    seed : int, optional
+        same seed, same aggregate.
 
-    Raises:
-        BadInput: wrong numbers, or grains that cannot touch one at a time.
+    Raises
+    ------
+    BadInput
+        wrong numbers, or grains that cannot touch one at a time.
     """
     chance = streams(seed)
     made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)
@@ -67,14 +77,20 @@ def bcca(
 def joined(
     made: Population, joins: list[tuple[int, int, int]], goals: np.ndarray | None, seed: np.uint64, choices: int
 ) -> np.ndarray:
-    """Places (N, 3) [m] of grains whose clusters fly into each other, see `setup._kernels.cluster_cluster.join_ballistic`.
+    """Places (N, 3) [m] of grains whose clusters fly into each other, see
+    `setup._kernels.cluster_cluster.join_ballistic`.
 
-    Args:
-        goals: radius of gyration [m] wanted after each join; None: whatever chance gives.
-        choices: meetings to choose from where one is wanted.
+    Parameters
+    ----------
+    goals : ndarray or None
+        radius of gyration [m] wanted after each join; None: whatever chance gives.
+    choices : int
+        meetings to choose from where one is wanted.
 
-    Raises:
-        BadInput: two clusters did not meet in a single contact.
+    Raises
+    ------
+    BadInput
+        two clusters did not meet in a single contact.
     """
     position = np.zeros((3, len(made.radius)))
     plan = np.array(joins, dtype=np.int64).reshape(-1, 3).T.copy()

@@ -22,8 +22,10 @@ def most_overlap(rest: np.ndarray | float, smaller: np.ndarray | float) -> np.nd
 def refuse_unsound(body: Grains, origin: str) -> None:
     """Raises BadInput naming grains (the first ten) that overlap by too much, or touch none of the largest cluster.
 
-    Args:
-        origin: where the body comes from, for the message.
+    Parameters
+    ----------
+    origin : str
+        where the body comes from, for the message.
     """
     problems = _overlaps(body) or _gaps(body)
     if problems:

@@ -40,12 +40,15 @@ def rbd(
     as in the BAM1 aggregates of Shen, Draine & Johnson (2008); about 0.23 of space is filled then.  The sphere is the
     smallest about the middle that holds a cluster of N grains; outermost grains with a single contact go until it is N.
 
-    Args:
-        grains, radius, …: as for `bpca`; but N radii or materials cannot be given one by one, since most grains of
-            the deposit are cut off.
+    Parameters
+    ----------
+    grains, radius, …: as for `bpca`; but N radii or materials cannot be given one by one, since most grains of
+        the deposit are cut off.
 
-    Raises:
-        BadInput: as for `bpca`.
+    Raises
+    ------
+    BadInput
+        as for `bpca`.
     """
     count, chance = whole(grains, "grains of an aggregate"), streams(seed)
     law = radii_of(radius)
@@ -83,8 +86,10 @@ def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarr
 
     Of length 0 if there is no cluster that large.
 
-    Args:
-        position, radius: (M, 3) and (M,) [m] of the heap.
+    Parameters
+    ----------
+    position, radius : ndarray
+        (M, 3) and (M,) [m] of the heap.
     """
     pairs = Box.open().close_pairs(position, 2.0 * float(radius.max()))
     apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)

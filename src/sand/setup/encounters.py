@@ -59,15 +59,22 @@ def encounter(
 ) -> Encounter:
     """Put the projectile before the target, on a straight line towards it, in the frame of their centre of mass.
 
-    Args:
-        target, projectile: bodies; their own velocities and spins are kept and the relative motion added.
-        speed: relative speed of the centres of mass [m/s] > 0.
-        impact_parameter: distance of the two lines of flight [m], or a fraction of the sum of the bodies' outer
-            radii as text, "0.5 b" (b is that sum).
-        along: direction the projectile flies in, "x", "y", "z" or a vector; the offset is along the next axis.
+    Parameters
+    ----------
+    target, projectile : Grains
+        bodies; their own velocities and spins are kept and the relative motion added.
+    speed
+        relative speed of the centres of mass [m/s] > 0.
+    impact_parameter : optional
+        distance of the two lines of flight [m], or a fraction of the sum of the bodies' outer
+        radii as text, "0.5 b" (b is that sum).
+    along : optional
+        direction the projectile flies in, "x", "y", "z" or a vector; the offset is along the next axis.
 
-    Raises:
-        BadInput: wrong numbers, or grains of a body that overlap those of the other.
+    Raises
+    ------
+    BadInput
+        wrong numbers, or grains of a body that overlap those of the other.
     """
     v = si(speed, "m/s", "speed", above=0.0)
     direction = _direction(along)
@@ -128,12 +135,17 @@ def _direction(along: Any) -> np.ndarray:
 def offset_of(given: Any, whole: float) -> float:
     """The impact parameter [m] as `encounter` takes it.
 
-    Args:
-        given: a length, or a part of `whole` as text, "0.5 b".
-        whole: sum of the outer radii [m].
+    Parameters
+    ----------
+    given
+        a length, or a part of `whole` as text, "0.5 b".
+    whole : float
+        sum of the outer radii [m].
 
-    Raises:
-        BadInput: neither, or below 0.
+    Raises
+    ------
+    BadInput
+        neither, or below 0.
     """
     if isinstance(given, str) and given.strip().endswith("b"):
         part = in_unit(given.strip()[:-1], "1")

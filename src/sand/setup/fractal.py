@@ -44,14 +44,19 @@ def fractal(
     Of up to 100 meetings in flight, from random directions, the one nearest to Γ is taken; what is missed is made up
     for when the clusters have doubled.  r_g is that of the centres of the grains, a their mean radius.
 
-    Args:
-        dimension: D_f, 1.3 … 2.4.
-        prefactor: k_f > 0; 1.3 is usual for soot and dust with D_f = 1.8.
-        grains, radius, …: as for `bpca`.
+    Parameters
+    ----------
+    dimension : optional
+        D_f, 1.3 … 2.4.
+    prefactor : optional
+        k_f > 0; 1.3 is usual for soot and dust with D_f = 1.8.
+    grains, radius, …: as for `bpca`.
 
-    Raises:
-        BadInput: a dimension and prefactor that N such grains cannot have, with the reason; or an aggregate whose
-            r_g misses what was asked for by more than 5 % (1 %, most of the time).
+    Raises
+    ------
+    BadInput
+        a dimension and prefactor that N such grains cannot have, with the reason; or an aggregate whose
+        r_g misses what was asked for by more than 5 % (1 %, most of the time).
     """
     count, chance = whole(grains, "grains of an aggregate"), streams(seed)
     power, factor = si(dimension, "1", "dimension"), si(prefactor, "1", "prefactor", above=0.0)

@@ -49,12 +49,17 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     A frame holds positions in single precision, overlaps in double: positions are moved by as little as gives each
     contact its overlap again and keeps apart what does not touch.  No contact is made or broken by that.
 
-    Args:
-        frame: a `sand.io.trajectory.Frame`.
-        materials: those of the run by name.
+    Parameters
+    ----------
+    frame
+        a `sand.io.trajectory.Frame`.
+    materials : Mapping[str, Material]
+        those of the run by name.
 
-    Raises:
-        BadInput: an unknown material, or overlaps that do not fit the positions.
+    Raises
+    ------
+    BadInput
+        an unknown material, or overlaps that do not fit the positions.
     """
     refuse_other(frame, "materials", "pair", "overlap", "position")
     if unknown := [name for name in frame.materials if name not in materials]:
@@ -96,11 +101,15 @@ def healed(position: np.ndarray, radius: np.ndarray, box: Box, pair: np.ndarray,
 
     Newton's method; each round takes the smallest displacement, in the sense of least squares, that mends all pairs.
 
-    Args:
-        pair, overlap: (C, 2) and (C,) [m] of the contacts.
+    Parameters
+    ----------
+    pair, overlap : ndarray
+        (C, 2) and (C,) [m] of the contacts.
 
-    Raises:
-        BadInput: there are no such positions within 1e-3 of a radius.
+    Raises
+    ------
+    BadInput
+        there are no such positions within 1e-3 of a radius.
     """
     unit = float(radius.mean())
     begun, size = position / unit, radius / unit

@@ -49,22 +49,34 @@ def gas(
 ) -> Grains:
     """Grains at random places, thermal, with random moments, none overlapping.
 
-    Args:
-        number: N ≥ 1.
-        box: a Box periodic on all axes (or a length for a cube).
-        radius: one [m], or (N,).
-        material: a Material or the name of a preset.
-        moment: size of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
-            own; directions are isotropic. One vector (3,) [A m²] is the moment of every grain.
-        charge: of each grain [C], one number or (N,); none by default.
-        temperature: T [K] ≥ 0 of velocities and spins, thermal speeds far below that of light.  Velocities are
-            Maxwellian, total momentum 0.
-        spins: "kT/2" mean rotational energy per grain as in Dominik & Nübold (2002), section 3;
-            "equipartition" (3/2) kT; "none".
-        seed: same seed, same grains; positions, velocities, spins and moments draw from separate streams.
+    Parameters
+    ----------
+    number : int
+        N ≥ 1.
+    box
+        a Box periodic on all axes (or a length for a cube).
+    radius
+        one [m], or (N,).
+    material : Material or str
+        a Material or the name of a preset.
+    moment : optional
+        size of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
+        own; directions are isotropic. One vector (3,) [A m²] is the moment of every grain.
+    charge : optional
+        of each grain [C], one number or (N,); none by default.
+    temperature : optional
+        T [K] ≥ 0 of velocities and spins, thermal speeds far below that of light.  Velocities are
+        Maxwellian, total momentum 0.
+    spins : str, optional
+        "kT/2" mean rotational energy per grain as in Dominik & Nübold (2002), section 3;
+        "equipartition" (3/2) kT; "none".
+    seed : int, optional
+        same seed, same grains; positions, velocities, spins and moments draw from separate streams.
 
-    Raises:
-        BadInput: wrong numbers, or a box too full to place the grains at random.
+    Raises
+    ------
+    BadInput
+        wrong numbers, or a box too full to place the grains at random.
     """
     space = as_box(box)
     if any(v is None for v in space.lengths):
@@ -132,8 +144,10 @@ def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
 def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarray:
     """Random centres (N, 3) [m] in a periodic box, largest grains first, CLEARANCE mean radii apart.
 
-    Raises:
-        BadInput: no place found for a grain in TRIES attempts.
+    Raises
+    ------
+    BadInput
+        no place found for a grain in TRIES attempts.
     """
     lengths = np.array(box.lengths, dtype=np.float64)
     gap = CLEARANCE * float(radius.mean())

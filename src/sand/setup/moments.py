@@ -38,13 +38,19 @@ def part_given(moment: Any, ways: str, magnetic: Any) -> float:
 def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.random.Generator, axis: int = 2) -> Grains:
     """The same grains with magnetic moments, in place.
 
-    Args:
-        moment: size of each, as for `sand.Grains`, or one vector (3,) [A m²], the same for all; None: no moments.
-        ways: "random": isotropic; "aligned": along `axis`; "relaxed": from random ones, see `relaxed`.
-        magnetic: part of the grains that have a moment, 0 … 1; which ones is drawn by chance.
+    Parameters
+    ----------
+    moment
+        size of each, as for `sand.Grains`, or one vector (3,) [A m²], the same for all; None: no moments.
+    ways : str
+        "random": isotropic; "aligned": along `axis`; "relaxed": from random ones, see `relaxed`.
+    magnetic
+        part of the grains that have a moment, 0 … 1; which ones is drawn by chance.
 
-    Raises:
-        BadInput: an unknown way, a part outside 0 … 1, or too many moments to be relaxed.
+    Raises
+    ------
+    BadInput
+        an unknown way, a part outside 0 … 1, or too many moments to be relaxed.
     """
     part = part_given(moment, ways, magnetic)
     if moment is None:
@@ -75,8 +81,10 @@ def relaxed(body: Grains) -> Grains:
     minimum of the energy near the start, not always the deepest; sizes do not change.  The grains must not have turned
     yet: moments in their own frames are taken for those in the laboratory.
 
-    Raises:
-        BadInput: more than 3000 moments.
+    Raises
+    ------
+    BadInput
+        more than 3000 moments.
     """
     chosen = np.flatnonzero((body.moment**2).sum(axis=1) > 0.0)
     if len(chosen) > MOST_RELAXED:

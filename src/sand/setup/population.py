@@ -31,10 +31,14 @@ FORMS = "a length, N of them, 'lognormal(MEDIAN, SIGMA, LEAST, MOST)' or 'power 
 class Lognormal:
     """Radii whose logarithms are normal about ln(median), with spread sigma, none outside least … most.
 
-    Args:
-        median: [m] > 0.
-        sigma: standard deviation of ln r, 0 < σ ≤ 2.
-        least, most: [m]; by default 3 σ from the median, which cuts 0.27 %.  What falls outside is drawn again.
+    Parameters
+    ----------
+    median
+        [m] > 0.
+    sigma
+        standard deviation of ln r, 0 < σ ≤ 2.
+    least, most : optional
+        [m]; by default 3 σ from the median, which cuts 0.27 %.  What falls outside is drawn again.
     """
 
     median: Any
@@ -73,9 +77,12 @@ class Lognormal:
 class PowerLaw:
     """Radii with dN/dr ∝ r^exponent between least and most.
 
-    Args:
-        exponent: such as −3.5 (Mathis, Rumpl & Nordsieck 1977).
-        least, most: [m], at most a factor of 200 apart.
+    Parameters
+    ----------
+    exponent
+        such as −3.5 (Mathis, Rumpl & Nordsieck 1977).
+    least, most
+        [m], at most a factor of 200 apart.
     """
 
     exponent: Any
@@ -119,8 +126,10 @@ def radii_of(given: Any) -> Any:
     Text is a length, 'lognormal(0.1 um, 0.3)', 'lognormal(0.1 um, 0.3, 50 nm, 0.3 um)' or
     'power law(-3.5, 50 nm, 500 nm)'.
 
-    Raises:
-        BadInput: none of these.
+    Raises
+    ------
+    BadInput
+        none of these.
     """
     if isinstance(given, (Lognormal, PowerLaw)):
         given.bounds()
@@ -157,14 +166,19 @@ class Population(NamedTuple):
 def population(count: int, radius: Any, material: Any, rng: np.random.Generator) -> Population:
     """So many grains.
 
-    Args:
-        radius: as for `radii_of`.
-        material: one, or N of them, or parts of each as {"silica": 0.7, "iron": 0.3}: the grains that get it are
-            drawn by chance, their number is N times the part to within rounding (of a whole deposit for `rbd`).
+    Parameters
+    ----------
+    radius
+        as for `radii_of`.
+    material
+        one, or N of them, or parts of each as {"silica": 0.7, "iron": 0.3}: the grains that get it are
+        drawn by chance, their number is N times the part to within rounding (of a whole deposit for `rbd`).
 
-    Raises:
-        BadInput: numbers of radii or materials that are not N, parts that are not positive, or grains so small that
-            they would sink into one another.
+    Raises
+    ------
+    BadInput
+        numbers of radii or materials that are not N, parts that are not positive, or grains so small that
+        they would sink into one another.
     """
     size, kinds = radii_of(radius), _materials(material, count, rng)
     if isinstance(size, np.ndarray) and len(size) != count:
@@ -192,8 +206,10 @@ def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Materia
 def stuff_of(radius: np.ndarray, kinds: list[Material]) -> Stuff:
     """The grains for kernels.
 
-    Raises:
-        BadInput: grains so small that two of them at rest overlap by more than half the smaller radius.
+    Raises
+    ------
+    BadInput
+        grains so small that two of them at rest overlap by more than half the smaller radius.
     """
     distinct, index = materials_of(kinds, len(radius))
     pairings = [[pairing_between(_sticky(a), _sticky(b)) for b in distinct] for a in distinct]

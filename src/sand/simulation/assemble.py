@@ -79,13 +79,19 @@ def build_engine(
 ) -> Engine:
     """Check that everything fits together and translate it.
 
-    Args:
-        seed: of random kicks.
-        fresh: a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
-        contacts: that are there from the start, with what they remember.
+    Parameters
+    ----------
+    seed : int, optional
+        of random kicks.
+    fresh : bool, optional
+        a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
+    contacts : Bonds or None, optional
+        that are there from the start, with what they remember.
 
-    Raises:
-        BadInput: every problem at once.
+    Raises
+    ------
+    BadInput
+        every problem at once.
     """
     warnings = _checked(grains, forces, box, fresh=fresh)
     given = _given(forces, grains)

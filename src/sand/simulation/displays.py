@@ -17,9 +17,12 @@ _DISPLAYS: dict[str, Callable[..., Any]] = {}
 def register_display(name: str, function: Callable[..., Any]) -> None:
     """Register a display; it replaces an earlier one of the same name.
 
-    Args:
-        name: "figure" (simulation) → figure, "save figure" (simulation, path), or "view" (simulation, path).
-        function: called with the simulation first.
+    Parameters
+    ----------
+    name : str
+        "figure" (simulation) → figure, "save figure" (simulation, path), or "view" (simulation, path).
+    function : Callable[..., Any]
+        called with the simulation first.
     """
     _DISPLAYS[name] = function
 

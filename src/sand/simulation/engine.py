@@ -48,15 +48,24 @@ from ..state.state import (
 class Engine:
     """A world and the compiled code that moves it.
 
-    Attributes:
-        world: the state, its grains numbered as the user knows them.
-        rules: everything that does not change, as the kernels take it.
-        warnings: what the forces had to say about these grains.
-        far: the long-range forces that some grain feels, with their loops and numbers.
-        outside: the per-grain forces.
-        search: how neighbours are found, in words.
-        stepping: the integrator, with a number for everything that depends on the grains at the start.
-        neighbours: their settings, likewise, unless they are those of an earlier run.
+    Attributes
+    ----------
+    world
+        the state, its grains numbered as the user knows them.
+    rules : Rules
+        everything that does not change, as the kernels take it.
+    warnings : list[str]
+        what the forces had to say about these grains.
+    far : Sequence[tuple[FarForce, Any, Any]]
+        the long-range forces that some grain feels, with their loops and numbers.
+    outside : Sequence[GrainForce]
+        the per-grain forces.
+    search : str
+        how neighbours are found, in words.
+    stepping : Verlet or Adaptive
+        the integrator, with a number for everything that depends on the grains at the start.
+    neighbours : Neighbours
+        their settings, likewise, unless they are those of an earlier run.
     """
 
     _world: World

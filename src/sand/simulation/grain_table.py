@@ -13,7 +13,9 @@ ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting
 def at_grains(engine: Engine) -> dict[str, np.ndarray]:
     """Flux density and energies at each grain.
 
-    Returns:
+    Returns
+    -------
+    dict[str, ndarray]
         `flux_density` (N, 3) [T]: at the centre, from the other grains and from outside. The rest are energies (N,) [J]
         that sum to the columns of the ledger: `kinetic` (translation and rotation), `contacts` (half of each
         contact's elastic energy to each of its grains), and one for each long-range force (half of each pair's energy;

@@ -62,9 +62,12 @@ def seed_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | Non
 def refuse_overlaps(grains: Grains, contact: Contact, found: Touching, held: np.ndarray) -> None:
     """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start.
 
-    Args:
-        found: the pairs that overlap.
-        held: pairs of contacts from an earlier run, sorted, (C, 2); they may be in the middle of an impact.
+    Parameters
+    ----------
+    found : Touching
+        the pairs that overlap.
+    held : ndarray
+        pairs of contacts from an earlier run, sorted, (C, 2); they may be in the middle of an impact.
     """
     (i, j), radius = found.pair.T, grains.radius
     count = np.int64(len(grains))

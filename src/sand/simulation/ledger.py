@@ -29,9 +29,12 @@ WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, float]:
     """One row of the ledger: all energies [J], losses [J], momenta (SI), numbers of contacts and clusters.
 
-    Args:
-        rules: of the run, as the driver takes them.
-        forces: energy [J] of each long-range and per-grain force by column.
+    Parameters
+    ----------
+    rules
+        of the run, as the driver takes them.
+    forces : dict[str, float]
+        energy [J] of each long-range and per-grain force by column.
     """
     energies = np.empty(len(ENERGIES))
     grains = world.grains.arrays
@@ -71,8 +74,10 @@ def momenta(grains: Grains) -> list[float]:
 class Ledger(Books):
     """The rows written so far, oldest first.
 
-    Args:
-        forces: columns of the long-range and per-grain forces, one energy each.
+    Parameters
+    ----------
+    forces : Sequence[str], optional
+        columns of the long-range and per-grain forces, one energy each.
     """
 
     def __init__(self, forces: Sequence[str] = ()):

@@ -15,8 +15,10 @@ Simulation = Any
 class Observer:
     """Derive from this and put an instance into `Simulation(observers=[…])`.
 
-    Attributes:
-        looks_in_ticks: False where `tick` leaves grains and contacts alone; that spares large simulations some time.
+    Attributes
+    ----------
+    looks_in_ticks : bool
+        False where `tick` leaves grains and contacts alone; that spares large simulations some time.
     """
 
     looks_in_ticks: bool = True

@@ -39,12 +39,18 @@ OF_STOP = {
 class Result:
     """What `Simulation.run` returns.
 
-    Attributes:
-        outcome: why it ended.
-        steps: number of steps since the start of the simulation.
-        time: [s]
-        drift: |change of the ledger's total| / (energy dissipated + largest kinetic energy).
-        grains: the grains an outcome names; empty if all went well.
+    Attributes
+    ----------
+    outcome : Outcome
+        why it ended.
+    steps : int
+        number of steps since the start of the simulation.
+    time : float
+        [s]
+    drift : float
+        |change of the ledger's total| / (energy dissipated + largest kinetic energy).
+    grains : tuple[int, ...]
+        the grains an outcome names; empty if all went well.
     """
 
     outcome: Outcome

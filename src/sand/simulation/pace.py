@@ -15,8 +15,10 @@ MOST_STEPS, MOST_SECONDS = 1e12, 365.25 * 86400.0
 class Pace:
     """Steps and time of a run so far, for one estimate of what is left.
 
-    Args:
-        end, last: time [s] and step at which the run is to end; infinite where it has no such end.
+    Parameters
+    ----------
+    end, last : float
+        time [s] and step at which the run is to end; infinite where it has no such end.
     """
 
     def __init__(self, end: float, last: float):

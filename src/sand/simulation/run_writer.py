@@ -37,10 +37,14 @@ COST = 0.01
 class Record:
     """Keeps case.toml, trajectory.gsd, ledger.csv, checkpoints, summary.json and the figure.
 
-    Args:
-        out: the folder.
-        overwrite: an earlier run's files in it may be replaced.
-        resumed: the folder is that of the run itself, which goes on.
+    Parameters
+    ----------
+    out : str or Path
+        the folder.
+    overwrite : bool, optional
+        an earlier run's files in it may be replaced.
+    resumed : bool, optional
+        the folder is that of the run itself, which goes on.
 
     A lock keeps all others from writing to the folder during each `run`, from `open` to `release`.
     """
@@ -60,9 +64,12 @@ class Record:
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
         """Begin or go on with the files; called by each `run` with its end.
 
-        Raises:
-            BadInput: another process or simulation writes to the folder, or has written to it since this one did.
-            FilesFailed: nothing can be written.
+        Raises
+        ------
+        BadInput
+            another process or simulation writes to the folder, or has written to it since this one did.
+        FilesFailed
+            nothing can be written.
         """
         lock = FolderLock(self.folder)
         try:

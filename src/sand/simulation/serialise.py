@@ -12,9 +12,12 @@ from .stop import SHORTEST
 def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
     """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back.
 
-    Args:
-        until: time [s] the run is to reach, or infinity.
-        last_step: number of the step it is to reach, or infinity.
+    Parameters
+    ----------
+    until : float
+        time [s] the run is to reach, or infinity.
+    last_step : float
+        number of the step it is to reach, or infinity.
     """
     materials = simulation.grains.materials
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}

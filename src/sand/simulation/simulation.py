@@ -46,22 +46,37 @@ GUARD_EVERY = 10_000
 class Simulation(Fixed):
     """Grains, forces and a box, and the time they have lived; only `frame_every` and `observers` can be assigned later.
 
-    Args:
-        grains: the start; copied.
-        forces: a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once; or a single one.
-        box: a Box, or a length for a periodic cube; open by default.
-        stepping: the integrator, `sand.Verlet()` by default, or `sand.Adaptive()`.
-        neighbours: how pairs within reach are found, `sand.Neighbours()` by default.
-        seed: of random forces, 0 … 2⁶³ − 1; kept with the run.
-        out: folder for the run's files, made at the first `run`; None keeps everything in memory.
-        overwrite: allow `out` to hold an earlier run, whose files are then replaced.
-        observers: objects that look on (see `sand.Observer`); they never change the physics.
-        frame_every: time between frames [s]; by default a two-hundredth of the first `run`.
-        contacts: present from the start, with their strains, as `sand.setup.from_frame` gives them.
-        restart: arrays and meta of a checkpoint in `out` to go on from (`sand.resume` gives them).
+    Parameters
+    ----------
+    grains : Grains
+        the start; copied.
+    forces : Sequence[Force] or Force, optional
+        a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once; or a single one.
+    box : optional
+        a Box, or a length for a periodic cube; open by default.
+    stepping : Verlet or Adaptive or None, optional
+        the integrator, `sand.Verlet()` by default, or `sand.Adaptive()`.
+    neighbours : Neighbours or None, optional
+        how pairs within reach are found, `sand.Neighbours()` by default.
+    seed : int or None, optional
+        of random forces, 0 … 2⁶³ − 1; kept with the run.
+    out : str or Path or None, optional
+        folder for the run's files, made at the first `run`; None keeps everything in memory.
+    overwrite : bool, optional
+        allow `out` to hold an earlier run, whose files are then replaced.
+    observers : Iterable[Observer], optional
+        objects that look on (see `sand.Observer`); they never change the physics.
+    frame_every : optional
+        time between frames [s]; by default a two-hundredth of the first `run`.
+    contacts : Bonds or None, optional
+        present from the start, with their strains, as `sand.setup.from_frame` gives them.
+    restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
+        arrays and meta of a checkpoint in `out` to go on from (`sand.resume` gives them).
 
-    Raises:
-        BadInput: everything that is wrong, one line each.
+    Raises
+    ------
+    BadInput
+        everything that is wrong, one line each.
     """
 
     def __init__(
@@ -179,14 +194,21 @@ class Simulation(Fixed):
     def run(self, until: Any = None, *, steps: Any = None) -> Result:
         """Go on until a time, or for a number of steps, whichever comes first.
 
-        Args:
-            until: absolute time [s]; the run ends at the first step at or after it. Resumed runs know theirs.
-            steps: number of steps from now, ≥ 1; the last cycle of long-range forces (`Verlet.far`) is finished.
+        Parameters
+        ----------
+        until : optional
+            absolute time [s]; the run ends at the first step at or after it. Resumed runs know theirs.
+        steps : optional
+            number of steps from now, ≥ 1; the last cycle of long-range forces (`Verlet.far`) is finished.
 
-        Raises:
-            BadInput: neither is given, or one is out of range, or the run's folder cannot be used.
-            FilesFailed: the disk is full, the folder has vanished, …; what was written before stays whole.
-            Interrupted: Ctrl-C or SIGTERM; the checkpoint is written before.
+        Raises
+        ------
+        BadInput
+            neither is given, or one is out of range, or the run's folder cannot be used.
+        FilesFailed
+            the disk is full, the folder has vanished, …; what was written before stays whole.
+        Interrupted
+            Ctrl-C or SIGTERM; the checkpoint is written before.
         """
         if self._broken:
             raise BadInput(f"this simulation cannot go on: {self._broken}")
@@ -218,8 +240,10 @@ class Simulation(Fixed):
     def view(self, path: str | Path | None = None) -> Any:
         """The grains in motion: a widget in a notebook with anywidget, else a page, opened if there is a browser.
 
-        Args:
-            path: of the page; view.html in the run's folder by default, or in a temporary one.
+        Parameters
+        ----------
+        path : str or Path or None, optional
+            of the page; view.html in the run's folder by default, or in a temporary one.
 
         Returns the widget, or the path of the page; the figure, with a warning, where the installation lacks the page.
         """

@@ -28,13 +28,19 @@ def ends_of(
 ) -> tuple[float, float]:
     """The time [s] and the step that `Simulation.run(until, steps=steps)` ends at, infinite where it has no such end.
 
-    Args:
-        time: now [s].
-        taken: steps so far.
-        planned: what counts where neither is given.
+    Parameters
+    ----------
+    time : float
+        now [s].
+    taken : int
+        steps so far.
+    planned : tuple[float, float]
+        what counts where neither is given.
 
-    Raises:
-        BadInput: no end, one that is past, or steps that are no whole number of at least 1.
+    Raises
+    ------
+    BadInput
+        no end, one that is past, or steps that are no whole number of at least 1.
     """
     end = math.inf if until is None else si(until, "s", "until")
     if 0.0 < end < SHORTEST:

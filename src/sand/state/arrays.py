@@ -105,9 +105,12 @@ CELLS_PER_GRAIN = 4
 def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collection[str] = ()) -> FarArrays:
     """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list.
 
-    Args:
-        blocks: of a sum over all pairs; 0 where there is none.
-        needless: arrays that get no columns, since nothing will touch them.
+    Parameters
+    ----------
+    blocks : int, optional
+        of a sum over all pairs; 0 where there is none.
+    needless : Collection[str], optional
+        arrays that get no columns, since nothing will touch them.
     """
     vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)

@@ -111,8 +111,10 @@ class World:
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
         """Take over the numbers of `to_arrays`; the grains' number and materials are this world's own.
 
-        Raises:
-            BadInput: a missing array, or one of another shape.
+        Raises
+        ------
+        BadInput
+            a missing array, or one of another shape.
         """
         for name in ("clock", "count", "lost"):
             # checkpoints of earlier versions lack the last counters, which begin at 0

@@ -19,22 +19,35 @@ from ..units import si
 class ContactNumbers:
     """Everything in closed form about the contact of two grains, SI; see `contact`.
 
-    Attributes:
-        reduced_radius: R = r1 r2/(r1+r2) [m].
-        rest_radius: a0 = (9πγR²/E*)^(1/3) [m]; jkr_ratio: a0/R, below 0.3 where JKR holds.
-        pull_off_force: F_c = 3πγR [N].
-        rest_overlap, pull_off_overlap: δ0 = a0²/(3R), δ_c = a0²/(2·6^(1/3) R) [m].
-        break_energy: from rest to the break, 1.542585 F_cδ_c [J].
-        cycle_energy: form at δ = 0 and break at −δ_c, 0.935503 F_cδ_c [J].
-        normal_stiffness, slide_stiffness, roll_stiffness: k_n, k_s, k_r [N/m]; twist_stiffness: k_t [N m].
-        slide_limit, roll_limit: ζ_c, ξ_c [m]; twist_limit: φ_c [rad].
-        slide_force: critical sliding force k_s ζ_c [N]; roll_moment: k_r R ξ_c = 4F_cξ_c and twist_moment:
-            k_t φ_c [N m].
-        roll_energy_clamped, roll_energy_released: to roll along πR, for equal spheres one by 90° round the other [J]:
-            12π²γRξ_c and 6π²γRξ_c (the literature's E_roll = 6π²γRξ_c is the latter).
-        normal_period, slide_period, roll_period, twist_period: of the free pair [s].
-        sticking_speed: relative speed below which undamped grains stick head-on, m̄v²/2 = cycle_energy [m/s];
-            for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).
+    Attributes
+    ----------
+    reduced_radius : float
+        R = r1 r2/(r1+r2) [m].
+    rest_radius : float
+        a0 = (9πγR²/E*)^(1/3) [m]; jkr_ratio: a0/R, below 0.3 where JKR holds.
+    pull_off_force : float
+        F_c = 3πγR [N].
+    rest_overlap, pull_off_overlap : float
+        δ0 = a0²/(3R), δ_c = a0²/(2·6^(1/3) R) [m].
+    break_energy : float
+        from rest to the break, 1.542585 F_cδ_c [J].
+    cycle_energy : float
+        form at δ = 0 and break at −δ_c, 0.935503 F_cδ_c [J].
+    normal_stiffness, slide_stiffness, roll_stiffness : float
+        k_n, k_s, k_r [N/m]; twist_stiffness: k_t [N m].
+    slide_limit, roll_limit : float
+        ζ_c, ξ_c [m]; twist_limit: φ_c [rad].
+    slide_force : float
+        critical sliding force k_s ζ_c [N]; roll_moment: k_r R ξ_c = 4F_cξ_c and twist_moment:
+        k_t φ_c [N m].
+    roll_energy_clamped, roll_energy_released : float
+        to roll along πR, for equal spheres one by 90° round the other [J]:
+        12π²γRξ_c and 6π²γRξ_c (the literature's E_roll = 6π²γRξ_c is the latter).
+    normal_period, slide_period, roll_period, twist_period : float
+        of the free pair [s].
+    sticking_speed : float
+        relative speed below which undamped grains stick head-on, m̄v²/2 = cycle_energy [m/s];
+        for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).
     """
 
     reduced_radius: float
@@ -81,15 +94,23 @@ def contact(
 ) -> ContactNumbers:
     """The contact between two grains, without damping and with plain stiffnesses.
 
-    Args:
-        material: of grain 1, or the name of a preset.
-        radius: r1 [m] > 0.
-        other, other_radius: of grain 2; the same as grain 1 by default.
-        mixing: rule for γ_eff, see `contact.mixing.MIXING`.
-        rolling_limit: ξ_c [m] instead of the materials' own.
+    Parameters
+    ----------
+    material : Material or str
+        of grain 1, or the name of a preset.
+    radius
+        r1 [m] > 0.
+    other, other_radius : optional
+        of grain 2; the same as grain 1 by default.
+    mixing : str, optional
+        rule for γ_eff, see `contact.mixing.MIXING`.
+    rolling_limit : optional
+        ξ_c [m] instead of the materials' own.
 
-    Raises:
-        BadInput: wrong numbers, or a pair without adhesion, which has no such contact.
+    Raises
+    ------
+    BadInput
+        wrong numbers, or a pair without adhesion, which has no such contact.
     """
     a = as_material(material)
     b = a if other is None else as_material(other, "other")

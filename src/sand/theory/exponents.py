@@ -50,13 +50,19 @@ def exponent_fit(found: Outputs, others: tuple[Outputs, ...], sizes: int) -> Exp
     * rounding.  S and dS/dt are sums over K sizes, each known to ε = 10 K 2⁻⁵² at best, which changes λ by
       Σ(u − ū)(δv − λδu)/Σ(u − ū)² ≤ (1 + |λ|) ε/σ_u (Cauchy and Schwarz), σ_u² the mean of (u − ū)².
 
-    Args:
-        found: T ≥ 3 outputs, all above 0.
-        others: the same outputs found otherwise.
-        sizes: K.
+    Parameters
+    ----------
+    found : Outputs
+        T ≥ 3 outputs, all above 0.
+    others : tuple[Outputs, ...]
+        the same outputs found otherwise.
+    sizes : int
+        K.
 
-    Raises:
-        BadInput: S hardly differs between the outputs.
+    Raises
+    ------
+    BadInput
+        S hardly differs between the outputs.
     """
     from scipy.special import stdtrit
 

@@ -27,13 +27,19 @@ def chain_moment(moment: Any, grains: int) -> float:
 def aggregate_moment(moment: Any, grains: Any, exponent: float = REMANENCE) -> float:
     """μ_agg = μ N^γ [A m²] (Eq. 16).
 
-    Args:
-        moment: of one grain, μ [A m²] ≥ 0.
-        grains: N ≥ 1.
-        exponent: γ; 0.5 for moments at random, 0.63 in the paper, 1 for all parallel.
+    Parameters
+    ----------
+    moment
+        of one grain, μ [A m²] ≥ 0.
+    grains
+        N ≥ 1.
+    exponent : float, optional
+        γ; 0.5 for moments at random, 0.63 in the paper, 1 for all parallel.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     return si(moment, "A m^2", "moment", least=0.0) * si(grains, "1", "grains", least=1.0) ** si(
         exponent, "1", "exponent"
@@ -44,12 +50,17 @@ def aggregate_moment(moment: Any, grains: Any, exponent: float = REMANENCE) -> f
 def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np.ndarray | None = None) -> float:
     """S = Σ s² n_s/Σ s n_s (Eq. 17), the size of the cluster that a grain picked at random is in.
 
-    Args:
-        sizes: s (K,) ≥ 1, grains per cluster.
-        numbers: n_s (K,) ≥ 0, how many clusters of each; one each by default.
+    Parameters
+    ----------
+    sizes : Sequence[float] or ndarray
+        s (K,) ≥ 1, grains per cluster.
+    numbers : Sequence[float] or ndarray or None, optional
+        n_s (K,) ≥ 0, how many clusters of each; one each by default.
 
-    Raises:
-        BadInput: none at all, or a size below 1.
+    Raises
+    ------
+    BadInput
+        none at all, or a size below 1.
     """
     try:
         s = np.asarray(sizes, float)
@@ -65,11 +76,15 @@ def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np
 def dynamic_exponent(eta: float, nu: float) -> float:
     """z = 1/(1 − η − ν), from η + ν = (z − 1)/z (Eq. 20): S ∝ t^z if σ ∝ m^η and v ∝ m^ν.
 
-    Args:
-        eta, nu: exponents of cross-section and speed, η + ν < 1 (from 1 on growth runs away in finite time).
+    Parameters
+    ----------
+    eta, nu : float
+        exponents of cross-section and speed, η + ν < 1 (from 1 on growth runs away in finite time).
 
-    Raises:
-        BadInput: η + ν ≥ 1.
+    Raises
+    ------
+    BadInput
+        η + ν ≥ 1.
     """
     first, second = si(eta, "1", "eta"), si(nu, "1", "nu")
     both = first + second
@@ -95,15 +110,21 @@ def growth_exponents(exponent: float = REMANENCE, reading: str = "paper", *, rou
     With μ ∝ m^γ, v ∝ μ/√m and σ ∝ μ^(4/3): ν = γ − 1/2, η = 4γ/3 (Eqs. 21, 22), 0.13 and 0.84, which makes z = 33.
     The paper then lets the relaxation time τ ∝ m^(1−γ) (Eq. 23) weaken the interaction.
 
-    Args:
-        exponent: γ (Eq. 16).
-        reading: what becomes of μ². "aligned": nothing; "paper": μ^(2−(1−γ)), the exponent of a mass taken off that
-            of a moment (Eqs. 24, 25): 0.0135, 0.685 and z = 3.31; "mass": m^(2γ−(1−γ)), both exponents of the mass:
-            z = 2.17.
-        rounded: ν and η to two digits before z is formed; the paper's 3.2 comes from 0.01 + 0.68.
+    Parameters
+    ----------
+    exponent : float, optional
+        γ (Eq. 16).
+    reading : str, optional
+        what becomes of μ². "aligned": nothing; "paper": μ^(2−(1−γ)), the exponent of a mass taken off that
+        of a moment (Eqs. 24, 25): 0.0135, 0.685 and z = 3.31; "mass": m^(2γ−(1−γ)), both exponents of the mass:
+        z = 2.17.
+    rounded : bool, optional
+        ν and η to two digits before z is formed; the paper's 3.2 comes from 0.01 + 0.68.
 
-    Raises:
-        BadInput: an unknown reading, or η + ν ≥ 1.
+    Raises
+    ------
+    BadInput
+        an unknown reading, or η + ν ≥ 1.
     """
     square = squared_exponent(exponent, reading)
     eta, nu = 2.0 * square / 3.0, 0.5 * (square - 1.0)
@@ -139,14 +160,21 @@ def alignment_exponent(exponent: float = REMANENCE) -> float:
 def alignment_time(inertia: Any, moment: Any, flux_density: Any, angle: float = 0.5 * math.pi) -> float:
     """τ = √(2φ I/(μB)) [s], to turn through φ from rest at the greatest torque; Eq. 23 leaves out the √2.
 
-    Args:
-        inertia: I [kg m²] > 0.
-        moment: μ [A m²] > 0.
-        flux_density: B [T] > 0.
-        angle: φ [rad] > 0.
+    Parameters
+    ----------
+    inertia
+        I [kg m²] > 0.
+    moment
+        μ [A m²] > 0.
+    flux_density
+        B [T] > 0.
+    angle : float, optional
+        φ [rad] > 0.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     torque = si(moment, "A m^2", "moment", above=0.0) * si(flux_density, "T", "flux_density", above=0.0)
     return math.sqrt(2.0 * si(angle, "1", "angle", above=0.0) * si(inertia, "kg m^2", "inertia", above=0.0) / torque)

@@ -29,10 +29,14 @@ Rate = Callable[[np.ndarray, np.ndarray], Any]
 class Kernel:
     """A function K(m1, m2) [m³/s] with a name.
 
-    Attributes:
-        name: one line for people.
-        function: of two arrays of masses [kg] > 0, symmetric.
-        degree: λ; None if the kernel is not homogeneous, or it is not known.
+    Attributes
+    ----------
+    name : str
+        one line for people.
+    function : Rate
+        of two arrays of masses [kg] > 0, symmetric.
+    degree : float or None
+        λ; None if the kernel is not homogeneous, or it is not known.
     """
 
     name: str
@@ -69,12 +73,17 @@ def additive(rate: Any, mass: Any) -> Kernel:
 def product(rate: Any, mass: Any) -> Kernel:
     """K = rate N1 N2, λ = 2: a gel, one cluster of all, after 1/(n rate).
 
-    Args:
-        rate: [m³/s] > 0.
-        mass: of a grain [kg] > 0, N = m/mass.
+    Parameters
+    ----------
+    rate
+        [m³/s] > 0.
+    mass
+        of a grain [kg] > 0, N = m/mass.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     value, grain = _scale(rate, mass)
     return Kernel("product", lambda m1, m2: value * (m1 / grain) * (m2 / grain), 2.0)
@@ -86,13 +95,19 @@ def power(rate: Any, mass: Any, eta: Any, nu: Any) -> Kernel:
 
     Radii that go as m^(η/2) add up in σ, and v follows the reduced mass.
 
-    Args:
-        rate: K of two grains [m³/s] > 0.
-        mass: of a grain [kg] > 0.
-        eta, nu: any numbers.
+    Parameters
+    ----------
+    rate
+        K of two grains [m³/s] > 0.
+    mass
+        of a grain [kg] > 0.
+    eta, nu
+        any numbers.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     value, grain = _scale(rate, mass)
     half, speed = 0.5 * si(eta, "1", "eta"), si(nu, "1", "nu")
@@ -120,14 +135,21 @@ def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 
     η = 2/D and ν = −1/2 of Eq. 20: z = 2 for D = 2, 6/5 for compact ones.  Below D = 2 it is an upper bound: the
     clusters are more transparent than the spheres around them.
 
-    Args:
-        radius: r of a grain [m] > 0.
-        mass: of a grain [kg] > 0.
-        temperature: T [K] > 0.
-        fractal_dimension: D, 1 … 3.
+    Parameters
+    ----------
+    radius
+        r of a grain [m] > 0.
+    mass
+        of a grain [kg] > 0.
+    temperature
+        T [K] > 0.
+    fractal_dimension : optional
+        D, 1 … 3.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     dimension = si(fractal_dimension, "1", "fractal_dimension", least=1.0)
     if dimension > 3.0:
@@ -159,18 +181,29 @@ def capture(
     σ(v∞) v∞, with the speed before the attraction, though: "thermal" is that, averaged over Maxwell's distribution,
     ⟨σv⟩ = σ(s) s 2^(−1/6) Γ(4/3)/Γ(3/2), s = √(k_B T/m̄): λ = η − 1/2, z = 1.52 with aligned moments.
 
-    Args:
-        radius: r of a grain [m] > 0.
-        mass: of a grain [kg] > 0.
-        moment: μ1 of a grain [A m²] > 0.
-        temperature: T [K] > 0.
-        exponent: γ.
-        reading: what becomes of μ1μ2 as clusters align more slowly, see `growth_exponents`: "aligned", "paper", "mass".
-        speed: "impact" or "thermal".
-        c: of Eq. 27, > 0.
+    Parameters
+    ----------
+    radius
+        r of a grain [m] > 0.
+    mass
+        of a grain [kg] > 0.
+    moment
+        μ1 of a grain [A m²] > 0.
+    temperature
+        T [K] > 0.
+    exponent : optional
+        γ.
+    reading : str, optional
+        what becomes of μ1μ2 as clusters align more slowly, see `growth_exponents`: "aligned", "paper", "mass".
+    speed : str, optional
+        "impact" or "thermal".
+    c : optional
+        of Eq. 27, > 0.
 
-    Raises:
-        BadInput: out of range, an unknown word.
+    Raises
+    ------
+    BadInput
+        out of range, an unknown word.
     """
     if speed not in SPEEDS:
         raise BadInput(f"speed = {speed!r}; {did_you_mean(str(speed), SPEEDS)}")

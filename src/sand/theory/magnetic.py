@@ -19,11 +19,15 @@ from ..units import si
 def reduced_mass(mass: Any, other: Any = None) -> float:
     """m̄ = m1 m2/(m1 + m2) [kg], m/2 for two equal ones (below Eq. 8).
 
-    Args:
-        mass, other: m1, m2 [kg] > 0; the same by default.
+    Parameters
+    ----------
+    mass, other
+        m1, m2 [kg] > 0; the same by default.
 
-    Raises:
-        BadInput: not a mass above 0.
+    Raises
+    ------
+    BadInput
+        not a mass above 0.
     """
     m1 = si(mass, "kg", "mass", above=0.0)
     m2 = m1 if other is None else si(other, "kg", "other", above=0.0)
@@ -34,12 +38,17 @@ def reduced_mass(mass: Any, other: Any = None) -> float:
 def thermal_speed(mass: Any, temperature: Any) -> float:
     """v_th = √(k_B T/m) [m/s] (section 4.1), one component's standard deviation.
 
-    Args:
-        mass: m [kg] > 0.
-        temperature: T [K] ≥ 0.
+    Parameters
+    ----------
+    mass
+        m [kg] > 0.
+    temperature
+        T [K] ≥ 0.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     heat = BOLTZMANN * si(temperature, "K", "temperature", least=0.0)
     return math.sqrt(heat / si(mass, "kg", "mass", above=0.0))
@@ -49,13 +58,19 @@ def thermal_speed(mass: Any, temperature: Any) -> float:
 def coupling(moment: Any, distance: Any, temperature: Any) -> float:
     """λ = μ²μ₀/(4π d³ k_B T) (Eq. 1): magnetic over thermal energy.
 
-    Args:
-        moment: μ [A m²] ≥ 0.
-        distance: d [m] > 0, the sum of the radii.
-        temperature: T [K] > 0.
+    Parameters
+    ----------
+    moment
+        μ [A m²] ≥ 0.
+    distance
+        d [m] > 0, the sum of the radii.
+    temperature
+        T [K] > 0.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     return dipole.coupling(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
 
@@ -72,11 +87,15 @@ def geometric_cross_section(radius: Any, other: Any = None) -> float:
 
     Eq. 3, πR² of one grain, is `geometric_cross_section(radius, 0.0)`.
 
-    Args:
-        radius, other: R_i, R_j [m] ≥ 0; the same by default.
+    Parameters
+    ----------
+    radius, other
+        R_i, R_j [m] ≥ 0; the same by default.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     r1 = si(radius, "m", "radius", least=0.0)
     r2 = r1 if other is None else si(other, "m", "other", least=0.0)
@@ -87,12 +106,17 @@ def geometric_cross_section(radius: Any, other: Any = None) -> float:
 def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
     """U = k [μ·μ′/r³ − 3 (μ·r)(μ′·r)/r⁵] [J] (Eq. 6, whose last r′ is r), k = μ₀/4π.
 
-    Args:
-        moment1, moment2: μ, μ′ (3,) [A m²].
-        apart: r (3,) [m], from one to the other, not 0.
+    Parameters
+    ----------
+    moment1, moment2
+        μ, μ′ (3,) [A m²].
+    apart
+        r (3,) [m], from one to the other, not 0.
 
-    Raises:
-        BadInput: not three finite numbers, or no distance.
+    Raises
+    ------
+    BadInput
+        not three finite numbers, or no distance.
     """
     a, b = _three(moment1, "A m^2", "moment1"), _three(moment2, "A m^2", "moment2")
     r = _three(apart, "m", "apart")
@@ -105,11 +129,15 @@ def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
 def potential_parameter(moment1: Any, moment2: Any = None) -> float:
     """α = 2kμμ′ [J m³] (Eq. 7): U_min = −α/d³.
 
-    Args:
-        moment1, moment2: μ, μ′ [A m²] ≥ 0; the same by default.
+    Parameters
+    ----------
+    moment1, moment2
+        μ, μ′ [A m²] ≥ 0; the same by default.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     first, second = _moments(moment1, moment2)
     return dipole.contact_energy(first, second, 1.0, MAGNETIC)
@@ -126,15 +154,23 @@ def lowest_energy(moment1: Any, distance: Any, moment2: Any = None) -> float:
 def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
     """U_eff = m̄ b² v∞²/(2r²) − α/r³ [J] (Eqs. 8–10), moments always along r.
 
-    Args:
-        distance: r [m] > 0.
-        impact_parameter: b [m] ≥ 0.
-        speed: v∞ [m/s] ≥ 0, relative.
-        mass: m̄ [kg] > 0, reduced.
-        alpha: `potential_parameter` [J m³].
+    Parameters
+    ----------
+    distance
+        r [m] > 0.
+    impact_parameter
+        b [m] ≥ 0.
+    speed
+        v∞ [m/s] ≥ 0, relative.
+    mass
+        m̄ [kg] > 0, reduced.
+    alpha
+        `potential_parameter` [J m³].
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     r, b = si(distance, "m", "distance", above=0.0), si(impact_parameter, "m", "impact_parameter", least=0.0)
     v, m = si(speed, "m/s", "speed", least=0.0), si(mass, "kg", "mass", above=0.0)
@@ -156,13 +192,19 @@ def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
 def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> float:
     """b_max = √3 (α/(m̄ v∞²))^(1/3) [m] (Eqs. 12, 13; what is printed as Eq. 13 is b_max²).
 
-    Args:
-        moment1, moment2: μ, μ′ [A m²] ≥ 0; the same by default.
-        mass: m̄ [kg] > 0, reduced (`reduced_mass`).
-        speed: v∞ [m/s] > 0, relative.
+    Parameters
+    ----------
+    moment1, moment2
+        μ, μ′ [A m²] ≥ 0; the same by default.
+    mass
+        m̄ [kg] > 0, reduced (`reduced_mass`).
+    speed
+        v∞ [m/s] > 0, relative.
 
-    Raises:
-        BadInput: out of range.
+    Raises
+    ------
+    BadInput
+        out of range.
     """
     first, second = _moments(moment1, moment2)
     m, v = si(mass, "kg", "mass", above=0.0), si(speed, "m/s", "speed", above=0.0)

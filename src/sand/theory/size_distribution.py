@@ -25,17 +25,28 @@ FULL, LARGE, LEFT = (
 class Growth:
     """A size distribution over time, as far as the grid holds it.
 
-    Attributes:
-        times: t (T,) [s], those of the given ones that were reached.
-        sizes: x (K,), grains per cluster.
-        numbers: n (T, K) [1/m³].
-        mean_size: S (T,), Eq. 17, of what is on the grid.
-        rate: dS/dt (T,) [1/s], from the equation itself.
-        mass: ρ (T,) [kg/m³] on the grid.
-        lost: (T,) [kg/m³] gone through the top of the grid; mass + lost is constant to rounding.
-        loss_rate: (T,) [kg/(m³ s)], d lost/dt.
-        outcome: one of `FULL`, `LARGE`, `LEFT`; but for `FULL` there are fewer times than asked for.
-        solve_tighter: solves the equation once more up to the given times [s], with a tenth of the tolerance.
+    Attributes
+    ----------
+    times : ndarray
+        t (T,) [s], those of the given ones that were reached.
+    sizes : ndarray
+        x (K,), grains per cluster.
+    numbers : ndarray
+        n (T, K) [1/m³].
+    mean_size : ndarray
+        S (T,), Eq. 17, of what is on the grid.
+    rate : ndarray
+        dS/dt (T,) [1/s], from the equation itself.
+    mass : ndarray
+        ρ (T,) [kg/m³] on the grid.
+    lost : ndarray
+        (T,) [kg/m³] gone through the top of the grid; mass + lost is constant to rounding.
+    loss_rate : ndarray
+        (T,) [kg/(m³ s)], d lost/dt.
+    outcome : str
+        one of `FULL`, `LARGE`, `LEFT`; but for `FULL` there are fewer times than asked for.
+    solve_tighter : Callable[[ndarray], Growth] or None
+        solves the equation once more up to the given times [s], with a tenth of the tolerance.
     """
 
     times: np.ndarray
@@ -70,12 +81,16 @@ class Growth:
 
         No t0 has to be known, so that this comes to z much sooner than `slope` does.  `exponent_fit` tells its error.
 
-        Args:
-            decades: how much of S, > 0.
+        Parameters
+        ----------
+        decades : float, optional
+            how much of S, > 0.
 
-        Raises:
-            BadInput: fewer than three outputs there, or S grows faster than any power, as far as the error of the
-                slope can tell.
+        Raises
+        ------
+        BadInput
+            fewer than three outputs there, or S grows faster than any power, as far as the error of the
+            slope can tell.
         """
         fit = self.exponent_fit(decades)
         if not np.isfinite(fit.high):
@@ -90,11 +105,15 @@ class Growth:
 
         The equation is solved once more, ten times more exactly, when this is first called.
 
-        Args:
-            decades: how much of S, > 0.
+        Parameters
+        ----------
+        decades : float, optional
+            how much of S, > 0.
 
-        Raises:
-            BadInput: fewer than three outputs there, or outputs that S hardly differs between.
+        Raises
+        ------
+        BadInput
+            fewer than three outputs there, or outputs that S hardly differs between.
         """
         size = np.log10(self.mean_size)
         first = size.max(initial=0.0) - si(decades, "1", "decades", above=0.0)

@@ -39,12 +39,17 @@ def all_sizes(largest: int) -> np.ndarray:
 def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
     """x (K,) from 1 to at least `largest`: whole numbers while they are closer than the ratio, then that ratio.
 
-    Args:
-        largest: > 1, e.g. 1e9.
-        per_decade: sizes in a factor of ten, ≥ 4, so that twice a size is never the next one.
+    Parameters
+    ----------
+    largest
+        > 1, e.g. 1e9.
+    per_decade : optional
+        sizes in a factor of ten, ≥ 4, so that twice a size is never the next one.
 
-    Raises:
-        BadInput: out of range, or more than 3000 sizes.
+    Raises
+    ------
+    BadInput
+        out of range, or more than 3000 sizes.
     """
     top, each = si(largest, "1", "largest", above=1.0), si(per_decade, "1", "per_decade", least=4.0)
     ratio = 10.0 ** (1.0 / each)
@@ -69,22 +74,35 @@ def coagulate(
 ) -> Growth:
     """Solve Smoluchowski's equation from t = 0 with one of SciPy's integrators.
 
-    Args:
-        kernel: K(m1, m2) [m³/s] of two arrays of masses [kg], see `kinetics`.
-        sizes: x (K,) ≥ 1, rising, grains per cluster, see `all_sizes` and `log_sizes`.
-        numbers: n(t=0) (K,) [1/m³] ≥ 0; one number: so many clusters of the first size.
-        times: (T,) [s] ≥ 0, rising.
-        mass: of a grain [kg] > 0.
-        until_size: the mean size S > 0 at which to stop; None: never.
-        may_lose: part of the mass that may leave through the top of the grid, above 0, below 1; beyond it all ends.
-        accuracy: error of a step over n_k, 1e-12 … 1e-2; but no better than 1e-4 of it of all grains, divided by x_k,
-            so that the far tail can neither spoil S nor hold up the rest.
-        method: "BDF", implicit, for any kernel: small clusters that meet large ones make the equation stiff; "DOP853",
-            explicit, many times faster for hundreds of sizes and growth by a few decades.
+    Parameters
+    ----------
+    kernel : Rate
+        K(m1, m2) [m³/s] of two arrays of masses [kg], see `kinetics`.
+    sizes : Sequence[float] or ndarray
+        x (K,) ≥ 1, rising, grains per cluster, see `all_sizes` and `log_sizes`.
+    numbers
+        n(t=0) (K,) [1/m³] ≥ 0; one number: so many clusters of the first size.
+    times
+        (T,) [s] ≥ 0, rising.
+    mass
+        of a grain [kg] > 0.
+    until_size : optional
+        the mean size S > 0 at which to stop; None: never.
+    may_lose : optional
+        part of the mass that may leave through the top of the grid, above 0, below 1; beyond it all ends.
+    accuracy : optional
+        error of a step over n_k, 1e-12 … 1e-2; but no better than 1e-4 of it of all grains, divided by x_k,
+        so that the far tail can neither spoil S nor hold up the rest.
+    method : str, optional
+        "BDF", implicit, for any kernel: small clusters that meet large ones make the equation stiff; "DOP853",
+        explicit, many times faster for hundreds of sizes and growth by a few decades.
 
-    Raises:
-        BadInput: out of range, or a kernel that is not symmetric, finite and positive.
-        SandError: the equation cannot be integrated.
+    Raises
+    ------
+    BadInput
+        out of range, or a kernel that is not symmetric, finite and positive.
+    SandError
+        the equation cannot be integrated.
     """
     if method not in METHODS:
         raise BadInput(f"method = {method!r}; {did_you_mean(str(method), METHODS)}")

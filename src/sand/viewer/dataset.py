@@ -36,15 +36,24 @@ FieldTold = tuple[str, Callable[[float], Sequence[float]]]
 class Story:
     """A run, told to a page; safe to be asked by several threads.
 
-    Args:
-        frames: of a trajectory (`io.live_trajectory.Following`), or what looks like them.
-        name: of the run.
-        place: its folder, or its file.
-        books: the ledger so far; None where there is none.
-        summary: how the run ended; None while it has not, empty where nobody knows.
-        field: the magnetic field, if there is one.
-        chosen: which frames are told; all by default.
-        compact: frames in half precision.
+    Parameters
+    ----------
+    frames
+        of a trajectory (`io.live_trajectory.Following`), or what looks like them.
+    name : str
+        of the run.
+    place : str
+        its folder, or its file.
+    books : Callable[[], Books or None]
+        the ledger so far; None where there is none.
+    summary : Callable[[], Mapping[str, Any] or None]
+        how the run ended; None while it has not, empty where nobody knows.
+    field : FieldTold or None, optional
+        the magnetic field, if there is one.
+    chosen : slice, optional
+        which frames are told; all by default.
+    compact : bool, optional
+        frames in half precision.
     """
 
     def __init__(
@@ -182,8 +191,10 @@ class Story:
     def read(self, k: int) -> tuple[Any, np.ndarray]:
         """The k-th frame told, and names (N,) of the clusters its grains are in.
 
-        Raises:
-            BadInput: there is none, or it is not whole.
+        Raises
+        ------
+        BadInput
+            there is none, or it is not whole.
         """
         with self._lock:
             if not 0 <= k < len(self):
@@ -211,8 +222,10 @@ class Story:
     def dimension(self, k: int, grain: int) -> dict[str, Any]:
         """Fractal dimension of the cluster of a grain: `value` and `error`, or the `reason` why there are none.
 
-        Raises:
-            BadInput: there is no such frame or grain.
+        Raises
+        ------
+        BadInput
+            there is no such frame or grain.
         """
         if not 0 <= grain < self.grains_count:
             raise BadInput(f"there are {self.grains_count} grains, from 0 to {self.grains_count - 1}; no {grain}")
@@ -255,8 +268,10 @@ def _direction(vector: Sequence[float]) -> list[float]:
 def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
     """The story of a run in a folder, or of a trajectory of SAND by itself.
 
-    Raises:
-        BadInput: there is no run, or no frame yet, or the file is foreign or broken.
+    Raises
+    ------
+    BadInput
+        there is no run, or no frame yet, or the file is foreign or broken.
     """
     place = Path(path)
     folder = run_folder(place)

@@ -68,14 +68,21 @@ def write_page(
 
     Frames are read, packed and written one by one.
 
-    Args:
-        path: of the file, .html; replaced if it is there.
-        progress: told how many frames of how many are written.
-        bundle: script and sheet of styles, of the package by default.
+    Parameters
+    ----------
+    path : str or Path
+        of the file, .html; replaced if it is there.
+    progress : Callable[[int, int], None] or None, optional
+        told how many frames of how many are written.
+    bundle : optional
+        script and sheet of styles, of the package by default.
 
-    Raises:
-        BadInput: the bundle is missing; a frame is not whole.
-        FilesFailed: the file cannot be written.
+    Raises
+    ------
+    BadInput
+        the bundle is missing; a frame is not whole.
+    FilesFailed
+        the file cannot be written.
     """
     script, styles = bundle or read_bundle()
     script = _harmless(f"\n{script}\n")

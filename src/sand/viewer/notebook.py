@@ -19,8 +19,10 @@ def has_widgets() -> bool:
 def widget(story: Story) -> Any:
     """A widget that shows a story.
 
-    Raises:
-        BadInput: anywidget is not installed, or the page is missing.
+    Raises
+    ------
+    BadInput
+        anywidget is not installed, or the page is missing.
     """
     if not has_widgets():
         raise BadInput("a page in a notebook needs anywidget: pip install anywidget")
@@ -34,8 +36,10 @@ def _kind(script: str, styles: str) -> Any:
     class GrainWidget(anywidget.AnyWidget):
         """Grains of a run that move.
 
-        Args:
-            story: of the run.
+        Parameters
+        ----------
+        story : Story
+            of the run.
 
         The page sends what it asks for, such as {"kind": "frame", "k": 3}, and gets the same back with the answer, or
         with `error`, a sentence; packets come as the first buffer.

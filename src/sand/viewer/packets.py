@@ -27,10 +27,14 @@ WHOLE_PRECISION = ("position", "radius", "mass", "charge")
 def encode(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray], compact: bool = False) -> bytes:
     """One packet.
 
-    Args:
-        header: what else to say; `arrays` is added to it.
-        arrays: of floats, uint32 or uint8, in the order in which they are to be stored.
-        compact: floats in half precision with a scale, but for those of WHOLE_PRECISION.
+    Parameters
+    ----------
+    header : Mapping[str, Any]
+        what else to say; `arrays` is added to it.
+    arrays : Mapping[str, ndarray]
+        of floats, uint32 or uint8, in the order in which they are to be stored.
+    compact : bool, optional
+        floats in half precision with a scale, but for those of WHOLE_PRECISION.
     """
     listed, parts, offset = [], [], 0
     for name, array in arrays.items():
@@ -63,8 +67,10 @@ def _stored(name: str, array: np.ndarray, compact: bool) -> tuple[str, float, np
 def decode(packet: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Header and arrays (float64 for floats) of a packet.
 
-    Raises:
-        BadInput: it is not a packet, or cut off.
+    Raises
+    ------
+    BadInput
+        it is not a packet, or cut off.
     """
     if packet[:8] != MAGIC:
         raise BadInput("this is not a packet of SAND")
@@ -84,8 +90,10 @@ def decode(packet: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 def grains_packet(frame: Any, unit: float) -> bytes:
     """What stays of the grains of a frame: radius in `unit` [m], mass, material, charge.
 
-    Raises:
-        BadInput: more materials than a byte counts.
+    Raises
+    ------
+    BadInput
+        more materials than a byte counts.
     """
     if len(frame.materials) > 256:
         raise BadInput(f"there are {len(frame.materials)} materials; the page can tell 256 apart")

@@ -23,8 +23,10 @@ RANGE = (1.0, 99.9)
 def ranges_of(frames: Any) -> dict[str, list[float]]:
     """Least and most of quantities by name, SI: of all numbers in EXTREMES, nearly all in PERCENTILES.
 
-    Args:
-        frames: of a trajectory; some, spread through the run, are looked at. Those that are not whole are left out.
+    Parameters
+    ----------
+    frames
+        of a trajectory; some, spread through the run, are looked at. Those that are not whole are left out.
     """
     seen: dict[str, list[np.ndarray]] = {name: [] for name in (*PERCENTILES, *EXTREMES)}
     for number in thinned(len(frames), LOOKED_AT):

@@ -68,12 +68,17 @@ def own_names(port: int) -> set[str]:
 class Server(ThreadingHTTPServer):
     """Tells a story to a browser on this machine.
 
-    Args:
-        story: of a run.
-        port: a free one by default.
+    Parameters
+    ----------
+    story : Story
+        of a run.
+    port : int, optional
+        a free one by default.
 
-    Raises:
-        BadInput: the port is taken or forbidden; the page is missing.
+    Raises
+    ------
+    BadInput
+        the port is taken or forbidden; the page is missing.
     """
 
     daemon_threads = True
@@ -149,9 +154,12 @@ class Server(ThreadingHTTPServer):
     def note(self, request: Any, *, busy: bool, trusted: bool = False) -> None:
         """What a connection does from now on.
 
-        Args:
-            busy: an answer is being worked out; otherwise its client is waited for.
-            trusted: it has named the token.
+        Parameters
+        ----------
+        busy : bool
+            an answer is being worked out; otherwise its client is waited for.
+        trusted : bool, optional
+            it has named the token.
         """
         line = self._lines.get(id(request))
         if line is not None and line.request is request:
@@ -163,8 +171,10 @@ class Server(ThreadingHTTPServer):
     def answer(self, address: str, query: str) -> tuple[str, bytes]:
         """Type and content of what lies at an address below the token.
 
-        Raises:
-            Refused: nothing does, or it cannot be had.
+        Raises
+        ------
+        Refused
+            nothing does, or it cannot be had.
         """
         if address in self._files and not query:
             kind, text = self._files[address]

@@ -24,15 +24,22 @@ LARGEST = 150e6
 def show_story(story: Story, path: str | Path | None, folder: Path | None, instead: Callable[[], Any]) -> Any:
     """The widget in a notebook with anywidget, unless a `path` is given; else the page, written and opened.
 
-    Args:
-        path: of the page; view.html in the `folder` of the run by default, or in a new temporary folder.
-        instead: shows the figure, where this installation lacks the page.
+    Parameters
+    ----------
+    path : str or Path or None
+        of the page; view.html in the `folder` of the run by default, or in a new temporary folder.
+    instead : Callable[[], Any]
+        shows the figure, where this installation lacks the page.
 
-    Returns:
+    Returns
+    -------
+    result
         The widget, or the path of the page, or the figure.
 
-    Raises:
-        BadInput, FilesFailed: the page cannot be written.
+    Raises
+    ------
+    BadInput, FilesFailed
+        the page cannot be written.
     """
     try:
         read_bundle()

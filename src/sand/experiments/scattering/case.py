@@ -131,8 +131,10 @@ def _list(value: Any) -> Sequence[Any]:
 def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     """Read and check a case file of `sand scatter`.
 
-    Raises:
-        BadInput: every mistake of the file, one line each, with its place.
+    Raises
+    ------
+    BadInput
+        every mistake of the file, one line each, with its place.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "scatter")

@@ -34,17 +34,25 @@ END, SPEED, DRIFT = (COLUMNS.index(name) for name in ("end", "speed", "drift"))
 class CrossSection:
     """σ of one set-up; SI.
 
-    Attributes:
-        sigma: area of the impact parameters that lead to a hit [m²]; for a target that moves by chance the rate of
-            hits over number density and v∞, ⟨σ(u) u⟩/v∞, u the relative speed. sigma_error: one standard deviation;
-            interval: 95 %.
-        geometric: π (r1 + r2)² [m²], of outer spheres for aggregates; analytic: Eq. 14 [m²] at the relative speed, with
-            Σ|μ| for aggregates, averaged as σ is for a target that moves by chance.
-        flights, hits: how many; bound, failed: of them, neither hit nor miss; counted as misses.
-        speed: [m/s]; distance: of the start [m]; seed.
-        profile: rows (b₋, b₊, flights, hits) of each annulus, (K, 4).
-        drift: largest change of a flight's energy over the largest kinetic energy of its relative motion.
-        seconds: spent.
+    Attributes
+    ----------
+    sigma : float
+        area of the impact parameters that lead to a hit [m²]; for a target that moves by chance the rate of
+        hits over number density and v∞, ⟨σ(u) u⟩/v∞, u the relative speed. sigma_error: one standard deviation;
+        interval: 95 %.
+    geometric : float
+        π (r1 + r2)² [m²], of outer spheres for aggregates; analytic: Eq. 14 [m²] at the relative speed, with
+        Σ|μ| for aggregates, averaged as σ is for a target that moves by chance.
+    flights, hits : int
+        how many; bound, failed: of them, neither hit nor miss; counted as misses.
+    speed : float
+        [m/s]; distance: of the start [m]; seed.
+    profile : ndarray
+        rows (b₋, b₊, flights, hits) of each annulus, (K, 4).
+    drift : float
+        largest change of a flight's energy over the largest kinetic energy of its relative motion.
+    seconds : float
+        spent.
     """
 
     sigma: float
@@ -105,14 +113,21 @@ def cross_section(
 ) -> CrossSection:
     """σ of two magnetic grains: the area of impact parameters that lead to a hit, over all orientations and spins.
 
-    Args:
-        radius, material, moment, temperature, speed, options: see `flight`.
-        relative_error: of σ at which to stop, one standard deviation, 1e-4 … 0.5.
-        seed: ≥ 0, of all that is drawn by chance.
-        executor: any `concurrent.futures.Executor`; None: here. The numbers are the same.
+    Parameters
+    ----------
+    radius, material, moment, temperature, speed, options
+        see `flight`.
+    relative_error : optional
+        of σ at which to stop, one standard deviation, 1e-4 … 0.5.
+    seed : int, optional
+        ≥ 0, of all that is drawn by chance.
+    executor : Executor or None, optional
+        any `concurrent.futures.Executor`; None: here. The numbers are the same.
 
-    Raises:
-        BadInput: one line for each mistake.
+    Raises
+    ------
+    BadInput
+        one line for each mistake.
     """
     flying = flight(radius, material, moment, temperature, speed, **options)
     return measure(flying, relative_error=relative_error, seed=seed, executor=executor)
@@ -131,9 +146,12 @@ def measure(
 ) -> CrossSection:
     """As `cross_section`, of a `Flight`.
 
-    Args:
-        known, keep: see `flown`.
-        watch: called with the number of flights, σ [m²] and its error after each round.
+    Parameters
+    ----------
+    known, keep : optional
+        see `flown`.
+    watch : Callable[[int, float, float], None] or None, optional
+        called with the number of flights, σ [m²] and its error after each round.
     """
     goal = si(relative_error, "1", "relative_error", above=0.0)
     if not 1e-4 <= goal <= 0.5:
@@ -195,9 +213,12 @@ def flown(
 ) -> Iterator[np.ndarray]:
     """The rows of all flights asked for, in pieces and in any order.
 
-    Args:
-        known: those that were flown before, which are not flown again.
-        keep: called with the rows of each piece of work as it is done.
+    Parameters
+    ----------
+    known : Mapping[tuple[int, int], ndarray] or None, optional
+        those that were flown before, which are not flown again.
+    keep : Callable[[ndarray], None] or None, optional
+        called with the rows of each piece of work as it is done.
     """
     before = known or {}
     ready = [before[key] for t in tasks for key in t.addresses() if key in before]

@@ -35,17 +35,27 @@ class Scales(NamedTuple):
 class Flight:
     """Two bodies and how they meet; SI, all checked (experiments/scattering/problem.py makes one from what users say).
 
-    Attributes:
-        projectile, target: grains; the projectile comes in along `along`, the target has the velocity `drift`.
-        speed: v∞ of the projectile [m/s]; temperature: [K], of spins and of a target that moves by chance.
-        distance: of the plane, or the radius of the sphere, that flights start on [m]; sphere: which of the two.
-        escape: distance [m] beyond which one that flies away is gone; 0: that of its start.
-        axes: RANDOM, ALIGNED or GIVEN of experiments/scattering/initial_conditions.py.
-        spin: three components [rad/s] of projectile and target, a thermal spin of `spin_energy` [J] each is added.
-        drift_spread: standard deviation of each component of the target's velocity [m/s].  Impact parameters are
-            those of the relative motion.
-        field: external flux density [T]; tolerance: error of a step over the scales.
-        contact: go on through the real contact, and count only what sticks.
+    Attributes
+    ----------
+    projectile, target : Grains
+        grains; the projectile comes in along `along`, the target has the velocity `drift`.
+    speed : float
+        v∞ of the projectile [m/s]; temperature: [K], of spins and of a target that moves by chance.
+    distance : float
+        of the plane, or the radius of the sphere, that flights start on [m]; sphere: which of the two.
+    escape : float
+        distance [m] beyond which one that flies away is gone; 0: that of its start.
+    axes : int
+        RANDOM, ALIGNED or GIVEN of experiments/scattering/initial_conditions.py.
+    spin : tuple[tuple[float, float, float], tuple[float, float, float]]
+        three components [rad/s] of projectile and target, a thermal spin of `spin_energy` [J] each is added.
+    drift_spread : float
+        standard deviation of each component of the target's velocity [m/s].  Impact parameters are
+        those of the relative motion.
+    field : tuple[float, float, float]
+        external flux density [T]; tolerance: error of a step over the scales.
+    contact : bool
+        go on through the real contact, and count only what sticks.
     """
 
     projectile: Grains

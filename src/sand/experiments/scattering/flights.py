@@ -35,9 +35,12 @@ COLUMNS = ("stratum", "number", *RESULTS)
 def fly(flying: Flight, tasks: Sequence[Task], width: float, seed: int = 0) -> np.ndarray:
     """Fly them; a row of `COLUMNS` each, (K, 10).
 
-    Args:
-        tasks: which numbers of which annuli.
-        width: of an annulus [m].
+    Parameters
+    ----------
+    tasks : Sequence[Task]
+        which numbers of which annuli.
+    width : float
+        of an annulus [m].
     """
     strata = np.concatenate([np.full(t.last - t.first, t.stratum) for t in tasks])
     numbers = np.concatenate([np.arange(t.first, t.last) for t in tasks])
@@ -89,16 +92,24 @@ def _flown(
 class Trajectory:
     """One flight from start to end, in the laboratory frame, where the target begins at the origin; SI.
 
-    Attributes:
-        end: "hit", "miss", "bound" (together after the most steps) or "failed".
-        time: (K,) at each step.
-        projectile, target: positions (K, 3); velocity_projectile, velocity_target: (K, 3).
-        moment_projectile, moment_target: unit vectors (K, 3); spin_projectile, spin_target: (K, 3). Of single grains;
-            empty (0, 3) for aggregates.
-        impact_parameter, speed: at the start; closest: least distance of the surfaces, 0 at a hit.
-        exchanged: part of the projectile's kinetic energy that the target has at the end; NaN after a hit, and where
-            the target moved from the start.
-        drift: change of the energy over the largest kinetic energy of the relative motion.
+    Attributes
+    ----------
+    end : str
+        "hit", "miss", "bound" (together after the most steps) or "failed".
+    time : ndarray
+        (K,) at each step.
+    projectile, target : ndarray
+        positions (K, 3); velocity_projectile, velocity_target: (K, 3).
+    moment_projectile, moment_target : ndarray
+        unit vectors (K, 3); spin_projectile, spin_target: (K, 3). Of single grains;
+        empty (0, 3) for aggregates.
+    impact_parameter, speed : float
+        at the start; closest: least distance of the surfaces, 0 at a hit.
+    exchanged : float
+        part of the projectile's kinetic energy that the target has at the end; NaN after a hit, and where
+        the target moved from the start.
+    drift : float
+        change of the energy over the largest kinetic energy of the relative motion.
     """
 
     end: str
@@ -130,14 +141,21 @@ def trajectory(
 ) -> Trajectory:
     """One flight with all that happened.
 
-    Args:
-        flying: from `flight`.
-        b: impact parameter ≥ 0 [m], or "0.95 b_max".
-        seed, stratum, number: address of what is drawn by chance.
-        azimuth: of the impact parameter about the line of flight [rad]; 0: along +y for a flight along +x.
+    Parameters
+    ----------
+    flying : Flight
+        from `flight`.
+    b
+        impact parameter ≥ 0 [m], or "0.95 b_max".
+    seed, stratum, number : int, optional
+        address of what is drawn by chance.
+    azimuth : optional
+        of the impact parameter about the line of flight [rad]; 0: along +y for a flight along +x.
 
-    Raises:
-        BadInput: b is out of range.
+    Raises
+    ------
+    BadInput
+        b is out of range.
     """
     square = impact_parameter(b, flying) ** 2
     angle = si(azimuth, "1", "azimuth", least=0.0)
@@ -147,10 +165,14 @@ def trajectory(
 def replay(flying: Flight, stratum: int, number: int, width: float, seed: int = 0) -> Trajectory:
     """A flight of a cross-section or a map once more, to the bit, with all that happened up to a touch.
 
-    Args:
-        flying: the set-up; what becomes of a hit in its contact is not followed here.
-        stratum, number: its address, as in flights.csv.
-        width: of an annulus [m], `CrossSection.profile[0, 1]`.
+    Parameters
+    ----------
+    flying : Flight
+        the set-up; what becomes of a hit in its contact is not followed here.
+    stratum, number : int
+        its address, as in flights.csv.
+    width : float
+        of an annulus [m], `CrossSection.profile[0, 1]`.
     """
     return _recorded(flying, (stratum, number), ((stratum * width) ** 2, ((stratum + 1) * width) ** 2), seed, -1.0)
 

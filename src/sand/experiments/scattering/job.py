@@ -32,14 +32,21 @@ Watch = Callable[[str, float], None]
 class Job:
     """One case in its folder.
 
-    Args:
-        case, flights: from `read_scattering`.
-        content: of the case file, as read.
-        folder: there already.
-        resume: go on with the flights that lie there.
+    Parameters
+    ----------
+    case, flights
+        from `read_scattering`.
+    content : dict[str, Any]
+        of the case file, as read.
+    folder : Path
+        there already.
+    resume : bool, optional
+        go on with the flights that lie there.
 
-    Raises:
-        BadInput: the folder belongs to another case.
+    Raises
+    ------
+    BadInput
+        the folder belongs to another case.
     """
 
     case: ScatterCase

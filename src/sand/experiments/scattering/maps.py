@@ -24,11 +24,16 @@ END, STRATUM = COLUMNS.index("end"), COLUMNS.index("stratum")
 class ProbabilityMap:
     """P(hit | b, v); SI.
 
-    Attributes:
-        speeds: (V,) [m/s]; edges: of the cells in b, (V, B + 1) [m].
-        hits, flights: (V, B).
-        capture: b_max of each speed (V,) [m] (Eqs. 12, 13).
-        geometric: r1 + r2 [m].
+    Attributes
+    ----------
+    speeds : ndarray
+        (V,) [m/s]; edges: of the cells in b, (V, B + 1) [m].
+    hits, flights : ndarray
+        (V, B).
+    capture : ndarray
+        b_max of each speed (V,) [m] (Eqs. 12, 13).
+    geometric : float
+        r1 + r2 [m].
     """
 
     speeds: np.ndarray
@@ -81,15 +86,23 @@ def probability_map(
 ) -> ProbabilityMap:
     """Fly `per_cell` pairs in each cell of speed and impact parameter; b² is spread evenly in a cell.
 
-    Args:
-        flights: one set-up for each speed.
-        cells: how many in b for each speed, up to 1.2 times the widest b that a central potential captures there.
-        seed: of the first; the others have `seed_of` it and their number.
-        known, keep: as for `scattering.flown`, with the number of the set-up.
-        watch: called with flights done and all flights.
+    Parameters
+    ----------
+    flights : Sequence[Flight]
+        one set-up for each speed.
+    cells : int, optional
+        how many in b for each speed, up to 1.2 times the widest b that a central potential captures there.
+    seed : int, optional
+        of the first; the others have `seed_of` it and their number.
+    known, keep : optional
+        as for `scattering.flown`, with the number of the set-up.
+    watch : Callable[[int, int], None] or None, optional
+        called with flights done and all flights.
 
-    Raises:
-        BadInput: no set-up, or a number of cells or flights below 1.
+    Raises
+    ------
+    BadInput
+        no set-up, or a number of cells or flights below 1.
     """
     if not flights or cells < 1 or per_cell < 1:
         raise BadInput(f"a map needs speeds, and cells = {cells} and per_cell = {per_cell} of at least 1")

@@ -84,26 +84,42 @@ def flight(
 ) -> Flight:
     """A scattering experiment from what a user says.
 
-    Args:
-        radius: of the grains [m] > 0; material: their `Material` or its name; moment: as `Grains` takes one.
-        temperature: T [K] ≥ 0, of thermal speeds and spins.
-        speed: v∞ of the projectile > 0 [m/s], or in v_th = √(k_B T/m) of the projectile with `speed_unit="thermal"`.
-        spin: mean rotational energy per body: "none", "kT/2" (the paper's U_rot), "equipartition" (3/2 k_B T), all
-            by chance; or a vector [rad/s] for both; or two of them, of projectile and target.
-        start: distance before the target: "auto", the larger of 10 b_max and 5 (r1 + r2); a length [m]; or
-            "20 b_max", "1 R_m" (Eq. 2; needs a temperature).
-        start_shape: of all starts together, "plane" across the flight, or "sphere" about the target.
-        target, projectile: grains, or aggregates, instead of radius, material and moment; the target is like the
-            projectile by default. Their own velocities and spins do not count.
-        orientation: "random"; "aligned", single grains' moments along the line of centres at the start; "given".
-        target_velocity: three components [m/s], or "thermal", √(k_B T/m) for each; None: at rest.
-        field: external flux density, three components [T]; None: none.
-        escape: distance [m] > r1 + r2 at which a body on its way out is gone; "auto": that of its start.
-        outcome: "hit", surfaces touch; "stick": those that hold, each followed through its real contact.
-        tolerance: error of a step over the scales, 1e-13 … 1e-3.
+    Parameters
+    ----------
+    radius : optional
+        of the grains [m] > 0; material: their `Material` or its name; moment: as `Grains` takes one.
+    temperature : optional
+        T [K] ≥ 0, of thermal speeds and spins.
+    speed : optional
+        v∞ of the projectile > 0 [m/s], or in v_th = √(k_B T/m) of the projectile with `speed_unit="thermal"`.
+    spin : optional
+        mean rotational energy per body: "none", "kT/2" (the paper's U_rot), "equipartition" (3/2 k_B T), all
+        by chance; or a vector [rad/s] for both; or two of them, of projectile and target.
+    start : optional
+        distance before the target: "auto", the larger of 10 b_max and 5 (r1 + r2); a length [m]; or
+        "20 b_max", "1 R_m" (Eq. 2; needs a temperature).
+    start_shape : str, optional
+        of all starts together, "plane" across the flight, or "sphere" about the target.
+    target, projectile : Grains or None, optional
+        grains, or aggregates, instead of radius, material and moment; the target is like the
+        projectile by default. Their own velocities and spins do not count.
+    orientation : str, optional
+        "random"; "aligned", single grains' moments along the line of centres at the start; "given".
+    target_velocity : optional
+        three components [m/s], or "thermal", √(k_B T/m) for each; None: at rest.
+    field : optional
+        external flux density, three components [T]; None: none.
+    escape : optional
+        distance [m] > r1 + r2 at which a body on its way out is gone; "auto": that of its start.
+    outcome : str, optional
+        "hit", surfaces touch; "stick": those that hold, each followed through its real contact.
+    tolerance : optional
+        error of a step over the scales, 1e-13 … 1e-3.
 
-    Raises:
-        BadInput: one line for each mistake.
+    Raises
+    ------
+    BadInput
+        one line for each mistake.
     """
     return _checked(dict(locals()))
 

@@ -61,9 +61,12 @@ def wilson(hits: np.ndarray, tries: np.ndarray, z: float) -> tuple[np.ndarray, n
 class Strata:
     """What is known of each annulus.
 
-    Args:
-        width: of an annulus [m].
-        count: how many annuli.
+    Parameters
+    ----------
+    width : float
+        of an annulus [m].
+    count : int
+        how many annuli.
     """
 
     def __init__(self, width: float, count: int):

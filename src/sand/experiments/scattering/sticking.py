@@ -33,8 +33,11 @@ def sticks(flying: Flight, state: np.ndarray) -> bool:
     The grains go on with all their contacts and dipoles (`Contact`, `Dipoles` without a cut-off, `Field`), deformable,
     until they have stayed in contact, or have come apart and fly away.
 
-    Args:
-        state: of the pair at the touch, (18,) or (20,), as experiments/scattering/two_spheres.py and experiments/scattering/two_aggregates.py lay it out.
+    Parameters
+    ----------
+    state : ndarray
+        of the pair at the touch, (18,) or (20,), as experiments/scattering/two_spheres.py and
+        experiments/scattering/two_aggregates.py lay it out.
     """
     grains, first = grains_at(flying, state)
     forces: list[Any] = [Contact(), Dipoles(cutoff=None)]

@@ -18,11 +18,15 @@ from .formulas import UniformElectric, uniform_electric
 class ElectricField:
     """An electric field that is the same everywhere and always: force q E, energy −q E·x.
 
-    Args:
-        strength: E, three components [V/m], or one size along +z: "1 kV/m".
+    Parameters
+    ----------
+    strength
+        E, three components [V/m], or one size along +z: "1 kV/m".
 
-    Raises:
-        BadInput: not one or three finite numbers in V/m; one line each.
+    Raises
+    ------
+    BadInput
+        not one or three finite numbers in V/m; one line each.
     """
 
     strength: Any

@@ -18,11 +18,15 @@ from .formulas import UniformGravity, uniform_gravity
 class Gravity:
     """An acceleration that is the same everywhere and always: force m g, energy −m g·x.
 
-    Args:
-        acceleration: g, three components [m/s^2], or one size ≥ 0, then along −z: "9.81 m/s^2".
+    Parameters
+    ----------
+    acceleration
+        g, three components [m/s^2], or one size ≥ 0, then along −z: "9.81 m/s^2".
 
-    Raises:
-        BadInput: not one or three finite numbers in m/s^2, or one below 0; one line each.
+    Raises
+    ------
+    BadInput
+        not one or three finite numbers in m/s^2, or one below 0; one line each.
     """
 
     acceleration: Any

@@ -86,20 +86,32 @@ class Field:
         rotating      B0 + B1 cos(2πft + φ) + n×B1 sin(2πft + φ),  n along `axis`, B1 across it
         ramp          B0 until `start`, then linear in time, `final` from `end` on
 
-    Args:
-        flux_density: B0, three components [T], or one size along +z as in the paper: "1 mT". 0 for none.
-        shape: "constant", "oscillating", "rotating" (right-handed about `axis`) or "ramp".
-        amplitude: B1 of "oscillating" and "rotating", three components [T], or one size along +z. When rotating it
-            is where the turning part points at the phase 0, and must be perpendicular to the axis.
-        frequency: f of "oscillating" and "rotating", swings or turns per second [Hz] > 0.
-        phase: φ of "oscillating" and "rotating" [rad]; 0 unless given. Text may say "90 deg".
-        axis: direction of the axis of "rotating", three numbers of any size.
-        final: flux density after a "ramp", three components [T], or one size along +z.
-        start: when a "ramp" begins [s]; 0 unless given.
-        end: when a "ramp" ends [s], after its start.
+    Parameters
+    ----------
+    flux_density
+        B0, three components [T], or one size along +z as in the paper: "1 mT". 0 for none.
+    shape : str, optional
+        "constant", "oscillating", "rotating" (right-handed about `axis`) or "ramp".
+    amplitude : optional
+        B1 of "oscillating" and "rotating", three components [T], or one size along +z. When rotating it
+        is where the turning part points at the phase 0, and must be perpendicular to the axis.
+    frequency : optional
+        f of "oscillating" and "rotating", swings or turns per second [Hz] > 0.
+    phase : optional
+        φ of "oscillating" and "rotating" [rad]; 0 unless given. Text may say "90 deg".
+    axis : optional
+        direction of the axis of "rotating", three numbers of any size.
+    final : optional
+        flux density after a "ramp", three components [T], or one size along +z.
+    start : optional
+        when a "ramp" begins [s]; 0 unless given.
+    end : optional
+        when a "ramp" ends [s], after its start.
 
-    Raises:
-        BadInput: numbers that are wrong or out of range, keys that the shape lacks or does not use; one line each.
+    Raises
+    ------
+    BadInput
+        numbers that are wrong or out of range, keys that the shape lacks or does not use; one line each.
     """
 
     flux_density: Any

@@ -74,10 +74,15 @@ def thermal_spread(lost, temperature_energy, mass):
 def relaxed(v, rest, lost, spread, noise):
     """v' = u + (v − u) e^(−t/τ) + spread ξ: the Ornstein–Uhlenbeck process after any time t, exact in law.
 
-    Args:
-        v, rest: velocity, and that of the gas u [m/s]; or spin, and (0, 0, 0) [rad/s].
-        lost: 1 − e^(−t/τ), from `forgotten`.
-        spread: from `thermal_spread`.
-        noise: ξ, three standard normal deviates.
+    Parameters
+    ----------
+    v, rest
+        velocity, and that of the gas u [m/s]; or spin, and (0, 0, 0) [rad/s].
+    lost
+        1 − e^(−t/τ), from `forgotten`.
+    spread
+        from `thermal_spread`.
+    noise
+        ξ, three standard normal deviates.
     """
     return axpy(lost, sub(rest, v), axpy(spread, noise, v))

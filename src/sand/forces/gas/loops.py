@@ -60,13 +60,20 @@ def kick_one(grains, i, seed, number, elapsed, gas):
 def gas_kick(grains, seed, number, elapsed, gas):
     """Let the gas act on velocity and spin of every grain for `elapsed` seconds.
 
-    Args:
-        seed: of the run, 0 ≤ seed < 2⁶³.
-        number: of this kick; a number used twice gives the same deviates twice.
-        elapsed: [s] ≥ 0.
-        gas: GasRules.
+    Parameters
+    ----------
+    seed
+        of the run, 0 ≤ seed < 2⁶³.
+    number
+        of this kick; a number used twice gives the same deviates twice.
+    elapsed
+        [s] ≥ 0.
+    gas
+        GasRules.
 
-    Returns:
+    Returns
+    -------
+    result
         Kinetic energy [J] that the grains gave to the gas, laboratory frame; negative if they gained.
 
     Deviates belong to the id of a grain, not to its place, and grains do not see each other: the same bits come
@@ -82,9 +89,12 @@ def gas_kick(grains, seed, number, elapsed, gas):
 def shortest_stopping_time(grains, gas):
     """The shortest of all m/f_t and I/f_r [s]; infinite without gas.  Not compiled.
 
-    Args:
-        grains: grains.GrainArrays.
-        gas: GasRules.
+    Parameters
+    ----------
+    grains
+        grains.GrainArrays.
+    gas
+        GasRules.
     """
     numbers = (gas.density, gas.mean_speed, gas.accommodation)
     fastest = max(

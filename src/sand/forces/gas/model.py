@@ -34,20 +34,31 @@ class Gas:
     f_r = (2π/3) α ρ_g v̄ r⁴. What the grains give to the gas is booked as `lost_gas`, negative where it heats them.
     The random kicks follow from the simulation's seed.
 
-    Args:
-        temperature: T [K] > 0 of the gas and of the grains' surfaces.
-        density: ρ_g [kg/m^3] > 0; this or the pressure.
-        pressure: p [Pa] > 0; this or the density.
-        molecule_mass: mean mass m_g of a molecule [kg] > 0, or "28.97 u"; 2.34 u, H2 with He, by default.
-        accommodation: α, 0 … 1, the part of the molecules that leaves diffusely, at the temperature T; the others
-            are reflected as by a mirror.
-        brownian: True: random kicks that bring the grains to the temperature T; False: drag alone.
-        wind: u, three components of the gas's own velocity [m/s]; at rest by default.
-        cross_section: of two molecules [m^2] > 0, about "2e-19 m^2" for H2; if given, the mean free path is compared
-            with the radii.
+    Parameters
+    ----------
+    temperature
+        T [K] > 0 of the gas and of the grains' surfaces.
+    density : optional
+        ρ_g [kg/m^3] > 0; this or the pressure.
+    pressure : optional
+        p [Pa] > 0; this or the density.
+    molecule_mass : optional
+        mean mass m_g of a molecule [kg] > 0, or "28.97 u"; 2.34 u, H2 with He, by default.
+    accommodation : optional
+        α, 0 … 1, the part of the molecules that leaves diffusely, at the temperature T; the others
+        are reflected as by a mirror.
+    brownian : bool, optional
+        True: random kicks that bring the grains to the temperature T; False: drag alone.
+    wind : optional
+        u, three components of the gas's own velocity [m/s]; at rest by default.
+    cross_section : optional
+        of two molecules [m^2] > 0, about "2e-19 m^2" for H2; if given, the mean free path is compared
+        with the radii.
 
-    Raises:
-        BadInput: numbers out of range, and density and pressure both or neither, one line each.
+    Raises
+    ------
+    BadInput
+        numbers out of range, and density and pressure both or neither, one line each.
     """
 
     temperature: Any

@@ -23,9 +23,12 @@ def cut_curvature(square, cutoff):
 def bare_rates(apart, moment1, moment2, moving, turning1, turning2, k):
     """Force, fields and energy of `pair_load`, and the rates of the first three.
 
-    Args:
-        moving: ṙ = v1 − v2 [m/s].
-        turning1, turning2: μ̇ of the moments [A m²/s].
+    Parameters
+    ----------
+    moving
+        ṙ = v1 − v2 [m/s].
+    turning1, turning2
+        μ̇ of the moments [A m²/s].
     """
     inverse2 = 1.0 / dot(apart, apart)
     inverse3 = k * inverse2 * math.sqrt(inverse2)

@@ -27,15 +27,20 @@ CAPTURE = 1.5
 class Dipoles(WithCutoff):
     """Forces and torques between magnetic moments.
 
-    Args:
-        cutoff: "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
-            [m]. "auto" is None in an open box. In a periodic one it is 1.5 b_max(v_th), but at least two diameters of
-            the largest grain, where that is less than (L/2)/1.35, and (L/2)/1.35 otherwise.
-        cut: "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp", the literal SAND,
-            where the energy jumps each time a pair crosses the radius.
+    Parameters
+    ----------
+    cutoff
+        "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
+        [m]. "auto" is None in an open box. In a periodic one it is 1.5 b_max(v_th), but at least two diameters of
+        the largest grain, where that is less than (L/2)/1.35, and (L/2)/1.35 otherwise.
+    cut
+        "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp", the literal SAND,
+        where the energy jumps each time a pair crosses the radius.
 
-    Raises:
-        BadInput: a cut-off that is neither; later, one beyond half the box.
+    Raises
+    ------
+    BadInput
+        a cut-off that is neither; later, one beyond half the box.
     """
 
     name: ClassVar[str] = "dipoles"

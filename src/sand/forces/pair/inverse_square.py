@@ -23,14 +23,19 @@ class Charges(WithCutoff):
 
     Charges sit at the centres; what they induce in their neighbours is left out.
 
-    Args:
-        cutoff: "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
-            [m]. "auto" is None in an open box and (L/2)/1.35 in a periodic one: a cut Coulomb force is a model of
-            screening, not of an infinite plasma.
-        cut: "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp".
+    Parameters
+    ----------
+    cutoff
+        "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
+        [m]. "auto" is None in an open box and (L/2)/1.35 in a periodic one: a cut Coulomb force is a model of
+        screening, not of an infinite plasma.
+    cut
+        "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp".
 
-    Raises:
-        BadInput: a cut-off that is neither; later, one beyond half the box.
+    Raises
+    ------
+    BadInput
+        a cut-off that is neither; later, one beyond half the box.
     """
 
     name: ClassVar[str] = "charges"
@@ -67,13 +72,18 @@ class Charges(WithCutoff):
 class Attraction(Charges):
     """Newtonian attraction between the grains, U = −G m1 m2/r; rarely matters below kilometres.
 
-    Args:
-        cutoff: "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
-            [m]. "auto" is None in an open box and (L/2)/1.35 in a periodic one.
-        cut: "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp".
+    Parameters
+    ----------
+    cutoff
+        "auto", None (no cut: all pairs in an open box, nearest images in a periodic one), or a length
+        [m]. "auto" is None in an open box and (L/2)/1.35 in a periodic one.
+    cut
+        "smooth", over the outer fifth of the radius, so that it costs no energy; or "sharp".
 
-    Raises:
-        BadInput: a cut-off that is neither; later, one beyond half the box.
+    Raises
+    ------
+    BadInput
+        a cut-off that is neither; later, one beyond half the box.
     """
 
     name: ClassVar[str] = "attraction"

@@ -24,10 +24,14 @@ DECADES = 100.0
 class Key:
     """What colours mean.
 
-    Attributes:
-        title: what is shown, with its unit.
-        swatches: (text, colour (3,)) one by one; empty if there is a bar.
-        map: colours of the bar, from `low` to `high` in units of the title; `log`: by logarithm.
+    Attributes
+    ----------
+    title : str
+        what is shown, with its unit.
+    swatches : tuple[tuple[str, ndarray], ...]
+        (text, colour (3,)) one by one; empty if there is a bar.
+    map : Colormap or None
+        colours of the bar, from `low` to `high` in units of the title; `log`: by logarithm.
     """
 
     title: str
@@ -49,10 +53,14 @@ class Key:
 def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) -> tuple[np.ndarray, Key]:
     """Colours (K, 3) of numbers, and their key.
 
-    Args:
-        values: (K,) SI.
-        frame: that they are from, for the names of materials.
-        label: cluster of each grain that is shown, for the quantity `cluster`.
+    Parameters
+    ----------
+    values : ndarray
+        (K,) SI.
+    frame
+        that they are from, for the names of materials.
+    label : ndarray
+        cluster of each grain that is shown, for the quantity `cluster`.
     """
     if what.name == "cluster":  # by rank, not by name as on the page: one picture has no history
         return cluster_colours(label), Key(what.name, _cluster_swatches(label))

@@ -23,11 +23,16 @@ NOTHING = -1
 class Solids:
     """Balls, then rods: cones cut flat at both ends, cylinders among them.  N balls, M rods, all in samples.
 
-    Attributes:
-        centre, radius: (N, 3), (N,) of balls.
-        start, end, girth: (M, 3), (M, 3), (M, 2) of rods: middles of the two ends, and their radii.
-        colour: (N + M, 3), 0 to 1, balls first.
-        lit: (N + M,) how much light and shade change the colour, 0 to 1.
+    Attributes
+    ----------
+    centre, radius : ndarray
+        (N, 3), (N,) of balls.
+    start, end, girth : ndarray
+        (M, 3), (M, 3), (M, 2) of rods: middles of the two ends, and their radii.
+    colour : ndarray
+        (N + M, 3), 0 to 1, balls first.
+    lit : ndarray
+        (N + M,) how much light and shade change the colour, 0 to 1.
     """
 
     centre: np.ndarray
@@ -49,10 +54,14 @@ class Solids:
 class Canvas:
     """The nearest shape in each sample of a picture, and how deep it lies there.
 
-    Args:
-        shape: rows and columns; the first row is the lowest.
-        solids: what there is to see.
-        w: one over the distance of the eye; 0: parallel rays.
+    Parameters
+    ----------
+    shape : tuple[int, int]
+        rows and columns; the first row is the lowest.
+    solids : Solids
+        what there is to see.
+    w : float, optional
+        one over the distance of the eye; 0: parallel rays.
     """
 
     def __init__(self, shape: tuple[int, int], solids: Solids, w: float = 0.0):

@@ -23,8 +23,10 @@ LARGEST_SHOWN = 3
 def camera(towards: np.ndarray | None = None) -> np.ndarray:
     """(3, 3): rows are the directions right, up and towards the eye in the laboratory frame.
 
-    Args:
-        towards: (3,) direction to the eye, of any length but 0; from above, y is up.
+    Parameters
+    ----------
+    towards : ndarray or None, optional
+        (3,) direction to the eye, of any length but 0; from above, y is up.
     """
     a, e = np.radians(AZIMUTH), np.radians(ELEVATION)
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -38,14 +40,22 @@ def camera(towards: np.ndarray | None = None) -> np.ndarray:
 class Scene:
     """What there is to see, laboratory frame.
 
-    Attributes:
-        position: (N, 3) [m], clusters whole and with their middle in the box.
-        radius: (N,) [m].
-        label: (N,) cluster of each grain.
-        colour: (N, 3).
-        arrow: (N, 3) direction of the moment times its share of the largest one's size.
-        box: with lengths [m].
-        number: (N,) of each grain in what the scene was made from.
+    Attributes
+    ----------
+    position : ndarray
+        (N, 3) [m], clusters whole and with their middle in the box.
+    radius : ndarray
+        (N,) [m].
+    label : ndarray
+        (N,) cluster of each grain.
+    colour : ndarray
+        (N, 3).
+    arrow : ndarray
+        (N, 3) direction of the moment times its share of the largest one's size.
+    box : Box
+        with lengths [m].
+    number : ndarray
+        (N,) of each grain in what the scene was made from.
     """
 
     position: np.ndarray
@@ -99,9 +109,12 @@ class Scene:
 def scene_of(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> Scene:
     """The scene of grains with contacts `pairs` (C, 2); grains whose place is not a number are left out.
 
-    Args:
-        grains: anything with position, radius and moment.
-        whole: clusters are not cut by the faces of the box; otherwise every grain lies inside it.
+    Parameters
+    ----------
+    grains
+        anything with position, radius and moment.
+    whole : bool, optional
+        clusters are not cut by the faces of the box; otherwise every grain lies inside it.
     """
     label = cluster_labels(len(grains), pairs)
     place = np.where(np.isfinite(grains.position), grains.position, np.nan)
@@ -231,7 +244,9 @@ def draw_scale_bar(axes: Axes, share: float = 0.25, ink: str = INK, margin: floa
 def side_by_side(scene: Scene, count: int) -> tuple[Balls, np.ndarray, list[int]]:
     """The `count` largest clusters next to each other, each turned so that its long axis is across.
 
-    Returns:
+    Returns
+    -------
+    tuple[Balls, ndarray, list[int]]
         What to draw; (K, 2) the middle of the lower edge of each cluster [m]; their numbers of grains.
     """
     parts, feet, sizes, edge = [], [], [], 0.0

@@ -29,12 +29,18 @@ MOST_ROWS = 400_000
 class Lamps:
     """How bright it is: the sum is the brightness of a surface that faces the key lamp.
 
-    Attributes:
-        sky: from everywhere, more from above; clefts and hollows see less of it.
-        key, fill: of the two lamps.
-        glint: how bright the key lamp's reflection is.
-        haze: share of the background in what is farthest.
-        background: (3,) colour that haze fades to.
+    Attributes
+    ----------
+    sky : float
+        from everywhere, more from above; clefts and hollows see less of it.
+    key, fill : float
+        of the two lamps.
+    glint : float
+        how bright the key lamp's reflection is.
+    haze : float
+        share of the background in what is farthest.
+    background : tuple[float, float, float]
+        (3,) colour that haze fades to.
     """
 
     sky: float = 0.60
@@ -48,9 +54,12 @@ class Lamps:
 def shaded(canvas: Canvas, finer: int, radius: float, lamps: Lamps) -> np.ndarray:
     """The picture (rows/finer, columns/finer, 4): red, green, blue, opacity from 0 to 1.
 
-    Args:
-        finer: samples per pixel and direction, averaged.
-        radius: of a typical grain [samples], for the size of clefts.
+    Parameters
+    ----------
+    finer : int
+        samples per pixel and direction, averaged.
+    radius : float
+        of a typical grain [samples], for the size of clefts.
     """
     height, width = canvas.shape[0] // finer, canvas.shape[1] // finer
     dim, lamp = _shade(canvas, finer, radius)

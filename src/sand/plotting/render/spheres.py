@@ -23,11 +23,16 @@ SHAFT, HEAD_WIDTH, HEAD_LENGTH = 0.11, 0.34, 0.75
 class Balls:
     """Spheres to be drawn, all lengths [m].
 
-    Attributes:
-        centre: (N, 3) in screen coordinates.
-        radius: (N,).
-        colour: (N, 3), 0 to 1.
-        arrow: (N, 3) half an arrow, in screen coordinates and in radii: at most 1 long, 0 for none.
+    Attributes
+    ----------
+    centre : ndarray
+        (N, 3) in screen coordinates.
+    radius : ndarray
+        (N,).
+    colour : ndarray
+        (N, 3), 0 to 1.
+    arrow : ndarray
+        (N, 3) half an arrow, in screen coordinates and in radii: at most 1 long, 0 for none.
     """
 
     centre: np.ndarray
@@ -47,11 +52,16 @@ class Balls:
 class Rods:
     """Cones cut flat at both ends, cylinders among them, all lengths [m], screen coordinates.
 
-    Attributes:
-        start, end: (M, 3) middles of the ends.
-        girth: (M, 2) radii of the ends.
-        colour: (M, 3), 0 to 1.
-        lit: (M,) 1 for light and shade, 0 for a flat colour.
+    Attributes
+    ----------
+    start, end : ndarray
+        (M, 3) middles of the ends.
+    girth : ndarray
+        (M, 2) radii of the ends.
+    colour : ndarray
+        (M, 3), 0 to 1.
+    lit : ndarray
+        (M,) 1 for light and shade, 0 for a flat colour.
     """
 
     start: np.ndarray
@@ -81,12 +91,18 @@ def draw(
 ) -> np.ndarray:
     """The picture, (height, width, 4) red, green, blue, opacity from 0 to 1; its first row is the lowest.
 
-    Args:
-        window: left, right, bottom, top of what is seen [m].
-        rods: to be drawn besides.
-        arrows: their colour; that of text by default.
-        eye: its distance from the plane z = 0 [m]; parallel rays by default.
-        finer: samples per pixel and direction.
+    Parameters
+    ----------
+    window : tuple[float, float, float, float]
+        left, right, bottom, top of what is seen [m].
+    rods : Rods or None, optional
+        to be drawn besides.
+    arrows : tuple[float, float, float] or None, optional
+        their colour; that of text by default.
+    eye : float or None, optional
+        its distance from the plane z = 0 [m]; parallel rays by default.
+    finer : int, optional
+        samples per pixel and direction.
     """
     left, right, bottom, top = window
     scale = width * finer / (right - left)  # samples per metre

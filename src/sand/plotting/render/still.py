@@ -83,21 +83,35 @@ def still_picture(
 ) -> Still:
     """A picture of a frame, without a browser or a graphics card; the same numbers give the same bits.
 
-    Args:
-        frame: of a trajectory, or anything that has its attributes.
-        colour: of grains: a name in `analysis.quantities.GRAINS`.
-        bonds: contacts by "load" or "mode", see `analysis.quantities.CONTACTS`; None: not marked.
-        arrows: moments are shown.
-        view: "iso", "front", "top", "side" or the direction to the eye, three numbers.
-        size: width and height [pixels].
-        dark: on a dark ground; transparent: on none.
-        whole: clusters are not cut by the faces of a periodic box.
-        cluster: one cluster by itself, counted from the largest, 1.
-        perspective: what is nearer is larger; otherwise lengths can be measured anywhere.
-        field: flux density of outside (3,) [T], shown by its direction.
+    Parameters
+    ----------
+    frame
+        of a trajectory, or anything that has its attributes.
+    colour : str, optional
+        of grains: a name in `analysis.quantities.GRAINS`.
+    bonds : str or None, optional
+        contacts by "load" or "mode", see `analysis.quantities.CONTACTS`; None: not marked.
+    arrows : bool, optional
+        moments are shown.
+    view : str or Sequence[float], optional
+        "iso", "front", "top", "side" or the direction to the eye, three numbers.
+    size : tuple[int, int], optional
+        width and height [pixels].
+    dark : bool, optional
+        on a dark ground; transparent: on none.
+    whole : bool, optional
+        clusters are not cut by the faces of a periodic box.
+    cluster : int or None, optional
+        one cluster by itself, counted from the largest, 1.
+    perspective : bool, optional
+        what is nearer is larger; otherwise lengths can be measured anywhere.
+    field : Sequence[float] or None, optional
+        flux density of outside (3,) [T], shown by its direction.
 
-    Raises:
-        BadInput: one line for each mistake.
+    Raises
+    ------
+    BadInput
+        one line for each mistake.
     """
     refuse_other(frame, "radius", "pair", "box")
     towards = check_picture(colour, bonds, view, size)

@@ -79,10 +79,14 @@ def stays(crowd, position, stuff, b, x, mate):
 def grow_ballistic(crowd, position, stuff, first, last, extent, seed, tries):
     """Grains first … last − 1 fly in from all sides, one by one, and stay where they touch first.
 
-    Args:
-        crowd: those before `first`, within `extent` [m] of the origin.
+    Parameters
+    ----------
+    crowd
+        those before `first`, within `extent` [m] of the origin.
 
-    Returns:
+    Returns
+    -------
+    result
         The next grain to fly (less than `last` if one met nobody in `tries` tries, or touched two), and the extent.
     """
     for b in range(first, last):
@@ -130,11 +134,16 @@ def walk_in(crowd, position, stuff, first, last, bound, inner, size, address):
     A walk on spheres: each step goes as far as nothing can be touched, in any direction.  `bound` keeps for each grain
     how far it is from touching at least, so that few have to be looked at in a step.
 
-    Args:
-        inner: the crowd lies within this radius [m].
-        size: where the centre of the body is farther out nothing can be touched [m].
+    Parameters
+    ----------
+    inner
+        the crowd lies within this radius [m].
+    size
+        where the centre of the body is farther out nothing can be touched [m].
 
-    Returns:
+    Returns
+    -------
+    result
         The centre, the two grains that are about to touch (EMPTY if the walk did not end), and the gap [m].
     """
     seed, number, grain = address

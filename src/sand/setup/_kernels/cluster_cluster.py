@@ -114,11 +114,16 @@ def strained(crowd, work, stuff, middle, last, shift, one, other):
 def flown(table, position, work, stuff, ends, middles, address, wanted):
     """One flight of the second cluster into the first, along z; both lie in `work`.
 
-    Args:
-        ends: the clusters are grains ends[0] … ends[1] − 1 and ends[1] … ends[2] − 1.
-        wanted: distance of centres that is wished for [m], not met by flights further out; infinite: any.
+    Parameters
+    ----------
+    ends
+        the clusters are grains ends[0] … ends[1] − 1 and ends[1] … ends[2] − 1.
+    wanted
+        distance of centres that is wished for [m], not met by flights further out; infinite: any.
 
-    Returns:
+    Returns
+    -------
+    result
         Whether they met (in one contact), and the shift of the second cluster.
     """
     seed, number, grain = address
@@ -160,12 +165,18 @@ def wanted_distance(goal, squares, masses):
 def join_ballistic(table, position, work, stuff, joins, goals, seed, tries, choices):
     """Pairs of clusters fly into each other, one pair after the other; each becomes one cluster.
 
-    Args:
-        joins: (3, K) the clusters of join k are grains joins[0] … joins[1] − 1 and joins[1] … joins[2] − 1.
-        goals: (K,) radius of gyration [m] wanted of each new cluster; infinite: whatever chance gives.
-        choices: meetings to choose from where one is wanted.
+    Parameters
+    ----------
+    joins
+        (3, K) the clusters of join k are grains joins[0] … joins[1] − 1 and joins[1] … joins[2] − 1.
+    goals
+        (K,) radius of gyration [m] wanted of each new cluster; infinite: whatever chance gives.
+    choices
+        meetings to choose from where one is wanted.
 
-    Returns:
+    Returns
+    -------
+    result
         Number of joins done; less than K where two did not meet in `tries` tries.
     """
     for k in range(goals.size):

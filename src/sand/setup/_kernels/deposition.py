@@ -103,7 +103,9 @@ def deposit(crowd, position, stuff, side, count, seed, tries):
 
     One that has landed on another rolls on it to the nearest place where it touches a second.
 
-    Returns:
+    Returns
+    -------
+    result
         The next grain to fall: less than all if one touched more than it may in each of `tries` tries.
     """
     clear(crowd)

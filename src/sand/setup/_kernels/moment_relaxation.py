@@ -23,7 +23,9 @@ def relax(position, moment, k, tolerance, most):
 
     Each turn lowers the energy, −μ·B of this moment, and no other part of it changes.
 
-    Returns:
+    Returns
+    -------
+    result
         Number of sweeps, and the largest turn of the last one [rad].
     """
     worst = math.inf
