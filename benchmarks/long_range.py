@@ -58,10 +58,10 @@ def seconds_per_step(sim: sand.Simulation, budget: float = 4.0) -> float:
 
 
 def _timed(sim: sand.Simulation, steps: int) -> float:
-    first = sim.world.steps
+    first = sim.state.steps
     start = time.thread_time()
     sim._engine.advance(np.inf, steps)
-    return (time.thread_time() - start) / (sim.world.steps - first)
+    return (time.thread_time() - start) / (sim.state.steps - first)
 
 
 def savings(counts: tuple[int, ...] = (100, 1000, 10_000)) -> list[dict[str, Any]]:

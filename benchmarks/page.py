@@ -13,7 +13,7 @@ from tests.browser.chromium import FLAGS, find
 from tests.browser.runs import many
 
 from sand.io.page_bundle import read_bundle
-from sand.viewer.dataset import Story, story_of
+from sand.viewer.dataset import RunDataset, run_dataset
 from sand.viewer.html import write_page
 from sand.viewer.server import Server
 
@@ -64,25 +64,25 @@ def all_rows(quick: bool) -> list[dict[str, Any]]:
         flags = [*FLAGS, "--js-flags=--expose-gc"]
         browser = playwright.chromium.launch(executable_path=find(), headless=True, args=flags)
         frames = 20 if quick else 200
-        small = story_of(many(top / "1e4", 5, 2000, frames))
+        small = run_dataset(many(top / "1e4", 5, 2000, frames))
         rows = _served(browser, small, frames, memory=True)
         size = write_page(small, top / "one.html")
         rows.append(row(f"single file, {frames} frames", size / 1e6, "MB", 0.75 * _bytes(small) / 1e6))
         rows += _file(browser, top / "one.html", _bytes(small), frames)
         if not quick:
-            large = story_of(many(top / "1e5", 10, 10_000, FEWER + 3))
+            large = run_dataset(many(top / "1e5", 10, 10_000, FEWER + 3))
             rows += _served(browser, large, FEWER + 3, memory=False)
         browser.close()
     return rows
 
 
-def _bytes(story: Story) -> int:
+def _bytes(story: RunDataset) -> int:
     """Of all frames in single precision."""
     story.compact = False
     return story.size
 
 
-def _served(browser: Any, story: Story, frames: int, memory: bool) -> list[dict[str, Any]]:
+def _served(browser: Any, story: RunDataset, frames: int, memory: bool) -> list[dict[str, Any]]:
     """Rows of a page that a server hands out."""
     grains = f"{story.grains_count} grains"
     server = Server(story)

@@ -12,15 +12,15 @@ import numpy as np
 import sand
 from sand.compiler.jit import kernel
 from sand.integrate.motion import kick_and_drift_for
-from sand.neighbours.cell_list import remake_far_list
-from sand.state.arrays import far_arrays
+from sand.neighbours.cell_list import rebuild_verlet_list
+from sand.state.arrays import empty_long_range_arrays
 
 from . import decks, machine, worlds
 from .steps import beside
 from .table import row
 from .timing import best, in_turns, thread
 
-MOVED = 8 * (3 * (2 + 2) + 2 + 3 * 2 * 2 + 4 * 2 + 3 * 2)
+BYTES_MOVED = 8 * (3 * (2 + 2) + 2 + 3 * 2 * 2 + 4 * 2 + 3 * 2)
 """Bytes per grain of a kick (v and ω read and written, F and M, m and I read) and a drift (x, ϱ; μ from the body's)."""
 CANDIDATE = 17.0
 """Operations per pair that a list looks at: 3 for r, 9 for the nearest image, 5 for r²."""
@@ -47,11 +47,11 @@ def motion(count: int = 1000) -> dict[str, Any]:
     world = sand.Simulation(
         sand.Grains(grains.position, worlds.RADIUS, worlds.PEER, moment=grains.moment, spin=spin),
         box=sand.Box.periodic(side),
-    ).world
+    ).state
     times = 400_000 // count
     arrays = world.grains.arrays
     seconds = best(lambda: move(arrays, world.box.span, 1e-12, times)) / times / count
-    share = machine.share_of_bandwidth(MOVED, MOVED * count, seconds)
+    share = machine.share_of_bandwidth(BYTES_MOVED, BYTES_MOVED * count, seconds)
     return row(f"motion, {count} grains", seconds, "ns per grain", 2.5, scale=1e9, **share)
 
 
@@ -60,13 +60,13 @@ def list_build(count: int, neighbours: int, quick: bool) -> dict[str, Any]:
     place, side = worlds.points(count)
     reach = (3.0 * neighbours / (4.0 * math.pi)) ** (1 / 3)
     points = sand.Grains(place, 0.2, worlds.PEER)
-    span, far = sand.Box.periodic(side).span, far_arrays(len(place), int(1.3 * neighbours * len(place)))
+    span, far = sand.Box.periodic(side).span, empty_long_range_arrays(len(place), int(1.3 * neighbours * len(place)))
     where = np.ascontiguousarray(place.T)
 
     def ours() -> float:
         def build() -> None:
             far.anchor[...] = where
-            if remake_far_list(far, span, reach) < 0:
+            if rebuild_verlet_list(far, span, reach) < 0:
                 raise RuntimeError("no room for the list")
 
         return thread(build)
@@ -114,7 +114,7 @@ def memory(quick: bool) -> list[dict[str, Any]]:
         sim = sand.Simulation(grains, forces)
         sim.run(steps=20)
         name, most = ("contacts", 1.0) if len(forces) == 1 else ("contacts + dipoles", None)
-        rows.append(row(f"memory, {name}", bytes_of(sim.world) / len(grains), "kB per grain", most, scale=1e-3))
+        rows.append(row(f"memory, {name}", bytes_of(sim.state) / len(grains), "kB per grain", most, scale=1e-3))
     return rows
 
 

@@ -60,7 +60,7 @@ def fly(one: Regime, stepping: sand.Verlet) -> tuple[sand.Simulation, float]:
 def measured(one: Regime) -> dict[str, Any]:
     """One row: cost, drift, and differences from the finer run."""
     ours, seconds = fly(one, sand.Verlet())
-    step = one.time / ours.world.steps / FINER
+    step = one.time / ours.state.steps / FINER
     truth, longer = fly(one, sand.Verlet(step=step, far="every step"))
     # both end with the first step after the time asked for: go back along the last velocities
     there = [s.grains.position - s.grains.velocity * (s.time - one.time) for s in (ours, truth)]
@@ -70,7 +70,7 @@ def measured(one: Regime) -> dict[str, Any]:
     return {
         "regime": one.name,
         "time": one.time,
-        "steps": ours.world.steps,
+        "steps": ours.state.steps,
         "time per hour": 3600.0 * one.time / seconds,
         "drift": ours.ledger.drift,
         "finer: step": step,

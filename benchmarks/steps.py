@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import sand
-from sand.state.state import MOVED
+from sand.state.state import SLIPPED
 
 from . import decks, lammps, machine, worlds
 from .table import row
@@ -27,8 +27,8 @@ FAR = {"every step": {2: 3.0, 20: 5.0, 100: 8.0}, "impulse": {1000: 100.0}}
 
 def touched_bytes(sim: sand.Simulation) -> float:
     """Bytes of the arrays that each step reads or writes, at least: grains, and contacts but for their books."""
-    w, contacts = sim.world, len(sim.contacts["pair"])
-    idle = ("formed", "lost", "damped", "bonded", "start", "turn", *(("bond",) if w.alike else ()))
+    w, contacts = sim.state, len(sim.contacts["pair"])
+    idle = ("formed", "lost", "damped", "bonded", "start", "turn", *(("bond",) if w.uniform_contacts else ()))
     per_contact = sum(a.nbytes / a.shape[-1] for k, a in w.contacts._asdict().items() if k not in idle)
     per_grain = sum(a.nbytes for a in w.grains.arrays) / len(w.grains)
     return contacts * per_contact + len(w.grains) * per_grain
@@ -74,9 +74,9 @@ def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict
     with beside(decks.contact_steps(grains)) as program:
         same_contacts(program, contacts, f"{kind}, {count} grains")
         steps = max(GRAIN_STEPS // count, 20) // (2 if quick else 1)
-        moved, first = sim.world.count[MOVED], sim.world.steps
+        moved, first = sim.state.count[SLIPPED], sim.state.steps
         pair = paired(sim, program, quick, steps)
-    share = (sim.world.count[MOVED] - moved) / max(contacts, 1) / (sim.world.steps - first)
+    share = (sim.state.count[SLIPPED] - moved) / max(contacts, 1) / (sim.state.steps - first)
     size = touched_bytes(sim)
     asked = None if gas or count > 10_000 else ASKED_OF_CONTACTS
     return row(

@@ -19,11 +19,11 @@ from .timing import fitting, in_turns
 def by_the_clock(sim: Any, threads: int, steps: int) -> float:
     """Seconds of a step with so many threads."""
     sand.set_threads(threads)
-    first, start = sim.world.steps, time.perf_counter()
+    first, start = sim.state.steps, time.perf_counter()
     sim._engine.advance(np.inf, steps)
     spent = time.perf_counter() - start
     sand.set_threads(1)
-    return spent / (sim.world.steps - first)
+    return spent / (sim.state.steps - first)
 
 
 def gain(name: str, sim: Any, quick: bool) -> dict[str, Any]:

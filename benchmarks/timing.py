@@ -83,10 +83,10 @@ def replayed(sim: Any, steps: int) -> Callable[[], float]:
 
     A copied world is in no cache: a tenth as many steps go before those that count.
     """
-    start = sim.world.copy()
+    start = sim.state.copy()
 
     def again() -> float:
-        sim._engine.world = start.copy()
+        sim._engine.state = start.copy()
         per_step(sim, steps // 10 + 1)
         return per_step(sim, steps)
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.integrate.kernel_spec import Plan
+from sand.integrate.kernel_spec import KernelSpec
 from sand.simulation import engine
 
 BOX = "0.3 um"
@@ -73,36 +73,36 @@ FIXTURES = {"looked_at": "fields", "in_a_field": "fields"}
 """Fixtures shared by many tests that run a simulation, and its driver."""
 
 
-def _key(plan: Plan) -> Plan:
+def _key(plan: KernelSpec) -> KernelSpec:
     """The plan without `wide`, which chooses longer vectors on few processors only."""
     return plan._replace(wide=False)
 
 
 @functools.cache
-def _plans() -> dict[Plan, str]:
+def _plans() -> dict[KernelSpec, str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return {_key(make()._engine._plan): name for name, make in DRIVERS.items()}
 
 
-def name_of(plan: Plan) -> str | None:
+def name_of(plan: KernelSpec) -> str | None:
     """The specification that a plan belongs to, None if it is no canonical one."""
     return _plans().get(_key(plan))
 
 
-def parts_of(plan: Plan) -> str:
+def parts_of(plan: KernelSpec) -> str:
     """What a driver is made of, in a few words."""
-    forces = [getattr(each, "__qualname__", str(each)) for each in (plan.far.loads, plan.outside)]
+    forces = [getattr(each, "__qualname__", str(each)) for each in (plan.long_range.loads, plan.external)]
     return ", ".join([*(name for name, value in plan._asdict().items() if value is True), *forces])
 
 
 @contextmanager
-def watched(use: Callable[[str | None, Plan], None]) -> Iterator[None]:
+def watched(use: Callable[[str | None, KernelSpec], None]) -> Iterator[None]:
     """Call `use(name, plan)` before a compiled driver takes steps."""
     kept = engine.driver_for, engine.flight_driver_for
 
     def wrapped(driver_for: Callable) -> Callable:
-        def watched_driver_for(plan: Plan) -> Callable:
+        def watched_driver_for(plan: KernelSpec) -> Callable:
             driver = driver_for(plan)
 
             @functools.wraps(driver_for)

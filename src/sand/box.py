@@ -125,11 +125,11 @@ class Box:
 
     def describe(self) -> str:
         """One line for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
-        from .units import spoken
+        from .units import format_quantity
 
         if self.is_open:
             return "open"
-        return "periodic " + " x ".join("open" if v is None else spoken(v, "m") for v in self.lengths)
+        return "periodic " + " x ".join("open" if v is None else format_quantity(v, "m") for v in self.lengths)
 
 
 def as_box(value: Any) -> Box:

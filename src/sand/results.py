@@ -36,7 +36,7 @@ class Columns(dict[str, np.ndarray]):
 
 
 @checked
-class Opened:
+class Run:
     """What `sand.open(DIR)` gives; nothing is read before it is asked for; only `export` and `view` write.
 
     A run that is still going can be looked at: open it again to see what has come since.
@@ -200,5 +200,5 @@ class Opened:
         return f"<run in {self.folder}: {len(self.frames)} frames>"
 
 
-open = Opened
+open = Run
 """`sand.open(DIR)`: a run's folder to be looked at."""

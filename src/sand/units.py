@@ -235,7 +235,7 @@ def seed_given(value: Any, bits: int = 64) -> int:
     return int(value)
 
 
-def spoken(value: float, unit: str) -> str:
+def format_quantity(value: float, unit: str) -> str:
     """A number for people, with an SI prefix: 1.2e-6 m → '1.2 um'."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g} {unit}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.server import Server
 
 from .small_runs import FIELD
@@ -35,7 +35,7 @@ CANVAS = """() => document.querySelector("canvas.gv-canvas").toDataURL("image/pn
 @contextmanager
 def served(folder: Path, field: Any = FIELD) -> Iterator[Server]:
     """The server of a run."""
-    server = Server(story_of(folder, field))
+    server = Server(run_dataset(folder, field))
     server.start()
     try:
         yield server

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sand.io.trajectory import read_frames
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 from sand.viewer.server import Server
 
@@ -58,11 +58,11 @@ class Shows:
     def __call__(self, kind: str) -> Shown:
         if kind not in self._known:
             folder = runs.KINDS[kind](self.place / kind)
-            server = Server(story_of(folder, _field()))
+            server = Server(run_dataset(folder, _field()))
             server.start()
             self._servers.append(server)
             target = self.place / f"{kind}.html"
-            write_page(story_of(folder, _field()), target)
+            write_page(run_dataset(folder, _field()), target)
             url = {"server": server.url, "file": target.as_uri()}
             self._known[kind] = Shown(read_frames(folder / "trajectory.gsd"), url)
         return self._known[kind]

@@ -15,7 +15,7 @@ import pytest
 
 from sand.box import Box
 from sand.errors import BadInput
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 from sand.viewer.server import Server
 
@@ -34,7 +34,7 @@ NO_WEBGL = """() => {
 def file(bundle, tmp_path_factory) -> str:
     """A page in one file, whole."""
     folder = tmp_path_factory.mktemp("files")
-    write_page(story_of(SmallRun(folder / "small").folder, FIELD), folder / "small.html")
+    write_page(run_dataset(SmallRun(folder / "small").folder, FIELD), folder / "small.html")
     return (folder / "small.html").read_text("utf-8")
 
 
@@ -207,7 +207,7 @@ class Mortal(Server):
 def test_the_server_is_gone(view, tmp_path, bundle):
     """While it plays: it stops and says so; frames that are here already can be looked at."""
     folder = SmallRun(tmp_path / "small").folder
-    server = Mortal(story_of(folder, FIELD))
+    server = Mortal(run_dataset(folder, FIELD))
     server.start()
     view.open(server.url)
     view.press("ArrowRight")
@@ -225,7 +225,7 @@ def test_an_empty_run(tmp_path):
     """The server's side says that there is nothing to look at yet."""
     SmallRun(tmp_path / "small", 0, ended=False)
     with pytest.raises(BadInput, match="no frame yet"):
-        story_of(tmp_path / "small")
+        run_dataset(tmp_path / "small")
 
 
 ONE = np.zeros((1, 3))

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from sand.errors import BadInput
-from sand.viewer.dataset import Story, story_of
+from sand.viewer.dataset import RunDataset, run_dataset
 from sand.viewer.notebook import answered
 
 from .driving import Driven
@@ -49,7 +49,7 @@ class Kernel:
         story: of the run; None once it is gone.
     """
 
-    def __init__(self, story: Story):
+    def __init__(self, story: RunDataset):
         self.story, self.asked = story, list[dict]()
 
     def __call__(self, content: dict) -> tuple[dict, list[str]]:
@@ -60,7 +60,7 @@ class Kernel:
 
 @pytest.fixture
 def kernel(tmp_path) -> Kernel:
-    return Kernel(story_of(SmallRun(tmp_path / "small").folder, FIELD))
+    return Kernel(run_dataset(SmallRun(tmp_path / "small").folder, FIELD))
 
 
 @pytest.fixture

@@ -67,7 +67,7 @@ class Imposed:
 
     def step(self, velocity, spin):
         """One step of 1 s at these velocities (N, 3) [m/s] and spins [rad/s]; what Verlet adds is taken back."""
-        g = self.sim.world.grains.arrays
+        g = self.sim.state.grains.arrays
         g.force[...] = 0.0
         g.torque[...] = 0.0
         g.velocity[...] = np.transpose(velocity)

@@ -39,7 +39,7 @@ def flight(grains, stepping=None, **options):
 def land(sim, end):
     """Go on to exactly `end` [s], which runs never do: the step to be tried next is cut from outside."""
     sim.loads()
-    clock = sim.world.clock
+    clock = sim.state.clock
     while sim.time < end * (1 - 1e-15):
         clock[FLIGHT] = min(clock[FLIGHT] or 1e-12, end - sim.time)
         sim.run(steps=1)
@@ -82,7 +82,7 @@ def test_the_error_follows_the_tolerance_over_six_decades():
     for tolerance in tolerances:
         sim = flight(scattering(), sand.Adaptive(tolerance=tolerance))
         sim.run(until="20 ns")
-        assert sim.world.count[MADE] == 0
+        assert sim.state.count[MADE] == 0
         errors.append(np.abs(state_of(sim.grains) - exact(sim.start, sim.time)).max())
     ratios = np.divide(errors[:-1], errors[1:])
     assert (np.array(errors) < 4 * tolerances).all()
@@ -158,8 +158,8 @@ def test_touch_comes_at_the_analytic_time(part):
     reach = 2.7e-8
     sim = flight(approaching(part * reach))
     sim.run(until="140 ns")
-    assert sim.world.count[MADE] == 1
-    assert sim.world.contacts.formed[0] == pytest.approx((1.3e-6 - reach * math.sqrt(1 - part**2)) / SPEED, rel=1e-9)
+    assert sim.state.count[MADE] == 1
+    assert sim.state.contacts.formed[0] == pytest.approx((1.3e-6 - reach * math.sqrt(1 - part**2)) / SPEED, rel=1e-9)
 
 
 @pytest.mark.compiled("adaptive")
@@ -168,10 +168,10 @@ def test_a_grazing_pass_is_seen_and_a_miss_is_none():
     for side, made in ((-1, 1), (1, 0)):
         sim = flight(approaching(2.7e-8 * (1 + side * 1e-6)))
         sim.run(until="200 ns")
-        assert sim.world.count[MADE] == made
+        assert sim.state.count[MADE] == made
         if not made:
             longest = sim._engine.rules.control.longest
-            assert sim.world.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
+            assert sim.state.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
 
 
 @pytest.mark.validate
@@ -187,7 +187,7 @@ def test_after_the_touch_the_books_close_as_with_verlet():
         )
         sim = flight(grains, stepping, frame_every="0.1 ns")
         sim.run(until="6 ns")
-        assert sim.world.count[CONTACTS] == 1
+        assert sim.state.count[CONTACTS] == 1
         drifts.append(np.abs(sim.ledger["total"] - sim.ledger["total"][0]).max() / sim.ledger.dissipated)
     assert drifts[0] < 1.5 * drifts[1] + 1e-8
 
@@ -201,7 +201,7 @@ def test_a_contact_that_breaks_gives_the_world_back():
     sim.run(until="100 ns")
     row = sim.ledger.rows[-1]
     assert (row["made"], row["broken"], row["contacts"]) == (1, 1, 0)
-    assert sim.world.clock[FLIGHT] == sim._engine.rules.control.longest
+    assert sim.state.clock[FLIGHT] == sim._engine.rules.control.longest
     assert sim.ledger.drift < 1e-3
 
 
@@ -221,7 +221,7 @@ def test_momenta():
     for tolerance in (1e-9, 1e-12):
         sim = flight(grains, sand.Adaptive(tolerance=tolerance))
         steps = sim.run(until="4 ns").steps
-        assert sim.world.count[MADE] == 0
+        assert sim.state.count[MADE] == 0
         ledger, s, g = sim.ledger, sim.stepping, sim.grains
         p, angular = (np.array([ledger[f"{k}_{a}"] for a in "xyz"]) for k in ("momentum", "angular_momentum"))
         speed, reach = np.linalg.norm(g.velocity, axis=1), np.linalg.norm(g.position, axis=1)
@@ -283,12 +283,12 @@ def test_no_pair_is_missed_by_a_list():
     ends = []
     for margin in ("20 nm", "60 nm"):
         sim = in_a_field(hot_gas(), margin=margin)
-        while sim.world.count[MADE] == 0:
+        while sim.state.count[MADE] == 0:
             sim.run(steps=1)
         ends.append(sim)
     a, b = ends
-    assert a.world.count[10] > b.world.count[10] > 1  # lists made
-    assert a.world.contacts.pair[:, 0].tolist() == b.world.contacts.pair[:, 0].tolist()
+    assert a.state.count[10] > b.state.count[10] > 1  # lists made
+    assert a.state.contacts.pair[:, 0].tolist() == b.state.contacts.pair[:, 0].tolist()
     assert a.time == pytest.approx(b.time, rel=1e-8)
     apart = np.array([sand.Box.periodic(BOX).nearest(x) for x in a.grains.position - b.grains.position])
     assert np.abs(apart).max() < 1e-6 * R
@@ -310,7 +310,7 @@ def four():
 
 
 def bits(sim):
-    return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
+    return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
 @pytest.mark.validate
@@ -331,8 +331,8 @@ def test_images_are_not_flown_through(lengths, margin):
     how = sand.Neighbours("cells", margin)
     sim = sand.Simulation(grains, [sand.Contact()], box=box, stepping=sand.Adaptive(), neighbours=how)
     sim.run(until=first + 1e-10)
-    assert sim.world.count[MADE] == 1
-    assert sim.world.contacts.formed[0] == pytest.approx(first, abs=2e-11)
+    assert sim.state.count[MADE] == 1
+    assert sim.state.contacts.formed[0] == pytest.approx(first, abs=2e-11)
 
 
 @pytest.mark.compiled("adaptive")
@@ -343,7 +343,7 @@ def test_pieces_and_cadence_change_no_bit():
         sim = flight(four(), frame_every=every)
         for steps in pieces:
             sim.run(steps=steps)
-        assert sim.world.count[CONTACTS] > 0
+        assert sim.state.count[CONTACTS] > 0
         ends.append(bits(sim))
     assert ends[0] == ends[1] == ends[2]
 
@@ -356,9 +356,9 @@ def test_resume_is_bit_for_bit(tmp_path, stop):
     whole.run(steps=600)
     flight(four(), out=tmp_path / "run", frame_every="1 ns").run(steps=stop)
     rest = sand.resume(tmp_path / "run")
-    assert (rest.world.count[CONTACTS] > 0) == (stop > 100)
+    assert (rest.state.count[CONTACTS] > 0) == (stop > 100)
     assert rest.stepping == whole.stepping
-    rest.run(steps=int(600 - rest.world.steps))  # the stop came at the end of a cycle
+    rest.run(steps=int(600 - rest.state.steps))  # the stop came at the end of a cycle
     assert bits(rest) == bits(whole)
 
 
@@ -367,10 +367,10 @@ def test_rejected_steps_are_counted_and_change_nothing_else():
     """A first step far too long is rejected until it fits; the end differs by no more than the tolerance does."""
     sim = flight(scattering())
     sim.loads()
-    sim.world.clock[FLIGHT] = 1e-8
+    sim.state.clock[FLIGHT] = 1e-8
     sim.run(steps=1)
-    assert sim.world.count[REJECTED] > 1
-    assert sim.world.clock[FLIGHT] < 1e-9
+    assert sim.state.count[REJECTED] > 1
+    assert sim.state.clock[FLIGHT] < 1e-9
     land(sim, 2e-8)
     assert np.abs(state_of(sim.grains) - exact(sim.start, 2e-8)).max() < 4e-9
 

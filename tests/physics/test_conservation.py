@@ -9,7 +9,7 @@ import pytest
 import sand
 from sand.constants import MAGNETIC
 from sand.contact import jkr
-from sand.contact import law as law_of
+from sand.contact import law as contact_law
 from sand.state.state import CONTACT_STEP
 
 from .setups import Imposed, random_aggregate, rest_distance, struck_chain
@@ -209,7 +209,7 @@ def beyond_energy(sim):
 
     def force(overlap):
         y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-        return law_of.normal_force(overlap, y, bond)
+        return contact_law.normal_force(overlap, y, bond)
 
     overlap, h = sim.grains.radius.sum() - distance, 1e-4 * bond.pull_off_overlap
     stiffness = (force(overlap + h) - force(overlap - h)) / (2.0 * h)
@@ -238,7 +238,7 @@ def test_the_ringing_after_a_touch_has_the_energy_of_before():
         ledger = sim.ledger
         ringing = ledger["contacts"] > 0
         offset = (ledger["total"][ringing] - ledger["total"][0]).mean() / ledger["translation"][ringing].max()
-        assert abs(offset) < (2 * math.pi / period * sim.world.clock[CONTACT_STEP]) ** 2 / 12.0
+        assert abs(offset) < (2 * math.pi / period * sim.state.clock[CONTACT_STEP]) ** 2 / 12.0
 
 
 @pytest.mark.compiled("contacts")
@@ -283,7 +283,7 @@ def test_twist_is_integrated_to_second_order():
         for k in range(steps):
             here, there = (d * np.array([-math.cos(a), -math.sin(a), 0]) for a in (k * angle, (k + 1) * angle))
             mover.step([np.zeros(3), there - here], [[turning / steps, 0, 0], [0, 0, 0]])
-        errors.append(abs(mover.sim.world.contacts.twist[0] - turning * math.sin(whole) / whole))
+        errors.append(abs(mover.sim.state.contacts.twist[0] - turning * math.sin(whole) / whole))
     assert errors[0] < 1e-5
     assert 3.5 < errors[0] / errors[1] < 4.5
 

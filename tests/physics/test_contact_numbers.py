@@ -156,7 +156,7 @@ def test_a_grain_rolled_round_another_by_90_degrees(beyond, share):
         roller.step([np.zeros(3), chord], [[0, 0, 0], [0, 0, 2 * angle]])
     k_r, limit = BOND.roll_stiffness, BOND.roll_limit
     expected = share * k_r * limit * (math.pi * r / 2 - limit)
-    assert roller.sim.world.lost[3] == pytest.approx(expected, rel=0.01, abs=0.0)
+    assert roller.sim.state.lost[3] == pytest.approx(expected, rel=0.01, abs=0.0)
     rough = 12 * math.pi**2 * sand.SILICA.surface_energy * (r / 2) * limit * share
     assert expected == pytest.approx(rough, rel=0.01, abs=0.0)
 
@@ -170,7 +170,7 @@ def test_a_grain_twisted_by_a_full_turn():
         for _ in range(steps):
             twister.step(np.zeros((2, 3)), [[sign * 2 * math.pi / steps, 0, 0], [0, 0, 0]])
         expected = BOND.twist_stiffness * tangential.TWIST_LIMIT * (2 * math.pi - tangential.TWIST_LIMIT)
-        assert twister.sim.world.lost[4] == pytest.approx(expected, rel=1e-3, abs=0.0)
+        assert twister.sim.state.lost[4] == pytest.approx(expected, rel=1e-3, abs=0.0)
         assert expected == pytest.approx(BOND.twist_stiffness * tangential.TWIST_LIMIT * 2 * math.pi, rel=0.01, abs=0.0)
 
 
@@ -188,8 +188,8 @@ def test_rigid_motion_strains_nothing(steps):
 
     turn = Rotation.from_rotvec(angle * axis)
     start = grains.position.copy()
-    before = mover.sim.world.contacts
-    used = mover.sim.world.count[2]
+    before = mover.sim.state.contacts
+    used = mover.sim.state.count[2]
     assert used == 11
     for k in range(steps):
         whole = Rotation.from_rotvec(k * angle * axis)
@@ -198,7 +198,7 @@ def test_rigid_motion_strains_nothing(steps):
     from sand.contact import law
     from sand.contact.update import bond_at, pose_at
 
-    g = mover.sim.world.grains.arrays
+    g = mover.sim.state.grains.arrays
     for c in range(used):
         i, j = (int(k) for k in before.pair[:, c])
         bond = bond_at(before, c)
@@ -208,5 +208,5 @@ def test_rigid_motion_strains_nothing(steps):
         across_n = np.array(strain.roll) - np.dot(strain.roll, pose.n) * np.array(pose.n)
         assert np.linalg.norm(across_n) < 1e-9 * bond.roll_limit
         assert abs(strain.twist) < 1e-9 * bond.twist_limit
-    assert mover.sim.world.lost.sum() == 0.0
+    assert mover.sim.state.lost.sum() == 0.0
     assert rest_overlap(rest_radius(0.025, 5e-8, 2.8e10), 5e-8) > 0

@@ -96,7 +96,7 @@ def test_each_contact_keeps_its_own_books():
     sim = sand.Simulation(grains, [sand.Contact(damping="constant", damping_constant="1e-10 kg/s")])
     sim.run(until="60 ns")
     assert sim.ledger["broken"][-1] == 0
-    lost = dict(zip(LOST, sim.world.lost, strict=True))
+    lost = dict(zip(LOST, sim.state.lost, strict=True))
     assert lost["forming"] > 0.0 or lost["rolling"] > 0.0
     for name in RECORDED:
         assert sim.contacts[f"lost_{name}"].sum() == pytest.approx(lost.pop(name), rel=1e-9, abs=1e-30)
@@ -140,7 +140,7 @@ def test_without_adhesion_grains_bounce_like_hertz():
         def see(self, simulation, row):
             if row["contacts"]:
                 touching.append(row["time"])
-                steps.append(simulation.world.clock[1])
+                steps.append(simulation.state.clock[1])
 
     sim = sand.Simulation(
         grains, [sand.Contact()], stepping=sand.Verlet(steps_per_period=100), observers=[Watch()], frame_every="1 ps"

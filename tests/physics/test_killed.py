@@ -119,7 +119,7 @@ def test_killed_once(whole, tmp_path):
     """Contacts, a list, cycles and a gas; killed while it runs: the same bits in checkpoint, ledger and frames."""
     arrays, _ = newest_checkpoint(whole[1])
     assert arrays["contacts/pair"].shape[1] > 5  # there is something to lose
-    assert np.isfinite(arrays["far/anchor"]).all()
+    assert np.isfinite(arrays["long_range/anchor"]).all()
     same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(1), 1))
 
 

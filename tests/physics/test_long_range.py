@@ -173,12 +173,12 @@ def test_kicks_come_in_time():
     times = [0.0]
     for _ in range(300):
         sim.run(steps=1)
-        if sim.world.clock[KICKED] > times[-1]:
-            times.append(sim.world.clock[KICKED])
+        if sim.state.clock[KICKED] > times[-1]:
+            times.append(sim.state.clock[KICKED])
     apart = np.diff(times) / period
     assert len(apart) > 25
     assert apart.min() > 0.66 and apart.max() < 1.34
-    assert abs(apart.mean() - 1.0) < 0.5 * sim.world.clock[STEP] / period + 1e-9
+    assert abs(apart.mean() - 1.0) < 0.5 * sim.state.clock[STEP] / period + 1e-9
 
 
 @pytest.mark.validate

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact.events import all_may_touch
+from sand.contact.events import inner_list_is_full
 from sand.integrate.step_parts import SOON_PART
-from sand.neighbours.spatial_sort import inverse, order_on_curve, rearrange
+from sand.neighbours.spatial_sort import inverse, rearrange, spatial_order
 from sand.simulation import engine as engines
-from sand.state.state import CONTACTS, LISTED, ORDERED, PAIRS, REBUILT, SOON
+from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 
 from .test_sameness import state
 
-BY_PLACE = ("order", "here", "source", "share", "home")
+BY_PLACE = ("order", "packed_position", "source", "block_sums", "cell_of")
 """Far arrays that belong to the list, or are filled by each sum."""
 EVERY = 700
 """Steps between two orders in these tests, so that some are made."""
@@ -63,8 +63,8 @@ def shaken(order, far=()):
 
 def listed(world):
     """The pairs in the rows of the far list, by grain."""
-    far, place = world.far, np.repeat(np.arange(len(world.grains)), np.diff(world.far.start.astype(int)))
-    return set(zip(far.order[place].tolist(), far.order[far.mate[: far.start[-1]]].tolist(), strict=True))
+    far, place = world.long_range, np.repeat(np.arange(len(world.grains)), np.diff(world.long_range.start.astype(int)))
+    return set(zip(far.order[place].tolist(), far.order[far.neighbour[: far.start[-1]]].tolist(), strict=True))
 
 
 def sides(world):
@@ -81,26 +81,28 @@ def test_there_and_back():
     """
     sim = stirred()
     sim.run(steps=2000)
-    world = sim.world
-    world.far.path[...] = np.random.default_rng(2).normal(size=(3, 80))  # nothing between two cycles
+    world = sim.state
+    world.long_range.path[...] = np.random.default_rng(2).normal(size=(3, 80))  # nothing between two cycles
     before, pairs = state(sim), listed(world)
     assert world.count[CONTACTS] > 0
     used, some = world.count[CONTACTS], world.count[PAIRS]
-    kept, near = world.contacts.pair[:, :used].copy(), world.near.pair[:, :some].copy()
-    order, arrays = order_on_curve(world), world.grains.arrays._asdict()
-    arrays |= {f"near {name}": array for name, array in world.near._asdict().items()}
-    arrays |= {f"far {name}": array for name, array in world.far._asdict().items() if name not in BY_PLACE}
+    kept, near = world.contacts.pair[:, :used].copy(), world.pair_list.pair[:, :some].copy()
+    order, arrays = spatial_order(world), world.grains.arrays._asdict()
+    arrays |= {f"near {name}": array for name, array in world.pair_list._asdict().items()}
+    arrays |= {f"far {name}": array for name, array in world.long_range._asdict().items() if name not in BY_PLACE}
     arrays = {name: array for name, array in arrays.items() if array.shape[-1] == 80}
     assert len(arrays) > 20
     old = {name: array.copy() for name, array in arrays.items()}
     rearrange(world, order)
     for name, array in arrays.items():
         assert (array == old[name][..., order]).all(), name
-    assert (world.grains.radius != old["radius"]).any() and (world.far.path != old["far path"]).any()
+    assert (world.grains.radius != old["radius"]).any() and (world.long_range.path != old["far path"]).any()
     assert sides(world) == [
         np.flatnonzero((world.contacts.pair[:, :used] == g).any(axis=0)).tolist() for g in range(80)
     ]
-    assert (order[world.contacts.pair[:, :used]] == kept).all() and (order[world.near.pair[:, :some]] == near).all()
+    assert (order[world.contacts.pair[:, :used]] == kept).all() and (
+        order[world.pair_list.pair[:, :some]] == near
+    ).all()
     assert {(order[i], order[j]) for i, j in listed(world)} == pairs
     rearrange(world, inverse(order))
     assert state(sim) == before and listed(world) == pairs
@@ -116,13 +118,13 @@ def test_everybody_sees_the_numbers_of_the_start():
     grains, start = sim.grains, sim.start
     for _ in range(4):
         sim.run(steps=EVERY)
-        assert sim.world.order.tolist() != list(range(80))
+        assert sim.state.order.tolist() != list(range(80))
         for name in ("radius", "mass", "inertia", "charge", "id"):
             assert (getattr(grains, name) == getattr(start, name)).all(), name
         i, j = sim.contacts["pair"].T
         gap = np.linalg.norm(sim.box.nearest(grains.position[i] - grains.position[j]), axis=1)
         assert (gap < (grains.radius[i] + grains.radius[j]) * 1.01).all()
-    assert sim.world.count[CONTACTS] > 0 and sim.world.count[ORDERED] == 3 * EVERY
+    assert sim.state.count[CONTACTS] > 0 and sim.state.count[ORDERED] == 3 * EVERY
     assert abs(sim.ledger.drift) < 1e-3
 
 
@@ -140,7 +142,7 @@ def test_watching_and_cutting_up_change_nothing():
         pieces.run(steps=steps)
     whole.run(steps=pieces.steps)
     watched.run(steps=pieces.steps)
-    assert whole.world.count[ORDERED] >= 4 * EVERY
+    assert whole.state.count[ORDERED] >= 4 * EVERY
     assert state(whole) == state(pieces) == state(watched)
 
 
@@ -154,14 +156,14 @@ def test_going_on_from_a_checkpoint_changes_nothing(tmp_path, cut):
     """
     whole, part = stirred(), stirred(out=tmp_path / "run")
     part.run(steps=cut)
-    assert part.world.count[ORDERED] > 0
+    assert part.state.count[ORDERED] > 0
     assert 'order = "curve"' in (tmp_path / "run" / "case.toml").read_text()
     rest = sand.resume(tmp_path / "run")
-    assert rest.world.order.tolist() == part.world.order.tolist()
+    assert rest.state.order.tolist() == part.state.order.tolist()
     assert state(rest) == state(part)
     rest.run(steps=2 * EVERY)
     whole.run(steps=rest.steps)
-    assert whole.world.count[LISTED] >= 3 and whole.world.count[REBUILT] > 3
+    assert whole.state.count[LISTED] >= 3 and whole.state.count[REBUILT] > 3
     assert state(whole) == state(rest)
 
 
@@ -200,7 +202,7 @@ def test_only_rounding_tells_the_orders_apart(far):
     for order in ("curve", "as given", "without"):
         sim = shaken("as given" if order == "without" else order, [] if order == "without" else far)
         sim.run(steps=300)
-        assert (sim.world.order.size > 0) == (order == "curve")
+        assert (sim.state.order.size > 0) == (order == "curve")
         pair = np.sort(sim.contacts["pair"], axis=1)
         ends.append((sim.grains.position.copy(), pair[np.lexsort(pair.T)]))
     assert np.abs(ends[0][0] - ends[1][0]).max() < 1e-9 * 1e-7
@@ -216,16 +218,18 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
     """
     sim = shaken("curve")
     sim.run(steps=EVERY)
-    listed = sim.world.count[REBUILT]
+    listed = sim.state.count[REBUILT]
     sim._engine.advance(np.inf, 1)
     w, reach = sim._engine._world, sim._engine.rules.control.reach
     assert w.count[ORDERED] == EVERY and w.count[REBUILT] == listed
-    i, j = w.near.pair[:, : w.count[PAIRS]].astype(int)
+    i, j = w.pair_list.pair[:, : w.count[PAIRS]].astype(int)
     apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)
-    close = (apart < w.grains.radius[i] + w.grains.radius[j] + SOON_PART * reach) & (w.near.touching[: i.size] == 0)
+    close = (apart < w.grains.radius[i] + w.grains.radius[j] + SOON_PART * reach) & (
+        w.pair_list.touching[: i.size] == 0
+    )
     assert close.sum() > 5
-    assert not all_may_touch(w.near, w.count)
-    assert set(np.flatnonzero(close)) <= set(w.near.soon[: int(w.near.watch[SOON])].tolist())
+    assert not inner_list_is_full(w.pair_list, w.count)
+    assert set(np.flatnonzero(close)) <= set(w.pair_list.inner[: int(w.pair_list.skin[INNER_COUNT])].tolist())
 
 
 @pytest.mark.validate
@@ -246,11 +250,11 @@ def test_the_grain_that_stops_a_run_is_named_by_its_own_number():
     """Faster than a step of this length bears: the culprit is the grain that was pushed, wherever it stood."""
     sim = stirred(stepping=sand.Verlet(step="0.2 ps"))
     sim.run(steps=10)
-    guilty = int(sim.world.order[5])
+    guilty = int(sim.state.order[5])
     assert guilty != 5
-    sim.world.grains.arrays.velocity[:, guilty] = 1e5
+    sim.state.grains.arrays.velocity[:, guilty] = 1e5
     result = sim.run(steps=10)
-    assert result.outcome is sand.Outcome.FLEW_TOO_FAR and result.grains == (guilty,)
+    assert result.outcome is sand.Outcome.TOO_FAST and result.grains == (guilty,)
 
 
 @pytest.mark.validate
@@ -261,7 +265,7 @@ def test_runge_kutta_steps_in_an_order_of_their_own():
         pieces.run(steps=steps)
         assert (pieces.grains.radius == pieces.start.radius).all()
     whole.run(steps=pieces.steps)
-    assert whole.world.count[ORDERED] >= 2 * EVERY
+    assert whole.state.count[ORDERED] >= 2 * EVERY
     assert state(whole) == state(pieces)
 
 
@@ -286,7 +290,7 @@ def test_whoever_kept_the_grains_finds_them_at_their_rows():
     with pytest.raises(RuntimeError, match="stumbled"):
         sim.run(steps=1000)
     assert (keeper.kept.radius == sim.start.radius).all()
-    assert 0 < sim.steps < 1000 and sim.world.order.size == 80
+    assert 0 < sim.steps < 1000 and sim.state.order.size == 80
 
 
 @pytest.mark.compiled("listed")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.state.state import BROKEN, CONTACTS, CYCLE, FAR_SUMS, LISTED, MOVED
+from sand.state.state import BROKEN, CONTACTS, CYCLE, LISTED, LONG_RANGE_SUMS, SLIPPED
 from sand.threads import set_threads
 
 from .setups import random_aggregate, rest_distance, struck_chain
@@ -24,7 +24,7 @@ def gas_simulation(**options):
 
 def state(sim):
     """All numbers of the world, as bytes."""
-    return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
+    return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
 @pytest.mark.compiled("dipoles")
@@ -35,7 +35,7 @@ def test_output_cadence_changes_nothing():
         sim = gas_simulation(frame_every=every)
         sim.run(steps=20_000)
         ends.append(state(sim))
-    assert sim.world.count[CONTACTS] > 0
+    assert sim.state.count[CONTACTS] > 0
     assert ends[0] == ends[1] == ends[2]
 
 
@@ -55,9 +55,9 @@ def test_running_in_pieces_changes_nothing():
     whole, pieces = gas_simulation(), gas_simulation(observers=[Curious()], frame_every="1 ns")
     for steps in (1, 2, 997, 4000, 5000, 10_000):
         pieces.run(steps=steps)
-    whole.run(steps=int(pieces.world.steps))
-    assert whole.world.count[CONTACTS] > 0
-    assert whole.world.count[FAR_SUMS] < 0.7 * whole.world.steps
+    whole.run(steps=int(pieces.state.steps))
+    assert whole.state.count[CONTACTS] > 0
+    assert whole.state.count[LONG_RANGE_SUMS] < 0.7 * whole.state.steps
     assert state(whole) == state(pieces)
 
 
@@ -83,13 +83,13 @@ def test_a_listed_run_goes_on_from_its_saved_state():
         return sand.Simulation(grains, forces, box="1.2 um", seed=2, **options)
 
     whole, cramped = start(), start()
-    cramped.world.far = cramped.world.far._replace(mate=np.zeros(16, np.uint32))
+    cramped.state.long_range = cramped.state.long_range._replace(mate=np.zeros(16, np.uint32))
     assert whole._engine.rules.search.listed
     whole.run(steps=3000)
-    saved = {name: array.copy() for name, array in whole.world.to_arrays().items()}
-    lists = whole.world.count[LISTED]
+    saved = {name: array.copy() for name, array in whole.state.to_arrays().items()}
+    lists = whole.state.count[LISTED]
     whole.run(steps=6000)
-    assert whole.world.count[LISTED] > lists > 1
+    assert whole.state.count[LISTED] > lists > 1
     again = start(restart=(saved, {"temperature": 3e5, "wall_seconds": 0.0}))
     again.run(steps=6000)
     assert state(whole) == state(again)
@@ -101,19 +101,19 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
     from sand.contact.law import Bond
-    from sand.state.arrays import FOR_ALL, contact_arrays, near_pairs
+    from sand.state.arrays import FOR_ALL, empty_contact_arrays, empty_pair_list
 
     ends = []
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.world.contacts = contact_arrays(n, room, len(Bond._fields), alike=alike)
-        sim.world.near, sim.world.alike = near_pairs(n, room, alike=alike), alike
+        sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), alike=alike)
+        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, alike=alike), alike
         rules = sim._engine.rules
         sim._engine.rules = rules._replace(contact=rules.contact._replace(alike=alike))
         sim.run(until=1e-9)
         ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in FOR_ALL})
-    assert sim.world.count[CONTACTS] > 16
+    assert sim.state.count[CONTACTS] > 16
     assert all(end == ends[0] for end in ends)
 
 
@@ -124,7 +124,7 @@ def test_a_frame_is_the_first_step_at_or_after_its_time():
 
     class Note(sand.Observer):
         def see(self, simulation, row):
-            seen.append((row["time"], simulation.world.clock[CYCLE]))
+            seen.append((row["time"], simulation.state.clock[CYCLE]))
 
     gas_simulation(frame_every="1 ns", observers=[Note()]).run(until="10 ns")
     assert len(seen) == 11
@@ -141,7 +141,7 @@ def test_resume_is_bit_for_bit(tmp_path):
     first.run(steps=7000)
     del first
     second = sand.resume(tmp_path / "parts")
-    assert second.world.steps == 7000
+    assert second.state.steps == 7000
     second.run(until="60 ns")
     assert state(second) == state(whole)
     rows = [(tmp_path / name / "ledger.csv").read_text().splitlines() for name in ("whole", "parts")]
@@ -187,8 +187,8 @@ def test_kernels_against_plain_python_loops():
     grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])
     sim.run(steps=50)
-    g, w = sim.grains, sim.world
-    listed = {frozenset(p) for p in w.near.pair[:, : w.count[3]].T.tolist()}
+    g, w = sim.grains, sim.state
+    listed = {frozenset(p) for p in w.pair_list.pair[:, : w.count[3]].T.tolist()}
     touching = {
         frozenset((i, j))
         for i in range(40)
@@ -234,6 +234,6 @@ def test_the_number_of_threads_changes_nothing():
         finally:
             set_threads(None)
         ends.append(state(sim))
-    count = sim.world.count
-    assert count[BROKEN] > 0 and count[MOVED] > 0.5 * 200 * count[CONTACTS]
+    count = sim.state.count
+    assert count[BROKEN] > 0 and count[SLIPPED] > 0.5 * 200 * count[CONTACTS]
     assert ends[0] == ends[1] == ends[2]

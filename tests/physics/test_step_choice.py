@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.integrate.step_control import calm_steps
+from sand.integrate.step_control import steps_of_free_grains
 
 R = 3e-7
 
@@ -98,12 +98,17 @@ def test_gravity_does_not_shorten_the_step():
     """A uniform load costs Verlet no energy, however weak the long-range force beside it: the same step without it."""
     grains = sand.Grains([[0, 0, 0], [1e-5, 0, 0]], R, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Attraction()])
-    world, control = sim.world, sim._engine.rules.control
+    world, control = sim.state, sim._engine.rules.control
     assert control.energy_scale > 0.0
     steps = []
     for pull in (0.0, 9.81):
         world.grains.arrays.force[2] = -pull * grains.mass
-        steps.append(calm_steps(world.grains.arrays, world.far, world.contacts.start, world.count, control))
+        steps.append(
+            steps_of_free_grains(world.grains.arrays, world.long_range, world.contacts.start, world.count, control)
+        )
     assert steps[0] == steps[1]
-    world.far.force[2] = -9.81 * grains.mass  # as a long-range force it does count
-    assert calm_steps(world.grains.arrays, world.far, world.contacts.start, world.count, control)[0] < 0.1 * steps[0][0]
+    world.long_range.force[2] = -9.81 * grains.mass  # as a long-range force it does count
+    assert (
+        steps_of_free_grains(world.grains.arrays, world.long_range, world.contacts.start, world.count, control)[0]
+        < 0.1 * steps[0][0]
+    )

@@ -9,10 +9,10 @@ import pytest
 import sand
 from sand import threads
 from sand.errors import BadInput
-from sand.integrate.task_queue import INSIDE, LEAVE, TASK, WORD, crew_for, is_large, new_crew
+from sand.integrate.task_queue import INSIDE, LEAVE, TASK, WORD, is_large, new_task_queue, worker_loops
 from sand.simulation import assemble as translate
 from sand.simulation import engine
-from sand.state.state import CONTACTS, MOVED, OUTSIDE
+from sand.state.state import CONTACTS, OUTSIDE, SLIPPED
 
 pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
 
@@ -37,7 +37,7 @@ def shaken_lattice(cutoff, size=(11, 10, 10)):
 
 def state(sim):
     """All numbers of the world, as bytes."""
-    return {name: array.tobytes() for name, array in sim.world.to_arrays().items()}
+    return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
 @pytest.mark.compiled("threads")
@@ -58,12 +58,12 @@ def test_threads_change_no_bit(cutoff, size):
     for number in (1, 2, 3):
         sand.set_threads(number)
         sim = shaken_lattice(cutoff, size)
-        assert sim._engine._plan.crew and sim._engine._plan.bare is (cutoff == "bare")
+        assert sim._engine._plan.queue and sim._engine._plan.bare is (cutoff == "bare")
         sim.run(steps=25)
         sim.run(steps=35)
         ends.append(state(sim))
-    assert sim.world.count[CONTACTS] > 2000
-    assert sim.world.count[MOVED] > 100
+    assert sim.state.count[CONTACTS] > 2000
+    assert sim.state.count[SLIPPED] > 100
     assert ends[0] == ends[1] == ends[2]
 
 
@@ -77,10 +77,10 @@ def test_blocks_change_only_rounding(monkeypatch):
     for large in (True, False):
         monkeypatch.setattr(translate, "is_large", lambda grains, large=large: large)
         sim[large] = shaken_lattice(None)
-        assert sim[large]._engine._plan.crew is large
+        assert sim[large]._engine._plan.queue is large
         sim[large].run(steps=1)
     for name in ("force", "torque", "velocity", "spin", "position"):
-        one, other = (getattr(sim[large].world.grains.arrays, name) for large in (True, False))
+        one, other = (getattr(sim[large].state.grains.arrays, name) for large in (True, False))
         assert np.abs(one - other).max() < 1e-12 * np.abs(one).max(), name
 
 
@@ -98,7 +98,7 @@ def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
         forces, stepping = [sand.Contact(), sand.Gravity("1e12 m/s^2")], sand.Verlet(step="10 ps")
         sim = sand.Simulation(grains, forces, box="1 um", stepping=stepping)
         sim.run(steps=60)
-        found.append((sim.grains.position, sim.grains.velocity, sim.world.lost))
+        found.append((sim.grains.position, sim.grains.velocity, sim.state.lost))
     for one, other in zip(*found, strict=True):
         assert np.abs(one - other).max() < 1e-12 * np.abs(one).max()
     assert found[0][2][OUTSIDE] != 0.0
@@ -109,12 +109,12 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     """It finds LEAVE on its board and goes, with nobody counted inside."""
     sim = shaken_lattice(None)
     sim.run(steps=1)
-    before, world = state(sim), sim.world
-    crew = new_crew(len(world.grains), world.contacts.flag.size)
-    crew.board[WORD] = LEAVE << TASK
+    before, world = state(sim), sim.state
+    crew = new_task_queue(len(world.grains), world.contacts.flag.size)
+    crew.words[WORD] = LEAVE << TASK
     rules = sim._engine.rules._replace(crew=crew)
-    crew_for(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.far, world.count, rules)
-    assert crew.board[INSIDE] == 0
+    worker_loops(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
+    assert crew.words[INSIDE] == 0
     assert state(sim) == before
 
 
@@ -124,7 +124,7 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     boards = []
 
     def watched(grains, contacts):
-        boards.append(new_crew(grains, contacts))
+        boards.append(new_task_queue(grains, contacts))
         return boards[-1]
 
     def fails(*arguments):
@@ -133,13 +133,13 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     sand.set_threads(2)
     sim = shaken_lattice(None)
     sim.run(steps=1)
-    monkeypatch.setattr(engine, "new_crew", watched)
+    monkeypatch.setattr(engine, "new_task_queue", watched)
     works = sim._engine._advance
     sim._engine._advance = fails
     with pytest.raises(RuntimeError, match="broken"):
         sim._engine.advance(1.0, 1)
-    assert boards[-1].board[WORD] == LEAVE << TASK
-    assert boards[-1].board[INSIDE] == 0
+    assert boards[-1].words[WORD] == LEAVE << TASK
+    assert boards[-1].words[INSIDE] == 0
     sim._engine._advance = works
     sim.run(steps=1)
     assert copy.deepcopy(sim._engine._hands) is not sim._engine._hands
@@ -178,8 +178,8 @@ def test_helpers_come_where_they_save_time(number, forces, helpers):
     chain = sand.Grains(place, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
     sim = sand.Simulation(chain, [sand.Contact(), *forces])
     sim.run(steps=1)
-    assert sim._engine._plan.crew
-    assert sim.world.count[CONTACTS] == number - 1
+    assert sim._engine._plan.queue
+    assert sim.state.count[CONTACTS] == number - 1
     assert len(sim._engine._hands._queues) == helpers
 
 

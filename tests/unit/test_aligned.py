@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.numerics.aligned import LANES, LINE, aligned, whole
+from sand.numerics.aligned import LINE, SIMD_WIDTH, aligned, whole
 
 
 def begins(array):
@@ -26,11 +26,11 @@ def test_what_is_aligned_stays_and_what_is_not_is_copied():
 def test_all_arrays_of_a_world_begin_with_a_line():
     """When it is made, copied, and after arrays have grown; contacts and pairs have room for whole vectors."""
     body = sand.setup.bpca(37, radius="0.1 um", material=sand.SILICA, seed=1)
-    world = sand.Simulation(body, [sand.Contact()]).world
+    world = sand.Simulation(body, [sand.Contact()]).state
     for one in (world, world.copy()):
         one.grow_contacts()
         one.grow_pairs()
-        groups = (one.grains.arrays, one.contacts, one.near, one.far, one.stages)
+        groups = (one.grains.arrays, one.contacts, one.pair_list, one.long_range, one.stages)
         assert all(begins(array) or array.size == 0 for group in groups for array in group)
-        assert one.contacts.flag.size % LANES == one.near.touching.size % LANES == 0
+        assert one.contacts.flag.size % SIMD_WIDTH == one.pair_list.touching.size % SIMD_WIDTH == 0
     assert [whole(number) for number in (0, 1, 8, 9)] == [0, 8, 8, 16]

@@ -66,8 +66,8 @@ def test_what_lammps_is_told_of_a_grain():
 
 def test_bytes_of_counts_every_array_of_a_world():
     """Grains' arrays, contacts, pairs and lists, whatever nests them."""
-    world = worlds.lattice(3).world
-    parts = (world.grains.arrays, world.contacts, world.near, world.far, world.stages)
+    world = worlds.lattice(3).state
+    parts = (world.grains.arrays, world.contacts, world.pair_list, world.long_range, world.stages)
     alone = (world.clock, world.count, world.lost)
     assert pieces.bytes_of(world) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
 
@@ -82,7 +82,7 @@ def test_a_replay_takes_the_same_steps():
     for _ in range(2):
         assert again() > 0.0
         ends.append(sim.grains.position.copy())
-    assert sim.world.steps == 5 + 2 + 10
+    assert sim.state.steps == 5 + 2 + 10
     assert np.array_equal(*ends)
 
 

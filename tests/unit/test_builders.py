@@ -15,14 +15,14 @@ from sand.contact.mixing import pairing_between
 from sand.io.bodies import read_body, write_body
 from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
 from sand.setup._kernels.aggregation import returned
-from sand.setup._kernels.hash_grid import gap_at, join_crowd
+from sand.setup._kernels.hash_grid import gap_at, join_hash_grid
 from sand.setup.aggregates import rest_distance
 from sand.setup.deposit import cut_sphere
 from sand.setup.growing import room
-from sand.setup.population import Lognormal, PowerLaw, stuff_of
+from sand.setup.population import Lognormal, PowerLaw, grain_set_of
 
 R, M = 3e-7, sand.SILICA
-GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}
+STEP_INCREASES = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}
 MIXED = {"radius": "lognormal(0.1 um, 0.4)", "material": {"silica": 0.6, "ice": 0.4}}
 
 
@@ -52,17 +52,17 @@ def size_of(body):
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("what", [{"radius": R, "material": M}, {"radius": "12 nm", "material": "iron"}, MIXED])
-@pytest.mark.parametrize("kind", list(GROWN))
+@pytest.mark.parametrize("kind", list(STEP_INCREASES))
 def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
     """Every pair that touches is at r1 + r2 − δ0, to the rounding of coordinates of ten diameters and ten turns,
     1e-13; one cluster; trees but for rbd; the centre of mass at the origin; the same seed gives the same bits."""
-    body = GROWN[kind](150, seed=7, **what)
+    body = STEP_INCREASES[kind](150, seed=7, **what)
     pairs, distance, rest = touching(body)
     assert np.abs(distance / rest - 1.0).max() < 1e-13
     assert pieces(body, pairs) == 1
     assert len(pairs) == 149 if kind != "rbd" else len(pairs) > 200
     assert np.abs(np.average(body.position, axis=0, weights=body.mass)).max() < 1e-12 * size_of(body)
-    again, other = (GROWN[kind](150, seed=s, **what) for s in (7, 8))
+    again, other = (STEP_INCREASES[kind](150, seed=s, **what) for s in (7, 8))
     assert (again.position == body.position).all() and (again.radius == body.radius).all()
     assert (other.position != body.position).any()
 
@@ -90,10 +90,10 @@ def test_spheres_are_cut_in_one_piece(make):
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
-@pytest.mark.parametrize("kind", list(GROWN))
+@pytest.mark.parametrize("kind", list(STEP_INCREASES))
 def test_few_grains(kind, count):
     """One, two, three grains make an aggregate, too."""
-    body = GROWN[kind](count, radius=R, material=M)
+    body = STEP_INCREASES[kind](count, radius=R, material=M)
     pairs, _, _ = touching(body)
     assert len(body) == count and pieces(body, pairs) == 1
 
@@ -168,15 +168,15 @@ def test_walkers_come_back_as_brownian_motion_does():
 def test_gaps_are_never_overrated():
     """Against all grains: `gap_at` is at most the gap of surfaces, and just that where it names a grain."""
     body, rng, named = dla(60, seed=1, **MIXED), np.random.default_rng(2), 0
-    stuff = stuff_of(body.radius, [body.materials[k] for k in body.material])
-    crowd = room(stuff)
+    grain_set = grain_set_of(body.radius, [body.materials[k] for k in body.material])
+    crowd = room(grain_set)
     for i in range(60):
-        join_crowd(crowd, i, tuple(body.position[i]))
+        join_hash_grid(crowd, i, tuple(body.position[i]))
     for number in range(900):
         x = rng.normal(size=3) * size_of(body) * rng.choice([0.3, 5.0, 50.0])
         if number % 3:  # where a look at cells says just so much
-            x = body.position[number % 60] + rng.normal(size=3) * rng.choice([2.0, 5.0]) * stuff.largest
-        gap, mate = gap_at(crowd, body.arrays.position, stuff, 0, tuple(x))
+            x = body.position[number % 60] + rng.normal(size=3) * rng.choice([2.0, 5.0]) * grain_set.largest
+        gap, mate = gap_at(crowd, body.arrays.position, grain_set, 0, tuple(x))
         true = np.linalg.norm(body.position - x, axis=1) - body.radius - body.radius[0]
         assert gap <= true.min() + 1e-20
         if mate >= 0:

@@ -215,7 +215,7 @@ def test_the_case_a_run_writes_is_the_case_it_ran(tmp_path, changes):
 
 def same_bits(one, other):
     """True if every array of two worlds agrees to the last bit."""
-    a, b = one.world.to_arrays(), other.world.to_arrays()
+    a, b = one.state.to_arrays(), other.state.to_arrays()
     return a.keys() == b.keys() and all(a[name].tobytes() == b[name].tobytes() for name in a)
 
 

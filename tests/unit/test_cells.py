@@ -10,17 +10,17 @@ from sand.box import Box, as_box
 from sand.compiler.jit import kernel
 from sand.contact.pair_types import bond_of
 from sand.forces.pair.dipole_loops import CUT
-from sand.integrate.respa import clear_far_loads
+from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours import cell_list as cells
 from sand.neighbours.settings import Neighbours, share_within
-from sand.state.arrays import far_arrays
+from sand.state.arrays import empty_long_range_arrays
 from sand.state.state import LISTED, MADE, PAIRS, REBUILT
 
 cut_loads = CUT.loads
 
 
 def _all_pairs(grains, far, span, rules):
-    clear_far_loads(far)
+    clear_long_range_loads(far)
     cut_loads(grains, far, span, rules)
 
 
@@ -30,13 +30,13 @@ all_pairs = kernel(_all_pairs, keep=False)
 def rows(position, box, reach):
     """The list from positions (N, 3) as a matrix: how often each pair stands in each grain's row."""
     count = len(position)
-    far = far_arrays(count, 8)
+    far = empty_long_range_arrays(count, 8)
     far.anchor[...] = position.T
-    while cells.remake_far_list(far, box.span, reach) == cells.FULL:
-        far = far._replace(mate=np.zeros(2 * far.mate.size, np.uint32))
+    while cells.rebuild_verlet_list(far, box.span, reach) == cells.FULL:
+        far = far._replace(mate=np.zeros(2 * far.neighbour.size, np.uint32))
     found = np.zeros((count, count), int)
     for place in range(count):
-        mates = far.order[far.mate[far.start[place] : far.start[place + 1]]]
+        mates = far.order[far.neighbour[far.start[place] : far.start[place + 1]]]
         np.add.at(found, (far.order[place], mates), 1)
     return found
 
@@ -168,9 +168,9 @@ def fast_gas(box, seed, contacts=False, **neighbours):
 
 def referee(sim):
     """Far forces, torques and fields of the same world over all pairs."""
-    world = sim.world.copy()
-    rules, far = sim._engine.rules, far_arrays(len(world.grains), 0)
-    all_pairs(world.grains.arrays, far, rules.span, rules.far[0])
+    world = sim.state.copy()
+    rules, far = sim._engine.rules, empty_long_range_arrays(len(world.grains), 0)
+    all_pairs(world.grains.arrays, far, rules.span, rules.long_range[0])
     return far.force, far.torque, world.grains.arrays.field
 
 
@@ -196,15 +196,15 @@ def test_listed_forces_are_those_of_all_pairs(lengths, margin, contacts):
     sim.run(steps=1)
     for step in range(1000):
         sim._engine.advance(np.inf, 1)
-        ours = (sim.world.far.force, sim.world.far.torque, sim.grains.arrays.field)
+        ours = (sim.state.long_range.force, sim.state.long_range.torque, sim.grains.arrays.field)
         for mine, theirs in zip(ours, referee(sim), strict=True):
             assert np.abs(mine - theirs).max() < 1e-12 * np.abs(theirs).max()
         if contacts and step % 20 == 0:
             assert no_touch_is_missed(sim)
-    assert sim.world.count[LISTED] > (15 if margin != "auto" else 5)
+    assert sim.state.count[LISTED] > (15 if margin != "auto" else 5)
     if contacts:
-        assert sim.world.count[MADE] > 0
-        assert sim.world.count[REBUILT] > 50
+        assert sim.state.count[MADE] > 0
+        assert sim.state.count[REBUILT] > 50
 
 
 def no_touch_is_missed(sim):
@@ -250,13 +250,13 @@ def test_near_pairs_are_those_with_a_small_gap(search, lengths):
     grains = sand.Grains(position[chosen], radius[chosen], sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact()], box=box, neighbours=SEARCHES[search])
     sim.run(steps=1)
-    near, found = sim.world.near, int(sim.world.count[PAIRS])
+    near, found = sim.state.pair_list, int(sim.state.count[PAIRS])
     apart = np.linalg.norm(box.nearest(grains.position[:, None] - grains.position[None]), axis=2)
     close = apart < grains.radius[:, None] + grains.radius[None] + 3.5e-9
     expected = {(i, j) for i, j in zip(*np.nonzero(close), strict=True) if j < i}
     assert found == len(expected) > 10
     assert {(i, j) for i, j in near.pair[:, :found].T.tolist()} == expected
-    assert (sim.world.far.mate.size > 1000) == (search == "list")
+    assert (sim.state.long_range.neighbour.size > 1000) == (search == "list")
 
 
 @pytest.mark.compiled("contacts")
@@ -264,13 +264,14 @@ def test_a_row_of_cells_may_need_more_room_than_there_is():
     """Room for 16 neighbours of one grain is found to be too little, and grows: the same pairs."""
     grains = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
     once, short = (sand.Simulation(grains, [sand.Contact()], neighbours=Neighbours("cells")) for _ in range(2))
-    short.world.far = short.world.far._replace(mate=np.zeros(16, np.uint32))
+    short.state.long_range = short.state.long_range._replace(mate=np.zeros(16, np.uint32))
     for sim in (once, short):
-        sim.world.near.anchor[:] = np.inf
+        sim.state.pair_list.anchor[:] = np.inf
         sim.run(steps=2)
-    assert short.world.far.mate.size > 16 and once.world.count[PAIRS] > 216
+    assert short.state.long_range.neighbour.size > 16 and once.state.count[PAIRS] > 216
     assert (
-        short.world.near.pair[:, : short.world.count[PAIRS]] == once.world.near.pair[:, : once.world.count[PAIRS]]
+        short.state.pair_list.pair[:, : short.state.count[PAIRS]]
+        == once.state.pair_list.pair[:, : once.state.count[PAIRS]]
     ).all()
 
 
@@ -289,14 +290,14 @@ def test_a_resumed_run_looks_for_neighbours_as_before(tmp_path, search):
         for name in ("whole", "begun")
     )
     begun.run(steps=20)
-    assert begun.world.count[MADE] == 0
+    assert begun.state.count[MADE] == 0
     rest = sand.resume(tmp_path / "begun")
     assert rest._engine.rules.search == whole._engine.rules.search
     assert rest.choices["neighbours"] == whole.choices["neighbours"]
     whole.run(steps=600)
     rest.run(steps=580)
-    assert whole.world.count[MADE] > 200 and whole.world.count[REBUILT] > 2
-    one, other = whole.world.to_arrays(), rest.world.to_arrays()
+    assert whole.state.count[MADE] > 200 and whole.state.count[REBUILT] > 2
+    one, other = whole.state.to_arrays(), rest.state.to_arrays()
     assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
@@ -307,10 +308,10 @@ def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
     block = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
     grains = sand.Grains(1.2 * block.position, 1e-8, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact()], neighbours=SEARCHES[search])
-    assert sim.world.near.pair.shape[1] == 16
+    assert sim.state.pair_list.pair.shape[1] == 16
     sim.run(steps=1)
-    assert sim.world.count[PAIRS] == 3 * 6 * 6 * 5  # a gap of 4 nm along the edges of the cubes, 14 nm across
-    assert 540 * 1.1 <= sim.world.near.pair.shape[1] < 540 * 1.12
+    assert sim.state.count[PAIRS] == 3 * 6 * 6 * 5  # a gap of 4 nm along the edges of the cubes, 14 nm across
+    assert 540 * 1.1 <= sim.state.pair_list.pair.shape[1] < 540 * 1.12
 
 
 @pytest.mark.compiled("contacts")
@@ -325,15 +326,17 @@ def test_rows_that_are_too_long_are_listed_with_more_room():
     radius = np.full(31, 1e-8)
     radius[30] = 2e-7
     sim = sand.Simulation(sand.Grains(position, radius, sand.SILICA), [sand.Contact()], neighbours=Neighbours("cells"))
-    world = sim.world
-    world.far = world.far._replace(mate=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
-    assert world.near.pair.shape[1] == 16
+    world = sim.state
+    world.long_range = world.long_range._replace(mate=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
+    assert world.pair_list.pair.shape[1] == 16
     sim.run(steps=1)
-    world = sim.world
-    assert world.far.source.shape == (1, world.far.mate.size) and world.far.mate.size > 29
+    world = sim.state
+    assert (
+        world.long_range.source.shape == (1, world.long_range.neighbour.size) and world.long_range.neighbour.size > 29
+    )
     assert world.count[REBUILT] == 1 and world.count[PAIRS] == 29
-    assert {tuple(sorted(pair)) for pair in world.near.pair[:, :29].T.tolist()} == {(k, k + 1) for k in range(29)}
-    assert np.array_equal(world.near.anchor.T, position)
+    assert {tuple(sorted(pair)) for pair in world.pair_list.pair[:, :29].T.tolist()} == {(k, k + 1) for k in range(29)}
+    assert np.array_equal(world.pair_list.anchor.T, position)
 
 
 @pytest.mark.compiled("contacts")
@@ -345,8 +348,8 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     mixed = sand.Grains(1.03 * block.position, radius, [sand.IRON if k % 3 else sand.SILICA for k in range(125)])
     sim = sand.Simulation(mixed, [sand.Contact()])
     sim.run(steps=1)
-    near, law, a = sim.world.near, sim._engine.rules.contact, sim.grains.arrays
-    pairs = sim.world.count[PAIRS]
+    near, law, a = sim.state.pair_list, sim._engine.rules.contact, sim.grains.arrays
+    pairs = sim.state.count[PAIRS]
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
         bond = bond_of(a, law.pairings, i, j)
@@ -372,7 +375,7 @@ def test_ringing_does_not_make_lists():
         sim.run(steps=100)
         way += (sim.time - before) * np.linalg.norm(sim.grains.velocity, axis=1).mean()
     assert way > 10 * 2e-9
-    assert sim.world.count[LISTED] <= 3
+    assert sim.state.count[LISTED] <= 3
 
 
 @pytest.mark.parametrize(
@@ -456,7 +459,7 @@ def test_a_state_without_a_list_or_with_a_wide_one_goes_on(earlier, far):
     begun.run(until="0.3 ns")
     moved = begun.box.nearest(begun.grains.position - grains.position)
     assert np.sqrt((moved**2).sum(axis=1)).max() > 1e-8
-    saved = begun.world.to_arrays(), {"temperature": 1e6, "wall_seconds": 0.0}
+    saved = begun.state.to_arrays(), {"temperature": 1e6, "wall_seconds": 0.0}
     goes_on = sand.Simulation(grains, forces, neighbours=Neighbours("cells", "2 nm"), restart=saved, **options)
     there, here = begun.loads(), goes_on.loads()
     for name, energy in there["energy"].items():

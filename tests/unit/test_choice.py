@@ -7,12 +7,12 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
-from sand.contact.events import all_may_touch
-from sand.integrate.step_control import calm_steps, closing_step, grain_step, pair_step
+from sand.contact.events import inner_list_is_full
+from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
 from sand.integrate.step_parts import SOON_PART
-from sand.neighbours.pair_list import list_soon
-from sand.numerics.float_order import rank, ranked
-from sand.state.state import PAIRS, SOON, SOON_LEEWAY
+from sand.neighbours.pair_list import build_inner_list
+from sand.numerics.float_order import float_from_bits, rank
+from sand.state.state import INNER_COUNT, INNER_SKIN, PAIRS
 
 
 def crowd():
@@ -31,7 +31,7 @@ def test_ranks_are_ordered_as_numbers():
     numbers = [0.0, 5e-324, 1e-310, 1e-30, 1.0, 1.0 + 2e-16, 1e300, math.inf]
     ranks = [rank(x) for x in numbers]
     assert ranks == sorted(ranks) and len(set(ranks)) == len(ranks)
-    assert [ranked(bits) for bits in ranks] == numbers
+    assert [float_from_bits(bits) for bits in ranks] == numbers
     assert rank(math.nan) > rank(math.inf)
 
 
@@ -39,16 +39,18 @@ def test_ranks_are_ordered_as_numbers():
 def test_choices_are_the_least_of_all():
     """The loops that vectorise give the least of what grains and pairs allow one by one in Python, to rounding."""
     sim = crowd()
-    w, rules = sim.world, sim._engine.rules
+    w, rules = sim.state, sim._engine.rules
     arrays, span, control = w.grains.arrays, rules.span, rules.control
 
     def look(grains, far, start, near, count, span, control):
-        step, cycle = calm_steps(grains, far, start, count, control)
+        step, cycle = steps_of_free_grains(grains, far, start, count, control)
         return step, cycle, closing_step(grains, near, count, span, control, math.inf)
 
-    step, cycle, closing = kernel(look, keep=False)(arrays, w.far, w.contacts.start, w.near, w.count, span, control)
-    each = [grain_step(arrays, w.far, w.contacts.start, control, i) for i in range(150)]
-    pairs = [pair_step(arrays, w.near, span, control, p) for p in range(w.count[PAIRS])]
+    step, cycle, closing = kernel(look, keep=False)(
+        arrays, w.long_range, w.contacts.start, w.pair_list, w.count, span, control
+    )
+    each = [grain_step(arrays, w.long_range, w.contacts.start, control, i) for i in range(150)]
+    pairs = [pair_step(arrays, w.pair_list, span, control, p) for p in range(w.count[PAIRS])]
     assert len(pairs) > 50
     assert math.isfinite(min(pairs))
     assert step == pytest.approx(min(control.longest, min(one for one, _ in each)), rel=1e-13)
@@ -63,16 +65,16 @@ def test_what_may_touch_soon_is_what_is_close():
     Where they have no room (an array has one place more than that), all near pairs are looked at.
     """
     sim = crowd()
-    w, reach = sim.world, sim._engine.rules.control.reach
+    w, reach = sim.state, sim._engine.rules.control.reach
     gap = 2.0 * SOON_PART * reach
 
     def picked(room):
-        near = w.near._replace(soon=np.zeros(room, np.uint32), watch=w.near.watch.copy())
-        list_soon(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
-        assert 0.49 * gap < near.watch[SOON_LEEWAY] < 0.5 * gap
-        if all_may_touch(near, w.count):
+        near = w.pair_list._replace(soon=np.zeros(room, np.uint32), watch=w.pair_list.skin.copy())
+        build_inner_list(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
+        assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
+        if inner_list_is_full(near, w.count):
             return {tuple(sorted(pair)) for pair in near.pair[:, : w.count[PAIRS]].T.tolist()}
-        soon = near.soon[: int(near.watch[SOON])].tolist()
+        soon = near.inner[: int(near.skin[INNER_COUNT])].tolist()
         assert len(set(soon)) == len(soon)
         return {tuple(sorted(near.pair[:, p].tolist())) for p in soon}
 
@@ -85,6 +87,6 @@ def test_what_may_touch_soon_is_what_is_close():
             if apart < radius[i] + radius[j] + gap and (j, i) not in bound:
                 close.add((j, i))
     assert len(close) > 3
-    assert picked(w.near.soon.size) == picked(len(close) + 1) == close
-    every = {tuple(sorted(pair)) for pair in w.near.pair[:, : w.count[PAIRS]].T.tolist()}
+    assert picked(w.pair_list.inner.size) == picked(len(close) + 1) == close
+    every = {tuple(sorted(pair)) for pair in w.pair_list.pair[:, : w.count[PAIRS]].T.tolist()}
     assert picked(len(close)) == picked(1) == every > close

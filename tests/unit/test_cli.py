@@ -342,7 +342,7 @@ def test_stopped_by_physics(place, capsys):
     assert read_checkpoint(place / path)[1]["until"] == 2e-8
     assert main(["run", "small.toml", "--json", "--overwrite"]) == 3
     summary = json.loads(capsys.readouterr().out)
-    assert summary["outcome"] == "flew_too_far"
+    assert summary["outcome"] == "too_fast"
     assert len(summary["grains_concerned"]) >= 1
     assert main(["info", "small"]) == 0
     assert "step is too long (grains" in capsys.readouterr().out

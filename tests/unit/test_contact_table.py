@@ -25,7 +25,7 @@ def busy(**options):
 def test_every_column_row_by_row(stiffness):
     """Displacements, shares, loads and energies of each contact from its pose; forces add up to the grains'."""
     sim = busy(stiffness=stiffness)
-    table, w = sim.contacts, sim.world
+    table, w = sim.contacts, sim.state
     assert set(table) == {name for name, _, _ in COLUMNS}
     force = np.zeros((15, 3))
     for c, (i, j) in enumerate(table["pair"]):

@@ -15,9 +15,9 @@ from sand.io import run_folder as files
 from sand.io.damage import sealed
 from sand.io.gsd_index import ENTRY, read_index
 from sand.io.ledger_table import LedgerFile, keep_if_damaged, read_ledger
-from sand.io.live_trajectory import Following
+from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import Frames, TrajectoryWriter, read_frames
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 
 from .reels import contacts_of, grains_of, reel
 
@@ -169,19 +169,19 @@ def test_readers_of_a_run_say_so(run, capsys):
         assert main(words) == 0
         said = capsys.readouterr().err.strip().splitlines()
         assert len(said) == 1 and "note:" in said[0] and "3 of the 6 rows" in said[0]
-    assert "3 of the 6 rows" in story_of(run).manifest()["note"]
+    assert "3 of the 6 rows" in run_dataset(run).manifest()["note"]
     ledger.write_text("".join([*lines[:3], lines[3].replace("5", "6"), *lines[4:]]))
     for words in (["info", str(run)], ["plot", str(run), "--what", "energies", "--overwrite"]):
         assert main(words) == 2
         assert "ledger.csv is damaged: row 3" in capsys.readouterr().err
-    assert "ledger.csv is damaged" in story_of(run).manifest()["note"]
+    assert "ledger.csv is damaged" in run_dataset(run).manifest()["note"]
     ledger.write_text("".join(lines))
     summary.write_text(summary.read_text().replace('"steps": ', '"steps": 1'))
     with pytest.raises(sand.BadInput, match=r"summary\.json is damaged"):
         sand.open(run).summary  # noqa: B018
     assert main(["info", str(run)]) == 2
     assert "summary.json is damaged" in capsys.readouterr().err
-    assert "summary.json is damaged" in story_of(run).manifest()["note"]
+    assert "summary.json is damaged" in run_dataset(run).manifest()["note"]
 
 
 def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
@@ -246,7 +246,7 @@ def test_data_without_a_frame(tmp_path):
     with open(path, "r+b") as file:
         file.seek(place)
         file.write(bytes(len(entries) * ENTRY.itemsize))
-    for read in (read_frames, Following, Frames):
+    for read in (read_frames, LiveTrajectory, Frames):
         with pytest.raises(sand.BadInput, match="holds data but no frame"):
             read(path)
     with pytest.warns(UserWarning, match=r"beyond mending; it is now trajectory\.gsd\.damaged"):

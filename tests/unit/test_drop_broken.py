@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from sand.contact.events import drop_broken
+from sand.contact.events import compact_contacts
 from sand.contact.update import BROKE
-from sand.state.arrays import ContactArrays, contact_arrays
+from sand.state.arrays import ContactArrays, empty_contact_arrays
 from sand.state.state import CONTACTS, COUNT
 
-BY_GRAIN = {"side", "start", "turn"}
+BY_GRAIN = {"side", "start", "gather_order"}
 """Arrays that are made anew from the pairs."""
 
 
@@ -19,7 +19,7 @@ def test_each_column_moves_with_its_contact(broken):
     Room for more contacts than there are, constants and losses for each, and damping, so that nothing is left out.
     The loop is called as plain Python.
     """
-    contacts = contact_arrays(9, 20, 15, channels=6)
+    contacts = empty_contact_arrays(9, 20, 15, channels=6)
     rng, count = np.random.default_rng(4), np.zeros(len(COUNT), np.int64)
     count[CONTACTS] = 7
     for name in set(ContactArrays._fields) - BY_GRAIN:
@@ -29,7 +29,7 @@ def test_each_column_moves_with_its_contact(broken):
     contacts.flag[broken] = BROKE
     kept = [c for c in range(7) if c not in broken]
     expected = {name: getattr(contacts, name)[..., kept].copy() for name in set(ContactArrays._fields) - BY_GRAIN}
-    drop_broken(contacts, count)
+    compact_contacts(contacts, count)
     assert count[CONTACTS] == len(kept)
     for name, array in expected.items():
         assert (getattr(contacts, name)[..., : len(kept)] == array).all(), name

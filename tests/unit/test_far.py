@@ -63,21 +63,21 @@ def test_taylor_torque_is_the_whole_product_rule():
     )
     from sand.compiler.jit import kernel
     from sand.forces.pair.dipole_loops import CUT
-    from sand.integrate.respa import clear_rates, set_paces
-    from sand.state.arrays import far_arrays
+    from sand.integrate.respa import clear_rates, set_mean_velocities
+    from sand.state.arrays import empty_long_range_arrays
 
     sum_rates = CUT.rates
 
     def fill(g, far, start, span, rules):
-        set_paces(g, far, start, span, 0.0, True)
+        set_mean_velocities(g, far, start, span, 0.0, True)
         clear_rates(far)
         sum_rates(g, far, span, rules)
 
     sim = sand.Simulation(grains, [sand.Dipoles()], stepping=sand.Verlet(step="1e-15 s"))
     before = sim.loads()
-    w, rules = sim.world, sim._engine.rules
-    far = far_arrays(len(grains), 0)  # a run in single steps has no room for rates
-    kernel(fill, keep=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.far[0])
+    w, rules = sim.state, sim._engine.rules
+    far = empty_long_range_arrays(len(grains), 0)  # a run in single steps has no room for rates
+    kernel(fill, keep=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.long_range[0])
     force_rate, torque_rate = far.force_rate.T.copy(), far.torque_rate.T.copy()
     sim.run(steps=10)
     after = sim.loads()

@@ -10,10 +10,10 @@ import pytest
 import sand
 from sand.compiler.jit import COMPILED, cache_folder, formula
 from sand.forces.base import compose
-from sand.forces.external.formulas import One, nothing, uniform_field
+from sand.forces.external.formulas import GrainState, nothing, uniform_field
 from sand.forces.external.loops import is_ours
 from sand.integrate.driver import driver_for
-from sand.integrate.kernel_spec import Plan
+from sand.integrate.kernel_spec import KernelSpec
 
 
 class Weight(NamedTuple):
@@ -67,15 +67,15 @@ def test_compiled_code_with_a_users_formula_is_not_kept():
     if not COMPILED:
         pytest.skip("the compiler is off")
     theirs, ours = (compose([force])[0] for force in (Gravity(), sand.Field(0.5)))
-    assert driver_for(Plan(outside=theirs, keep=False)).stats.cache_path is None
-    assert Path(driver_for(Plan(outside=ours)).stats.cache_path).is_relative_to(cache_folder())
+    assert driver_for(KernelSpec(external=theirs, keep=False)).stats.cache_path is None
+    assert Path(driver_for(KernelSpec(external=ours)).stats.cache_path).is_relative_to(cache_folder())
 
 
 def test_composed_forces_add_up():
     """Two forces in one formula: sums of force, torque and energy, each with its own parameters."""
     field = sand.Field([0.0, 0.0, 0.5])
     both, numbers = compose([Gravity(), field])
-    grain = One((0.0, 0.0, 2.0), (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0), 1.0, 3.0, 0.0)
+    grain = GrainState((0.0, 0.0, 2.0), (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0), 1.0, 3.0, 0.0)
     force, torque, energy = both(0.0, grain, numbers)
     assert force == pytest.approx((0, 0, -3 * 9.81), rel=1e-6, abs=0.0)
     assert torque == pytest.approx((0, -0.5, 0), rel=1e-6, abs=0.0)
@@ -89,9 +89,9 @@ def test_the_field_is_minus_the_gradient_of_its_energy():
     numbers = sand.Field(b).numbers()
 
     def energy(m):
-        return uniform_field(0.0, One((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, tuple(m), 1.0, 1.0, 0.0), numbers)[2]
+        return uniform_field(0.0, GrainState((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, tuple(m), 1.0, 1.0, 0.0), numbers)[2]
 
-    one = One((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, tuple(moment), 1.0, 1.0, 0.0)
+    one = GrainState((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, tuple(moment), 1.0, 1.0, 0.0)
     torque = uniform_field(0.0, one, numbers)[1]
     h = 1e-6
     slope = [

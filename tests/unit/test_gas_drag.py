@@ -10,7 +10,7 @@ from sand.compiler.jit import kernel
 from sand.constants import BOLTZMANN
 from sand.forces.base import Force, GrainForce
 from sand.forces.gas import drag as law
-from sand.forces.gas.loops import VACUUM, GasRules, gas_kick, shortest_stopping_time
+from sand.forces.gas.loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
 from sand.forces.gas.model import Gas
 
 SPEED = math.sqrt(8.0 / math.pi)
@@ -401,10 +401,12 @@ def test_a_gas_in_numbers():
     assert gas.molecule_mass == pytest.approx(Gas(280, 1e-6, molecule_mass="2.34 u").molecule_mass, rel=1e-8, abs=0)
     speed = math.sqrt(8 * BOLTZMANN * 280 / (math.pi * gas.molecule_mass))
     assert gas.rules() == pytest.approx(
-        GasRules(True, 1e-6, speed, BOLTZMANN * 280, 1.0, 0.0, 0.0, 0.0), rel=1e-14, abs=0
+        GasParameters(True, 1e-6, speed, BOLTZMANN * 280, 1.0, 0.0, 0.0, 0.0), rel=1e-14, abs=0
     )
     pressed = Gas(280, pressure=1e-6 * BOLTZMANN * 280 / gas.molecule_mass, wind=["1 km/s", 0, -2], brownian=False)
-    assert pressed.rules() == pytest.approx(GasRules(True, 1e-6, speed, 0.0, 1.0, 1e3, 0.0, -2.0), rel=1e-14, abs=0)
+    assert pressed.rules() == pytest.approx(
+        GasParameters(True, 1e-6, speed, 0.0, 1.0, 1e3, 0.0, -2.0), rel=1e-14, abs=0
+    )
     assert isinstance(gas, Force) and not isinstance(gas, GrainForce)
     assert gas.name == "gas" and "Epstein 1924" in gas.references
 

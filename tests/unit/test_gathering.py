@@ -8,11 +8,11 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
-from sand.contact.gather import BLOCK, DENSE, MOST, gather, resort_sides
+from sand.contact.gather import BLOCK, DENSE, MOST, gather, resort_contacts_by_grain
 from sand.integrate.motion import gather_and_kick, kick, kick_and_drift_for
-from sand.integrate.task_queue import GRAINS_AT_ONCE
-from sand.state.arrays import KINDS, TURNS_FROM, contact_arrays
-from sand.state.state import CONTACTS, COUNT, FASTEST, QUICKEST
+from sand.integrate.task_queue import GRAINS_PER_BLOCK
+from sand.state.arrays import KINDS, TURNS_FROM, empty_contact_arrays
+from sand.state.state import CONTACTS, COUNT, LARGEST_SPEED, LARGEST_SPIN
 
 GRAINS = TURNS_FROM + 37
 """Enough for an order of their own, and a last block that is not full."""
@@ -43,11 +43,11 @@ def some(per_grain, count=GRAINS):
     first, second = near[0], (near[0] + near[1]) % count
     pair = np.unique(np.array([first, second]), axis=1)
     pair = rng.permutation(pair, axis=1)[:, : int(per_grain * count)]
-    contacts, counters = contact_arrays(count, pair.shape[1], 15), np.zeros(len(COUNT), np.int64)
+    contacts, counters = empty_contact_arrays(count, pair.shape[1], 15), np.zeros(len(COUNT), np.int64)
     contacts.pair[:, : pair.shape[1]], counters[CONTACTS] = pair, pair.shape[1]
     for loads in (contacts.push, contacts.torque1, contacts.torque2):
         loads[...] = 1e-9 * rng.normal(size=loads.shape)
-    resort_sides(contacts, counters, count)
+    resort_contacts_by_grain(contacts, counters, count)
     return grains, contacts, pair
 
 
@@ -56,7 +56,7 @@ def some(per_grain, count=GRAINS):
 def test_sums_are_those_of_brute_force(per_grain, count):
     """F = Σ ±push, M = Σ torque of each end; terms of 1e-9, at most some 30, rounded to 1e-16 each: 1e-23."""
     grains, contacts, pair = some(per_grain, count)
-    assert contacts.turn.size == (count + KINDS if count >= TURNS_FROM else 0)
+    assert contacts.gather_order.size == (count + KINDS if count >= TURNS_FROM else 0)
     used = pair.shape[1]
     force, torque = np.zeros((3, count)), np.zeros((3, count))
     for end, sign, own in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
@@ -86,7 +86,7 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     _, contacts, pair = some(1.0)
     many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], MOST)
     kind = many[0] * (MOST + 1) + many[1]
-    turn = contacts.turn[:GRAINS]
+    turn = contacts.gather_order[:GRAINS]
     assert len(set(kind.tolist())) > 10
     for first in range(0, GRAINS, BLOCK):
         block = np.arange(first, min(first + BLOCK, GRAINS))
@@ -142,10 +142,10 @@ def test_the_fastest_grain_of_all_blocks_is_known(moved):
     """What the step is limited by are the largest squares of speed and spin among all grains."""
     sim = sand.Simulation(large(moved), [sand.Contact()])
     sim.run(steps=3)
-    watch, v, w = sim.world.near.watch, sim.grains.velocity, sim.grains.spin
-    assert GRAINS > GRAINS_AT_ONCE and (v**2).sum(axis=1).argmax() == moved
-    assert watch[FASTEST] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
-    assert watch[QUICKEST] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[QUICKEST] > 0.0
+    watch, v, w = sim.state.pair_list.skin, sim.grains.velocity, sim.grains.spin
+    assert GRAINS > GRAINS_PER_BLOCK and (v**2).sum(axis=1).argmax() == moved
+    assert watch[LARGEST_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
+    assert watch[LARGEST_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[LARGEST_SPIN] > 0.0
 
 
 @pytest.mark.validate
@@ -154,8 +154,8 @@ def test_a_resumed_world_takes_its_turns(tmp_path):
     sim = sand.Simulation(large(), [sand.Contact()], out=tmp_path / "run")
     sim.run(steps=3)
     rest = sand.resume(shutil.copytree(tmp_path / "run", tmp_path / "copy"))
-    assert sorted(rest.world.contacts.turn[:GRAINS].tolist()) == list(range(GRAINS))
-    assert (rest.world.contacts.turn[:GRAINS] == sim.world.contacts.turn[:GRAINS]).all()
+    assert sorted(rest.state.contacts.gather_order[:GRAINS].tolist()) == list(range(GRAINS))
+    assert (rest.state.contacts.gather_order[:GRAINS] == sim.state.contacts.gather_order[:GRAINS]).all()
     sim.run(steps=3)
     rest.run(steps=3)
     assert (rest.grains.position == sim.grains.position).all() and (rest.grains.spin == sim.grains.spin).all()

@@ -6,7 +6,7 @@ import pytest
 
 from sand.errors import BadInput
 from sand.io.page_bundle import PAGE, read_bundle
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 
 from .reels import reel
@@ -50,7 +50,7 @@ def test_script_and_styles_begin_with_the_licences(bundle):
 def test_a_file_to_send_carries_them(bundle, tmp_path):
     """`sand view --html` puts script and sheet into the file, and their first comments with them."""
     reel(tmp_path / "a.gsd", [[(0, 1)], []], 3)
-    write_page(story_of(tmp_path / "a.gsd"), tmp_path / "a.html", bundle=bundle)
+    write_page(run_dataset(tmp_path / "a.gsd"), tmp_path / "a.html", bundle=bundle)
     text = (tmp_path / "a.html").read_text("utf-8")
     for part in bundle:
         assert licences_in(part) in text

@@ -7,20 +7,20 @@ import pytest
 
 from sand.box import Box
 from sand.compiler.jit import kernel
-from sand.contact.events import settle_flagged
+from sand.contact.events import update_flagged_contacts
 from sand.contact.law import Bond, bond_between, strain_of
 from sand.contact.model import Contact
-from sand.contact.slip import book_passed, contact_pass, strain_before
+from sand.contact.slip import contact_pass, log_slip_sums, strain_before
 from sand.contact.tangential import pointers_for
-from sand.contact.update import BROKE, WAITS, YIELDED, pose_at, quiet_pass, twist_gain
+from sand.contact.update import BROKE, SLIPPED_FLAGS, WAITS, contact_loop, pose_at, twist_gain
 from sand.grains import GrainArrays, Grains
-from sand.integrate.kernel_spec import ContactRules
+from sand.integrate.kernel_spec import ContactParameters
 from sand.integrate.motion import kick_and_drift_for
 from sand.material import SILICA
 from sand.numerics.quaternion import turned_back
 from sand.numerics.vec import axpy, load4, put, scale
-from sand.state.arrays import contact_arrays, near_pairs
-from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, MOVED, ROLLING, SLIDING, TWISTING
+from sand.state.arrays import empty_contact_arrays, empty_pair_list
+from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, TWISTING
 
 PAIRS = 403
 """Contacts of a test: whole blocks, and a rest that fills no vector."""
@@ -28,21 +28,21 @@ STEP = 1e-11
 STATE = ("pointer1", "pointer2", "twist", "push", "torque1", "torque2", "lost")
 
 
-def _pass_and_settle(grains, contacts, near, count, lost, span, law, dt):
+def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
     passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, dt)
-    book_passed(count, lost, passed)
-    settle_flagged(grains, contacts, near, count, lost, span, law, dt)
+    log_slip_sums(count, lost, passed)
+    update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
     return passed.waiting
 
 
-pass_and_settle = kernel(_pass_and_settle, keep=False)
+pass_and_settle = kernel(_pass_and_update, keep=False)
 
 
 def one_by_one(grains, contacts, near, count, lost, span, law, dt):
     """The referee, in Python: a pass that moves nothing, then every contact beyond a limit by itself."""
     used = np.uint64(count[CONTACTS])
-    quiet_pass(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
-    settle_flagged(grains, contacts, near, count, lost, span, law, dt)
+    contact_loop(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
+    update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
 
 
 def some_contacts(material, box, seed=1):
@@ -56,7 +56,7 @@ def some_contacts(material, box, seed=1):
     pairing = Contact().pairing(material, material)
     r1, r2 = rng.uniform(5e-9, 2e-8, (2, PAIRS))
     mass = 4 / 3 * np.pi * 2000.0 * np.array([r1, r2]) ** 3
-    n, contacts = vectors(1.0), contact_arrays(2 * PAIRS, PAIRS, len(Bond._fields))
+    n, contacts = vectors(1.0), empty_contact_arrays(2 * PAIRS, PAIRS, len(Bond._fields))
     grains = GrainArrays(*(np.zeros_like(a) for a in Grains(np.zeros((2 * PAIRS, 3)), 1e-8, material).arrays))
     grains.orientation[:] = rng.normal(size=(4, 2 * PAIRS))
     grains.orientation[:] /= np.linalg.norm(grains.orientation, axis=0)
@@ -84,11 +84,11 @@ def some_contacts(material, box, seed=1):
     grains.position[:] = box.wrap(grains.position.T).T
     count = np.zeros(len(COUNT), np.int64)
     count[CONTACTS] = PAIRS
-    return grains, contacts, near_pairs(2 * PAIRS, 16), count, np.zeros(len(LOST))
+    return grains, contacts, empty_pair_list(2 * PAIRS, 16), count, np.zeros(len(LOST))
 
 
 def law_for(release=False, follow=False):
-    return ContactRules(True, np.zeros((10, 1, 1)), release, follow, False, 25.0)
+    return ContactParameters(True, np.zeros((10, 1, 1)), release, follow, False, 25.0)
 
 
 OPTIONS = {
@@ -124,12 +124,12 @@ def test_contacts_moved_in_the_pass_are_as_if_moved_one_by_one(option):
     # there are all sorts of contacts, and it is the pass that moves them, but for those it must leave alone
     assert 0 < world[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
     if option in ("clamped", "released", "periodic"):
-        assert np.sum(flag == YIELDED) > PAIRS / 4 and np.sum(flag == WAITS) > 0
+        assert np.sum(flag == SLIPPED_FLAGS) > PAIRS / 4 and np.sum(flag == WAITS) > 0
         assert world[3][BROKEN] < waited < PAIRS / 3
-        assert world[3][MOVED] >= np.sum(flag == YIELDED)
+        assert world[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAGS)
         assert (world[4][[SLIDING, ROLLING, TWISTING]] != 0.0).all()
     if option == "following":
-        assert not np.any(flag == YIELDED)
+        assert not np.any(flag == SLIPPED_FLAGS)
 
 
 def test_the_strain_before_a_step_is_that_of_grains_put_back():
@@ -168,5 +168,5 @@ def test_a_quiet_block_waits_to_be_settled():
     world = some_contacts(SILICA, Box.open())
     world[1].flag[:] = 0.0
     waited = pass_and_settle(*world, Box.open().span, law_for(), STEP)
-    assert waited > PAIRS / 2 and not np.any(world[1].flag == YIELDED)
-    assert world[3][MOVED] > PAIRS / 2
+    assert waited > PAIRS / 2 and not np.any(world[1].flag == SLIPPED_FLAGS)
+    assert world[3][SLIPPED] > PAIRS / 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.neighbours.morton_order import places_on_curve
+from sand.neighbours.morton_order import morton_keys
 
 
 def test_places_interleave_the_bits():
@@ -13,7 +13,7 @@ def test_places_interleave_the_bits():
     corners = np.array([[0, 0, 0], [top, 0, 0], [0, top, 0], [0, 0, top], [top, top, top], [2**7, 0, 2**20]], float)
     spread = sum(1 << (3 * b) for b in range(21))
     expected = [0, spread, spread << 1, spread << 2, spread * 7, (1 << 21) | (1 << 62)]
-    assert places_on_curve(corners).tolist() == expected
+    assert morton_keys(corners).tolist() == expected
 
 
 @pytest.mark.compiled("small")
@@ -22,7 +22,7 @@ def test_the_same_grains_in_another_order():
     grains = sand.setup.bpca(2000, radius="0.1 um", material=sand.SILICA, seed=3)
     grains.arrays.velocity[...] = grains.arrays.position * 2.0
     ordered = sand.setup.in_space_order(grains)
-    order = np.argsort(places_on_curve(grains.position), kind="stable")
+    order = np.argsort(morton_keys(grains.position), kind="stable")
     assert sorted(order) == list(range(2000))
     for name, array in grains.arrays._asdict().items():
         assert (getattr(ordered.arrays, name) == array[..., order]).all(), name
@@ -37,6 +37,6 @@ def test_the_same_grains_in_another_order():
 
 def test_points_in_one_place_or_a_plane():
     """No extent along an axis, or none at all, is no error."""
-    assert (places_on_curve(np.zeros((3, 3))) == 0).all()
+    assert (morton_keys(np.zeros((3, 3))) == 0).all()
     plane = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
-    assert len(set(places_on_curve(plane).tolist())) == 3
+    assert len(set(morton_keys(plane).tolist())) == 3

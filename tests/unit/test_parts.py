@@ -7,12 +7,12 @@ import pytest
 
 import sand
 from sand.compiler.jit import formula, kernel
-from sand.forces.base import compose_far
+from sand.forces.base import compose_long_range
 from sand.forces.pair import dipole_loops as dipoles
 from sand.forces.pair import inverse_square_loops as central
-from sand.integrate.respa import clear_far_loads
-from sand.neighbours.cell_list import make_far_list
-from sand.state.arrays import far_arrays
+from sand.integrate.respa import clear_long_range_loads
+from sand.neighbours.cell_list import build_verlet_list
+from sand.state.arrays import empty_long_range_arrays
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -38,15 +38,15 @@ def test_blocks_of_forces_together_are_their_sum(order):
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
-    of_dipoles, (of_charges, _) = sim._engine.rules.far
+    of_dipoles, (of_charges, _) = sim._engine.rules.long_range
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
     loops = {"listed dipoles": dipoles.LISTED, "listed charges": central.LISTED, "dipoles": dipoles.CUT}
-    sums, own = compose_far([loops[name] for name in order], [numbers[name] for name in order])
+    sums, own = compose_long_range([loops[name] for name in order], [numbers[name] for name in order])
     span, found = sim._engine.rules.span, []
     for way in ("at once", "in blocks"):
-        arrays, far = sim.world.copy().grains.arrays, far_arrays(40, 4000)
-        make_far_list(arrays, far, sim.world.count.copy(), span, sim._engine.rules.search)
-        clear_far_loads(far)
+        arrays, far = sim.state.copy().grains.arrays, empty_long_range_arrays(40, 4000)
+        build_verlet_list(arrays, far, sim.state.count.copy(), span, sim._engine.rules.search)
+        clear_long_range_loads(far)
         if way == "at once":
             sums.loads(arrays, far, span, own)
         else:

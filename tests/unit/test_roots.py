@@ -9,7 +9,7 @@ from sand.constants import MAGNETIC
 from sand.forces.pair import dipole_loops as dipoles
 from sand.numerics import roots
 from sand.simulation.assemble import WIDE_FROM
-from sand.state.arrays import far_arrays
+from sand.state.arrays import empty_long_range_arrays
 
 
 def filled_by(function):
@@ -68,10 +68,10 @@ def test_sums_with_seeds_are_those_without(count):
     for pair in (dipoles.bare_pair, dipoles.seeded_pair):
         loads, far, own = (
             kernel(dipoles.all_pairs(pair).loads, keep=False, wide=True),
-            far_arrays(count, 0, 8),
+            empty_long_range_arrays(count, 0, 8),
             grains.copy(),
         )
-        loads(own.arrays, far, span, dipoles.DipoleRules(MAGNETIC, None))
+        loads(own.arrays, far, span, dipoles.DipoleParameters(MAGNETIC, None))
         found.append((far.force, far.torque, own.arrays.field))
     for exact, seeded in zip(*found, strict=True):
         assert np.abs(exact - seeded).max() < 1e-13 * np.abs(exact).max()
@@ -84,7 +84,7 @@ def test_seeds_are_for_many_grains_on_processors_with_long_vectors():
         grains = sand.Grains(
             1e-6 * np.arange(3 * count).reshape(count, 3), 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * count
         )
-        (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles()])._engine.far
+        (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles()])._engine.long_range
         assert (sums is dipoles.BARE) == (count < WIDE_FROM or not LONG_VECTORS)
-        (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles(cutoff="1 um")])._engine.far
+        (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles(cutoff="1 um")])._engine.long_range
         assert sums in (dipoles.CUT, dipoles.LISTED)

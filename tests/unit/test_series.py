@@ -5,7 +5,7 @@ import json
 import pytest
 
 from sand.analysis.ledger_columns import Books
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.series import MOST, of_ledger, thinned
 
 from .reels import reel
@@ -15,7 +15,7 @@ from .reels import reel
 def test_series_are_the_ledgers(looked_at):
     """Plots hold the ledger's columns; total − start is worked out before numbers are shortened; counts of events."""
     folder, sim = looked_at
-    series = story_of(folder).series()
+    series = run_dataset(folder).series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
     assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
@@ -49,7 +49,7 @@ def test_long_and_broken_ledgers(looked_at):
 
 def test_without_a_ledger(tmp_path):
     """A file by itself: clusters and contacts are counted in its frames."""
-    story = story_of(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
+    story = run_dataset(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
     series = story.series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert plots["contacts"]["contacts"] == [0, 1, 2]

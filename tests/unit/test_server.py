@@ -12,7 +12,7 @@ import pytest
 
 from sand.errors import BadInput
 from sand.viewer import server as servers
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.packets import decode
 from sand.viewer.server import Server
 
@@ -27,7 +27,7 @@ def server(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setattr(servers, "read_bundle", lambda: BUNDLE)
     path = reel(tmp_path_factory.mktemp("served") / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5)
-    one = Server(story_of(path))
+    one = Server(run_dataset(path))
     one.start()
     yield one
     one.stop()

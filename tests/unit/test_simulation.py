@@ -10,7 +10,7 @@ import pytest
 
 import sand
 from sand.simulation.observers import Schedule
-from sand.state.state import PAIRS, SOON
+from sand.state.state import INNER_COUNT, PAIRS
 
 from ..physics.setups import rest_distance, struck_chain
 
@@ -133,7 +133,7 @@ def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
     grains = pair(velocity=[[0, 0, 0], [0, 100.0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="1 ns"), out=tmp_path / "run")
     result = sim.run(until="1 us")
-    assert result.outcome is sand.Outcome.FLEW_TOO_FAR
+    assert result.outcome is sand.Outcome.TOO_FAST
     assert result.grains == (1,)
     assert list((tmp_path / "run").glob("checkpoint-*.npz"))
     assert "grains 1" in str(result)
@@ -144,7 +144,7 @@ def test_crushed_grains_end_the_run():
     """An impact so fast that a centre enters the other grain: JKR has nothing to say."""
     grains = pair(velocity=[[0, 0, 0], [-2e5, 0, 0]], material=sand.SILICA)
     result = sand.Simulation(grains, [sand.Contact()]).run(until="1 ns")
-    assert result.outcome is sand.Outcome.CRUSHED
+    assert result.outcome is sand.Outcome.OVERCOMPRESSED
     assert result.grains == (0, 1)
 
 
@@ -153,7 +153,7 @@ def test_numbers_that_are_not_finite_end_the_run():
     """A spin driven to NaN from outside is seen within 16 steps, and its grain is named."""
     sim = sand.Simulation(sand.Grains(1e-6 * np.arange(15).reshape(5, 3), 1e-8, sand.IRON), [sand.Contact()])
     sim.run(steps=100)
-    sim.world.grains.arrays.spin[0, 3] = math.nan
+    sim.state.grains.arrays.spin[0, 3] = math.nan
     result = sim.run(steps=200)
     assert result.outcome is sand.Outcome.NOT_FINITE
     assert result.grains == (3,)
@@ -188,7 +188,7 @@ def test_a_runaway_energy_ends_the_run(tmp_path):
     assert np.abs(arrays["grains/velocity"]).max() < 1.0  # a state from before
     go_on = sand.resume(tmp_path / "run")
     assert go_on.run().outcome is sand.Outcome.RUNAWAY
-    assert go_on.world.steps == result.steps
+    assert go_on.state.steps == result.steps
 
 
 @pytest.mark.compiled("contacts")
@@ -244,7 +244,7 @@ def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
     """6 radians in a step: the rotation parameters would be destroyed; the run stops and names the grain."""
     sim = sand.Simulation(pair(spin=[[0, 0, 0], [0, 0, 6e9]]), [sand.Contact()], stepping=sand.Verlet(step="1 ns"))
     result = sim.run(steps=200)
-    assert result.outcome is sand.Outcome.SPUN_TOO_FAR
+    assert result.outcome is sand.Outcome.SPINS_TOO_FAST
     assert result.grains == (1,)
     assert np.linalg.norm(sim.grains.orientation[1]) == pytest.approx(1.0, rel=1e-6, abs=0.0)
 
@@ -253,20 +253,20 @@ def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
 def test_steps_are_counted_through_growing_arrays():
     """run(steps=N) takes N steps, also when the list of pairs outgrows its arrays on the way."""
     sim = struck_chain(length=30)
-    near = sim.world.near
-    own = ("anchor", "soon", "watch")  # not by pair
+    near = sim.state.pair_list
+    own = ("anchor", "inner", "skin")  # not by pair
     columns = {name: array[..., :1].copy() for name, array in near._asdict().items() if name not in own}
-    sim.world.near = near._replace(**columns)
+    sim.state.pair_list = near._replace(**columns)
     sim.run(steps=32)
-    assert sim.world.steps == 32
+    assert sim.state.steps == 32
 
 
 @pytest.mark.parametrize(
     ("far", "there", "not_there"),
     [
-        ("impulse", ("held_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "home")),
-        ("taylor", ("torque_rate", "past_position", "past_moment"), ("held_force", "path", "order", "cell")),
-        ("every step", ("force", "torque"), ("held_torque", "force_rate", "past_position", "order")),
+        ("impulse", ("slow_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "cell_of")),
+        ("taylor", ("torque_rate", "past_position", "past_moment"), ("slow_force", "path", "order", "cell")),
+        ("every step", ("force", "torque"), ("slow_torque", "force_rate", "past_position", "order")),
     ],
 )
 def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
@@ -275,10 +275,10 @@ def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
     grains = sand.Grains(place, 1e-8, sand.SILICA, moment="1 A m^2/kg")
     forces, search = [sand.Contact(), sand.Dipoles(cutoff="none")], sand.Neighbours(search="all pairs")
     sim = sand.Simulation(grains, forces, stepping=sand.Verlet(far=far), neighbours=search)
-    arrays = sim.world.far._asdict()
+    arrays = sim.state.long_range._asdict()
     assert all(arrays[name].shape[-1] == 64 for name in there)
     assert not any(arrays[name].size for name in not_there)
-    assert sim.world.contacts.pair.shape[1] == -8 * (-int(1.1 * 3 * 4 * 4 * 3) // 8) == 160
+    assert sim.state.contacts.pair.shape[1] == -8 * (-int(1.1 * 3 * 4 * 4 * 3) // 8) == 160
 
 
 @pytest.mark.compiled("contacts")
@@ -290,14 +290,14 @@ def test_contacts_alone_have_no_room_for_other_forces():
         forces, search = [sand.Contact(damping=damping)], sand.Neighbours(search="cells")
         sim = sand.Simulation(grains, forces, neighbours=search)
         sim.run(steps=2)
-        far, contacts = sim.world.far, sim.world.contacts
+        far, contacts = sim.state.long_range, sim.state.contacts
         assert far.force.size == far.torque.size == far.anchor.size == far.start.size == 0
-        assert far.here.size == 0 and far.source.shape == (1, far.mate.size) and far.order.size == 64
+        assert far.packed_position.size == 0 and far.source.shape == (1, far.neighbour.size) and far.order.size == 64
         assert contacts.damped.size == (contacts.twist.size if damping == "viscoelastic" else 0)
         assert len(contacts.lost) == (6 if damping == "viscoelastic" else 4)
-        near = sim.world.near
-        assert near.pair.shape[1] >= sim.world.count[PAIRS] >= 144 and near.soon.size == near.pair.shape[1] // 8
-        assert near.watch[SOON] == 0  # those in contact need not be looked at, and all others are farther
+        near = sim.state.pair_list
+        assert near.pair.shape[1] >= sim.state.count[PAIRS] >= 144 and near.inner.size == near.pair.shape[1] // 8
+        assert near.skin[INNER_COUNT] == 0  # those in contact need not be looked at, and all others are farther
 
 
 @pytest.mark.compiled("contacts")
@@ -443,5 +443,5 @@ def test_bound_grains_take_the_whole_step_of_their_contact():
         grains = sand.Grains([[0, 0, 0], [d, 0, 0]], 1e-7, sand.SILICA, velocity=[[speed, 0, 0], [0, 0, 0]])
         sim = sand.Simulation(grains, [sand.Contact()])
         sim.run(steps=5)
-        step = sim.world.clock[1]
+        step = sim.state.clock[1]
         assert step == pytest.approx(period / 25, rel=1e-7, abs=0.0) if whole else step < 0.5 * period / 25

@@ -14,7 +14,7 @@ from sand.analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured
 from sand.analysis.tracking import SINGLE
 from sand.io.gsd_index import ENTRY, read_index
 from sand.io.trajectory import TrajectoryWriter
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.packets import decode
 from sand.viewer.ranges import EXTREMES, PERCENTILES
 from sand.viewer.simulation_view import field_in
@@ -48,7 +48,7 @@ KEYS = [
 def test_the_manifest_of_a_run(looked_at):
     """All keys of the contract, the run's own numbers, nothing that JSON cannot hold."""
     folder, sim = looked_at
-    told = story_of(folder, field_in(folder)).manifest()
+    told = run_dataset(folder, field_in(folder)).manifest()
     assert list(told) == KEYS
     json.dumps(told, allow_nan=False)
     assert (told["format"], told["name"], told["grains"], told["materials"]) == (1, "run", 6, ["iron"])
@@ -70,7 +70,7 @@ def test_the_manifest_of_a_run(looked_at):
 @pytest.mark.compiled("fields")
 def test_times_are_told_from_a_frame_on(looked_at):
     """`since` leaves out earlier ones and nothing else, and may be beyond the end."""
-    story = story_of(looked_at[0])
+    story = run_dataset(looked_at[0])
     whole, late, none = story.manifest(), story.manifest(4), story.manifest(10**8)
     assert late["times"] == whole["times"][4:] and late["steps"] == whole["steps"][4:]
     assert none["times"] == [] and {k: v for k, v in late.items() if k not in ("times", "steps")} == {
@@ -81,7 +81,7 @@ def test_times_are_told_from_a_frame_on(looked_at):
 def test_frames_of_a_run(looked_at):
     """A packet holds what the file holds, and names that stay."""
     folder, sim = looked_at
-    story = story_of(folder / "trajectory.gsd")  # the file means the run it lies in
+    story = run_dataset(folder / "trajectory.gsd")  # the file means the run it lies in
     assert story.manifest()["outcome"]
     head, arrays = decode(story.frame(5))
     assert head["time"] == sim.time and head["frame"] == 5
@@ -98,7 +98,7 @@ def test_a_run_that_goes_on(tmp_path, looked_at):
     shutil.copy(looked_at[0] / "case.toml", tmp_path)
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     append(writer, [[(1, 2)]], 4)
-    story = story_of(tmp_path)
+    story = run_dataset(tmp_path)
     assert story.manifest()["running"] and len(story) == 1
     assert not story.frames.refresh()
     append(writer, [[(1, 2), (0, 1)], [(1, 2), (0, 1)]], 4, first=1)
@@ -119,7 +119,7 @@ def test_a_run_that_goes_on(tmp_path, looked_at):
 
 def test_a_run_begun_anew_is_another(tmp_path):
     """Where the file is replaced by one of other grains, nothing of the old one is told."""
-    story = story_of(reel(tmp_path / "a.gsd", [[(0, 1)]] * 3, 4))
+    story = run_dataset(reel(tmp_path / "a.gsd", [[(0, 1)]] * 3, 4))
     (tmp_path / "a.gsd").unlink()
     reel(tmp_path / "a.gsd", [[(2, 3)], [(2, 3)]], 6)
     story.refresh()
@@ -130,7 +130,7 @@ def test_a_run_begun_anew_is_another(tmp_path):
 def test_a_run_begun_anew_without_a_frame(tmp_path):
     """Until the new file has a frame the old story stays, though it is looked at again and again."""
     path = tmp_path / "a.gsd"
-    story = story_of(reel(path, [[(0, 1)]] * 3, 4))
+    story = run_dataset(reel(path, [[(0, 1)]] * 3, 4))
     path.unlink()
     writer = TrajectoryWriter(path)
     for _ in range(2):
@@ -150,7 +150,7 @@ def test_a_run_that_ends_while_it_is_looked_at(tmp_path):
     (tmp_path / "case.toml").write_text("")
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     append(writer, [[]], 4)
-    story = story_of(tmp_path)
+    story = run_dataset(tmp_path)
     look = story.frames.refresh
 
     def late():
@@ -172,11 +172,11 @@ def test_a_run_that_was_killed(tmp_path):
     """Without an end and for hours without a frame: what may have happened, and what to do."""
     (tmp_path / "case.toml").write_text("")
     path = reel(tmp_path / "trajectory.gsd", [[]], 4)
-    story = story_of(tmp_path)
+    story = run_dataset(tmp_path)
     assert story.manifest()["note"] is None
-    for age, spoken in ((7200, "2 h"), (86400 * 3, "3 days")):
+    for age, format_quantity in ((7200, "2 h"), (86400 * 3, "3 days")):
         os.utime(path, (time.time() - age,) * 2)
-        note = f"no frame for {spoken}: it may have been killed; sand resume goes on"
+        note = f"no frame for {format_quantity}: it may have been killed; sand resume goes on"
         assert story.manifest()["note"] == note and story.manifest()["running"]
     (tmp_path / "summary.json").write_text('{"steps": 0}')
     story.refresh()
@@ -188,7 +188,7 @@ def test_the_last_frames_stay_the_same_ones(tmp_path):
     path = tmp_path / "a.gsd"
     writer = TrajectoryWriter(path)
     append(writer, [[]] * 6, 4)
-    story = story_of(path)
+    story = run_dataset(path)
     story.choose(slice(-2, None))
     append(writer, [[]] * 2, 4, first=6)
     story.refresh()
@@ -210,7 +210,7 @@ def test_a_damaged_frame_spoils_no_other(tmp_path):
         with open(path, "r+b") as file:
             file.seek(int(chunk[0]["location"]))
             file.write(b"\xff" * 4)
-        story = story_of(path)
+        story = run_dataset(path)
         told = story.manifest()
         assert len(told["times"]) == 3 and told["colours"]["named"] == {"0": 0}
         with pytest.raises(sand.BadInput, match="check sum"):
@@ -230,7 +230,7 @@ def test_a_torn_end_is_left_out(tmp_path):
         late = entries[(entries["frame"] == 2) & (entries["rows"] == 5) & (entries["columns"] == 3)][0]
         file.seek(int(late["location"]))
         file.write(bytes(60))
-    story = story_of(path)
+    story = run_dataset(path)
     assert len(story) == 2 and "1 frame at the end left out" in story.manifest()["note"]
     assert decode(story.frame(1))[1]["pair"].tolist() == [[0, 2]]
     assert ENTRY.itemsize == 32 and place > 0
@@ -241,21 +241,21 @@ def test_files_that_are_none(tmp_path):
     import gsd.hoomd
 
     with pytest.raises(sand.BadInput, match="no such folder"):
-        story_of(tmp_path / "none")
+        run_dataset(tmp_path / "none")
     with pytest.raises(sand.BadInput, match=r"no trajectory.gsd in it"):
-        story_of(tmp_path)
+        run_dataset(tmp_path)
     TrajectoryWriter(tmp_path / "trajectory.gsd").close()
     with pytest.raises(sand.BadInput, match="no frame yet"):
-        story_of(tmp_path)
+        run_dataset(tmp_path)
     with gsd.hoomd.open(str(tmp_path / "other.gsd"), "w") as file:
         frame = gsd.hoomd.Frame()
         frame.particles.N = 3
         file.append(frame)
     with pytest.raises(sand.BadInput, match="not written by SAND"):
-        story_of(tmp_path / "other.gsd")
+        run_dataset(tmp_path / "other.gsd")
     (tmp_path / "text.gsd").write_text("no frames here")
     with pytest.raises(sand.BadInput, match="not a trajectory"):
-        story_of(tmp_path / "text.gsd")
+        run_dataset(tmp_path / "text.gsd")
 
 
 def test_other_numbers_of_grains(tmp_path):
@@ -264,7 +264,7 @@ def test_other_numbers_of_grains(tmp_path):
     append(writer, [[]], 4)
     append(writer, [[]], 5, first=1)
     writer.close()
-    story = story_of(tmp_path / "a.gsd")
+    story = run_dataset(tmp_path / "a.gsd")
     story.frame(0)
     with pytest.raises(sand.BadInput, match="frame 1 has 5 grains"):
         story.frame(1)
@@ -273,7 +273,7 @@ def test_other_numbers_of_grains(tmp_path):
 @pytest.mark.slow
 def test_several_readers_at_once(tmp_path):
     """Eight threads that ask for frames in any order all get the right ones."""
-    story = story_of(reel(tmp_path / "a.gsd", [[(k % 5, k % 5 + 1)] for k in range(30)], 9))
+    story = run_dataset(reel(tmp_path / "a.gsd", [[(k % 5, k % 5 + 1)] for k in range(30)], 9))
     expected, wrong = [story.frame(k) for k in range(30)], []
 
     def ask(seed):
@@ -292,7 +292,7 @@ def test_several_readers_at_once(tmp_path):
 def test_ranges_are_those_of_the_quantities(looked_at, tmp_path):
     """Names are those of the table but for `moment`; extremes are those of all frames; without moments 0 to 0."""
     folder, _ = looked_at
-    ranges, frames = story_of(folder).ranges(), sand.open(folder).frames
+    ranges, frames = run_dataset(folder).ranges(), sand.open(folder).frames
     assert set(ranges) == {*PERCENTILES, *EXTREMES} and set(ranges) - {"moment"} <= {*GRAIN_NAMES, *CONTACT_NAMES}
     for name in ("size", "radius", "coordination", "load"):
         every = np.concatenate([np.abs(measured(frame, name)) for frame in frames])
@@ -302,7 +302,7 @@ def test_ranges_are_those_of_the_quantities(looked_at, tmp_path):
     still = sand.Grains([[0.0, 0.0, 0.0]], "10 nm", sand.SILICA)
     writer.write(0, 0.0, still, sand.Box.open(), contacts_of([]))
     writer.close()
-    ranges = story_of(tmp_path / "a.gsd").ranges()
+    ranges = run_dataset(tmp_path / "a.gsd").ranges()
     assert ranges["moment"] == ranges["load"] == ranges["speed"] == [0.0, 0.0] and ranges["size"] == [1.0, 1.0]
 
 
@@ -313,6 +313,6 @@ def test_clusters_that_end_as_the_largest_are_named(tmp_path, monkeypatch):
     """
     bonds = [[(0, 1), (4, 5), (6, 7)], [(0, 1), (1, 2), (2, 3), (6, 7)]]
     path = reel(tmp_path / "a.gsd", bonds, 9)
-    assert story_of(path).manifest()["colours"]["named"] == {"0": 0, "6": 1}
+    assert run_dataset(path).manifest()["colours"]["named"] == {"0": 0, "6": 1}
     monkeypatch.setattr("sand.viewer.dataset.FOLLOWED", 17)
-    assert story_of(path).manifest()["colours"]["named"] == {}
+    assert run_dataset(path).manifest()["colours"]["named"] == {}

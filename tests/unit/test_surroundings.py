@@ -16,7 +16,7 @@ from sand.config.case import check_case
 from sand.errors import BadInput
 from sand.forces.base import GrainForce
 from sand.forces.external import formulas as surroundings
-from sand.forces.external.formulas import One, field_in_time, flux_density_at, uniform_field
+from sand.forces.external.formulas import GrainState, field_in_time, flux_density_at, uniform_field
 from sand.forces.external.loops import is_ours
 
 EPS = np.finfo(float).eps
@@ -33,7 +33,7 @@ FORCES = [*FIELDS, sand.Gravity([1.0, -2.0, 3.0]), sand.ElectricField(["1 kV/m",
 
 def one(position=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), mass=1.0, charge=0.0):
     """A grain as formulas see it."""
-    return One(tuple(position), (0.0,) * 3, (0.0,) * 3, tuple(moment), 1.0, mass, charge)
+    return GrainState(tuple(position), (0.0,) * 3, (0.0,) * 3, tuple(moment), 1.0, mass, charge)
 
 
 def b_at(field, time):
@@ -186,7 +186,7 @@ def test_the_size_bounds_the_field_at_all_times_and_is_reached(field):
 def test_fields_that_change_in_time_say_so():
     """Work is booked and the step limited where B changes; the constant field keeps its cheap formula."""
     assert [f.formula for f in FIELDS] == [uniform_field, field_in_time, field_in_time, field_in_time]
-    assert [f.timed for f in FIELDS] == [False, True, True, True]
+    assert [f.time_dependent for f in FIELDS] == [False, True, True, True]
     assert [f.longest_step() for f in FIELDS] == pytest.approx(
         [math.inf, MICRO / 200, MICRO / 200, 2e-8], rel=1e-6, abs=0.0
     )
@@ -196,10 +196,10 @@ def test_fields_that_change_in_time_say_so():
 def test_forces_that_have_a_place_say_so():
     """Gravity and the electric field store energy in the position; none brings a magnetic field."""
     for force in FORCES[-2:]:
-        assert force.moored
-        assert not getattr(force, "timed", False)
+        assert force.position_dependent
+        assert not getattr(force, "time_dependent", False)
         assert force.flux_density_size() == 0.0
-    assert not any(getattr(f, "moored", False) for f in FIELDS)
+    assert not any(getattr(f, "position_dependent", False) for f in FIELDS)
     assert all(isinstance(f, GrainForce) for f in FORCES)
 
 

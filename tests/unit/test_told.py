@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.simulation_view import field_in, field_of
 
 
@@ -12,13 +12,13 @@ from sand.viewer.simulation_view import field_in, field_of
 def test_a_field_is_told(looked_at):
     """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
     folder, sim = looked_at
-    told = story_of(folder, field_in(folder)).manifest()["field"]
+    told = run_dataset(folder, field_in(folder)).manifest()["field"]
     assert "rotating" in told["text"] and "1 mT" in told["text"]
     expected = [np.array(sim.forces[2].flux_density_at(t)) * 1e3 for t in sim.ledger["time"]]
     assert np.array(told["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
-    steady = story_of(folder, field_of([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
+    steady = run_dataset(folder, field_of([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
     assert steady["direction"] == [0.0, 0.6, 0.8] and "directions" not in steady
-    assert field_of([sand.Field(0.0)]) is None and story_of(folder).manifest()["field"] is None
+    assert field_of([sand.Field(0.0)]) is None and run_dataset(folder).manifest()["field"] is None
     texts = {
         "constant": field_of([sand.Field("2 mT")])[0],
         "oscillating at 1 MHz": field_of([sand.Field(0.0, "oscillating", amplitude="1 mT", frequency="1 MHz")])[0],

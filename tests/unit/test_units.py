@@ -8,7 +8,7 @@ import pint
 import pytest
 
 from sand.errors import BadInput
-from sand.units import in_unit, si, spoken
+from sand.units import format_quantity, in_unit, si
 
 
 @pytest.mark.parametrize(
@@ -141,4 +141,4 @@ def test_quantities_of_astropy_by_what_they_can_do():
 )
 def test_numbers_for_people(value, unit, text):
     """With an SI prefix."""
-    assert spoken(value, unit) == text
+    assert format_quantity(value, unit) == text

@@ -6,18 +6,18 @@ import pytest
 import sand
 from sand.integrate.kernel_spec import Stop
 from sand.integrate.step_parts import SOON_PART
-from sand.neighbours.skin import farthest, largest_speeds
+from sand.neighbours.skin import largest_displacement, largest_speeds
 from sand.simulation import assemble as translate
 from sand.state.state import (
     BROKEN,
-    FAR_LEEWAY,
-    FASTEST,
+    INNER_SKIN,
+    LARGEST_SPEED,
+    LARGEST_SPIN,
+    LONG_RANGE_SKIN,
     LOST_IN_CONTACTS,
     MADE,
-    NEAR_LEEWAY,
-    QUICKEST,
+    PAIR_LIST_SKIN,
     REBUILT,
-    SOON_LEEWAY,
 )
 
 
@@ -48,11 +48,11 @@ def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(
     once, often = crowd(**WAYS[way]), crowd(**WAYS[way])
     once.run(steps=600)
     often.run(steps=1)
-    while often.world.steps < once.world.steps:
+    while often.state.steps < once.state.steps:
         often._engine.advance(np.inf, 1)
-    assert once.world.count[MADE] > 0
-    assert once.world.count[REBUILT] > 3
-    a, b = once.world.to_arrays(), often.world.to_arrays()
+    assert once.state.count[MADE] > 0
+    assert once.state.count[REBUILT] > 3
+    a, b = once.state.to_arrays(), often.state.to_arrays()
     assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
@@ -67,20 +67,20 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     sim = crowd(margin="5 nm")
     control, search = sim._engine.rules.control, sim._engine.rules.search
     limits = {
-        FAR_LEEWAY: ("far", "anchor", 0.5 * search.margin),
-        NEAR_LEEWAY: ("near", "anchor", 0.25 * control.reach),
+        LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
+        PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.reach),
     }
     sim.run(steps=1)
     spared = 0
     for steps in (1, 2, 3, 5, 8, 13, 21, 34, 55):
         sim._engine.advance(np.inf, steps)
-        w, span = sim.world, sim._engine.rules.span
+        w, span = sim.state, sim._engine.rules.span
         for place, (group, name, limit) in limits.items():
-            strayed = farthest(w.grains.arrays, getattr(getattr(w, group), name), span)
-            assert w.near.watch[place] <= limit - strayed + 1e-12 * limit
-            spared += w.near.watch[place] > 0.0
+            strayed = largest_displacement(w.grains.arrays, getattr(getattr(w, group), name), span)
+            assert w.pair_list.skin[place] <= limit - strayed + 1e-12 * limit
+            spared += w.pair_list.skin[place] > 0.0
         speeds = np.linalg.norm(sim.grains.velocity, axis=1).max(), np.linalg.norm(sim.grains.spin, axis=1).max()
-        assert np.sqrt(w.near.watch[[FASTEST, QUICKEST]]) == pytest.approx(speeds, rel=1e-14)
+        assert np.sqrt(w.pair_list.skin[[LARGEST_SPEED, LARGEST_SPIN]]) == pytest.approx(speeds, rel=1e-14)
         assert np.sqrt(largest_speeds(w.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
     assert spared > 10
 
@@ -99,21 +99,21 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     looked_at = 0
     for steps in (2, 3, 4, 5, 6) * 5:
         twin._engine.advance(np.inf, 1)
-        picked = twin.world.grains.arrays.position.copy()
+        picked = twin.state.grains.arrays.position.copy()
         twin._engine.advance(np.inf, steps - 1)
-        events = sim.world.count[[MADE, BROKEN, REBUILT]]
+        events = sim.state.count[[MADE, BROKEN, REBUILT]]
         sim._engine.advance(np.inf, steps)
-        if np.array_equal(sim.world.count[[MADE, BROKEN, REBUILT]], events):  # else they are picked once more
-            strayed = farthest(sim.world.grains.arrays, picked, span)
+        if np.array_equal(sim.state.count[[MADE, BROKEN, REBUILT]], events):  # else they are picked once more
+            strayed = largest_displacement(sim.state.grains.arrays, picked, span)
             assert 0.0 < strayed < limit
-            assert 0.0 < sim.world.near.watch[SOON_LEEWAY] <= limit - strayed
+            assert 0.0 < sim.state.pair_list.skin[INNER_SKIN] <= limit - strayed
             looked_at += 1
     assert looked_at > 10
     sim.run(steps=2000)
-    while twin.world.steps < sim.world.steps:
+    while twin.state.steps < sim.state.steps:
         twin._engine.advance(np.inf, 1)
-    assert sim.world.count[MADE] > 10 and sim.world.count[BROKEN] > 3
-    a, b = sim.world.to_arrays(), twin.world.to_arrays()
+    assert sim.state.count[MADE] > 10 and sim.state.count[BROKEN] > 3
+    a, b = sim.state.to_arrays(), twin.state.to_arrays()
     assert all(np.array_equal(a[name], b[name]) for name in a)
 
 
@@ -132,16 +132,16 @@ def test_a_pair_that_parts_and_comes_back_at_once_is_seen():
             grains = sand.Grains(place, 1e-8, sand.SILICA, velocity=velocity, charge=[6e-18, -6e-18])
             sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], stepping=every_step)
             sim.run(steps=1)
-            while sim.world.steps < 400:
+            while sim.state.steps < 400:
                 sim._engine.advance(np.inf, 399 if calls == "one" else 1)
-            ends.append(sim.world.to_arrays())
-        seen += bool(sim.world.count[BROKEN] > 0 and sim.world.count[MADE] > 0)
+            ends.append(sim.state.to_arrays())
+        seen += bool(sim.state.count[BROKEN] > 0 and sim.state.count[MADE] > 0)
         assert all(np.array_equal(ends[0][name], ends[1][name]) for name in ends[0])
     assert seen > 3
 
 
 @pytest.mark.compiled("contacts")
-@pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.FLEW_TOO_FAR, 2), (0.0, Stop.SPUN_TOO_FAR, 0)])
+@pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.TOO_FAST, 2), (0.0, Stop.SPINS_TOO_FAST, 0)])
 def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
     """Grain 0 spins too fast for the user's step, grain 2 flies too fast or rests."""
     position, still = np.diag([0.0, 1e-7, 2e-7]), np.zeros((3, 3))
@@ -151,7 +151,7 @@ def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="0.1 ps"))
     sim._engine.begin()
     assert sim._engine.advance(np.inf, 1) is stop
-    assert sim._engine.culprits() == (culprit,)
+    assert sim._engine.limiting_grains() == (culprit,)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -161,7 +161,7 @@ def test_what_is_no_number_is_the_largest(sign):
     anchor, span = arrays.position.copy(), sand.Box.open().span
     arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
     assert np.isnan(largest_speeds(arrays)[0]) and np.isfinite(largest_speeds(arrays)[1])
-    assert np.isnan(farthest(arrays, anchor, span))
+    assert np.isnan(largest_displacement(arrays, anchor, span))
 
 
 @pytest.mark.compiled("contacts")
@@ -172,28 +172,30 @@ def test_what_contacts_lost_is_read_from_every_format(damping, channels):
     place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [3.996e-8, 0, 0]])
     sim = sand.Simulation(sand.Grains(place, 1e-8, sand.SILICA), [sand.Contact(damping=damping)])
     sim.run(steps=1)
-    saved = sim.world.to_arrays()
+    saved = sim.state.to_arrays()
     seven = np.arange(14.0).reshape(7, 2)
     law = 5 if damping == "none" else 7
-    sim.world.from_arrays(saved | {"contacts/lost": seven if channels == "one row for each" else seven[:law]})
+    sim.state.from_arrays(saved | {"contacts/lost": seven if channels == "one row for each" else seven[:law]})
     for row, name in enumerate(LOST_IN_CONTACTS):
         if name != "breaking":
             assert sim.contacts[f"lost_{name}"].tolist() == (seven[row].tolist() if row < law else [0.0, 0.0])
 
 
 @pytest.mark.compiled("contacts")
-@pytest.mark.parametrize("name", ["contacts/twist", "contacts/side", "contacts/bond", "near/pair", "near/step"])
+@pytest.mark.parametrize(
+    "name", ["contacts/twist", "contacts/side", "contacts/bond", "pair_list/pair", "pair_list/step"]
+)
 @pytest.mark.parametrize("radius", [[1e-8, 1e-8, 1e-8], [1e-8, 1e-8, 9e-9]], ids=["alike", "unlike"])
 def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
     """Two contacts: one column less of what is kept for each is BadInput; equal grains keep one for all."""
     place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [1.998e-8 + 0.999 * (radius[1] + radius[2]), 0, 0]])
     sim = sand.Simulation(sand.Grains(place, radius, sand.SILICA), [sand.Contact()])
     sim.run(steps=1)
-    world, saved = sim.world.copy(), sim.world.to_arrays()
-    assert world.alike == (radius[2] == radius[0]) and len(sim.contacts["pair"]) == 2
+    world, saved = sim.state.copy(), sim.state.to_arrays()
+    assert world.uniform_contacts == (radius[2] == radius[0]) and len(sim.contacts["pair"]) == 2
     world.from_arrays(saved)
     fewer = saved | {name: saved[name][..., :1]}
-    if world.alike and name in ("contacts/bond", "near/step"):
+    if world.uniform_contacts and name in ("contacts/bond", "pair_list/step"):
         world.from_arrays(fewer)
     else:
         with pytest.raises(sand.BadInput, match=name):

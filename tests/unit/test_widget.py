@@ -6,7 +6,7 @@ import pytest
 
 import sand
 from sand.viewer import show
-from sand.viewer.dataset import story_of
+from sand.viewer.dataset import run_dataset
 from sand.viewer.notebook import answered, widget
 from sand.viewer.packets import decode
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.usefixtures("bundle")
 @pytest.mark.compiled("fields")
 def test_messages_of_the_widget(looked_at):
     """Each kind is answered with what the story tells, echoed so that the page knows what it asked for."""
-    story = story_of(looked_at[0])
+    story = run_dataset(looked_at[0])
     assert answered(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
     assert answered(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
     told, none = answered(story, {"kind": "manifest", "since": 4})
@@ -45,14 +45,14 @@ def test_messages_of_the_widget(looked_at):
 )
 def test_wrong_messages(looked_at, content):
     """A sentence, whatever comes; nothing is raised in the kernel."""
-    told, buffers = answered(story_of(looked_at[0]), content)
+    told, buffers = answered(run_dataset(looked_at[0]), content)
     assert isinstance(told["error"], str) and buffers == []
 
 
 @pytest.mark.compiled("fields")
 def test_what_nobody_thought_of(looked_at, monkeypatch):
     """An error of any kind is answered with a sentence, so that the page does not wait for ever."""
-    story = story_of(looked_at[0])
+    story = run_dataset(looked_at[0])
     monkeypatch.setattr(story, "frame", lambda k: 1 / 0)
     told, buffers = answered(story, {"kind": "frame", "k": 1, "id": 3})
     assert told["id"] == 3 and "ZeroDivisionError" in told["error"] and buffers == []
@@ -62,7 +62,7 @@ def test_what_nobody_thought_of(looked_at, monkeypatch):
 def test_the_widget(looked_at, monkeypatch):
     """It holds nothing that would be saved with the notebook, runs the bundle, and answers through its own channel."""
     pytest.importorskip("anywidget", reason="anywidget is in the test extra")
-    one = widget(story_of(looked_at[0]))
+    one = widget(run_dataset(looked_at[0]))
     assert not {"manifest", "series"} & set(one.get_state()) and SCRIPT in str(one._esm)
     sent = []
     monkeypatch.setattr(one, "send", lambda content, buffers=None: sent.append((content, buffers)))
@@ -76,4 +76,4 @@ def test_without_anywidget(looked_at, monkeypatch):
     """It says what to install."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(sand.BadInput, match="pip install anywidget"):
-        widget(story_of(looked_at[0]))
+        widget(run_dataset(looked_at[0]))

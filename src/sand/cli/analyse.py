@@ -64,12 +64,12 @@ def _place(folder: Path, names: Sequence[str], overwrite: bool) -> Path:
 
 
 def _tell(content: dict[str, Any], place: Path | None) -> None:
-    from ..units import spoken
+    from ..units import format_quantity
 
     for one in content["ensembles"]:
         rows = [
             ("boxes", f"{one['boxes']} of {one['grains']} grains"),
-            ("S", f"{one['mean_size']:.3g}{_pm(one['mean_size_error'])} at {spoken(one['time'], 's')}"),
+            ("S", f"{one['mean_size']:.3g}{_pm(one['mean_size_error'])} at {format_quantity(one['time'], 's')}"),
             (
                 "z",
                 _line(
@@ -90,7 +90,10 @@ def _tell(content: dict[str, Any], place: Path | None) -> None:
         report.show(
             f"{compared['first']} against {compared['second']}",
             [
-                ("ln S", f"apart by {compared['sigma']:.3g} standard errors at {spoken(compared['time'], 's')}"),
+                (
+                    "ln S",
+                    f"apart by {compared['sigma']:.3g} standard errors at {format_quantity(compared['time'], 's')}",
+                ),
                 ("S", f"apart by {compared['sigma_of_size']:.3g}"),
             ],
         )

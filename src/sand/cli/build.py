@@ -149,14 +149,14 @@ def _shape(body: Any) -> tuple[float, float | None, float | None]:
 
 
 def _rows(content: dict[str, Any]) -> report.Rows:
-    from ..units import spoken
+    from ..units import format_quantity
 
     low, high = content["radius"]
-    size = spoken(low, "m") if low == high else f"{spoken(low, 'm')} to {spoken(high, 'm')}"
+    size = format_quantity(low, "m") if low == high else f"{format_quantity(low, 'm')} to {format_quantity(high, 'm')}"
     dimension, error = content["fractal_dimension"], content["fractal_dimension_error"]
     rows = [
         ("grains", f"{content['grains']} of {', '.join(content['materials'])}, radius {size}"),
-        ("radius of gyration", spoken(content["radius_of_gyration"], "m")),
+        ("radius of gyration", format_quantity(content["radius_of_gyration"], "m")),
         ("fractal dimension", "too few grains" if dimension is None else f"{dimension:.2f} ± {error or 0.0:.2f}"),
         ("contacts", f"{content['contacts']}, {content['mean_coordination']:.2f} for each grain"),
     ]

@@ -28,9 +28,9 @@ def command(folder: str, form: str, out: str | None, frames: str, overwrite: boo
     ASE; lammps-dump and lammps-data: `units si`.
     """
     from ..io.run_folder import TRAJECTORY
-    from ..results import Opened
+    from ..results import Run
 
-    run = Opened(folder)
+    run = Run(folder)
     stem = Path(out) if out else Path(folder) / Path(TRAJECTORY).stem
     endings = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
     there = sorted(stem.parent.glob(stem.name + endings[form]))

@@ -15,7 +15,7 @@ from ..io.ledger_table import read_ledger
 from . import options, report
 from .info_jobs import of_job_file, of_job_folder, of_other_case
 
-Told = tuple[str, report.Rows, dict[str, Any]]
+Report = tuple[str, report.Rows, dict[str, Any]]
 """A heading, rows for people, and the same for machines."""
 
 
@@ -38,7 +38,7 @@ def command(path: str, as_json: bool) -> int:
     return 0
 
 
-def _teller(path: Path) -> Callable[[Path], Told]:
+def _teller(path: Path) -> Callable[[Path], Report]:
     """The function that knows this kind of file.  Raises BadInput."""
     if path.is_dir():
         return of_run
@@ -72,9 +72,9 @@ def _ledger(path: Path) -> list[dict[str, float]]:
     return rows
 
 
-def of_run(path: Path) -> Told:
+def of_run(path: Path) -> Report:
     """A run's folder: how it ended or how far it is."""
-    from ..units import spoken
+    from ..units import format_quantity
 
     if not any((path / name).exists() for name in (files.CASE, files.ONE_COLLISION)):
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
@@ -95,11 +95,11 @@ def of_run(path: Path) -> Told:
         label = "state" if summary is None else "since then"
         rows += [
             (label, "running, or stopped without having been closed"),
-            ("last frame", f"{spoken(beyond['time'], 's')} after {beyond['step']} steps"),
+            ("last frame", f"{format_quantity(beyond['time'], 's')} after {beyond['step']} steps"),
             ("clusters", report.clusters(beyond)),
         ]
     if "until" in planned:
-        rows.append(("planned end", spoken(planned["until"], "s")))
+        rows.append(("planned end", format_quantity(planned["until"], "s")))
     rows.append(("files", "  ".join(report.files_of(path))))
     until = planned.get("until", 0.0)
     ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
@@ -110,7 +110,7 @@ def of_run(path: Path) -> Told:
     return f"{path}: a run", rows, content
 
 
-def of_case(path: Path) -> Told:
+def of_case(path: Path) -> Report:
     """A case file, checked: what would run, and what would be chosen."""
     from ..config.build import simulation_of
     from ..config.case import read_case
@@ -131,17 +131,17 @@ def of_case(path: Path) -> Told:
     return f"{path}: a case without mistakes", rows, content
 
 
-def of_trajectory(path: Path) -> Told:
+def of_trajectory(path: Path) -> Report:
     """Frames, times and the last frame of a trajectory."""
     from ..io.trajectory import read_frames
-    from ..units import spoken
+    from ..units import format_quantity
 
     frames = read_frames(path)
     if not frames:
         raise BadInput(f"{path} holds no frame")
     first, last = frames[0], frames[-1]
     rows = [
-        ("frames", f"{len(frames)}, from {spoken(first.time, 's')} to {spoken(last.time, 's')}"),
+        ("frames", f"{len(frames)}, from {format_quantity(first.time, 's')} to {format_quantity(last.time, 's')}"),
         ("grains", str(len(last.radius))),
         ("box", last.box.describe()),
         ("last frame", f"step {last.step}, {len(last.pair)} contacts"),
@@ -159,25 +159,25 @@ def of_trajectory(path: Path) -> Told:
     return f"{path}: a trajectory", rows, content
 
 
-def of_checkpoint(path: Path) -> Told:
+def of_checkpoint(path: Path) -> Report:
     """The state a checkpoint holds."""
     from ..io.checkpoint import read_checkpoint
-    from ..units import spoken
+    from ..units import format_quantity
 
     arrays, meta = read_checkpoint(path)
     grains, contacts = len(arrays["grains/radius"]), arrays["contacts/pair"].shape[1]
     end = meta.get("until")
     rows = [
-        ("time", f"{spoken(meta['time'], 's')} after {meta['steps']} steps"),
+        ("time", f"{format_quantity(meta['time'], 's')} after {meta['steps']} steps"),
         ("grains", f"{grains}, {contacts} contacts"),
-        ("planned end", "none" if end is None else spoken(end, "s")),
+        ("planned end", "none" if end is None else format_quantity(end, "s")),
         ("go on with", report.resume_line(path.parent)),
     ]
     content = {"kind": "checkpoint", "grains": grains, "contacts": contacts, **meta}
     return f"{path}: a checkpoint, whole", rows, content
 
 
-def of_summary(path: Path) -> Told:
+def of_summary(path: Path) -> Report:
     """A summary, or the results of another command."""
     if (job := of_job_file(path)) is not None:
         return job
@@ -186,15 +186,15 @@ def of_summary(path: Path) -> Told:
     return f"{path}: the summary of a run", rows + report.results(summary), {"kind": "summary", **summary}
 
 
-def of_ledger(path: Path) -> Told:
+def of_ledger(path: Path) -> Report:
     """First and last row of the books."""
-    from ..units import spoken
+    from ..units import format_quantity
 
     ledger = _ledger(path)
     first, last = ledger[0], ledger[-1]
     lost = {name: value for name, value in last.items() if name.startswith("lost_")}
     rows = [
-        ("rows", f"{len(ledger)}, from {spoken(first['time'], 's')} to {spoken(last['time'], 's')}"),
+        ("rows", f"{len(ledger)}, from {format_quantity(first['time'], 's')} to {format_quantity(last['time'], 's')}"),
         ("total energy", f"{first['total']:.6g} J at first, {last['total']:.6g} J at last"),
         ("dissipated", ", ".join(f"{k[5:]} {v:.3g} J" for k, v in lost.items())),
         ("clusters", report.clusters(last)),
@@ -203,7 +203,7 @@ def of_ledger(path: Path) -> Told:
     return f"{path}: the ledger of a run", rows, content
 
 
-KINDS: dict[str, Callable[[Path], Told]] = {
+KINDS: dict[str, Callable[[Path], Report]] = {
     ".toml": of_case,
     ".gsd": of_trajectory,
     ".npz": of_checkpoint,

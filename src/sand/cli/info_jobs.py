@@ -18,11 +18,11 @@ UNFINISHED = {
     "grow": ("boxes", "growth"),
 }
 """Jobs by the command that began them: what they are called for people, and for machines."""
-Told = tuple[str, report.Rows, dict[str, Any]]
+Report = tuple[str, report.Rows, dict[str, Any]]
 """A heading, rows for people, and the same for machines."""
 
 
-def of_other_case(path: Path) -> Told | None:
+def of_other_case(path: Path) -> Report | None:
     """A case of another command, checked; None if it is not one."""
     content = files.read_toml(path)
     kind = command_for(content)
@@ -33,7 +33,7 @@ def of_other_case(path: Path) -> Told | None:
     return _growth_case(path) if kind == "grow" else None
 
 
-def _collision_case(path: Path, content: dict[str, Any]) -> Told:
+def _collision_case(path: Path, content: dict[str, Any]) -> Report:
     from ..experiments.collision_case import read_collision
 
     case = read_collision(path)
@@ -46,7 +46,7 @@ def _collision_case(path: Path, content: dict[str, Any]) -> Told:
     return f"{path}: a collision without mistakes", rows, {"kind": "collision case", "case": content}
 
 
-def _growth_case(path: Path) -> Told:
+def _growth_case(path: Path) -> Report:
     from ..config.build import simulation_of
     from ..config.case import check_case
     from ..experiments.growth_case import read_growth
@@ -60,15 +60,15 @@ def _growth_case(path: Path) -> Told:
     return f"{path}: boxes without mistakes", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}}
 
 
-def _scatter_case(path: Path) -> Told:
+def _scatter_case(path: Path) -> Report:
     from ..experiments.scattering.case import read_scattering
-    from ..units import spoken
+    from ..units import format_quantity
 
     case, flights = read_scattering(path)
     rows: report.Rows = [("job", case.measure.job)]
     for one in flights:
-        reach = f", b_max = {spoken(one.scales.capture, 'm')}" if one.scales.capture else ""
-        rows.append((f"{one.speed:.4g} m/s", f"from {spoken(one.distance, 'm')}{reach}"))
+        reach = f", b_max = {format_quantity(one.scales.capture, 'm')}" if one.scales.capture else ""
+        rows.append((f"{one.speed:.4g} m/s", f"from {format_quantity(one.distance, 'm')}{reach}"))
     rows.append(("run it with", f"sand scatter {shlex.quote(str(path))}"))
     return (
         f"{path}: a scattering case without mistakes",
@@ -77,7 +77,7 @@ def _scatter_case(path: Path) -> Told:
     )
 
 
-def of_job_folder(path: Path) -> Told | None:
+def of_job_folder(path: Path) -> Report | None:
     """A folder of `sand scatter`, `sand collide` or `sand grow`; None if it is not one."""
     for name in (files.SCATTERING, files.COLLISION):
         if (path / name).exists():
@@ -103,7 +103,7 @@ def of_job_folder(path: Path) -> Told | None:
     return f"{path}: {name}", rows, {"kind": json, "folder": str(path), "finished": False}
 
 
-def of_job_file(path: Path) -> Told | None:
+def of_job_file(path: Path) -> Report | None:
     """scattering.json or collision.json; None for anything else.  Raises BadInput for one that is not whole."""
     content = files.read_json(path)
     tellers: tuple[tuple[str, str, str, Callable[[dict[str, Any]], report.Rows]], ...] = (

@@ -13,7 +13,7 @@ from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OURS, SUMMARY, is_used, read_json, read_toml
-from ..units import spoken
+from ..units import format_quantity
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
 from .interrupt import Watch
@@ -100,7 +100,7 @@ def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
     """Tell how a run ended; returns the exit code."""
     from ..simulation.outcome import Outcome
 
-    outcome, when = result.outcome, f"t = {spoken(result.time, 's')}"
+    outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
     if as_json:
         report.emit({**summary, "folder": str(folder)})

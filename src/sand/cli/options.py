@@ -10,7 +10,7 @@ from ..io.run_folder import checked_name
 from ..limits import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 
 
-class PlaceName(click.ParamType):
+class PathName(click.ParamType):
     """The name of a file or folder: not empty, and not longer than systems take."""
 
     name = "place"
@@ -21,7 +21,7 @@ class PlaceName(click.ParamType):
         return checked_name(str(value), name)
 
 
-PLACE = PlaceName()
+PLACE = PathName()
 SEED = click.IntRange(0, MOST_SEED)
 FRAME = click.IntRange(-(2**31), 2**31 - 1)
 COUNT = click.IntRange(1, MOST_GRAINS)

@@ -116,10 +116,10 @@ def _size(text: str) -> tuple[int, int] | None:
 def _source(path: Path) -> Source:
     """Raises BadInput: there is nothing of ours."""
     from ..io.trajectory import Frames
-    from ..results import Opened
+    from ..results import Run
 
     if not path.is_file():
-        run = Opened(path)
+        run = Run(path)
         return Source(path, run.frames, run)
     frames = Frames(path)
     if not frames.is_ours:

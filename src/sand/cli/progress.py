@@ -7,7 +7,7 @@ import sys
 from typing import IO, Any
 
 from ..simulation.observers import Observer
-from ..units import spoken
+from ..units import format_quantity
 
 FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
 """Fits into 80 columns."""
@@ -52,9 +52,9 @@ class Progress(Observer):
             self._take(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
             self._bar = self._open(here, total)
         bar = self._bar
-        bar.set_description_str(spoken(simulation.time, "s"), refresh=False)
+        bar.set_description_str(format_quantity(simulation.time, "s"), refresh=False)
         rate = bar.format_dict["rate"] or 0.0
-        speed = f"{spoken(float(f'{rate:.2g}'), 's')}/s" if self._by_time else f"{rate:.2g} steps/s"
+        speed = f"{format_quantity(float(f'{rate:.2g}'), 's')}/s" if self._by_time else f"{rate:.2g} steps/s"
         bar.set_postfix_str(f"{speed}, {self._numbers}" if rate else self._numbers, refresh=False)
         bar.update(min(here, total) - bar.n)
 

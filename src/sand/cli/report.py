@@ -136,15 +136,15 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
     end, last_step : float
         time [s] and step that are to be reached, infinite where there is none.
     """
-    from ..units import spoken
+    from ..units import format_quantity
 
     every = simulation.frame_every
     if every is None:  # what `run` will choose
         every = (end - simulation.time) / 200.0
-    frames = f"a frame every {spoken(every, 's')}" if math.isfinite(every) else "frames at start and end"
-    goals = [f"{spoken(end, 's')}"] if math.isfinite(end) else []
+    frames = f"a frame every {format_quantity(every, 's')}" if math.isfinite(every) else "frames at start and end"
+    goals = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
     goals += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
-    start = f"from {spoken(simulation.time, 's')} " if simulation.time > 0.0 else ""
+    start = f"from {format_quantity(simulation.time, 's')} " if simulation.time > 0.0 else ""
     return [
         ("grains", _grains(simulation.grains, simulation.temperature)),
         *simulation.choices.items(),
@@ -156,7 +156,7 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
 
 
 def _grains(grains: Any, temperature: float) -> str:
-    from ..units import spoken
+    from ..units import format_quantity
 
     def span(values: Any, say: Callable[[float], str]) -> str:
         least, most = say(float(values.min())), say(float(values.max()))
@@ -164,12 +164,12 @@ def _grains(grains: Any, temperature: float) -> str:
 
     parts = [
         f"{len(grains)} of {', '.join(m.name for m in grains.materials)}",
-        f"radius {span(grains.radius, lambda v: spoken(v, 'm'))}",
+        f"radius {span(grains.radius, lambda v: format_quantity(v, 'm'))}",
     ]
     if grains.body_moment.any():
         size = (grains.body_moment**2).sum(axis=1) ** 0.5
         parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
-    moving = f"kinetic temperature {spoken(temperature, 'K')}" if temperature > 0.0 else "at rest"
+    moving = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "at rest"
     return ", ".join([*parts, moving])
 
 
@@ -189,12 +189,12 @@ def _force(force: Any) -> str:
 
 def results(summary: dict[str, Any]) -> Rows:
     """The numbers of summary.json that people ask for first."""
-    from ..units import spoken
+    from ..units import format_quantity
 
     rate = summary["ns_per_grain_step"]
-    wall = spoken_wall(summary["wall_seconds"])
+    wall = format_wall_time(summary["wall_seconds"])
     return [
-        ("time", f"{spoken(summary['time'], 's')} in {summary['steps']} steps"),
+        ("time", f"{format_quantity(summary['time'], 's')} in {summary['steps']} steps"),
         ("clusters", clusters(summary)),
         (
             "contacts",
@@ -213,7 +213,7 @@ def clusters(row: dict[str, Any]) -> str:
     )
 
 
-def spoken_wall(seconds: float) -> str:
+def format_wall_time(seconds: float) -> str:
     """Wall time for people: '5.6 s', '12 min 05 s', '3 h 07 min'."""
     if seconds < 60.0:
         return f"{seconds:.3g} s"

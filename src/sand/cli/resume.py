@@ -117,9 +117,9 @@ def _is_there(simulation: Any) -> bool:
 
 
 def _stand(simulation: Any) -> str:
-    from ..units import spoken
+    from ..units import format_quantity
 
-    return spoken(simulation.time, "s")
+    return format_quantity(simulation.time, "s")
 
 
 def _nothing_to_do(simulation: Any, folder: Path, *, quiet: bool, as_json: bool) -> int:

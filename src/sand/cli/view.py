@@ -84,7 +84,7 @@ def command(
 
 def _story(place: Path, talk: bool) -> Any:
     """Of the run in a folder, as soon as it has a frame.  Raises BadInput: there is none, or not within WAIT."""
-    from ..viewer.dataset import story_of
+    from ..viewer.dataset import run_dataset
     from ..viewer.run_files import run_folder
     from ..viewer.simulation_view import field_in
 
@@ -94,7 +94,7 @@ def _story(place: Path, talk: bool) -> Any:
         waited = time.monotonic() - begun
         try:
             home = run_folder(place)
-            return story_of(place, None if home is None else field_in(home))
+            return run_dataset(place, None if home is None else field_in(home))
         except BadInput as error:
             if not _is_beginning(place, watched=waited > 0.1):
                 raise

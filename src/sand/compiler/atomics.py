@@ -16,7 +16,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
-__all__ = ["fetch_add", "give_way", "read", "write"]
+__all__ = ["fetch_add", "read", "write", "yield_cpu"]
 
 
 def fetch_add(board: Any, place: int, value: int) -> int:
@@ -36,7 +36,7 @@ def write(board: Any, place: int, value: int) -> None:
     board[place] = value
 
 
-def give_way() -> None:
+def yield_cpu() -> None:
     """Let another thread run on this core."""
     time.sleep(0.0)
 
@@ -133,6 +133,6 @@ def _compiled_write(board, place, value):
     return lambda board, place, value: _write(board, place, value)
 
 
-@overload(give_way)
+@overload(yield_cpu)
 def _compiled_give_way():
     return lambda: _give_way()

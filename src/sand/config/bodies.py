@@ -8,7 +8,7 @@ from typing import Any
 from ..grains import Grains
 from ..io.bodies import read_body
 from ..material import Material
-from ..setup.checks import refuse_unsound
+from ..setup.checks import check_body
 
 
 def body_from_file(path: str | Path, material: Material | None = None, *others: Any, **named: Any) -> Grains:
@@ -21,5 +21,5 @@ def body_from_file(path: str | Path, material: Material | None = None, *others: 
         gaps: grains without a contact to the rest.  The first ten are named.
     """
     body = read_body(path, material, *others, **named)
-    refuse_unsound(body, str(path))
+    check_body(body, str(path))
     return body

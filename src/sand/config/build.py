@@ -19,7 +19,7 @@ from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
 from ..simulation.simulation import Simulation
 from .bodies import body_from_file
-from .case import Case, check_case, read_case
+from .case import Case, check_case
 
 ENDS = (("run", "until"), ("run", "steps"))
 """What may be changed in the case.toml of a run that goes on."""
@@ -155,8 +155,6 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
         case.toml has been changed since, in more than its end.
     """
     path = folder / CASE
-    if "case" not in meta:  # of an early development version
-        return read_case(path)
     begun: dict[str, Any] = meta["case"]
     there = read_toml(path) if path.exists() else begun
     case = check_case(there, str(path))
@@ -167,7 +165,6 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
 
     was = check_case(begun, str(path))
     for name in {**begun, **there}:
-        # earlier versions left out settings that are new: what counts is what is understood
         meant = name not in {table for table, _ in ENDS} and getattr(was, name) == getattr(case, name)
         if fixed(begun, name) != fixed(there, name) and not meant:
             raise BadInput(

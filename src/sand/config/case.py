@@ -25,8 +25,8 @@ from ..material import PRESETS, Material, like_preset
 from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
 from .commands import refuse_other_command
-from .errors import complaints
-from .sections import Count, Duration, PlaceName, Section, Seed, Steps, quantity
+from .errors import validation_errors
+from .sections import Count, Duration, PathName, Section, Seed, Steps, quantity
 
 INTEGRATORS: dict[str, type] = {"verlet": Verlet, "adaptive": Adaptive}
 
@@ -38,7 +38,7 @@ class RunSection(Section):
     steps: Steps | None = None
     frame_every: Duration | None = None
     seed: Seed = 0
-    out: PlaceName | None = None
+    out: PathName | None = None
 
     @model_validator(mode="after")
     def _ends(self) -> RunSection:
@@ -94,7 +94,7 @@ class GrainsSection(Section):
     charge: quantity("C") | None = None  # type: ignore[valid-type]
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
     spins: str = "kT/2"
-    file: PlaceName | None = None
+    file: PathName | None = None
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
     length: str | None = None
 
@@ -269,7 +269,7 @@ def check_case(content: dict[str, Any], name: str) -> Case:
         case.materials_by_name()
     except ValidationError as error:
         problems += wrong_materials(content)
-        problems += [line for slip in error.errors() for line in complaints(slip, model, kinds)]
+        problems += [line for slip in error.errors() for line in validation_errors(slip, model, kinds)]
     except BadInput as error:
         problems += error.problems
     if problems:

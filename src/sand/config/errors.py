@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from ..errors import did_you_mean
 
 
-def complaints(slip: Any, whole: type, extra: dict[type, list[str]]) -> list[str]:
+def validation_errors(slip: Any, whole: type, extra: dict[type, list[str]]) -> list[str]:
     """pydantic's error as our lines: place, what is wrong, what to do.
 
     Parameters

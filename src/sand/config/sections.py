@@ -37,7 +37,7 @@ def _name(value: str, info: ValidationInfo) -> str:
 
 Duration = Annotated[Any, BeforeValidator(_duration)]
 """[s]"""
-PlaceName = Annotated[str, AfterValidator(_name)]
+PathName = Annotated[str, AfterValidator(_name)]
 """Of a file or folder."""
 Count = Annotated[int, Field(ge=1, le=MOST_GRAINS, strict=True)]
 """A number of grains."""

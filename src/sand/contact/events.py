@@ -12,23 +12,23 @@ from ..state.state import (
     CONTACTS,
     DAMPING,
     FORMING,
+    INNER_COUNT,
+    INNER_SKIN,
     MADE,
-    MOVED,
     PAIRS,
     ROLLING,
     SLIDING,
-    SOON,
-    SOON_LEEWAY,
+    SLIPPED,
     STIFFNESS,
     TIME,
     TWISTING,
 )
 from . import jkr, tangential
-from . import law as law_of
+from . import law as contact_law
 from .law import speed_gained
 from .pair_types import bond_of
 from .slip import record_of, strain_before
-from .update import BROKE, WAITS, alike, bond_at, damping_at, pose_at, write_loads
+from .update import BROKE, WAITS, bond_at, damping_at, pose_at, uniform_contacts, write_loads
 
 
 @loop
@@ -41,7 +41,7 @@ def book(own, lost, c, channel, energy):
 
 
 @loop
-def book_yielding(own, lost, c, energies):
+def log_slip_losses(own, lost, c, energies):
     """The same for the three tangential modes."""
     book(own, lost, c, SLIDING, energies[0])
     book(own, lost, c, ROLLING, energies[1])
@@ -72,7 +72,7 @@ def damp(grains, contacts, span, c, dt):
     closing = -dot(axpy(0.5 * dt, pull, moving), n)
     overlap = grains.radius[i] + grains.radius[j] - distance
     y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    force = law_of.damping_force(overlap, y, closing, bond)
+    force = contact_law.damping_force(overlap, y, closing, bond)
     accrue(contacts.push, c, scale(force, n))
     earlier = axpy(-dt, moving, apart)
     before = damping_at(contacts, c) / math.sqrt(dot(earlier, earlier))
@@ -89,33 +89,33 @@ def damp_contacts(grains, contacts, count, lost, span, dt):
 
 
 @rare
-def book_stiffness(grains, contacts, count, lost, span, dt):
+def log_stiffness_work(grains, contacts, count, lost, span, dt):
     """What stiffnesses that follow a(δ) took out of the springs of all contacts in this step."""
     for c in range(count[CONTACTS]):
         bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
         before = strain_before(grains, contacts, c, pose, bond, dt)
-        strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
+        strain = contact_law.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
         earlier, now = stiffened_at(before.overlap, bond), stiffened_at(strain.overlap, bond)
-        book(contacts.lost, lost, c, STIFFNESS, law_of.lost_to_stiffness(before, strain, earlier, now))
+        book(contacts.lost, lost, c, STIFFNESS, contact_law.lost_to_stiffness(before, strain, earlier, now))
 
 
 @loop
 def stiffened_at(overlap, bond):
     """The bond with the stiffnesses that follow this overlap."""
-    return law_of.stiffened(bond, jkr.root(jkr.stretch(overlap, bond.pull_off_overlap)), True)
+    return contact_law.stiffened(bond, jkr.root(jkr.stretch(overlap, bond.pull_off_overlap)), True)
 
 
 @loop
-def knock(grains, i, j, n, impulse):
+def apply_pair_impulse(grains, i, j, n, impulse):
     """Give grain i the impulse [N s] along n and grain j the opposite."""
     accrue(grains.velocity, i, scale(impulse / grains.mass[i], n))
     accrue(grains.velocity, j, scale(-impulse / grains.mass[j], n))
 
 
 @rare
-def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
+def break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt):
     """Book the energy of a neck that snapped inside the step, and mark the contact as dead.
 
     The force −(5/9)F_c ended τ ago; velocity Verlet let it act until half the step: the difference is
@@ -126,8 +126,8 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
     late = -bond.break_overlap - overlap
     since = min(late / opening, dt) if opening > 0.0 else 0.0
-    energy, force = law_of.breaking(bond)
-    knock(grains, i, j, pose.n, (force + damping_at(contacts, c)) * (0.5 * dt - since))
+    energy, force = contact_law.breaking(bond)
+    apply_pair_impulse(grains, i, j, pose.n, (force + damping_at(contacts, c)) * (0.5 * dt - since))
     book(contacts.lost, lost, c, BREAKING, energy)
     # the damping force acted until the break: half a step by Verlet, the rest by the impulse
     book(contacts.lost, lost, c, DAMPING, -damping_at(contacts, c) * opening * (dt - since))
@@ -137,11 +137,11 @@ def break_contact(grains, contacts, near, count, lost, c, pose, bond, dt):
     put(contacts.torque1, c, (0.0, 0.0, 0.0))
     put(contacts.torque2, c, (0.0, 0.0, 0.0))
     keep_damping(contacts, c, 0.0)
-    forget_touch(near, count, i, j)
+    mark_separated(pair_list, count, i, j)
 
 
 @rare
-def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
+def update_flagged_contacts(grains, contacts, pair_list, count, lost, span, law, dt):
     """Break or move the contacts that wait for it; returns True if any broke."""
     parted = False
     for c in range(count[CONTACTS]):
@@ -151,34 +151,34 @@ def settle_flagged(grains, contacts, near, count, lost, span, law, dt):
         r1, r2 = grains.radius[i], grains.radius[j]
         bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        strain = law_of.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        if law_of.beyond_limits(strain, pose.n, bond):
+        strain = contact_law.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
+        if contact_law.beyond_limits(strain, pose.n, bond):
             before = strain_before(grains, contacts, c, pose, bond, dt)
             y = jkr.root(jkr.stretch(strain.overlap, bond.pull_off_overlap))
-            now = law_of.stiffened(bond, y, law.follow)
+            now = contact_law.stiffened(bond, y, law.follow)
             if strain.overlap < -bond.break_overlap:
                 zero = (0.0, 0.0, 0.0)
-                gone = law_of.Strain(strain.overlap, zero, zero, 0.0)
-                slid, rolled, twisted = law_of.lost_by_yielding(before, strain, gone, now)
+                gone = contact_law.Strain(strain.overlap, zero, zero, 0.0)
+                slid, rolled, twisted = contact_law.lost_by_yielding(before, strain, gone, now)
                 book(contacts.lost, lost, c, BREAKING, slid + rolled + twisted)
-                break_contact(grains, contacts, near, count, lost, c, pose, bond, dt)
+                break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt)
                 parted = True
                 continue
-            wish = law_of.yielded(strain, pose.n, bond, law.release)
+            wish = contact_law.yielded(strain, pose.n, bond, law.release)
             n1, n2 = tangential.pointers_for(wish.slide, wish.roll, pose.n, r1, r2)
-            moved = law_of.Pose(pose.n, pose.distance, n1, n2, wish.twist)
-            left = law_of.strain_of(moved, strain.overlap, r1, r2, bond)
-            book_yielding(contacts.lost, lost, c, law_of.lost_by_yielding(before, strain, left, now))
+            moved = contact_law.Pose(pose.n, pose.distance, n1, n2, wish.twist)
+            left = contact_law.strain_of(moved, strain.overlap, r1, r2, bond)
+            log_slip_losses(contacts.lost, lost, c, contact_law.lost_by_yielding(before, strain, left, now))
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
             contacts.twist[c] = left.twist
-            count[MOVED] += 1
+            count[SLIPPED] += 1
         write_loads(grains, contacts, span, law, c)
     return parted
 
 
 @rare
-def drop_broken(contacts, count):
+def compact_contacts(contacts, count):
     """Close the gaps that broken contacts leave; the order of the others stays."""
     kept = 0
     for c in range(count[CONTACTS]):
@@ -193,7 +193,7 @@ def drop_broken(contacts, count):
                 contacts.push[row, kept] = contacts.push[row, c]
                 contacts.torque1[row, kept] = contacts.torque1[row, c]
                 contacts.torque2[row, kept] = contacts.torque2[row, c]
-            if not alike(contacts):
+            if not uniform_contacts(contacts):
                 for row in range(contacts.bond.shape[0]):
                     contacts.bond[row, kept] = contacts.bond[row, c]
             for row in range(contacts.lost.shape[0]):
@@ -208,24 +208,24 @@ def drop_broken(contacts, count):
 
 
 @loop
-def _touches(grains, near, span, p):
+def _touches(grains, pair_list, span, p):
     """1 if pair p has come to touch (D ≤ r1 + r2), else 0."""
-    i, j = near.pair[0, p], near.pair[1, p]
+    i, j = pair_list.pair[0, p], pair_list.pair[1, p]
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     reach = grains.radius[i] + grains.radius[j]
-    return 1 if (near.touching[p] == 0) & (dot(apart, apart) <= reach * reach) else 0
+    return 1 if (pair_list.touching[p] == 0) & (dot(apart, apart) <= reach * reach) else 0
 
 
 @loop
-def new_touches(grains, near, count, span):
+def new_touches(grains, pair_list, count, span):
     """How many pairs have come to touch, out of those that may."""
     found = 0
-    if all_may_touch(near, count):
+    if inner_list_is_full(pair_list, count):
         for p in range(count[PAIRS]):
-            found += _touches(grains, near, span, p)
+            found += _touches(grains, pair_list, span, p)
     else:
-        for k in range(int(near.watch[SOON])):
-            found += _touches(grains, near, span, near.soon[k])
+        for k in range(int(pair_list.skin[INNER_COUNT])):
+            found += _touches(grains, pair_list, span, pair_list.inner[k])
     return found
 
 
@@ -248,8 +248,8 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     for row in range(contacts.lost.shape[0]):
         contacts.lost[row, c] = 0.0
     bond = bond_of(grains, law.pairings, i, j)
-    first, last = (0, contacts.bond.shape[1]) if law.alike else (c, c + 1)
-    if c == 0 or not law.alike:
+    first, last = (0, contacts.bond.shape[1]) if law.uniform_contacts else (c, c + 1)
+    if c == 0 or not law.uniform_contacts:
         for row in range(contacts.bond.shape[0]):
             for k in range(first, last):
                 contacts.bond[row, k] = bond[row]
@@ -258,7 +258,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
 
 
 @rare
-def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
+def make_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt):
     """Form the contacts of pairs that came to touch inside the step, and book −U(0).
 
     The grains flew freely to where they are, a time τ = overlap / closing speed w beyond the touch.  An impulse along
@@ -266,11 +266,11 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
     The second order, (F τ)²/2m̄, would be an error of the same sign in every touch.
     """
     for p in range(count[PAIRS]):
-        i, j = near.pair[0, p], near.pair[1, p]
+        i, j = pair_list.pair[0, p], pair_list.pair[1, p]
         apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         reach = grains.radius[i] + grains.radius[j]
         square = dot(apart, apart)
-        if near.touching[p] == 1 or square > reach * reach:
+        if pair_list.touching[p] == 1 or square > reach * reach:
             continue
         distance = math.sqrt(square)
         n = scale(1.0 / distance, apart)
@@ -284,24 +284,24 @@ def make_contacts(grains, contacts, near, count, lost, clock, span, law, dt):
         # a step of 0 s finds what touches already
         gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts, c), dt) if dt > 0.0 else 0.0
         owed = damping_at(contacts, c) * since - reduced * gain
-        knock(grains, i, j, n, owed - 0.5 * dt * dot(load(contacts.push, c), n))
-        book(contacts.lost, lost, c, FORMING, law_of.forming(bond_at(contacts, c)))
-        near.touching[p] = 1
+        apply_pair_impulse(grains, i, j, n, owed - 0.5 * dt * dot(load(contacts.push, c), n))
+        book(contacts.lost, lost, c, FORMING, contact_law.forming(bond_at(contacts, c)))
+        pair_list.touching[p] = 1
         count[MADE] += 1
 
 
 @loop
-def all_may_touch(near, count):
-    """Are all near pairs to be looked at, instead of the first watch[SOON] of `soon`?"""
-    return near.watch[SOON] == count[PAIRS]
+def inner_list_is_full(pair_list, count):
+    """Are all near pairs to be looked at, instead of the first watch[INNER_COUNT] of `soon`?"""
+    return pair_list.skin[INNER_COUNT] == count[PAIRS]
 
 
 @rare
-def forget_touch(near, count, i, j):
+def mark_separated(pair_list, count, i, j):
     """Mark the pair (i, j) of the list as no longer in contact; it may touch again soon."""
-    near.watch[SOON_LEEWAY] = 0.0
+    pair_list.skin[INNER_SKIN] = 0.0
     for p in range(count[PAIRS]):
-        a, b = near.pair[0, p], near.pair[1, p]
+        a, b = pair_list.pair[0, p], pair_list.pair[1, p]
         if (a == i and b == j) or (a == j and b == i):
-            near.touching[p] = 0
+            pair_list.touching[p] = 0
             return

@@ -48,15 +48,15 @@ def gather(grains, contacts, first, last):
 
     Both ends are multiples of BLOCK, but for the last grain of all.
     """
-    if contacts.turn.size > 0:
+    if contacts.gather_order.size > 0:
         for k in range(last - first):
-            _gather_at(grains, contacts, contacts.turn[first + k])
+            _gather_at(grains, contacts, contacts.gather_order[first + k])
     else:
         gather_by_number(grains, contacts, first, last)
 
 
 @rare
-def sort_sides(contacts, count, n):
+def sort_contacts_by_grain(contacts, count, n):
     """Rebuild the list of contacts per grain: first those that it is grain 1 of, each in the order of the contacts."""
     total = count[CONTACTS]
     start, side = contacts.start, contacts.side
@@ -77,7 +77,7 @@ def sort_sides(contacts, count, n):
     for g in range(n):
         start[g] = start[g + 1]
     start[n] = 2 * total
-    if contacts.turn.size > 0:
+    if contacts.gather_order.size > 0:
         _take_turns(contacts, n, total)
 
 
@@ -94,7 +94,7 @@ def _kind(contacts, g):
 @loop
 def _take_turns(contacts, n, total):
     """Fill `turn`: the grains of each block by their kind; by their numbers where contacts are many."""
-    turn = contacts.turn
+    turn = contacts.gather_order
     for first in range(0, n, BLOCK):
         last = min(first + BLOCK, n)
         for g in range(first, last):
@@ -115,6 +115,6 @@ def _take_turns(contacts, n, total):
 
 
 @kernel
-def resort_sides(contacts, count, n):
+def resort_contacts_by_grain(contacts, count, n):
     """The same, from Python."""
-    sort_sides(contacts, count, n)
+    sort_contacts_by_grain(contacts, count, n)

@@ -8,7 +8,7 @@ from ..numerics.quaternion import turned_back
 from ..numerics.vec import dot, load, load4, put, scale, sub
 from . import tangential
 from .events import add_contact
-from .gather import sort_sides
+from .gather import sort_contacts_by_grain
 from .update import bond_at, write_loads
 
 
@@ -42,5 +42,5 @@ def seed_contacts(grains, contacts, count, span, law, pair, slide, roll, twist):
         write_loads(grains, contacts, span, law, c)
         if wrong < 0 and r1 + r2 - distance < -bond_at(contacts, c).break_overlap:
             wrong = k
-    sort_sides(contacts, count, grains.mass.size)
+    sort_contacts_by_grain(contacts, count, grains.mass.size)
     return wrong

@@ -13,7 +13,7 @@ from ..box import Box
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..grains import Grains
 from ..material import Material
-from ..units import si, spoken
+from ..units import format_quantity, si
 from .jkr import rest_radius
 from .law import Pairing
 from .mixing import MIXING, pairing_between
@@ -153,7 +153,7 @@ class Contact:
         if ratio <= JKR_LIMIT:
             return ""
         names = a.name if a is b else f"{a.name} and {b.name}"
-        radii = spoken(r1, "m") if r1 == r2 else f"{spoken(r1, 'm')} and {spoken(r2, 'm')}"
+        radii = format_quantity(r1, "m") if r1 == r2 else f"{format_quantity(r1, 'm')} and {format_quantity(r2, 'm')}"
         return (
             f"contacts of {names} grains of radius {radii} have a0/R = {ratio:.2f}; "
             f"JKR assumes a0/R below {JKR_LIMIT}: take forces and energies as estimates"

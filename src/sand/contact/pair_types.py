@@ -18,8 +18,8 @@ class Kind(NamedTuple):
     length: Any  # δ at which it breaks [m]
 
 
-NO_GRAIN = (np.uint32(0), -1.0, -1.0)
-NO_KIND = Kind((NO_GRAIN, NO_GRAIN), 0.0, 0.0)
+NO_GRAIN_TYPE = (np.uint32(0), -1.0, -1.0)
+NO_PAIR_TYPE = Kind((NO_GRAIN_TYPE, NO_GRAIN_TYPE), 0.0, 0.0)
 
 
 @loop
@@ -47,15 +47,15 @@ def bond_of(grains, pairings, i, j):
 
 
 @loop
-def make_of(grains, i):
+def grain_type_of(grains, i):
     """All that the bonds of grain i depend on."""
     return grains.material[i], grains.radius[i], grains.mass[i]
 
 
 @loop
-def kind_of(grains, law, i, j, last):
+def pair_type_of(grains, law, i, j, last):
     """The kind of a pair: the `last` one if it is the same, as its powers cost more than all else."""
-    a, b = make_of(grains, i), make_of(grains, j)
+    a, b = grain_type_of(grains, i), grain_type_of(grains, j)
     if (a, b) == last.grains:
         return last
     bond = bond_of(grains, law.pairings, i, j)
@@ -63,12 +63,12 @@ def kind_of(grains, law, i, j, last):
 
 
 @loop
-def kind_at(near, p):
+def pair_type_index(pair_list, p):
     """The place of the numbers of pair p."""
-    return p if near.step.size > 1 else 0
+    return p if pair_list.step.size > 1 else 0
 
 
 @loop
-def kinds(near, count):
+def kinds(pair_list, count):
     """How many places are in use."""
-    return min(count[PAIRS], near.step.size)
+    return min(count[PAIRS], pair_list.step.size)

@@ -1,7 +1,7 @@
 """The pass over all contacts, quiet ones and those that slide, roll or twist beyond a limit.
 
 In shaken aggregates most contacts move in every step.  Blocks of which many moved in the step before get a pass that
-moves them at once, without a branch; elsewhere `events.settle_flagged` moves the few that must.  Both do the same.
+moves them at once, without a branch; elsewhere `events.update_flagged_contacts` moves the few that must.  Both do the same.
 """
 
 import math
@@ -13,18 +13,18 @@ from ..compiler.jit import formula, loop
 from ..numerics.quaternion import turned_back, turned_by
 from ..numerics.vec import axpy, dot, load, load4, put, scale, sub
 from ..state.arrays import BLOCK as JUDGED_TOGETHER
-from ..state.state import BREAKING, MOVED, ROLLING, SLIDING, TWISTING
+from ..state.state import BREAKING, ROLLING, SLIDING, SLIPPED, TWISTING
 from . import jkr, tangential
-from . import law as law_of
-from .update import WAITS, YIELDED, alike, bond_in, pose_after, quiet_pass, twist_gain, whole_vectors
+from . import law as contact_law
+from .update import SLIPPED_FLAGS, WAITS, bond_in, contact_loop, pose_after, twist_gain, uniform_contacts, whole_vectors
 
 BLOCK = np.uint64(JUDGED_TOGETHER)
 """Contacts that are judged together."""
-BUSY = 0.1
+SLIP_FRACTION = 0.1
 """Share of a block's contacts that passed a limit in the step before, from which it gets the longer pass."""
 
 
-class Passed(NamedTuple):
+class SlipSums(NamedTuple):
     """What a pass over contacts found and lost."""
 
     waiting: float  # contacts that wait to be settled one by one
@@ -41,7 +41,7 @@ def _strain_at_start(grains, contacts, c, pose, twist, bond, dt):
     moving = sub(load(grains.velocity, i), load(grains.velocity, j))
     apart = axpy(-dt, moving, scale(pose.distance, pose.n))
     distance = math.sqrt(dot(apart, apart))
-    earlier = law_of.Pose(
+    earlier = contact_law.Pose(
         scale(1.0 / distance, apart),
         distance,
         turned_by(scale(-dt, load(grains.spin, i)), pose.n1),
@@ -49,7 +49,7 @@ def _strain_at_start(grains, contacts, c, pose, twist, bond, dt):
         twist,
     )
     r1, r2 = grains.radius[i], grains.radius[j]
-    return law_of.strain_of(earlier, r1 + r2 - distance, r1, r2, bond)
+    return contact_law.strain_of(earlier, r1 + r2 - distance, r1, r2, bond)
 
 
 @loop
@@ -80,8 +80,8 @@ def _keep_record(own, c, slid, rolled, twisted):
 
 
 @loop
-def _busy_pass(grains, contacts, first, last, column, span, law, dt):
-    """What `quiet_pass` does, but contacts beyond a limit are moved at once unless they break or are pressed hard."""
+def _slip_loop(grains, contacts, first, last, column, span, law, dt):
+    """What `contact_loop` does, but contacts beyond a limit are moved at once unless they break or are pressed hard."""
     waiting = moved = slid = rolled = twisted = 0.0
     for k in range(last - first):
         c = first + k
@@ -93,36 +93,36 @@ def _busy_pass(grains, contacts, first, last, column, span, law, dt):
         overlap = r1 + r2 - pose.distance
         s = jkr.stretch(overlap, bond.pull_off_overlap)
         y = jkr.root_in_reach(s)
-        now = law_of.stiffened(bond, y, law.follow)
-        strain = law_of.strain_of(pose, overlap, r1, r2, bond)
+        now = contact_law.stiffened(bond, y, law.follow)
+        strain = contact_law.strain_of(pose, overlap, r1, r2, bond)
         odd = (overlap < -bond.break_overlap) | (s > jkr.STRETCH_OF_POLYNOMIAL)
-        moves = law_of.beyond_limits(strain, pose.n, bond) & (not odd)
+        moves = contact_law.beyond_limits(strain, pose.n, bond) & (not odd)
         # all is worked out for all and chosen from at the end: a branch, or a store under a condition, stops SIMD
         before = _strain_at_start(grains, contacts, c, pose, contacts.twist[c], bond, dt)
-        wish = law_of.yielded(strain, pose.n, bond, law.release)
+        wish = contact_law.yielded(strain, pose.n, bond, law.release)
         n1, n2 = tangential.pointers_for(wish.slide, wish.roll, pose.n, r1, r2)
         back1 = turned_back(load4(grains.orientation, i), n1)
         back2 = turned_back(load4(grains.orientation, j), n2)
         n1, n2 = _chosen(moves, n1, pose.n1), _chosen(moves, n2, pose.n2)
-        there = law_of.Pose(pose.n, pose.distance, n1, n2, wish.twist if moves else pose.twist)
-        left = law_of.strain_of(there, overlap, r1, r2, bond)
-        lost = law_of.lost_by_yielding(before, strain, left, now)
+        there = contact_law.Pose(pose.n, pose.distance, n1, n2, wish.twist if moves else pose.twist)
+        left = contact_law.strain_of(there, overlap, r1, r2, bond)
+        lost = contact_law.lost_by_yielding(before, strain, left, now)
         lost = _chosen(moves, lost, (0.0, 0.0, 0.0))
-        push, torque1, torque2 = law_of.contact_load(there, overlap, y, r1, r2, now)
+        push, torque1, torque2 = contact_law.contact_load(there, overlap, y, r1, r2, now)
         put(contacts.pointer1, c, _chosen(moves, back1, pointer1))
         put(contacts.pointer2, c, _chosen(moves, back2, pointer2))
         contacts.twist[c] = there.twist
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if odd else YIELDED if moves else 0
+        contacts.flag[c] = WAITS if odd else SLIPPED_FLAGS if moves else 0
         _keep_record(contacts.lost, c, lost[0], lost[1], lost[2])
         waiting += 1.0 if odd else 0.0
         moved += 1.0 if moves else 0.0
         slid += lost[0]
         rolled += lost[1]
         twisted += lost[2]
-    return Passed(waiting, moved, slid, rolled, twisted)
+    return SlipSums(waiting, moved, slid, rolled, twisted)
 
 
 @loop
@@ -135,12 +135,12 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
     for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
         begin = first + b * BLOCK
         end = begin + BLOCK if begin + BLOCK < last else last
-        column = np.uint64(0) if alike(contacts) else begin
+        column = np.uint64(0) if uniform_contacts(contacts) else begin
         busy = 0.0
         for k in range(end - begin):
             busy += 1.0 if contacts.flag[begin + k] > 0 else 0.0
-        if busy > BUSY * (end - begin) and not law.follow:
-            part = _busy_pass(grains, contacts, begin, end, column, span, law, dt)
+        if busy > SLIP_FRACTION * (end - begin) and not law.follow:
+            part = _slip_loop(grains, contacts, begin, end, column, span, law, dt)
             waiting += part.waiting
             moved += part.moved
             slid += part.slid
@@ -148,21 +148,21 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
             twisted += part.twisted
         else:
             whole = whole_vectors(contacts, end)
-            waiting += quiet_pass(grains, contacts, begin, whole, end, column, span, law, dt)
-    return Passed(waiting, moved, slid, rolled, twisted)
+            waiting += contact_loop(grains, contacts, begin, whole, end, column, span, law, dt)
+    return SlipSums(waiting, moved, slid, rolled, twisted)
 
 
 @loop
-def book_passed(count, lost, passed):
+def log_slip_sums(count, lost, passed):
     """Add what a pass moved and lost to the books."""
-    count[MOVED] += int(passed.moved)
+    count[SLIPPED] += int(passed.moved)
     lost[SLIDING] += passed.slid
     lost[ROLLING] += passed.rolled
     lost[TWISTING] += passed.twisted
 
 
 @loop
-def keep_passed(rows, b, passed):
+def store_slip_sums(rows, b, passed):
     """Leave what a pass found in row b of a (B, 5 or more) array."""
     rows[b, 0] = passed.waiting
     rows[b, 1] = passed.moved
@@ -172,6 +172,6 @@ def keep_passed(rows, b, passed):
 
 
 @loop
-def kept_passed(rows, b):
-    """What `keep_passed` left there."""
-    return Passed(rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4])
+def load_slip_sums(rows, b):
+    """What `store_slip_sums` left there."""
+    return SlipSums(rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4])

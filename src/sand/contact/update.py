@@ -7,21 +7,21 @@ import numpy as np
 from ..box import nearest_image
 from ..compiler.jit import COMPILED, loop, rare
 from ..numerics.quaternion import turned
-from ..numerics.simd import filled_up
+from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import across, dot, load, load4, put, scale, sub
 from ..state.state import CONTACT_STEP, CONTACTS
 from . import jkr, tangential
-from . import law as law_of
+from . import law as contact_law
 from .pair_types import kinds
 
 FEW = 4
 """Contacts that are faster done one by one than as a vector."""
-WAITS, BROKE, YIELDED = 1, 2, 3
+WAITS, BROKE, SLIPPED_FLAGS = 1, 2, 3
 """Flags of a contact that passed a limit: to be settled; broken in this step; moved in the pass over all contacts."""
 
 
 @loop
-def alike(contacts):
+def uniform_contacts(contacts):
     """Do all contacts share their constants?  (If there is room for BLOCK of them, what is told does not matter.)"""
     return contacts.bond.shape[1] != contacts.flag.size
 
@@ -29,7 +29,7 @@ def alike(contacts):
 @loop
 def bond_at(contacts, c):
     """The stored constants of contact c."""
-    return bond_in(contacts.bond, 0 if alike(contacts) else c)
+    return bond_in(contacts.bond, 0 if uniform_contacts(contacts) else c)
 
 
 @loop
@@ -41,7 +41,7 @@ def damping_at(contacts, c):
 @loop
 def bond_in(b, c):
     """Column c of a (K, …) array of constants."""
-    return law_of.Bond(
+    return contact_law.Bond(
         b[0, c],
         b[1, c],
         b[2, c],
@@ -66,7 +66,7 @@ def pose_at(grains, contacts, span, c, twist):
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(apart, apart))
-    return law_of.Pose(
+    return contact_law.Pose(
         scale(1.0 / distance, apart),
         distance,
         turned(load4(grains.orientation, i), load(contacts.pointer1, c)),
@@ -89,11 +89,11 @@ def pose_after(grains, contacts, span, c, dt):
     """How the grains of contact c stand at the end of a step of dt, with the twist that they gained in it."""
     pose = pose_at(grains, contacts, span, c, 0.0)
     twist = contacts.twist[c] + twist_gain(grains, contacts, c, pose, dt)
-    return law_of.Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
+    return contact_law.Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
 
 
 @loop
-def quiet_pass(grains, contacts, first, last, used, column, span, law, dt):
+def contact_loop(grains, contacts, first, last, used, column, span, law, dt):
     """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises.
 
     Parameters
@@ -113,10 +113,10 @@ def quiet_pass(grains, contacts, first, last, used, column, span, law, dt):
         overlap = r1 + r2 - pose.distance
         s = jkr.stretch(overlap, bond.pull_off_overlap)
         y = jkr.root_in_reach(s)
-        now = law_of.stiffened(bond, y, law.follow)
-        push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
-        strain = law_of.strain_of(pose, overlap, r1, r2, bond)
-        beyond = law_of.beyond_limits(strain, pose.n, bond) | (s > jkr.STRETCH_OF_POLYNOMIAL)
+        now = contact_law.stiffened(bond, y, law.follow)
+        push, torque1, torque2 = contact_law.contact_load(pose, overlap, y, r1, r2, now)
+        strain = contact_law.strain_of(pose, overlap, r1, r2, bond)
+        beyond = contact_law.beyond_limits(strain, pose.n, bond) | (s > jkr.STRETCH_OF_POLYNOMIAL)
         contacts.twist[c] = pose.twist
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
@@ -132,7 +132,7 @@ def whole_vectors(contacts, number):
 
     What is beyond the contacts in use is worked out as well, and never read.  Both are uint64.
     """
-    whole = filled_up(number, np.uint64(FEW))
+    whole = round_up_to_simd_width(number, np.uint64(FEW))
     return whole if COMPILED and whole <= np.uint64(contacts.pair.shape[1]) else number
 
 
@@ -145,15 +145,15 @@ def write_loads(grains, contacts, span, law, c):
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
     y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    now = law_of.stiffened(bond, y, law.follow)
-    push, torque1, torque2 = law_of.contact_load(pose, overlap, y, r1, r2, now)
+    now = contact_law.stiffened(bond, y, law.follow)
+    push, torque1, torque2 = contact_law.contact_load(pose, overlap, y, r1, r2, now)
     put(contacts.push, c, push)
     put(contacts.torque1, c, torque1)
     put(contacts.torque2, c, torque2)
 
 
 @rare
-def contact_step(contacts, near, count, n, clock, per_period):
+def contact_step(contacts, pair_list, count, n, clock, per_period):
     """The longest step [s] while there are contacts: fastest period / per_period, less above 6 neighbours.
 
     Pairs that may touch soon count as well, so that a contact of small grains never begins at the step of large
@@ -168,7 +168,7 @@ def contact_step(contacts, near, count, n, clock, per_period):
     clock[CONTACT_STEP] = math.inf
     if fastest > 0.0:
         clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(fastest * crowd) / per_period
-        for k in range(kinds(near, count)):
-            clock[CONTACT_STEP] = min(clock[CONTACT_STEP], near.step[k])
+        for k in range(kinds(pair_list, count)):
+            clock[CONTACT_STEP] = min(clock[CONTACT_STEP], pair_list.step[k])
         # few digits, so that sums of steps are exact: cycles of long-range forces then keep momenta to rounding
         clock[CONTACT_STEP] = np.float64(np.float32(clock[CONTACT_STEP]))

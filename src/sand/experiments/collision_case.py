@@ -24,8 +24,8 @@ from ..config.case import (
     wrong_materials,
 )
 from ..config.commands import BODIES, refuse_other_command
-from ..config.errors import complaints
-from ..config.sections import Count, PlaceName, Seed
+from ..config.errors import validation_errors
+from ..config.sections import Count, PathName, Seed
 from ..errors import BadInput, did_you_mean
 from ..grains import Grains, moment_size
 from ..integrate.verlet import Verlet
@@ -47,7 +47,7 @@ class BodySection(Section):
     """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
 
     kind: Kind
-    path: PlaceName | None = None
+    path: PathName | None = None
     length: str | None = None
     grains: Count | None = None
     shape: list[Count] | None = None
@@ -116,7 +116,7 @@ class ImpactSection(Section):
     along: Literal["x", "y", "z"] = "x"
     turn: bool = True
     seeds: list[Seed] = Field(default_factory=lambda: [1], min_length=1)
-    out: PlaceName | None = None
+    out: PathName | None = None
 
     @field_validator("impact_parameter")
     @classmethod
@@ -190,7 +190,7 @@ def wrong_bodies(content: dict[str, Any]) -> list[str]:
     return problems
 
 
-def with_whole_paths(content: dict[str, Any]) -> dict[str, Any]:
+def with_absolute_paths(content: dict[str, Any]) -> dict[str, Any]:
     """The case with the bodies' files named so that they are found from any folder."""
     whole = dict(content)
     for body in BODIES & content.keys():
@@ -216,7 +216,7 @@ def read_collision(path: str | Path) -> CollisionCase:
         case = model.model_validate(content)
     except ValidationError as error:
         extra: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
-        problems += [line for slip in error.errors() for line in complaints(slip, model, extra)]
+        problems += [line for slip in error.errors() for line in validation_errors(slip, model, extra)]
     if problems or case is None:
         raise BadInput(f"{path}: {problem}" for problem in problems)
     return case

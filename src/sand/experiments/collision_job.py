@@ -24,7 +24,7 @@ from ..io.run_folder import (
 )
 from ..io.table import GrowingOutcomes
 from .collision import finished
-from .collision_case import CollisionCase, read_collision, run_seeds, with_whole_paths
+from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
 
 
 def description_in(folder: Path) -> Path | None:
@@ -69,7 +69,7 @@ class CollisionJob:
         self.path, self.resume, self.overwrite = path, resume, overwrite
         self.case: CollisionCase = read_collision(path)
         self.folder = folder or Path(self.case.impact.out or Path(path).stem)
-        self.content = with_whole_paths(read_toml(path))
+        self.content = with_absolute_paths(read_toml(path))
         if seeds is not None:
             self.case.impact.seeds = seeds
         self.content["impact"]["seeds"] = self.case.impact.seeds

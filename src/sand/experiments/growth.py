@@ -13,7 +13,7 @@ from ..analysis.fractal import Dimension, ensemble_dimension
 from ..analysis.frame_statistics import COLUMNS, census
 from ..errors import BadInput
 from ..io import run_folder as files
-from ..results import Opened
+from ..results import Run
 from .growth_boxes import alike, grow, one_box
 
 __all__ = ["Box", "Growth", "alike", "boxes_in", "grow", "growth_of", "one_box", "read_box"]
@@ -49,7 +49,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
     BadInput
         there is no run, or one that cannot be read.
     """
-    run = Opened(folder)
+    run = Run(folder)
     frames, ledger = run.frames, run.ledger
     if not len(frames) or "mean_cluster_size" not in ledger:
         raise BadInput(f"{folder} holds a run without frames or ledger")

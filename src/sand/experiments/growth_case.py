@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError
 
 from ..config.case import Case, check_case
 from ..config.commands import refuse_other_command
-from ..config.errors import complaints
+from ..config.errors import validation_errors
 from ..config.sections import Section, Seed
 from ..errors import BadInput
 from ..io.run_folder import read_toml
@@ -50,7 +50,7 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
             seeds = GrowSection.model_validate(given).seeds
         except ValidationError as error:
             slips = [{**slip, "loc": ("grow", *slip["loc"])} for slip in error.errors()]
-            problems += [f"{path}: {line}" for slip in slips for line in complaints(slip, GrowthCase, {})]
+            problems += [f"{path}: {line}" for slip in slips for line in validation_errors(slip, GrowthCase, {})]
     try:
         case = check_case(content, str(path))
     except BadInput as error:

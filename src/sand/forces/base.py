@@ -9,7 +9,7 @@ from ..box import Box
 from ..grains import Grains
 from .external.formulas import nothing, together
 from .pair.cutoff import Choice
-from .pair.loops import NO_FAR_FORCE, FarSums, far_together
+from .pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, combined_sums
 
 
 @runtime_checkable
@@ -62,7 +62,7 @@ class GrainForce(Force, Protocol):
 
 
 @runtime_checkable
-class FarForce(Force, Protocol):
+class LongRangeForce(Force, Protocol):
     """A force between all grains, near and far (forces/pair/dipole_loops.py and forces/pair/inverse_square_loops.py
     have the loops).
 
@@ -77,7 +77,7 @@ class FarForce(Force, Protocol):
     def choose(self, grains: Grains, box: Box) -> Choice:
         """Its cut-off, with the reason."""
 
-    def sums(self, box: Box, listed: bool) -> FarSums:
+    def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops that sum it: over listed pairs, or over all."""
 
     def numbers(self, grains: Grains, box: Box) -> Any:
@@ -99,11 +99,11 @@ def compose(forces: Sequence[GrainForce]) -> tuple[Callable, Any]:
     return formula, numbers
 
 
-def compose_far(sums: Sequence[FarSums], numbers: Sequence[Any]) -> tuple[FarSums, Any]:
+def compose_long_range(sums: Sequence[LongRangeSums], numbers: Sequence[Any]) -> tuple[LongRangeSums, Any]:
     """One set of loops and one nested tuple of numbers for a list of long-range forces, in order."""
-    whole, nested = NO_FAR_FORCE, ()
+    whole, nested = NO_LONG_RANGE_FORCE, ()
     for each, own in zip(reversed(sums), reversed(numbers), strict=True):
-        whole = far_together(each, whole)
+        whole = combined_sums(each, whole)
         nested = (own, nested)  # type: ignore[assignment]
     return whole, nested
 

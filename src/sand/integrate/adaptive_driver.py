@@ -12,32 +12,32 @@ from collections.abc import Callable
 from ..box import nearest_image
 from ..compiler.jit import kernel, loop
 from ..forces.external.loops import outside_energy, outside_wrap
-from ..neighbours.cell_list import FULL, make_far_list
-from ..neighbours.skin import begin_watch, farthest, forget_speeds, forget_ways
+from ..neighbours.cell_list import FULL, build_verlet_list
+from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement, reset_skins
 from ..numerics.vec import dot, load, put
 from ..state.state import (
+    CHECKED,
     CONTACTS,
     CYCLE,
     FLIGHT,
     GRAIN1,
     GRAIN2,
-    GROWN,
     LEFT,
-    LOOKED,
     OUTSIDE,
     REJECTED,
     STAGE,
     STEP,
+    STEP_INCREASES,
     STEPS,
     TIME,
 )
 from .driver import halves_for
 from .event_location import NEVER, first_touch
-from .kernel_spec import Plan, Stop
+from .kernel_spec import KernelSpec, Stop
 from .runge_kutta import GROW, error_of, loads_at_stage, next_factor, normalise_all, place_stage, trial_for, work_of
-from .step_control import GROW_EVERY, calm_steps
-from .step_parts import no_gas, stir_gas
-from .task_queue import dismiss, nobody_to_dismiss
+from .step_control import GROW_EVERY, steps_of_free_grains
+from .step_parts import apply_drag_and_noise, no_gas
+from .task_queue import join_workers, no_workers
 
 ORDER = 5.0
 """The error of a step goes as this power of its length."""
@@ -50,20 +50,20 @@ TRIES = 30
 
 
 @loop
-def refreshed(grains, far, count, rules):
+def refreshed(grains, long_range, count, rules):
     """Make the far list anew where a quarter of its margin is used up; FULL asks for longer arrays."""
     search = rules.search
-    if search.listed and not farthest(grains, far.anchor, rules.span) <= STALE_PART * search.margin:
-        return make_far_list(grains, far, count, rules.span, search)
+    if search.listed and not largest_displacement(grains, long_range.anchor, rules.span) <= STALE_PART * search.margin:
+        return build_verlet_list(grains, long_range, count, rules.span, search)
     return 0
 
 
 @loop
-def first_trial(grains, contacts, far, clock, count, rules):
+def first_trial(grains, contacts, long_range, clock, count, rules):
     """The step to try [s]: what the last one left, or Verlet's own after a start or a parting; 0 if not finite."""
     dt = clock[FLIGHT]
     if not dt > 0.0:
-        dt, _ = calm_steps(grains, far, contacts.start, count, rules.control)
+        dt, _ = steps_of_free_grains(grains, long_range, contacts.start, count, rules.control)
     fastest = 0.0
     for i in range(grains.mass.size):
         v = load(grains.velocity, i)
@@ -82,14 +82,14 @@ def wrap_all(grains, span):
 
 
 @functools.cache
-def step_for(plan: Plan) -> Callable:
+def step_for(plan: KernelSpec) -> Callable:
     """The loop that finds the length of a Runge–Kutta step and takes it: (length [s], touched?, stop)."""
-    sum_stage = loads_at_stage(plan.outside, plan.far.loads)
-    begin_step, try_step = trial_for(plan.outside, plan.far.loads)
+    sum_stage = loads_at_stage(plan.external, plan.long_range.loads)
+    begin_step, try_step = trial_for(plan.external, plan.long_range.loads)
 
     @loop
-    def fitting_step(grains, contacts, far, stages, clock, count, rules):
-        dt = wish = first_trial(grains, contacts, far, clock, count, rules)
+    def fitting_step(grains, contacts, long_range, stages, clock, count, rules):
+        dt = wish = first_trial(grains, contacts, long_range, clock, count, rules)
         if not dt > 0.0:
             return 0.0, False, Stop.NOT_FINITE
         begin_step(grains, stages, rules, clock[TIME])
@@ -97,10 +97,10 @@ def step_for(plan: Plan) -> Callable:
         while True:
             if tries == 0 and clock[TIME] + dt == clock[TIME]:
                 place_stage(grains, stages, 0, 0.0)
-                sum_stage(grains, far, count, rules, clock[TIME])
+                sum_stage(grains, long_range, count, rules, clock[TIME])
                 return 0.0, False, Stop.NO_STEP
             error, stray = math.inf, -1
-            if try_step(grains, far, stages, count, rules, clock[TIME], dt):
+            if try_step(grains, long_range, stages, count, rules, clock[TIME], dt):
                 error, stray = error_of(stages, dt, rules.precision)
             if not error <= 1.0:
                 count[GRAIN1], count[GRAIN2] = stray, -1
@@ -110,7 +110,7 @@ def step_for(plan: Plan) -> Callable:
                 continue
             if tries == 0:
                 wish = dt * min(growth, next_factor(error, ORDER))
-            touch = first_touch(grains, far, stages, rules, dt) if rules.contact.on else NEVER
+            touch = first_touch(grains, long_range, stages, rules, dt) if rules.contact.on else NEVER
             if touch >= 1.0 or tries == TRIES:
                 clock[FLIGHT] = min(wish, rules.control.longest)
                 return dt, touch <= 1.0, Stop.STEPS_DONE
@@ -121,37 +121,37 @@ def step_for(plan: Plan) -> Callable:
 
 
 @functools.cache
-def flight_for(plan: Plan) -> Callable:
+def flight_for(plan: KernelSpec) -> Callable:
     """The loop that takes one Runge–Kutta step and books it."""
-    fitting_step, sum_stage = step_for(plan), loads_at_stage(plan.outside, plan.far.loads)
-    energy, wrap_booked = outside_energy(plan.outside), outside_wrap(plan.outside)
-    stir = stir_gas if plan.gas else no_gas
+    fitting_step, sum_stage = step_for(plan), loads_at_stage(plan.external, plan.long_range.loads)
+    energy, wrap_with_work = outside_energy(plan.external), outside_wrap(plan.external)
+    stir = apply_drag_and_noise if plan.gas else no_gas
 
     @loop
-    def fly(grains, contacts, near, far, stages, clock, count, lost, rules):
-        if refreshed(grains, far, count, rules) == FULL:
+    def fly(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules):
+        if refreshed(grains, long_range, count, rules) == FULL:
             return Stop.LIST_FULL
-        before = energy(grains, clock[TIME], rules.outside) if rules.books.timed else 0.0
-        dt, touched, stop = fitting_step(grains, contacts, far, stages, clock, count, rules)
+        before = energy(grains, clock[TIME], rules.external) if rules.books.time_dependent else 0.0
+        dt, touched, stop = fitting_step(grains, contacts, long_range, stages, clock, count, rules)
         if stop != Stop.STEPS_DONE:
             return stop
         normalise_all(grains)
-        forget_speeds(near)
-        forget_ways(near)
+        invalidate_speeds(pair_list)
+        invalidate_skins(pair_list)
         clock[TIME] += dt
-        if rules.books.timed:
-            lost[OUTSIDE] -= energy(grains, clock[TIME], rules.outside) - before + work_of(stages, dt)
-        if rules.books.moored:
-            lost[OUTSIDE] -= wrap_booked(grains, rules.span, clock[TIME], rules.outside)
-            sum_stage(grains, far, count, rules, clock[TIME])
+        if rules.books.time_dependent:
+            lost[OUTSIDE] -= energy(grains, clock[TIME], rules.external) - before + work_of(stages, dt)
+        if rules.books.position_dependent:
+            lost[OUTSIDE] -= wrap_with_work(grains, rules.span, clock[TIME], rules.external)
+            sum_stage(grains, long_range, count, rules, clock[TIME])
         else:
             wrap_all(grains, rules.span)
         clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
         if touched:
             # what is left is the second half of a step of 0 s, with new lists and then a new choice of the step
-            near.anchor[0, 0] = math.inf
+            pair_list.anchor[0, 0] = math.inf
             clock[FLIGHT] = 0.0
-            count[LOOKED] = count[GROWN] = count[STEPS] - GROW_EVERY
+            count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - GROW_EVERY
             count[STAGE] = 1
             return Stop.STEPS_DONE
         clock[STEP] = dt
@@ -163,16 +163,16 @@ def flight_for(plan: Plan) -> Callable:
 
 
 @functools.cache
-def flight_driver_for(plan: Plan) -> Callable:
+def flight_driver_for(plan: KernelSpec) -> Callable:
     """The compiled `advance` of an adaptive run; as `advance.driver_for`, with the stages besides."""
     first_half, second_half = halves_for(plan)
     fly = flight_for(plan)
-    leave = dismiss if plan.crew else nobody_to_dismiss
+    leave = join_workers if plan.queue else no_workers
 
     @loop
-    def steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
+    def steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules, until, last):
         """Steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
-        begin_watch(near, count)
+        reset_skins(pair_list, count)
         while True:
             stop = Stop.STEPS_DONE
             if count[STAGE] == 0:
@@ -182,17 +182,17 @@ def flight_driver_for(plan: Plan) -> Callable:
                     if count[STEPS] >= last:
                         return Stop.STEPS_DONE
                 if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
-                    stop = fly(grains, contacts, near, far, stages, clock, count, lost, rules)
+                    stop = fly(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules)
                 else:
-                    stop = first_half(grains, contacts, near, far, clock, count, lost, rules)
+                    stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, rules)
             if stop == Stop.STEPS_DONE and count[STAGE] == 1:
-                stop = second_half(grains, contacts, near, far, clock, count, lost, rules)
+                stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, rules)
             if stop != Stop.STEPS_DONE:
                 return stop
 
-    def advance(grains, contacts, near, far, stages, clock, count, lost, rules, until, last):
-        stop = steps_until(grains, contacts, near, far, stages, clock, count, lost, rules, until, last)
+    def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules, until, last):
+        stop = steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules, until, last)
         leave(rules)
         return stop
 
-    return kernel(advance, keep=plan.keep, alone=plan.crew, wide=plan.wide)
+    return kernel(advance, keep=plan.keep, alone=plan.queue, wide=plan.wide)

@@ -69,11 +69,11 @@ def way_of_pair(grains, stages, span, i, j, dt):
 @formula
 def stays_away(points, limit):
     """True if the curve cannot come closer to the origin than `limit`: no point is that far from the first."""
-    farthest = 0.0
+    largest_displacement = 0.0
     for k in range(1, 6):
         way = sub(points[k], points[0])
-        farthest = max(farthest, dot(way, way))
-    return norm(points[0]) - math.sqrt(farthest) > limit
+        largest_displacement = max(largest_displacement, dot(way, way))
+    return norm(points[0]) - math.sqrt(largest_displacement) > limit
 
 
 @rare
@@ -112,14 +112,14 @@ def first_entry(points, limit):
 
 
 @loop
-def touch_of_pair(grains, stages, span, i, j, dt):
+def contact_time_of_pair(grains, stages, span, i, j, dt):
     """The part of the step at which grains i and j touch first: 1 if they do at its end, to rounding, or NEVER."""
     reach = grains.radius[i] + grains.radius[j]
     points = way_of_pair(grains, stages, span, i, j, dt)
     if stays_away(points, reach):
         return NEVER
-    far = max(norm(load(grains.position, i)), norm(load(grains.position, j)))
-    allowed = TOUCH_ERROR * reach + ROUNDING * far
+    long_range = max(norm(load(grains.position, i)), norm(load(grains.position, j)))
+    allowed = TOUCH_ERROR * reach + ROUNDING * long_range
     overlap = reach - norm(points[5])
     if 0.0 <= overlap <= allowed and dot(points[5], sub(points[5], points[4])) < 0.0:
         return 1.0
@@ -127,7 +127,7 @@ def touch_of_pair(grains, stages, span, i, j, dt):
 
 
 @loop
-def first_touch(grains, far, stages, rules, dt):
+def first_touch(grains, long_range, stages, rules, dt):
     """The part of the step at which the first of all pairs comes to touch; NEVER if none does.
 
     With a list, its pairs are all that can: a pair was either listed or farther apart than the reach, r1 + r2 and more
@@ -136,10 +136,10 @@ def first_touch(grains, far, stages, rules, dt):
     listed = rules.search.listed
     first = NEVER
     for k in range(grains.mass.size):
-        begin, end = (far.start[k], far.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
-        i = far.order[k] if listed else np.uint32(k)
+        begin, end = (long_range.start[k], long_range.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
+        i = long_range.order[k] if listed else np.uint32(k)
         for m in range(begin, end):
-            j = far.order[far.mate[m]] if listed else np.uint32(m)
+            j = long_range.order[long_range.neighbour[m]] if listed else np.uint32(m)
             if j < i:
-                first = min(first, touch_of_pair(grains, stages, rules.span, i, j, dt))
+                first = min(first, contact_time_of_pair(grains, stages, rules.span, i, j, dt))
     return first

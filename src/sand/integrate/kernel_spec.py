@@ -5,7 +5,7 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 from ..forces.external.formulas import nothing
-from ..forces.pair.loops import NO_FAR_FORCE, FarSums
+from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums
 
 
 class Stop(IntEnum):
@@ -17,23 +17,23 @@ class Stop(IntEnum):
     PAIRS_FULL = 3
     NOT_FINITE = 4
     NO_STEP = 5
-    FLEW_TOO_FAR = 6
-    CRUSHED = 7
-    SPUN_TOO_FAR = 8
+    TOO_FAST = 6
+    OVERCOMPRESSED = 7
+    SPINS_TOO_FAST = 8
     LIST_FULL = 9
 
 
-class Plan(NamedTuple):
+class KernelSpec(NamedTuple):
     """What a driver is compiled from; each combination is compiled once."""
 
-    outside: Callable = nothing  # per-grain forces, composed
-    far: FarSums = NO_FAR_FORCE  # long-range forces, composed
+    external: Callable = nothing  # per-grain forces, composed
+    long_range: LongRangeSums = NO_LONG_RANGE_FORCE  # long-range forces, composed
     split: bool = False  # pairs in contact feel their far force in every step
     impulse: bool = False  # far loads as impulses at both ends of a cycle, but for a held part
-    foretell: bool = False  # far loads by Taylor series inside a cycle
+    taylor: bool = False  # far loads by Taylor series inside a cycle
     gas: bool = False  # drag and Brownian kicks
     adaptive: bool = False  # Runge–Kutta steps while nothing touches
-    crew: bool = False  # large loops in blocks, for threads to share
+    queue: bool = False  # large loops in blocks, for threads to share
     keep: bool = True  # the compiled code on disk, if all of it is ours
     magnetic: bool = True  # some grain has a moment
     wide: bool = False  # so many grains that loops are made of the longest vectors
@@ -41,10 +41,10 @@ class Plan(NamedTuple):
     @property
     def bare(self) -> bool:
         """True where contacts are the only forces."""
-        return self.outside is nothing and self.far is NO_FAR_FORCE
+        return self.external is nothing and self.long_range is NO_LONG_RANGE_FORCE
 
 
-class ContactRules(NamedTuple):
+class ContactParameters(NamedTuple):
     """The contact law's run-time numbers."""
 
     on: bool  # False: grains pass through each other
@@ -53,10 +53,10 @@ class ContactRules(NamedTuple):
     follow: bool  # stiffnesses: False frozen at a₀, True following the contact radius
     damped: bool  # is there any damping
     per_period: float  # steps per fastest period
-    alike: bool = False  # as in World: one set of constants for all contacts
+    uniform_contacts: bool = False  # as in World: one set of constants for all contacts
 
 
-class Beat(NamedTuple):
+class RespaSettings(NamedTuple):
     """How often far loads are summed while grains are in contact."""
 
     most: int  # k_max, steps from one summation to the next; 1: every step
@@ -66,29 +66,29 @@ class Beat(NamedTuple):
 class Books(NamedTuple):
     """Energies that the outside forces leave to the driver."""
 
-    timed: bool  # their energy depends on time
-    moored: bool  # their energy depends on position, which periodic boundaries make jump
+    time_dependent: bool  # their energy depends on time
+    position_dependent: bool  # their energy depends on position, which periodic boundaries make jump
 
 
-class Stirring(NamedTuple):
+class GasSettings(NamedTuple):
     """When and how the gas acts."""
 
     period: float  # shortest time between two kicks [s]
     seed: int
-    gas: Any  # forces.gas.loops.GasRules
+    gas: Any  # forces.gas.loops.GasParameters
 
 
-class Rules(NamedTuple):
+class StepParameters(NamedTuple):
     """All numbers that do not change during a run."""
 
     span: Any
-    contact: ContactRules
-    far: Any
-    outside: Any
+    contact: ContactParameters
+    long_range: Any
+    external: Any
     search: Any
-    beat: Beat
+    beat: RespaSettings
     books: Books
     gas: Any
     control: Any
     precision: Any = ()  # adaptive.Precision, where there are Runge–Kutta steps
-    crew: Any = ()  # crew.Crew, where the plan has one
+    queue: Any = ()  # crew.Crew, where the plan has one

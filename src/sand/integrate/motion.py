@@ -9,13 +9,13 @@ import numpy as np
 from ..box import Span, nearest_image
 from ..compiler.jit import loop
 from ..contact.gather import BLOCK, gather
-from ..numerics.float_order import rank, rank_for_most, ranked
+from ..numerics.float_order import float_from_bits, magnitude_bits, rank
 from ..numerics.quaternion import turn, turned
 from ..numerics.vec import axpy, dot, load, load4, put, put4, scale
 
 OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """A box without walls, for moves that are wrapped later."""
-AT_ONCE = np.uint64(4 * BLOCK)
+BLOCK_OF_GRAINS = np.uint64(4 * BLOCK)
 """Grains whose loads are gathered before they are kicked, whole blocks; their forces stay in the first cache."""
 
 
@@ -32,30 +32,30 @@ def kicked(grains, i, dt):
 @loop
 def kick_some(grains, first, last, dt):
     """Velocities and spins of the grains first…last − 1 (uint64); ranks of the largest squares of speed and spin."""
-    fastest = quickest = rank(0.0)
+    fastest = fastest_spin = rank(0.0)
     for k in range(last - first):
         v, w = kicked(grains, first + k, dt)
-        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
-    return fastest, quickest
+        fastest, fastest_spin = max(fastest, magnitude_bits(dot(v, v))), max(fastest_spin, magnitude_bits(dot(w, w)))
+    return fastest, fastest_spin
 
 
 @loop
 def kick(grains, dt):
     """All velocities and spins; returns squares of the largest speed [m²/s²] and spin [1/s²]."""
-    fastest, quickest = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
-    return ranked(fastest), ranked(quickest)
+    fastest, fastest_spin = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
+    return float_from_bits(fastest), float_from_bits(fastest_spin)
 
 
 @loop
 def gather_and_kick(grains, contacts, first, last, dt):
     """Loads of contacts, the only ones, and the kick that they give, few grains at a time; as `kick_some`."""
-    fastest = quickest = rank(0.0)
+    fastest = fastest_spin = rank(0.0)
     while first < last:
-        end = min(first + AT_ONCE, last)
+        end = min(first + BLOCK_OF_GRAINS, last)
         gather(grains, contacts, first, end)
         v, w = kick_some(grains, first, end, dt)
-        fastest, quickest, first = max(fastest, v), max(quickest, w), end
-    return fastest, quickest
+        fastest, fastest_spin, first = max(fastest, v), max(fastest_spin, w), end
+    return fastest, fastest_spin
 
 
 @loop
@@ -83,7 +83,7 @@ def drift_for(magnetic: bool) -> Callable:
         for k in range(last - first):
             i = first + k
             v, w = kicked(grains, i, 0.5 * dt)
-            fastest = max(fastest, rank_for_most(dot(v, v)))
+            fastest = max(fastest, magnitude_bits(dot(v, v)))
             put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
             q = turn(load4(grains.orientation, i), scale(dt, w))
             put4(grains.orientation, i, q)
@@ -101,6 +101,6 @@ def kick_and_drift_for(magnetic: bool) -> Callable:
     @loop
     def kick_and_drift(grains, span, dt):
         fastest = drift_some(grains, np.uint64(0), np.uint64(grains.mass.size), span, dt)
-        return dt * math.sqrt(ranked(fastest))
+        return dt * math.sqrt(float_from_bits(fastest))
 
     return kick_and_drift

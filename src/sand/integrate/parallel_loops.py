@@ -9,42 +9,42 @@ import numpy as np
 
 from ..compiler.jit import loop
 from ..contact.gather import gather_by_number
-from ..contact.slip import book_passed, contact_pass, kept_passed
-from ..numerics.float_order import rank, rank_for_most, ranked
+from ..contact.slip import contact_pass, load_slip_sums, log_slip_sums
+from ..numerics.float_order import float_from_bits, magnitude_bits, rank
 from ..state.state import CONTACTS, STEP
-from .kernel_spec import Plan
+from .kernel_spec import KernelSpec
 from .motion import gather_and_kick, kick_and_drift_for
 from .task_queue import (
-    CONTACTS_AT_ONCE,
+    CONTACTS_PER_BLOCK,
     DRIFT,
     FAR,
     GATHER,
     GATHER_AND_KICK,
-    GRAINS_AT_ONCE,
+    GRAINS_PER_BLOCK,
     PASS,
     blocks_of,
-    crew_for,
     span_of_drift,
+    worker_loops,
 )
 
 
 @loop
-def _pass_alone(grains, contacts, far, clock, count, lost, rules):
+def _pass_alone(grains, contacts, long_range, clock, count, lost, rules):
     last = np.uint64(count[CONTACTS])
     passed = contact_pass(grains, contacts, np.uint64(0), last, rules.span, rules.contact, clock[STEP])
-    book_passed(count, lost, passed)
+    log_slip_sums(count, lost, passed)
     return passed.waiting > 0.0
 
 
 @loop
-def _gather_alone(grains, contacts, far, count, rules):
+def _gather_alone(grains, contacts, long_range, count, rules):
     gather_by_number(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
 
 
 @loop
-def _gather_and_kick_alone(grains, contacts, far, count, rules, dt):
-    fastest, quickest = gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
-    return ranked(fastest), ranked(quickest)
+def _gather_and_kick_alone(grains, contacts, long_range, count, rules, dt):
+    fastest, fastest_spin = gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
+    return float_from_bits(fastest), float_from_bits(fastest_spin)
 
 
 class Large(NamedTuple):
@@ -58,71 +58,71 @@ class Large(NamedTuple):
 
 
 @functools.cache
-def large_loops(plan: Plan) -> Large:
+def large_loops(plan: KernelSpec) -> Large:
     """The large loops for one plan."""
-    return _by_a_crew(plan) if plan.crew else _alone(plan)
+    return _by_a_crew(plan) if plan.queue else _alone(plan)
 
 
-def _alone(plan: Plan) -> Large:
-    sum_far, kick_and_drift = plan.far.loads, kick_and_drift_for(plan.magnetic)
-
-    @loop
-    def far_alone(grains, contacts, far, count, rules):
-        sum_far(grains, far, rules.span, rules.far)
+def _alone(plan: KernelSpec) -> Large:
+    sum_far, kick_and_drift = plan.long_range.loads, kick_and_drift_for(plan.magnetic)
 
     @loop
-    def drift_alone(grains, contacts, far, count, rules, dt):
+    def far_alone(grains, contacts, long_range, count, rules):
+        sum_far(grains, long_range, rules.span, rules.long_range)
+
+    @loop
+    def drift_alone(grains, contacts, long_range, count, rules, dt):
         return kick_and_drift(grains, span_of_drift(rules), dt)
 
     return Large(_pass_alone, _gather_alone, _gather_and_kick_alone, far_alone, drift_alone)
 
 
-def _by_a_crew(plan: Plan) -> Large:
-    share, _ = crew_for(plan)
-    begin, _, end, far_blocks = plan.far.parts
+def _by_a_crew(plan: KernelSpec) -> Large:
+    share, _ = worker_loops(plan)
+    begin, _, end, far_blocks = plan.long_range.parts
 
     @loop
-    def pass_together(grains, contacts, far, clock, count, lost, rules):
-        rules.crew.step[0] = clock[STEP]
-        blocks = blocks_of(count[CONTACTS], CONTACTS_AT_ONCE)
-        share(PASS, blocks, grains, contacts, far, count, rules)
+    def pass_together(grains, contacts, long_range, clock, count, lost, rules):
+        rules.queue.step[0] = clock[STEP]
+        blocks = blocks_of(count[CONTACTS], CONTACTS_PER_BLOCK)
+        share(PASS, blocks, grains, contacts, long_range, count, rules)
         waiting = False
         for b in range(blocks):
-            passed = kept_passed(rules.crew.passed, b)
+            passed = load_slip_sums(rules.queue.passed, b)
             waiting |= passed.waiting > 0.0
-            book_passed(count, lost, passed)
+            log_slip_sums(count, lost, passed)
         return waiting
 
     @loop
-    def gather_together(grains, contacts, far, count, rules):
-        blocks = blocks_of(grains.mass.size, GRAINS_AT_ONCE)
-        share(GATHER, blocks, grains, contacts, far, count, rules)
+    def gather_together(grains, contacts, long_range, count, rules):
+        blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+        share(GATHER, blocks, grains, contacts, long_range, count, rules)
 
     @loop
-    def gather_and_kick_together(grains, contacts, far, count, rules, dt):
-        rules.crew.step[0] = dt
-        blocks = blocks_of(grains.mass.size, GRAINS_AT_ONCE)
-        share(GATHER_AND_KICK, blocks, grains, contacts, far, count, rules)
-        fastest = quickest = rank(0.0)
+    def gather_and_kick_together(grains, contacts, long_range, count, rules, dt):
+        rules.queue.step[0] = dt
+        blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+        share(GATHER_AND_KICK, blocks, grains, contacts, long_range, count, rules)
+        fastest = fastest_spin = rank(0.0)
         for b in range(blocks):
-            fastest = max(fastest, rank_for_most(rules.crew.speeds[b, 0]))
-            quickest = max(quickest, rank_for_most(rules.crew.speeds[b, 1]))
-        return ranked(fastest), ranked(quickest)
+            fastest = max(fastest, magnitude_bits(rules.queue.speeds[b, 0]))
+            fastest_spin = max(fastest_spin, magnitude_bits(rules.queue.speeds[b, 1]))
+        return float_from_bits(fastest), float_from_bits(fastest_spin)
 
     @loop
-    def far_together(grains, contacts, far, count, rules):
-        begin(grains, far, rules.span, rules.far)
-        share(FAR, far_blocks(grains), grains, contacts, far, count, rules)
-        end(grains, far, rules.span, rules.far)
+    def combined_sums(grains, contacts, long_range, count, rules):
+        begin(grains, long_range, rules.span, rules.long_range)
+        share(FAR, far_blocks(grains), grains, contacts, long_range, count, rules)
+        end(grains, long_range, rules.span, rules.long_range)
 
     @loop
-    def drift_together(grains, contacts, far, count, rules, dt):
-        rules.crew.step[0] = dt
-        blocks = blocks_of(grains.mass.size, GRAINS_AT_ONCE)
-        share(DRIFT, blocks, grains, contacts, far, count, rules)
+    def drift_together(grains, contacts, long_range, count, rules, dt):
+        rules.queue.step[0] = dt
+        blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+        share(DRIFT, blocks, grains, contacts, long_range, count, rules)
         fastest = rank(0.0)
         for b in range(blocks):
-            fastest = max(fastest, rank_for_most(rules.crew.speeds[b, 0]))
-        return dt * math.sqrt(ranked(fastest))
+            fastest = max(fastest, magnitude_bits(rules.queue.speeds[b, 0]))
+        return dt * math.sqrt(float_from_bits(fastest))
 
-    return Large(pass_together, gather_together, gather_and_kick_together, far_together, drift_together)
+    return Large(pass_together, gather_together, gather_and_kick_together, combined_sums, drift_together)

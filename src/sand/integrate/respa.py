@@ -11,7 +11,7 @@ from ..contact.update import BROKE, whole_vectors
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..state.state import CONTACTS
 
-HELD_CHANGE = 0.5
+SLOW_FORCE_CHANGE = 0.5
 """Change of a grain's far load, in parts of it, at which its held part follows.
 
 A chain of 20 at rest and one that rings were tried in cycles of 70 steps with 0.2, 0.5 and 1 (no held part): 0.2 lets
@@ -20,58 +20,58 @@ the energy of the ringing one drift, 1 makes the impulses shake the calm one; se
 
 
 @loop
-def clear_far_loads(far):
+def clear_long_range_loads(long_range):
     """No far loads."""
-    for i in range(far.force.shape[1]):
-        put(far.force, i, (0.0, 0.0, 0.0))
-        put(far.torque, i, (0.0, 0.0, 0.0))
+    for i in range(long_range.force.shape[1]):
+        put(long_range.force, i, (0.0, 0.0, 0.0))
+        put(long_range.torque, i, (0.0, 0.0, 0.0))
 
 
 @loop
-def add_far_loads(grains, far):
+def add_long_range_loads(grains, long_range):
     """The far loads as last summed, on top of what the grains carry."""
     for i in range(grains.mass.size):
-        accrue(grains.force, i, load(far.force, i))
-        accrue(grains.torque, i, load(far.torque, i))
+        accrue(grains.force, i, load(long_range.force, i))
+        accrue(grains.torque, i, load(long_range.torque, i))
 
 
 @loop
-def add_held_loads(grains, far, since):
+def add_slow_loads(grains, long_range, since):
     """The held part of the far loads, which acts in every step.
 
     A load that does not change can be split off without any error, and impulses of what is left shake a cluster
     at rest much less.
     """
     for i in range(grains.mass.size):
-        accrue(grains.force, i, load(far.held_force, i))
-        accrue(grains.torque, i, load(far.held_torque, i))
+        accrue(grains.force, i, load(long_range.slow_force, i))
+        accrue(grains.torque, i, load(long_range.slow_torque, i))
 
 
 @loop
-def renew_held_loads(grains, far):
+def update_slow_loads(grains, long_range):
     """At the begin of a cycle: let the held part of a grain's far loads follow where they have become too different."""
     for i in range(grains.mass.size):
-        force, torque = load(far.force, i), load(far.torque, i)
-        change = sub(force, load(far.held_force, i))
-        if dot(change, change) > HELD_CHANGE**2 * dot(force, force):
-            put(far.held_force, i, force)
-        change = sub(torque, load(far.held_torque, i))
-        if dot(change, change) > HELD_CHANGE**2 * dot(torque, torque):
-            put(far.held_torque, i, torque)
-        put(far.past_position, i, load(grains.position, i))
-        put(far.path, i, (0.0, 0.0, 0.0))
+        force, torque = load(long_range.force, i), load(long_range.torque, i)
+        change = sub(force, load(long_range.slow_force, i))
+        if dot(change, change) > SLOW_FORCE_CHANGE**2 * dot(force, force):
+            put(long_range.slow_force, i, force)
+        change = sub(torque, load(long_range.slow_torque, i))
+        if dot(change, change) > SLOW_FORCE_CHANGE**2 * dot(torque, torque):
+            put(long_range.slow_torque, i, torque)
+        put(long_range.past_position, i, load(grains.position, i))
+        put(long_range.path, i, (0.0, 0.0, 0.0))
 
 
 @loop
-def follow_path(grains, far, span, weight):
+def follow_path(grains, long_range, span, weight):
     """Sum up the displacement since the begin of the cycle where the held force acts for `weight` seconds."""
     for i in range(grains.mass.size):
-        moved = nearest_image(sub(load(grains.position, i), load(far.past_position, i)), span)
-        accrue(far.path, i, scale(weight, moved))
+        moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
+        accrue(long_range.path, i, scale(weight, moved))
 
 
 @loop
-def keep_angular_momentum(grains, far, span, weight):
+def keep_angular_momentum(grains, long_range, span, weight):
     """Give each grain the spin that its held force F̄ took from the sum of all angular momenta.
 
     Far loads leave L alone where they are summed, at x_n and x_{n+1}.  The held force acts at the places between as
@@ -79,25 +79,25 @@ def keep_angular_momentum(grains, far, span, weight):
     (∫(x − x_n) dt − w (x_{n+1} − x_n)) × F̄.
     """
     for i in range(grains.mass.size):
-        moved = nearest_image(sub(load(grains.position, i), load(far.past_position, i)), span)
-        excess = cross(axpy(-weight, moved, load(far.path, i)), load(far.held_force, i))
+        moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
+        excess = cross(axpy(-weight, moved, load(long_range.path, i)), load(long_range.slow_force, i))
         accrue(grains.spin, i, scale(-1.0 / grains.inertia[i], excess))
 
 
 @loop
-def add_foretold_loads(grains, far, since):
+def add_extrapolated_loads(grains, long_range, since):
     """F + Ḟ t and M + Ṁ t (Eq. 51), t the time [s] since the last summation."""
     for i in range(grains.mass.size):
-        accrue(grains.force, i, axpy(since, load(far.force_rate, i), load(far.force, i)))
-        accrue(grains.torque, i, axpy(since, load(far.torque_rate, i), load(far.torque, i)))
+        accrue(grains.force, i, axpy(since, load(long_range.force_rate, i), load(long_range.force, i)))
+        accrue(grains.torque, i, axpy(since, load(long_range.torque_rate, i), load(long_range.torque, i)))
 
 
 @loop
-def kick_far(grains, far, dt):
+def apply_impulse(grains, long_range, dt):
     """v += ΔF dt/m, ω += ΔM dt/I with what the far loads differ from their held part."""
     for i in range(grains.mass.size):
-        force = sub(load(far.force, i), load(far.held_force, i))
-        torque = sub(load(far.torque, i), load(far.held_torque, i))
+        force = sub(load(long_range.force, i), load(long_range.slow_force, i))
+        torque = sub(load(long_range.torque, i), load(long_range.slow_torque, i))
         accrue(grains.velocity, i, scale(dt / grains.mass[i], force))
         accrue(grains.spin, i, scale(dt / grains.inertia[i], torque))
 
@@ -121,18 +121,18 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
             accrue(contacts.torque2, c, scale(part, torque2))
 
     @loop
-    def take_out_bonded(grains, contacts, count, far, span, numbers):
+    def take_out_bonded(grains, contacts, count, long_range, span, numbers):
         for c in range(count[CONTACTS]):
             if contacts.bonded[c] == 1:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, numbers, i, j)
-                accrue(far.force, i, scale(-1.0, force))
-                accrue(far.force, j, force)
-                accrue(far.torque, i, scale(-1.0, torque1))
-                accrue(far.torque, j, scale(-1.0, torque2))
+                accrue(long_range.force, i, scale(-1.0, force))
+                accrue(long_range.force, j, force)
+                accrue(long_range.torque, i, scale(-1.0, torque1))
+                accrue(long_range.torque, j, scale(-1.0, torque2))
 
     @loop
-    def change_sides(grains, contacts, count, far, span, numbers):
+    def swap_slow_parts(grains, contacts, count, long_range, span, numbers):
         for c in range(count[CONTACTS]):
             dead = contacts.flag[c] == BROKE
             if dead or contacts.bonded[c] == 0:
@@ -140,25 +140,25 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
                 force, torque1, torque2 = pair(grains, span, numbers, i, j)
                 sign = 1.0 if dead else -1.0
                 if not (dead and contacts.bonded[c] == 0):
-                    accrue(far.force, i, scale(sign, force))
-                    accrue(far.force, j, scale(-sign, force))
-                    accrue(far.torque, i, scale(sign, torque1))
-                    accrue(far.torque, j, scale(sign, torque2))
+                    accrue(long_range.force, i, scale(sign, force))
+                    accrue(long_range.force, j, scale(-sign, force))
+                    accrue(long_range.torque, i, scale(sign, torque1))
+                    accrue(long_range.torque, j, scale(sign, torque2))
                 contacts.bonded[c] = 1
 
-    return add_bonded, take_out_bonded, change_sides
+    return add_bonded, take_out_bonded, swap_slow_parts
 
 
 @loop
-def remember(grains, far):
+def store_positions(grains, long_range):
     """Keep positions and moments of this summation for the mean rates of the next."""
     for i in range(grains.mass.size):
-        put(far.past_position, i, load(grains.position, i))
-        put(far.past_moment, i, load(grains.moment, i))
+        put(long_range.past_position, i, load(grains.position, i))
+        put(long_range.past_moment, i, load(grains.moment, i))
 
 
 @loop
-def set_paces(grains, far, start, span, cycle, literal):
+def set_mean_velocities(grains, long_range, start, span, cycle, literal):
     """Turn `past_position` and `past_moment` into ṙ and μ̇.
 
     Grains in contact ring within the time that is to be foretold: their mean rates since the summation before the
@@ -166,19 +166,19 @@ def set_paces(grains, far, start, span, cycle, literal):
     """
     for i in range(grains.mass.size):
         if literal or start[i + 1] == start[i]:
-            put(far.past_position, i, load(grains.velocity, i))
-            put(far.past_moment, i, cross(load(grains.spin, i), load(grains.moment, i)))
+            put(long_range.past_position, i, load(grains.velocity, i))
+            put(long_range.past_moment, i, cross(load(grains.spin, i), load(grains.moment, i)))
         else:
             rate = 1.0 / cycle if cycle > 0.0 else 0.0
-            moved = nearest_image(sub(load(grains.position, i), load(far.past_position, i)), span)
-            turned = sub(load(grains.moment, i), load(far.past_moment, i))
-            put(far.past_position, i, scale(rate, moved))
-            put(far.past_moment, i, scale(rate, turned))
+            moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
+            turned = sub(load(grains.moment, i), load(long_range.past_moment, i))
+            put(long_range.past_position, i, scale(rate, moved))
+            put(long_range.past_moment, i, scale(rate, turned))
 
 
 @loop
-def clear_rates(far):
+def clear_rates(long_range):
     """No rates."""
-    for i in range(far.force.shape[1]):
-        put(far.force_rate, i, (0.0, 0.0, 0.0))
-        put(far.torque_rate, i, (0.0, 0.0, 0.0))
+    for i in range(long_range.force.shape[1]):
+        put(long_range.force_rate, i, (0.0, 0.0, 0.0))
+        put(long_range.torque_rate, i, (0.0, 0.0, 0.0))

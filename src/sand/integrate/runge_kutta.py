@@ -18,8 +18,8 @@ from ..compiler.jit import formula, loop, rare
 from ..forces.external.loops import grain_at, outside_loads
 from ..numerics.quaternion import normalised, turned, turning_rate
 from ..numerics.vec import dot, load, load4, put, put4
-from ..state.state import FAR_SUMS
-from .respa import add_far_loads, clear_far_loads
+from ..state.state import LONG_RANGE_SUMS
+from .respa import add_long_range_loads, clear_long_range_loads
 
 STAGES = 7
 TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
@@ -81,7 +81,7 @@ def place_stage(grains, stages, s, dt):
 
     Stage 0 is the start.
     """
-    farthest = 0.0
+    largest_displacement = 0.0
     start, rate, weights = stages.start, stages.rate, WEIGHTS[s]
     for i in range(grains.mass.size):
         way = 0.0
@@ -95,9 +95,9 @@ def place_stage(grains, stages, s, dt):
             grains.orientation[row, i] = start[Q + row, i] + dt * blended(rate, weights, s, Q + row, i)
         put(grains.moment, i, turned(normalised(load4(grains.orientation, i)), load(grains.body_moment, i)))
         # written so that what is not a number counts as far
-        farthest = farthest if way <= farthest else way
-        farthest = farthest if way < math.inf else math.inf
-    return farthest
+        largest_displacement = largest_displacement if way <= largest_displacement else way
+        largest_displacement = largest_displacement if way < math.inf else math.inf
+    return largest_displacement
 
 
 @rare
@@ -147,20 +147,20 @@ def error_of(stages, dt, precision):
 
 
 @functools.cache
-def loads_at_stage(outside: Callable, far_loads: Callable) -> Callable:
+def loads_at_stage(external: Callable, far_loads: Callable) -> Callable:
     """The loop that sums all loads of free grains where they are."""
-    add_outside = outside_loads(outside)
+    add_outside = outside_loads(external)
 
     @rare
-    def sum_stage(grains, far, count, rules, time):
+    def sum_stage(grains, long_range, count, rules, time):
         for i in range(grains.mass.size):
             put(grains.force, i, (0.0, 0.0, 0.0))
             put(grains.torque, i, (0.0, 0.0, 0.0))
-        add_outside(grains, time, rules.outside)
-        clear_far_loads(far)
-        far_loads(grains, far, rules.span, rules.far)
-        add_far_loads(grains, far)
-        count[FAR_SUMS] += 1
+        add_outside(grains, time, rules.external)
+        clear_long_range_loads(long_range)
+        far_loads(grains, long_range, rules.span, rules.long_range)
+        add_long_range_loads(grains, long_range)
+        count[LONG_RANGE_SUMS] += 1
 
     return sum_stage
 
@@ -181,28 +181,28 @@ def outside_power(formula_of_grain: Callable) -> Callable:
 
 
 @functools.cache
-def trial_for(outside: Callable, far_loads: Callable) -> tuple[Callable, Callable]:
+def trial_for(external: Callable, far_loads: Callable) -> tuple[Callable, Callable]:
     """The loops that begin a step, and that go through its stages; False as soon as a grain strays too far."""
-    sum_stage, power = loads_at_stage(outside, far_loads), outside_power(outside)
+    sum_stage, power = loads_at_stage(external, far_loads), outside_power(external)
 
     @loop
     def begin_step(grains, stages, rules, begin):
         keep_start(grains, stages)
         note_rates(grains, stages, 0)
-        if rules.books.timed:
-            stages.power[0] = power(grains, begin, rules.outside)
+        if rules.books.time_dependent:
+            stages.power[0] = power(grains, begin, rules.external)
 
     @loop
-    def try_step(grains, far, stages, count, rules, begin, dt):
+    def try_step(grains, long_range, stages, count, rules, begin, dt):
         stride = rules.precision.stride
         for s in range(1, STAGES):
             if not place_stage(grains, stages, s, dt) <= stride * stride:
                 return False
             time = begin + TIMES[s] * dt
-            sum_stage(grains, far, count, rules, time)
+            sum_stage(grains, long_range, count, rules, time)
             note_rates(grains, stages, s)
-            if rules.books.timed:
-                stages.power[s] = power(grains, time, rules.outside)
+            if rules.books.time_dependent:
+                stages.power[s] = power(grains, time, rules.external)
         return True
 
     return begin_step, try_step

@@ -5,27 +5,27 @@ from typing import NamedTuple
 
 from ..box import nearest_image
 from ..compiler.jit import formula, loop, rare
-from ..contact.pair_types import kind_at
+from ..contact.pair_types import pair_type_index
 from ..forces.external.formulas import stiffness_of_field
-from ..numerics.float_order import rank, ranked
+from ..numerics.float_order import float_from_bits, rank
 from ..numerics.vec import dot, load, sub
 from ..state.state import (
     CALM,
+    CHECKED,
     CONTACT_STEP,
     CONTACTS,
     CYCLE,
-    FAR_LEVEL,
-    FASTEST,
     GRAIN1,
     GRAIN2,
-    GROWN,
-    HARMLESS,
+    LARGEST_SPEED,
     LEFT,
     LEVEL,
-    LOOKED,
+    LONG_RANGE_LEVEL,
     NEEDED,
     PAIRS,
+    SAFE_SPEED,
     STEP,
+    STEP_INCREASES,
     STEPS,
 )
 
@@ -81,7 +81,7 @@ def load_step(force, torque, mass, inertia, control):
 
 
 @loop
-def grain_step(grains, far, start, control, i):
+def grain_step(grains, long_range, start, control, i):
     """Longest step [s] that grain i by itself allows, and longest cycle of the far loads.
 
     Bound grains ring: their step is that of contacts, and only how they fly and spin is looked at.  Free grains
@@ -94,8 +94,8 @@ def grain_step(grains, far, start, control, i):
     inertia = grains.inertia[i]
     swing = field_step(load(grains.moment, i), load(grains.field, i), control.outer_field, inertia)
     own = math.inf
-    if far.force.shape[1] > 0:  # else there is no such force
-        own = load_step(load(far.force, i), load(far.torque, i), grains.mass[i], inertia, control)
+    if long_range.force.shape[1] > 0:  # else there is no such force
+        own = load_step(load(long_range.force, i), load(long_range.torque, i), grains.mass[i], inertia, control)
     bound = start[i + 1] != start[i]
     own = math.inf if bound else own
     cycle = min(min(spin, swing), own)
@@ -104,7 +104,7 @@ def grain_step(grains, far, start, control, i):
 
 
 @loop
-def calm_steps(grains, far, start, count, control):
+def steps_of_free_grains(grains, long_range, start, count, control):
     """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
 
     GRAIN1 becomes a grain that is not finite. `start` (N + 1,) tells who has contacts (state.arrays.ContactArrays).
@@ -114,12 +114,12 @@ def calm_steps(grains, far, start, count, control):
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         lost += 0.0 if (dot(v, v) < math.inf) & (dot(w, w) < math.inf) else 1.0
-        own_step, own_cycle = grain_step(grains, far, start, control, i)
+        own_step, own_cycle = grain_step(grains, long_range, start, control, i)
         step, cycle = min(step, rank(own_step)), min(cycle, rank(own_cycle))
     if lost > 0.0:
         count[GRAIN1] = first_not_finite(grains)
         return 0.0, 0.0
-    return ranked(step), ranked(cycle)
+    return float_from_bits(step), float_from_bits(cycle)
 
 
 @rare
@@ -133,18 +133,18 @@ def first_not_finite(grains):
 
 
 @loop
-def pair_step(grains, near, span, control, p):
+def pair_step(grains, pair_list, span, control, p):
     """The longest step [s] that pair p allows, about to touch or in contact."""
-    i, j = near.pair[0, p], near.pair[1, p]
+    i, j = pair_list.pair[0, p], pair_list.pair[1, p]
     moving = sub(load(grains.velocity, i), load(grains.velocity, j))
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(apart, apart))
     closing = -dot(moving, apart) / distance
-    touching = near.touching[p] == 1
+    touching = pair_list.touching[p] == 1
     # in contact only what loads the neck counts: a pair may spin as fast as it likes
     speed = abs(closing) if touching else math.sqrt(dot(moving, moving))
-    kind = kind_at(near, p)
-    need, length = near.step[kind], near.length[kind]
+    kind = pair_type_index(pair_list, p)
+    need, length = pair_list.step[kind], pair_list.length[kind]
     fast = (length > 0.0) & (speed * need > control.impact * length)
     need = control.impact * length / speed if fast else need
     gap = distance - grains.radius[i] - grains.radius[j]
@@ -155,39 +155,39 @@ def pair_step(grains, near, span, control, p):
 
 
 @loop
-def _harmless(near, control):
+def _safe_speed(pair_list, control):
     """True if no two grains can meet so fast that they need a shorter step than contacts do."""
-    impact = control.impact * near.watch[HARMLESS]
-    return 4.0 * near.watch[FASTEST] < impact * impact
+    impact = control.impact * pair_list.skin[SAFE_SPEED]
+    return 4.0 * pair_list.skin[LARGEST_SPEED] < impact * impact
 
 
 @loop
-def closing_step(grains, near, count, span, control, wanted):
+def closing_step(grains, pair_list, count, span, control, wanted):
     """The longest step [s], at most `wanted`, that pairs about to touch or in contact allow."""
     least = rank(wanted)
     for p in range(count[PAIRS]):
-        least = min(least, rank(pair_step(grains, near, span, control, p)))
-    return ranked(least)
+        least = min(least, rank(pair_step(grains, pair_list, span, control, p)))
+    return float_from_bits(least)
 
 
 @rare
-def name_culprits(grains, far, start, near, count, span, control):
+def find_limiting_grains(grains, long_range, start, pair_list, count, span, control):
     """Let GRAIN1 and GRAIN2 be the pair, or GRAIN1 the grain, that wants the shortest step."""
     shortest = math.inf
     for i in range(grains.mass.size):
-        own, _ = grain_step(grains, far, start, control, i)
+        own, _ = grain_step(grains, long_range, start, control, i)
         if own < shortest:
             shortest = own
             count[GRAIN1], count[GRAIN2] = i, -1
     for p in range(count[PAIRS]):
-        own = pair_step(grains, near, span, control, p)
+        own = pair_step(grains, pair_list, span, control, p)
         if own < shortest:
             shortest = own
-            count[GRAIN1], count[GRAIN2] = near.pair[0, p], near.pair[1, p]
+            count[GRAIN1], count[GRAIN2] = pair_list.pair[0, p], pair_list.pair[1, p]
 
 
 @loop
-def levelled(level, wanted, may_grow):
+def quantise_step(level, wanted, may_grow):
     """The power of two of a second at or below `wanted`, or the old level where that is below and may not grow."""
     level = level if level > 0.0 else 1.0
     while level > wanted:
@@ -198,7 +198,7 @@ def levelled(level, wanted, may_grow):
 
 
 @loop
-def choose_step(grains, far, start, near, clock, count, span, control):
+def choose_step(grains, long_range, start, pair_list, clock, count, span, control):
     """The next step [s], or 0 if there is none: that of the contacts, or less if something else needs less.
 
     Steps that are not the contacts' are powers of two of a second and change seldom, because every change
@@ -209,27 +209,27 @@ def choose_step(grains, far, start, near, clock, count, span, control):
     alone = count[CONTACTS] == 0
     # a step of the user's own is looked at only for numbers that are not finite
     each = (alone and control.fixed == 0.0) or (between and clock[CYCLE] > clock[STEP])
-    if each or count[STEPS] - count[LOOKED] >= CHECK_EVERY:
-        may_grow = count[STEPS] - count[GROWN] >= GROW_EVERY
+    if each or count[STEPS] - count[CHECKED] >= CHECK_EVERY:
+        may_grow = count[STEPS] - count[STEP_INCREASES] >= GROW_EVERY
         if between:
-            clock[CALM], cycle = calm_steps(grains, far, start, count, control)
+            clock[CALM], cycle = steps_of_free_grains(grains, long_range, start, count, control)
             if not clock[CALM] > 0.0:
                 return 0.0
-            clock[FAR_LEVEL] = levelled(clock[FAR_LEVEL], cycle, may_grow)
-        quiet = not alone and _harmless(near, control)
-        wanted = clock[CALM] if quiet else closing_step(grains, near, count, span, control, clock[CALM])
+            clock[LONG_RANGE_LEVEL] = quantise_step(clock[LONG_RANGE_LEVEL], cycle, may_grow)
+        quiet = not alone and _safe_speed(pair_list, control)
+        wanted = clock[CALM] if quiet else closing_step(grains, pair_list, count, span, control, clock[CALM])
         if not wanted > 0.0:
             return 0.0
-        count[LOOKED] = count[STEPS]
+        count[CHECKED] = count[STEPS]
         if may_grow:
-            count[GROWN] = count[STEPS]
+            count[STEP_INCREASES] = count[STEPS]
         if not alone:
             if wanted >= ALMOST * clock[CONTACT_STEP]:  # just that will do, not the power of two below
                 wanted = max(wanted, 2.0 * clock[CONTACT_STEP])
             elif wanted < 2.0 * clock[LEVEL]:
                 count[NEEDED] = count[STEPS]
             may_grow = count[STEPS] - count[NEEDED] >= HOLD
-        clock[LEVEL] = levelled(clock[LEVEL], wanted, may_grow)
+        clock[LEVEL] = quantise_step(clock[LEVEL], wanted, may_grow)
     if control.fixed > 0.0:
         return control.fixed
     return min(clock[LEVEL], clock[CONTACT_STEP])
@@ -243,5 +243,5 @@ def cycle_steps(clock, count, beat, dt):
     """
     if count[CONTACTS] == 0:
         return 1
-    longest = min(clock[FAR_LEVEL], beat.most * clock[CONTACT_STEP])
+    longest = min(clock[LONG_RANGE_LEVEL], beat.most * clock[CONTACT_STEP])
     return max(1, min(beat.most, int(longest / dt + 1e-6)))

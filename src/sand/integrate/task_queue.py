@@ -12,26 +12,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.atomics import fetch_add, give_way, read, write
+from ..compiler.atomics import fetch_add, read, write, yield_cpu
 from ..compiler.jit import CAN_SHARE, kernel, loop, rare, shared
 from ..contact.gather import gather
-from ..contact.slip import contact_pass, keep_passed
-from ..forces.pair.loops import CREW_FROM
+from ..contact.slip import contact_pass, store_slip_sums
+from ..forces.pair.loops import PARALLEL_FROM
 from ..grains import GrainArrays
-from ..numerics.float_order import ranked
+from ..numerics.float_order import float_from_bits
 from ..state.state import CONTACTS
-from .kernel_spec import Plan
-from .motion import AT_ONCE, OPEN, drift_for, gather_and_kick
+from .kernel_spec import KernelSpec
+from .motion import BLOCK_OF_GRAINS, OPEN, drift_for, gather_and_kick
 
 WORD, DONE, INSIDE = 0, 8, 16
 """Places on the board, a line of the cache apart: the work at hand, its finished blocks, helpers at work."""
 PLACES = 24
-PATIENCE = 4000
+SPINS_BEFORE_YIELD = 4000
 """Looks at the board before a waiting thread lets others run on its core."""
-CONTACTS_AT_ONCE = 512
-GRAINS_AT_ONCE = 2 * int(AT_ONCE)
+CONTACTS_PER_BLOCK = 512
+GRAINS_PER_BLOCK = 2 * int(BLOCK_OF_GRAINS)
 """Contacts and grains in a block: 3 to 10 µs of work, whole vectors, and whole blocks of the gathering."""
-HELP_FROM = 8 * CONTACTS_AT_ONCE
+WORKERS_FROM = 8 * CONTACTS_PER_BLOCK
 """Contacts from which a helper saves more time than handing it work takes, where nothing else can be shared."""
 _BITS = 20
 _MASK = (1 << _BITS) - 1
@@ -42,38 +42,38 @@ FRONT, BACK, BLOCKS, TASK = 0, _BITS, 2 * _BITS, 3 * _BITS
 
 def is_large(grains: int) -> bool:
     """True if a simulation of so many grains is for a crew, be it of one thread."""
-    return CAN_SHARE and grains >= CREW_FROM
+    return CAN_SHARE and grains >= PARALLEL_FROM
 
 
-def wants_help(plan: Plan, grains: GrainArrays, contacts: int) -> bool:
+def benefits_from_workers(plan: KernelSpec, grains: GrainArrays, contacts: int) -> bool:
     """True if helpers save time: without sums to share, a thousand contacts are done before a helper has begun."""
-    return plan.far.parts.blocks(grains) > 0 or contacts >= HELP_FROM
+    return plan.long_range.parts.blocks(grains) > 0 or contacts >= WORKERS_FROM
 
 
 PASS, GATHER, GATHER_AND_KICK, FAR, DRIFT, LEAVE = range(1, 7)
 """What a word asks for: contacts, their loads at grains, these and a kick, long-range loads, a drift, the end."""
 
 
-class Crew(NamedTuple):
+class TaskQueue(NamedTuple):
     """What the threads share besides the world."""
 
-    board: Any  # (24,) int64; made anew for every call of the driver
+    words: Any  # (24,) int64; made anew for every call of the driver
     step: Any  # (1,) float64: length of the step at hand, or of the kick [s]
     passed: Any  # (B, 8) float64: what the pass over each block of contacts found, by `Passed`
     speeds: Any  # (G, 2) float64: largest squares of speed [m²/s²] and spin [1/s²] in each block of grains
 
 
-def new_crew(grains: int, contacts: int) -> Crew:
+def new_task_queue(grains: int, contacts: int) -> TaskQueue:
     """A board without work, for so many grains and up to so many contacts."""
-    passed = np.zeros((contacts // CONTACTS_AT_ONCE + 1, 8))
-    return Crew(np.zeros(PLACES, np.int64), np.zeros(1), passed, np.zeros((grains // GRAINS_AT_ONCE + 1, 2)))
+    passed = np.zeros((contacts // CONTACTS_PER_BLOCK + 1, 8))
+    return TaskQueue(np.zeros(PLACES, np.int64), np.zeros(1), passed, np.zeros((grains // GRAINS_PER_BLOCK + 1, 2)))
 
 
-def send_away(crew: Crew) -> None:
+def release_workers(queue: TaskQueue) -> None:
     """Let the helpers of a driver that did not come to its end leave, and wait until they have."""
-    crew.board[WORD] = LEAVE << TASK
-    while crew.board[INSIDE] > 0:
-        give_way()
+    queue.words[WORD] = LEAVE << TASK
+    while queue.words[INSIDE] > 0:
+        yield_cpu()
 
 
 @loop
@@ -85,7 +85,7 @@ def blocks_of(number, at_once):
 @loop
 def span_of_drift(rules):
     """The box in which grains drift: without walls where what the walls cost is booked afterwards."""
-    return OPEN if rules.books.moored else rules.span
+    return OPEN if rules.books.position_dependent else rules.span
 
 
 @loop
@@ -101,84 +101,84 @@ def is_left(word):
 
 
 @functools.cache
-def crew_for(plan: Plan) -> tuple[Callable, Callable]:
+def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
     """The function that shares a task among all threads, and the kernel that a helper runs meanwhile."""
-    far_block, drift_some = plan.far.parts.block, drift_for(plan.magnetic)
+    far_block, drift_some = plan.long_range.parts.block, drift_for(plan.magnetic)
 
     @shared
-    def do_block(task, b, grains, contacts, far, count, rules):
+    def do_block(task, b, grains, contacts, long_range, count, rules):
         if task == PASS:
-            first = b * CONTACTS_AT_ONCE
-            last = min(first + CONTACTS_AT_ONCE, count[CONTACTS])
-            span, law, step = rules.span, rules.contact, rules.crew.step[0]
+            first = b * CONTACTS_PER_BLOCK
+            last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
+            span, law, step = rules.span, rules.contact, rules.queue.step[0]
             found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, law, step)
-            keep_passed(rules.crew.passed, b, found)
+            store_slip_sums(rules.queue.passed, b, found)
         elif task == GATHER:
-            first = b * GRAINS_AT_ONCE
-            last = min(first + GRAINS_AT_ONCE, grains.mass.size)
+            first = b * GRAINS_PER_BLOCK
+            last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
             gather(grains, contacts, np.uint64(first), np.uint64(last))
         elif task == GATHER_AND_KICK:
-            first = b * GRAINS_AT_ONCE
-            last = min(first + GRAINS_AT_ONCE, grains.mass.size)
-            v, w = gather_and_kick(grains, contacts, np.uint64(first), np.uint64(last), rules.crew.step[0])
-            rules.crew.speeds[b, 0], rules.crew.speeds[b, 1] = ranked(v), ranked(w)
+            first = b * GRAINS_PER_BLOCK
+            last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
+            v, w = gather_and_kick(grains, contacts, np.uint64(first), np.uint64(last), rules.queue.step[0])
+            rules.queue.speeds[b, 0], rules.queue.speeds[b, 1] = float_from_bits(v), float_from_bits(w)
         elif task == FAR:
-            far_block(grains, far, rules.span, rules.far, b)
+            far_block(grains, long_range, rules.span, rules.long_range, b)
         elif task == DRIFT:
-            first = b * GRAINS_AT_ONCE
-            last = min(first + GRAINS_AT_ONCE, grains.mass.size)
-            v = drift_some(grains, np.uint64(first), np.uint64(last), span_of_drift(rules), rules.crew.step[0])
-            rules.crew.speeds[b, 0] = ranked(v)
+            first = b * GRAINS_PER_BLOCK
+            last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
+            v = drift_some(grains, np.uint64(first), np.uint64(last), span_of_drift(rules), rules.queue.step[0])
+            rules.queue.speeds[b, 0] = float_from_bits(v)
 
     @shared
-    def share(task, blocks, grains, contacts, far, count, rules):
-        board = rules.crew.board
-        write(board, DONE, 0)
-        write(board, WORD, (task << TASK) | (blocks << BLOCKS))
-        word = fetch_add(board, WORD, 1 << FRONT)
+    def share(task, blocks, grains, contacts, long_range, count, rules):
+        words = rules.queue.words
+        write(words, DONE, 0)
+        write(words, WORD, (task << TASK) | (blocks << BLOCKS))
+        word = fetch_add(words, WORD, 1 << FRONT)
         while is_left(word):
-            do_block(task, part_of(word, FRONT), grains, contacts, far, count, rules)
-            fetch_add(board, DONE, 1)
-            word = fetch_add(board, WORD, 1 << FRONT)
+            do_block(task, part_of(word, FRONT), grains, contacts, long_range, count, rules)
+            fetch_add(words, DONE, 1)
+            word = fetch_add(words, WORD, 1 << FRONT)
         looks = 0
-        while read(board, DONE) < blocks:
+        while read(words, DONE) < blocks:
             looks += 1
-            if looks > PATIENCE:
-                give_way()
+            if looks > SPINS_BEFORE_YIELD:
+                yield_cpu()
 
-    def help_along(grains, contacts, far, count, rules):
+    def worker_loop(grains, contacts, long_range, count, rules):
         """Take blocks until the board says LEAVE."""
-        board = rules.crew.board
-        fetch_add(board, INSIDE, 1)
+        words = rules.queue.words
+        fetch_add(words, INSIDE, 1)
         looks = 0
-        word = read(board, WORD)
+        word = read(words, WORD)
         while word >> TASK != LEAVE:
             looks += 1
             if is_left(word):
                 # what is at hand may have changed since the look: what was taken is what this says
-                word = fetch_add(board, WORD, 1 << BACK)
+                word = fetch_add(words, WORD, 1 << BACK)
                 if is_left(word):
                     b = part_of(word, BLOCKS) - 1 - part_of(word, BACK)
-                    do_block(word >> TASK, b, grains, contacts, far, count, rules)
-                    fetch_add(board, DONE, 1)
+                    do_block(word >> TASK, b, grains, contacts, long_range, count, rules)
+                    fetch_add(words, DONE, 1)
                 looks = 0
-            elif looks > PATIENCE:
-                give_way()
-            word = read(board, WORD)
-        fetch_add(board, INSIDE, -1)
+            elif looks > SPINS_BEFORE_YIELD:
+                yield_cpu()
+            word = read(words, WORD)
+        fetch_add(words, INSIDE, -1)
 
-    return share, kernel(help_along, keep=plan.keep, alone=True, wide=plan.wide)
+    return share, kernel(worker_loop, keep=plan.keep, alone=True, wide=plan.wide)
 
 
 @loop
-def nobody_to_dismiss(rules):
+def no_workers(rules):
     """Where there is no crew."""
 
 
 @rare
-def dismiss(rules):
+def join_workers(rules):
     """Send the helpers away, and wait until the last has left: then the arrays are the driver's alone."""
-    board = rules.crew.board
-    write(board, WORD, LEAVE << TASK)
-    while read(board, INSIDE) > 0:
-        give_way()
+    words = rules.queue.words
+    write(words, WORD, LEAVE << TASK)
+    while read(words, INSIDE) > 0:
+        yield_cpu()

@@ -8,7 +8,7 @@ from typing import Any
 from ..arguments import checked
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..units import is_word, si, whole_number
-from .kernel_spec import Beat
+from .kernel_spec import RespaSettings
 
 BELOW_RESONANCE = 0.48
 """Longest cycle of impulses in fastest periods: at half a period the first of them would push in step."""
@@ -105,6 +105,6 @@ class Verlet:
             return int(self.far_steps)
         return max(1, int(BELOW_RESONANCE * self.steps_per_period)) if self.far == "impulse" else LITERAL_STEPS
 
-    def beat(self, distant: bool) -> Beat:
+    def beat(self, distant: bool) -> RespaSettings:
         """How often far loads are summed, for the driver; every step if there are none."""
-        return Beat(self.most_steps if distant else 1, self.far == "taylor-literal")
+        return RespaSettings(self.most_steps if distant else 1, self.far == "taylor-literal")

@@ -13,23 +13,23 @@ from ..compiler.jit import COMPILED
 from ..threads import threads
 
 
-class Hands:
+class WorkerThreads:
     """Threads that run a kernel beside the driver whenever it is called; started when first needed.
 
     Parameters
     ----------
-    help_along : Callable
+    worker_loop : Callable
         the kernel, which ends when the driver says so.
     """
 
-    def __init__(self, help_along: Callable):
-        self._help, self._process = help_along, os.getpid()
+    def __init__(self, worker_loop: Callable):
+        self._help, self._process = worker_loop, os.getpid()
         self._queues: list[queue.SimpleQueue] = []
         self._end = weakref.finalize(self, _send_home, self._queues)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Hands:
+    def __deepcopy__(self, memo: dict[int, Any]) -> WorkerThreads:
         """Others of the same kind."""
-        return Hands(self._help)
+        return WorkerThreads(self._help)
 
     def call(self, arrays: tuple[Any, ...]) -> None:
         """Let all threads but the caller's own run the kernel on these arguments."""
@@ -46,9 +46,9 @@ class Hands:
             line.put(arrays)
 
 
-def _work(line: queue.SimpleQueue, help_along: Callable) -> None:
+def _work(line: queue.SimpleQueue, worker_loop: Callable) -> None:
     while (arrays := line.get()) is not None:
-        help_along(*arrays)
+        worker_loop(*arrays)
         del arrays
 
 

@@ -40,13 +40,8 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 4
-"""Of the file format; a newer program reads older versions, an older one refuses newer files.
-
-Since 2 there is one column of constants where all grains are equal, and no row for losses that a contact cannot have;
-since 3 there are no columns for far loads where there is no such force, and for damping where there is none; since 4
-contacts keep no record of what they lost by breaking, as they are no more.
-"""
+VERSION = 5
+"""Version of the file format; files of other versions are refused.  Versions before 5 were never released."""
 KEPT = 2
 _META = "meta.json"
 
@@ -114,8 +109,8 @@ def _refuse_impossible_sizes(path: Path) -> None:
                     raise ValueError(f"{part.filename} says that it is larger than the file")
 
 
-class NewerFormat(BadInput):
-    """A checkpoint of a SAND that is newer than this one; nothing is wrong with it."""
+class OtherFormat(BadInput):
+    """A checkpoint of another version of the format; the file is not damaged."""
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -123,8 +118,8 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
 
     Raises
     ------
-    NewerFormat
-        of a newer version.
+    OtherFormat
+        another version of the format.
     BadInput
         not a checkpoint, damaged, or with numbers that a state cannot have.
     """
@@ -138,11 +133,9 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         raise BadInput(f"{path} is not a readable checkpoint ({type(error).__name__})") from error
     if not whole or meta.get("format") != "SAND checkpoint" or not isinstance(meta.get("version"), int):
         raise BadInput(f"{path} is not a checkpoint of SAND")
-    if meta["version"] > VERSION:
-        raise NewerFormat(
-            f"{path} was written by a newer SAND (format {meta['version']}, this one reads up to {VERSION}); "
-            "update SAND"
-        )
+    if meta["version"] != VERSION:
+        advice = "update SAND" if meta["version"] > VERSION else "resume it with the development version that wrote it"
+        raise OtherFormat(f"{path} has format {meta['version']}, and this SAND reads format {VERSION}; {advice}")
     if _checksum(arrays) != meta.get("sha256"):
         raise BadInput(f"{path} is damaged: its checksum is wrong")
     try:
@@ -157,8 +150,8 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
 
     Raises
     ------
-    NewerFormat
-        one of a newer version is met first.
+    OtherFormat
+        the newest readable file has another version of the format.
     BadInput
         there is none; no file is renamed then.
     FilesFailed
@@ -168,7 +161,7 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
     for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
         try:
             arrays, meta = read_checkpoint(path)
-        except NewerFormat:
+        except OtherFormat:
             raise
         except BadInput as error:
             problems.append((path, str(error)))

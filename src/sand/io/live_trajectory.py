@@ -17,7 +17,7 @@ TORN_AT_MOST = 64
 """Frames at the end of a file that are looked at before it is said to be broken."""
 
 
-class Following(FrameSequence):
+class LiveTrajectory(FrameSequence):
     """Frames of a trajectory that grows; safe to be read from several threads.
 
     Parameters

@@ -18,9 +18,9 @@ from ..state.state import (
     CLOCK,
     CONTACTS,
     COUNT,
-    FAR_SUMS,
     GRAIN1,
     GRAIN2,
+    LONG_RANGE_SUMS,
     LOST,
     MADE,
     PAIRS,
@@ -36,7 +36,6 @@ class Stored(NamedTuple):
     kind: str  # type of number
     shape: tuple[Any, ...]  # sizes: a number, N grains, C contacts, P pairs; a tuple: one of these; None: any
     rule: str = "finite"  # which numbers are allowed: a name in RULES
-    early: str = ""  # type of number in formats 1 and 2, where it was another
     needed: bool = True
 
 
@@ -51,14 +50,12 @@ def _grains() -> dict[str, Stored]:
     return found | {"grains/material": Stored("u4", ("N",), "any"), "grains/id": Stored("u4", ("N",), "order")}
 
 
-FIRST_COUNTERS = tuple(range(16, len(COUNT) + 1))
-"""Formats before 4 have fewer counters; the last ones begin at 0 then."""
 STORED = {
     "clock": Stored("f8", (len(CLOCK),), "no nan"),
-    "count": Stored("i8", (FIRST_COUNTERS,), "any"),
+    "count": Stored("i8", (len(COUNT),), "any"),
     "lost": Stored("f8", (len(LOST),)),
     "order": Stored("u4", ("N",), "order", needed=False),
-    "ledger": Stored("f8", (None, None), needed=False),
+    "ledger": Stored("f8", (None, None)),
     **_grains(),
     "contacts/pair": Stored("u4", (2, "C"), "grains"),
     "contacts/pointer1": Stored("f8", (3, "C")),
@@ -66,24 +63,24 @@ STORED = {
     "contacts/twist": Stored("f8", ("C",)),
     "contacts/formed": Stored("f8", ("C",)),
     "contacts/bond": Stored("f8", (None, (1, "C"))),
-    "contacts/lost": Stored("f8", ((4, 5, 6, 7), "C")),
+    "contacts/lost": Stored("f8", ((4, 6), "C")),
     "contacts/damped": Stored("f8", ((0, "C"),)),
     "contacts/push": Stored("f8", (3, "C")),
     "contacts/torque1": Stored("f8", (3, "C")),
     "contacts/torque2": Stored("f8", (3, "C")),
-    "contacts/flag": Stored("u1", ("C",), "any", early="f8"),
+    "contacts/flag": Stored("u1", ("C",), "any"),
     "contacts/bonded": Stored("u1", ("C",), "yes or no"),
     "contacts/side": Stored("u4", ("2C",), "order"),
     "contacts/start": Stored("u4", ("N+1",), "starts"),
-    "near/pair": Stored("u4", (2, "P"), "grains"),
-    "near/touching": Stored("u1", ("P",), "yes or no"),
-    "near/step": Stored("f8", ((1, "P"),), "no nan"),
-    "near/length": Stored("f8", ((1, "P"),)),
-    "near/anchor": Stored("f8", (3, "N"), "no nan"),
-    "far/anchor": Stored("f8", (3, (0, "N")), "no nan"),
+    "pair_list/pair": Stored("u4", (2, "P"), "grains"),
+    "pair_list/touching": Stored("u1", ("P",), "yes or no"),
+    "pair_list/step": Stored("f8", ((1, "P"),), "no nan"),
+    "pair_list/length": Stored("f8", ((1, "P"),)),
+    "pair_list/anchor": Stored("f8", (3, "N"), "no nan"),
+    "long_range/anchor": Stored("f8", (3, (0, "N")), "no nan"),
     **{
-        f"far/{name}": Stored("f8", (3, (0, "N")))
-        for name in ("force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
+        f"long_range/{name}": Stored("f8", (3, (0, "N")))
+        for name in ("force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
     },
 }
 """Every array of a checkpoint."""
@@ -92,7 +89,7 @@ NUMBERS = {"steps": int, "time": float, "wall_seconds": float, "temperature": fl
 GOALS = {"until": float, "last_step": int}
 """The same for numbers that may be missing, as null."""
 TABLES = {"choices": dict, "case": dict, "ledger": list}
-"""The same for what early formats lack."""
+"""Tables of `meta.json`."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
@@ -114,13 +111,12 @@ def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> No
     sizes = _sizes(arrays)
     for name, right in STORED.items():
         if name in arrays:
-            kind = right.early if right.early and meta["version"] < 3 else right.kind
-            _check_array(name, arrays[name], right._replace(kind=kind), sizes)
+            _check_array(name, arrays[name], right, sizes)
         elif right.needed:
             raise BadInput(f"there is no array {name!r}")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
-    if "ledger" in arrays and arrays["ledger"].shape[1] != len(meta.get("ledger", ())):
+    if arrays["ledger"].shape[1] != len(meta.get("ledger", ())):
         raise BadInput(f"'ledger' has {arrays['ledger'].shape[1]} columns, but meta.json names another number of them")
 
 
@@ -135,8 +131,8 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
                 f"its meta.json has {name} = {value!r}, which is no {'number of steps' if kind is int else 'number'}"
             )
     for name, table in TABLES.items():
-        if not isinstance(meta.get(name, table()), table):
-            raise BadInput(f"its meta.json has {name} = {meta[name]!r}, which is not a {table.__name__}")
+        if not isinstance(meta.get(name), table):
+            raise BadInput(f"its meta.json has {name} = {meta.get(name)!r}, which is not a {table.__name__}")
 
 
 def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
@@ -147,7 +143,7 @@ def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
             raise BadInput(f"there is no array {name!r}")
         return int(arrays[name].shape[-1])
 
-    n, c, p = columns("grains/radius"), columns("contacts/pair"), columns("near/pair")
+    n, c, p = columns("grains/radius"), columns("contacts/pair"), columns("pair_list/pair")
     if n == 0:
         raise BadInput("it holds no grain")
     return {"N": n, "N+1": n + 1, "C": c, "2C": 2 * c, "P": p}
@@ -229,12 +225,12 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
         STEPS: meta["steps"],
         STAGE: 0,
         CONTACTS: arrays["contacts/pair"].shape[1],
-        PAIRS: arrays["near/pair"].shape[1],
+        PAIRS: arrays["pair_list/pair"].shape[1],
     }
     for place, value in wanted.items():
         if count[place] != value:
             raise BadInput(f"'count' says {COUNT[place]} = {count[place]}, but it must be {value}")
-    for place in (MADE, BROKEN, FAR_SUMS):
+    for place in (MADE, BROKEN, LONG_RANGE_SUMS):
         if count[place] < 0:
             raise BadInput(f"'count' says {COUNT[place]} = {count[place]}: it must not be below 0")
     for place in (GRAIN1, GRAIN2):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..box import nearest_image
 from ..compiler.jit import kernel, loop, rare
-from ..numerics.aligned import LANES
+from ..numerics.aligned import SIMD_WIDTH
 from ..numerics.vec import dot, load, put, sub
 from ..state.arrays import CELLS_PER_GRAIN
 from ..state.state import LISTED
@@ -104,33 +104,33 @@ def cell_at(x, number):
 
 
 @loop
-def sort_into_cells(far, here, anchor, span, grid):
+def sort_into_cells(long_range, here, anchor, span, grid):
     """Fill `home`, `cell`, `order` and `here` (anchors by place): grains by cell, in each cell by number.
 
-    Here and in `list_stretch`, `here` may be far.here, which is not to be touched by its other name.
+    Here and in `list_stretch`, `here` may be far.packed_position, which is not to be touched by its other name.
     """
     nx, ny, nz = grid.counts
     total = nx * ny * nz
     for c in range(total + 1):
-        far.cell[c] = 0
+        long_range.cell[c] = 0
     for i in range(anchor.shape[1]):
         x = in_cells(grid, nearest_image(load(anchor, i), span))
         home = (cell_at(x[2], nz) * ny + cell_at(x[1], ny)) * nx + cell_at(x[0], nx)
-        far.home[i] = home
-        far.cell[home + 1] += 1
+        long_range.cell_of[i] = home
+        long_range.cell[home + 1] += 1
     for c in range(total):
-        far.cell[c + 1] += far.cell[c]
+        long_range.cell[c + 1] += long_range.cell[c]
     # each `cell[c]` serves as the place of its next grain, and is put back afterwards
     for i in range(anchor.shape[1]):
-        home = far.home[i]
-        s = far.cell[home]
-        far.order[s] = i
+        home = long_range.cell_of[i]
+        s = long_range.cell[home]
+        long_range.order[s] = i
         put(here, s, nearest_image(load(anchor, i), span))
-        far.cell[home] += 1
+        long_range.cell[home] += 1
     for k in range(total):
         c = total - k
-        far.cell[c] = far.cell[c - 1]
-    far.cell[0] = 0
+        long_range.cell[c] = long_range.cell[c - 1]
+    long_range.cell[0] = 0
 
 
 @loop
@@ -152,29 +152,29 @@ def gap_on_axis(x, c, step, width):
 
 
 @loop
-def list_stretch(far, here, span, limit, s, first, last, found):
+def list_stretch(long_range, here, span, limit, s, first, last, found):
     """Append those of the places first…last − 1 that are close to place s; FULL if there is no room for all.
 
     Distances first, in a loop that vectorises; then each place is written down, and kept if it is close: no branch
     has to be guessed.  The distance is odd in its two grains to the last bit, so that both have the pair or neither.
     """
     own, length = load(here, s), last - first
-    if found + np.int64(length) + LANES > far.mate.size:  # whole vectors are read
+    if found + np.int64(length) + SIMD_WIDTH > long_range.neighbour.size:  # whole vectors are read
         return FULL
     for k in range(length):
         apart = nearest_image(sub(own, load(here, first + k)), span)
-        far.source[0, k] = dot(apart, apart)
+        long_range.source[0, k] = dot(apart, apart)
     if first <= s < last:
-        far.source[0, s - first] = math.inf
+        long_range.source[0, s - first] = math.inf
     end = np.uint64(found)
     for k in range(length):
-        far.mate[end] = first + k
-        end += np.uint64(far.source[0, k] < limit)
+        long_range.neighbour[end] = first + k
+        end += np.uint64(long_range.source[0, k] < limit)
     return np.int64(end)
 
 
 @loop
-def list_row(far, here, grid, span, limit, s, x, row, left, found):
+def list_row(long_range, here, grid, span, limit, s, x, row, left, found):
     """Append the neighbours of place s in the row of cells from `row` on; FULL if there is no room.
 
     Those within ±√left [m] along x are looked at.  Beyond a periodic wall they are a stretch of their own.  All are
@@ -182,8 +182,8 @@ def list_row(far, here, grid, span, limit, s, x, row, left, found):
     """
     nx = grid.counts[0]
     if span.x > 0.0 and nx == grid.fine:
-        begin, end = np.uint64(far.cell[row]), np.uint64(far.cell[row + nx])
-        return list_stretch(far, here, span, limit, np.uint64(s), begin, end, found)
+        begin, end = np.uint64(long_range.cell[row]), np.uint64(long_range.cell[row + nx])
+        return list_stretch(long_range, here, span, limit, np.uint64(s), begin, end, found)
     wide, home = math.sqrt(left) * grid.per_length[0] + ROUNDING, cell_at(x, nx)
     # never more cells than hold the reach: in a box of three, one more would be met from both sides;
     # never fewer than one, should a coordinate be no number
@@ -191,8 +191,8 @@ def list_row(far, here, grid, span, limit, s, x, row, left, found):
     high = max(min(math.floor(x + wide), home + grid.fine), home)
     first, last = max(low, 0), min(high, nx - 1) + 1
     for _ in range(2):
-        begin, end = np.uint64(far.cell[row + first]), np.uint64(far.cell[row + last])
-        found = list_stretch(far, here, span, limit, np.uint64(s), begin, end, found)
+        begin, end = np.uint64(long_range.cell[row + first]), np.uint64(long_range.cell[row + last])
+        found = list_stretch(long_range, here, span, limit, np.uint64(s), begin, end, found)
         if found == FULL or not (span.x > 0.0 and (low < 0 or high >= nx)):
             break
         first, last = (low + nx, nx) if low < 0 else (0, high - nx + 1)
@@ -200,15 +200,15 @@ def list_row(far, here, grid, span, limit, s, x, row, left, found):
 
 
 @rare
-def grid_of(far, here, anchor, span, reach):
+def grid_of(long_range, here, anchor, span, reach):
     """Cells for these anchors, and the grains sorted into them."""
     grid = grid_for(anchor, span, reach)
-    sort_into_cells(far, here, anchor, span, grid)
+    sort_into_cells(long_range, here, anchor, span, grid)
     return grid
 
 
 @rare
-def list_place(far, here, grid, span, reach, s, found):
+def list_place(long_range, here, grid, span, reach, s, found):
     """Append the places closer than the reach to place s, from mate[found] on; where they end, or FULL.
 
     The first row of `source` serves meanwhile, for distances.
@@ -230,43 +230,43 @@ def list_place(far, here, grid, span, reach, s, found):
         left = widest - gap_y * gap_y - gap_z * gap_z
         if ty >= 0 and tz >= 0 and left > 0.0:
             row = (tz * ny + ty) * nx
-            found = list_row(far, here, grid, span, reach * reach, s, x[0], row, left, found)
+            found = list_row(long_range, here, grid, span, reach * reach, s, x[0], row, left, found)
             if found == FULL:
                 return FULL
     return found
 
 
 @rare
-def rows_from_anchors(far, span, reach):
+def rows_from_anchors(long_range, span, reach):
     """Order, rows and mates from the anchors alone; the number of entries, or FULL.
 
     A row of `mate` needs nothing of the rows before it but the place where it begins: blocks of places can be listed
     apart, each with room for distances of its own, and be put together in their order.
     """
-    grid = grid_of(far, far.here, far.anchor, span, reach)
+    grid = grid_of(long_range, long_range.packed_position, long_range.anchor, span, reach)
     found = 0
-    far.start[0] = 0
-    for s in range(far.anchor.shape[1]):
-        found = list_place(far, far.here, grid, span, reach, s, found)
+    long_range.start[0] = 0
+    for s in range(long_range.anchor.shape[1]):
+        found = list_place(long_range, long_range.packed_position, grid, span, reach, s, found)
         if found == FULL:
             return FULL
-        far.start[s + 1] = found
+        long_range.start[s + 1] = found
     return found
 
 
 @rare
-def make_far_list(grains, far, count, span, search):
+def build_verlet_list(grains, long_range, count, span, search):
     """List all pairs closer than the reach, from where the grains are now; FULL if there is no room."""
     for i in range(grains.mass.size):
-        put(far.anchor, i, load(grains.position, i))
-    if rows_from_anchors(far, span, search.reach) == FULL:
-        far.anchor[0, 0] = math.inf
+        put(long_range.anchor, i, load(grains.position, i))
+    if rows_from_anchors(long_range, span, search.reach) == FULL:
+        long_range.anchor[0, 0] = math.inf
         return FULL
     count[LISTED] += 1
     return 0
 
 
 @kernel
-def remake_far_list(far, span, reach):
+def rebuild_verlet_list(long_range, span, reach):
     """The list of an earlier run from its anchors, as it was; FULL if there is no room."""
-    return rows_from_anchors(far, span, reach)
+    return rows_from_anchors(long_range, span, reach)

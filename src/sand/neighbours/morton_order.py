@@ -11,7 +11,7 @@ BITS = 21
 """Of each coordinate: three of them fill 63 bits."""
 
 
-def places_on_curve(position: np.ndarray) -> np.ndarray:
+def morton_keys(position: np.ndarray) -> np.ndarray:
     """Place of each point (N, 3) on Morton's curve, (N,) uint64: the bits of its three coordinates in turns."""
     low = position.min(axis=0)
     longest = float((position.max(axis=0) - low).max())
@@ -48,9 +48,9 @@ def in_space_order(grains: Grains) -> Grains:
     Returns
     -------
     Grains
-        A copy; grain k of it is `order[k]` of the old ones, order = argsort of `places_on_curve`.
+        A copy; grain k of it is `order[k]` of the old ones, order = argsort of `morton_keys`.
     """
-    order = np.argsort(places_on_curve(grains.position), kind="stable")
+    order = np.argsort(morton_keys(grains.position), kind="stable")
     ordered = grains.copy()
     for array, old in zip(ordered.arrays, grains.arrays, strict=True):
         array[...] = old[..., order]

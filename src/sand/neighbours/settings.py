@@ -12,7 +12,7 @@ from ..arguments import checked
 from ..box import Box
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..grains import Grains
-from ..units import is_word, si, spoken
+from ..units import format_quantity, is_word, si
 from .cell_list import Search
 
 SEARCHES = ("auto", "cells", "all pairs")
@@ -148,13 +148,15 @@ class Neighbours:
                 return Found(nothing, f"all pairs: fewer than {LIST_FROM} grains")
             share = share_within(grains.position, box, whole)
             if share > LIST_UP_TO:
-                held = f"a grain has {share:.2g} of the others within {spoken(whole, 'm')}, more than {LIST_UP_TO}"
+                held = f"a grain has {share:.2g} of the others within {format_quantity(whole, 'm')}, more than {LIST_UP_TO}"
                 return Found(nothing, f"all pairs: {held}")
         if celled:
-            near = spoken(whole, "m")
+            near = format_quantity(whole, "m")
             return Found(Search(False, whole, margin, True), f"cells, for pairs closer than {near} (contacts)")
-        purpose = f"cut-off {spoken(widest, 'm')}" if widest > touch else f"contacts {spoken(touch, 'm')}"
+        purpose = (
+            f"cut-off {format_quantity(widest, 'm')}" if widest > touch else f"contacts {format_quantity(touch, 'm')}"
+        )
         return Found(
             Search(True, whole, margin),
-            f"cells and a list of pairs closer than {spoken(whole, 'm')} ({purpose}, margin {spoken(margin, 'm')})",
+            f"cells and a list of pairs closer than {format_quantity(whole, 'm')} ({purpose}, margin {format_quantity(margin, 'm')})",
         )

@@ -11,72 +11,72 @@ import math
 from ..box import nearest_image
 from ..compiler.jit import loop
 from ..contact.pair_types import kinds
-from ..numerics.float_order import rank, rank_for_most, ranked
+from ..numerics.float_order import float_from_bits, magnitude_bits, rank
 from ..numerics.vec import dot, load, sub
-from ..state.state import FAR_LEEWAY, FASTEST, HARMLESS, NEAR_LEEWAY, QUICKEST, SOON_LEEWAY
+from ..state.state import INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED
 
 UNKNOWN = -1.0
 """What stands for a speed that must be looked up, or a leeway that is spent."""
-SPARED = 0.999
+SKIN_SAFETY = 0.999
 """Part of a limit that is leeway: positions are rounded in every step, and what is left is far more than that."""
 
 
 @loop
-def forget_speeds(near):
+def invalidate_speeds(pair_list):
     """Grains were kicked by something that keeps no watch."""
-    near.watch[FASTEST] = near.watch[QUICKEST] = UNKNOWN
+    pair_list.skin[LARGEST_SPEED] = pair_list.skin[LARGEST_SPIN] = UNKNOWN
 
 
 @loop
-def forget_ways(near):
+def invalidate_skins(pair_list):
     """Grains were moved by something that keeps no watch."""
-    near.watch[FAR_LEEWAY] = near.watch[NEAR_LEEWAY] = near.watch[SOON_LEEWAY] = UNKNOWN
+    pair_list.skin[LONG_RANGE_SKIN] = pair_list.skin[PAIR_LIST_SKIN] = pair_list.skin[INNER_SKIN] = UNKNOWN
 
 
 @loop
-def look_up_harmless(near, count):
+def update_safe_speed(pair_list, count):
     """The speed [m/s] that is δ_c in the step of a contact, for the pair of the list for which it is least."""
     harmless = math.inf
-    for k in range(kinds(near, count)):
-        harmless = min(harmless, near.length[k] / near.step[k] if near.length[k] > 0.0 else math.inf)
-    near.watch[HARMLESS] = harmless
+    for k in range(kinds(pair_list, count)):
+        harmless = min(harmless, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)
+    pair_list.skin[SAFE_SPEED] = harmless
 
 
 @loop
-def begin_watch(near, count):
+def reset_skins(pair_list, count):
     """At the start of a call of the driver: grains may be elsewhere, and lists have been read from a file."""
-    forget_speeds(near)
-    forget_ways(near)
-    look_up_harmless(near, count)
+    invalidate_speeds(pair_list)
+    invalidate_skins(pair_list)
+    update_safe_speed(pair_list, count)
 
 
 @loop
 def largest_speeds(grains):
     """Squares of the largest speed [m²/s²] and spin [1/s²]."""
-    fastest = quickest = rank(0.0)
+    fastest = fastest_spin = rank(0.0)
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        fastest, quickest = max(fastest, rank_for_most(dot(v, v))), max(quickest, rank_for_most(dot(w, w)))
-    return ranked(fastest), ranked(quickest)
+        fastest, fastest_spin = max(fastest, magnitude_bits(dot(v, v))), max(fastest_spin, magnitude_bits(dot(w, w)))
+    return float_from_bits(fastest), float_from_bits(fastest_spin)
 
 
 @loop
-def spend(near, way):
+def consume_skins(pair_list, way):
     """No grain flew farther than this [m]."""
-    near.watch[FAR_LEEWAY] -= way
-    near.watch[NEAR_LEEWAY] -= way
-    near.watch[SOON_LEEWAY] -= way
+    pair_list.skin[LONG_RANGE_SKIN] -= way
+    pair_list.skin[PAIR_LIST_SKIN] -= way
+    pair_list.skin[INNER_SKIN] -= way
 
 
 @loop
-def look_up_speeds(grains, near):
+def update_speeds(grains, pair_list):
     """See to it that the largest speeds are known."""
-    if near.watch[FASTEST] < 0.0:
-        near.watch[FASTEST], near.watch[QUICKEST] = largest_speeds(grains)
+    if pair_list.skin[LARGEST_SPEED] < 0.0:
+        pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN] = largest_speeds(grains)
 
 
 @loop
-def farthest(grains, anchor, span):
+def largest_displacement(grains, anchor, span):
     """Largest displacement [m] of a grain from its anchor; not a number for an anchor at infinity.
 
     What counts is the displacement, not the way: a grain that rings in its cluster moves as the cluster does, to
@@ -85,16 +85,16 @@ def farthest(grains, anchor, span):
     most = rank(0.0)
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
-        most = max(most, rank_for_most(dot(moved, moved)))
-    return math.sqrt(ranked(most))
+        most = max(most, magnitude_bits(dot(moved, moved)))
+    return math.sqrt(float_from_bits(most))
 
 
 @loop
-def is_stale(grains, anchor, span, limit, watch, leeway):
+def list_is_stale(grains, anchor, span, limit, skin, skin_index):
     """True once a grain is farther than `limit` [m] from its anchor; `leeway` is the place of this list's."""
-    if watch[leeway] > 0.0:
+    if skin[skin_index] > 0.0:
         return False
-    strayed = farthest(grains, anchor, span)
-    watch[leeway] = SPARED * limit - strayed
+    strayed = largest_displacement(grains, anchor, span)
+    skin[skin_index] = SKIN_SAFETY * limit - strayed
     # written so that an anchor at infinity (no list yet) counts as strayed
     return not strayed <= limit

@@ -8,13 +8,13 @@ import numpy as np
 
 LINE = 64
 """Bytes of a line."""
-LANES = 8
+SIMD_WIDTH = 8
 """Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
 
 
 def whole(number: int) -> int:
     """So many columns, rounded up to whole vectors."""
-    return (number + LANES - 1) // LANES * LANES
+    return (number + SIMD_WIDTH - 1) // SIMD_WIDTH * SIMD_WIDTH
 
 
 def aligned(array: np.ndarray) -> np.ndarray:

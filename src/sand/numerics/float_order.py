@@ -12,12 +12,12 @@ def rank(x):
 
 
 @formula
-def rank_for_most(x):
+def magnitude_bits(x):
     """The rank of x ≥ 0 in a search for the largest: NaN comes last, whatever its sign."""
     return rank(abs(x))
 
 
 @formula
-def ranked(bits):
+def float_from_bits(bits):
     """The number of this rank."""
     return np.int64(bits).view(np.float64)

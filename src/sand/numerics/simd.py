@@ -3,11 +3,11 @@
 import numpy as np
 
 from ..compiler.jit import loop
-from .aligned import LANES
+from .aligned import SIMD_WIDTH
 
 
 @loop
-def filled_up(number, few):
+def round_up_to_simd_width(number, few):
     """A row's length (uint64), rounded up to whole vectors where `few` or more are left over (uint64)."""
-    lanes = np.uint64(LANES)
+    lanes = np.uint64(SIMD_WIDTH)
     return (number + lanes - np.uint64(1)) // lanes * lanes if number % lanes >= few else number

@@ -18,14 +18,14 @@ from .deposit import rbd
 from .diffusion import dla, dlca
 from .fractal import fractal
 from .moments import magnetised, part_given
-from .population import Streams, at_home, population, rest_distances, streams, stuff_of, whole
+from .population import Streams, centred_grains, grain_set_of, population, rest_distances, streams, whole
 
 
 @checked
 def rest_distance(material: Material | str, radius: float) -> float:
     """Distance of the centres of two equal grains in contact at rest [m]: 2r − δ0."""
     one = as_material(material)
-    pair = stuff_of(np.full(2, radius), [one, one])
+    pair = grain_set_of(np.full(2, radius), [one, one])
     return float(rest_distances(pair, np.array([0]), np.array([1]))[0])
 
 
@@ -60,12 +60,12 @@ def chain(
     made = population(count, radius, material, chance.population)
     number = np.arange(count)
     position = np.zeros((count, 3))
-    position[1:, 0] = np.cumsum(rest_distances(made.stuff, number[:-1], number[1:]))
+    position[1:, 0] = np.cumsum(rest_distances(made.grain_set, number[:-1], number[1:]))
     across = position[2:, 0] - position[:-2, 0] - made.radius[2:] - made.radius[:-2]
     if (across <= 0.0).any():
         small = int(np.argmin(across)) + 1
         raise BadInput(f"grain {small} of the chain is so small that its neighbours touch; take larger ones")
-    return magnetised(at_home(position, made), moment, moments, magnetic, chance.moments, axis=0)
+    return magnetised(centred_grains(position, made), moment, moments, magnetic, chance.moments, axis=0)
 
 
 @checked
@@ -125,7 +125,7 @@ def _regular(
     r = si(radius, "m", "radius", above=0.0)
     made = population(len(grid), r, material, chance.population)
     spacing = rest_distance(material, r)
-    return magnetised(at_home(spacing * grid, made), moment, moments, magnetic, chance.moments)
+    return magnetised(centred_grains(spacing * grid, made), moment, moments, magnetic, chance.moments)
 
 
 KINDS: dict[str, Callable[..., Grains]] = {

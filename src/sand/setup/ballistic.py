@@ -8,11 +8,11 @@ import numpy as np
 
 from ..arguments import checked
 from ..grains import Grains
-from ._kernels.aggregation import begin_crowd, grow_ballistic
+from ._kernels.aggregation import begin_hash_grid, grow_ballistic
 from ._kernels.cluster_cluster import join_ballistic
-from .growing import TRIES, halves, refuse_unmet, room
+from .growing import TRIES, halves, require_all_placed, room
 from .moments import magnetised
-from .population import Population, at_home, population, streams, whole
+from .population import Population, centred_grains, population, streams, whole
 
 ADVICE = "take larger grains, stiffer ones, or a narrower law of radii"
 
@@ -51,12 +51,12 @@ def bpca(
     """
     chance = streams(seed)
     made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)
-    position, crowd = np.zeros((3, len(made.radius))), room(made.stuff)
-    begin_crowd(crowd, position)
+    position, crowd = np.zeros((3, len(made.radius))), room(made.grain_set)
+    begin_hash_grid(crowd, position)
     count, size = len(made.radius), float(made.radius[0])
-    done, _ = grow_ballistic(crowd, position, made.stuff, 1, count, size, chance.places, TRIES)
-    refuse_unmet(done, count, f"grain {done}", ADVICE)
-    return magnetised(at_home(position.T, made), moment, moments, magnetic, chance.moments)
+    done, _ = grow_ballistic(crowd, position, made.grain_set, 1, count, size, chance.places, TRIES)
+    require_all_placed(done, count, f"grain {done}", ADVICE)
+    return magnetised(centred_grains(position.T, made), moment, moments, magnetic, chance.moments)
 
 
 @checked
@@ -71,7 +71,7 @@ def bcca(
     chance = streams(seed)
     made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)
     position = joined(made, halves(0, len(made.radius)), None, chance.places, 1)
-    return magnetised(at_home(position, made), moment, moments, magnetic, chance.moments)
+    return magnetised(centred_grains(position, made), moment, moments, magnetic, chance.moments)
 
 
 def joined(
@@ -95,9 +95,9 @@ def joined(
     position = np.zeros((3, len(made.radius)))
     plan = np.array(joins, dtype=np.int64).reshape(-1, 3).T.copy()
     aims = np.full(plan.shape[1], np.inf) if goals is None else goals
-    table = room(made.stuff, 2.0 * made.stuff.largest)
-    done = join_ballistic(table, position, np.zeros_like(position), made.stuff, plan, aims, seed, TRIES, choices)
-    refuse_unmet(done, plan.shape[1], f"a cluster of {_size(joins, done)} grains", ADVICE)
+    table = room(made.grain_set, 2.0 * made.grain_set.largest)
+    done = join_ballistic(table, position, np.zeros_like(position), made.grain_set, plan, aims, seed, TRIES, choices)
+    require_all_placed(done, plan.shape[1], f"a cluster of {_size(joins, done)} grains", ADVICE)
     return position.T
 
 

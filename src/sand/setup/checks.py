@@ -7,7 +7,7 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput
 from ..grains import ROUNDING, Grains
-from .population import rest_distances, stuff_of
+from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)
 """Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
@@ -19,7 +19,7 @@ def most_overlap(rest: np.ndarray | float, smaller: np.ndarray | float) -> np.nd
     return np.maximum(MOST_OVERLAP[0] * np.asarray(rest), MOST_OVERLAP[1] * np.asarray(smaller))
 
 
-def refuse_unsound(body: Grains, origin: str) -> None:
+def check_body(body: Grains, origin: str) -> None:
     """Raises BadInput naming grains (the first ten) that overlap by too much, or touch none of the largest cluster.
 
     Parameters
@@ -44,9 +44,9 @@ def _pairs(body: Grains) -> tuple[np.ndarray, np.ndarray]:
 
 def _overlaps(body: Grains) -> list[str]:
     pairs, overlap = _pairs(body)
-    stuff = stuff_of(body.radius, [body.materials[k] for k in body.material])
+    grain_set = grain_set_of(body.radius, [body.materials[k] for k in body.material])
     touch = body.radius[pairs].sum(axis=1)
-    rest = touch - rest_distances(stuff, pairs[:, 0], pairs[:, 1])
+    rest = touch - rest_distances(grain_set, pairs[:, 0], pairs[:, 1])
     most = most_overlap(rest, body.radius[pairs].min(axis=1))
     return [
         f"grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m; at most {most[k]:.3g} m may be: "

@@ -16,9 +16,19 @@ from ..grains import Grains
 from ..material import Material
 from ._kernels.deposition import deposit
 from .ballistic import ADVICE
-from .growing import CELL, TRIES, refuse_unmet, room
+from .growing import CELL, TRIES, require_all_placed, room
 from .moments import magnetised
-from .population import Lognormal, Population, PowerLaw, at_home, population, radii_of, streams, stuff_of, whole
+from .population import (
+    Lognormal,
+    Population,
+    PowerLaw,
+    centred_grains,
+    grain_set_of,
+    population,
+    radii_of,
+    streams,
+    whole,
+)
 
 FILLING = 0.23
 """Of a deposit of equal grains that roll once, about."""
@@ -57,18 +67,18 @@ def rbd(
     for doubled in range(DOUBLED):
         spare = SPARE * 2**doubled
         every, side = _of_deposit(count, law, material, chance.population, spare)
-        columns = max(3, int(side / (CELL * every.stuff.largest)))
-        position, crowd = np.zeros((3, len(every.radius))), room(every.stuff, side / columns)
-        done = deposit(crowd, position, every.stuff, side, columns, chance.places, TRIES)
-        refuse_unmet(done, len(every.radius), f"grain {done} of the deposit", ADVICE)
+        columns = max(3, int(side / (CELL * every.grain_set.largest)))
+        position, crowd = np.zeros((3, len(every.radius))), room(every.grain_set, side / columns)
+        done = deposit(crowd, position, every.grain_set, side, columns, chance.places, TRIES)
+        require_all_placed(done, len(every.radius), f"grain {done} of the deposit", ADVICE)
         kept = cut_sphere(position.T, every.radius, count)
         if len(kept):
             break
     else:
         raise BadInput(f"no deposit had a cluster of {count} grains; take another seed")
     kinds = [every.material[k] for k in kept]
-    cut = Population(every.radius[kept], kinds, stuff_of(every.radius[kept], kinds))
-    return magnetised(at_home(position.T[kept], cut), moment, moments, magnetic, chance.moments)
+    cut = Population(every.radius[kept], kinds, grain_set_of(every.radius[kept], kinds))
+    return magnetised(centred_grains(position.T[kept], cut), moment, moments, magnetic, chance.moments)
 
 
 def _of_deposit(
@@ -77,7 +87,7 @@ def _of_deposit(
     """Grains that fill a cube, and its side [m]: larger than the sphere by a part, and by a rim of large grains."""
     few = population(max(count, 100), law, material, rng)
     volume = 4.0 / 3.0 * math.pi * float((few.radius**3).mean())
-    side = (spare * count * volume / FILLING) ** (1.0 / 3.0) + 3.0 * CELL * few.stuff.largest
+    side = (spare * count * volume / FILLING) ** (1.0 / 3.0) + 3.0 * CELL * few.grain_set.largest
     return population(int(FILLING * side**3 / volume) + 10, law, material, rng), side
 
 

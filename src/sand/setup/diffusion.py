@@ -8,12 +8,12 @@ import numpy as np
 
 from ..arguments import checked
 from ..grains import Grains
-from ._kernels.aggregation import begin_crowd, grow_diffusing
+from ._kernels.aggregation import begin_hash_grid, grow_diffusing
 from ._kernels.cluster_cluster import join_diffusing
 from .ballistic import ADVICE
-from .growing import TRIES, halves, refuse_unmet, room
+from .growing import TRIES, halves, require_all_placed, room
 from .moments import magnetised
-from .population import at_home, population, streams, whole
+from .population import centred_grains, population, streams, whole
 
 
 @checked
@@ -29,13 +29,13 @@ def dla(
     """
     chance = streams(seed)
     made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)
-    count, crowd = len(made.radius), room(made.stuff)
+    count, crowd = len(made.radius), room(made.grain_set)
     position = np.zeros((3, count))
-    begin_crowd(crowd, position)
+    begin_hash_grid(crowd, position)
     size = float(made.radius[0])
-    done, _ = grow_diffusing(crowd, position, np.zeros(count), made.stuff, 1, count, size, chance.places, TRIES)
-    refuse_unmet(done, count, f"grain {done}", ADVICE)
-    return magnetised(at_home(position.T, made), moment, moments, magnetic, chance.moments)
+    done, _ = grow_diffusing(crowd, position, np.zeros(count), made.grain_set, 1, count, size, chance.places, TRIES)
+    require_all_placed(done, count, f"grain {done}", ADVICE)
+    return magnetised(centred_grains(position.T, made), moment, moments, magnetic, chance.moments)
 
 
 @checked
@@ -53,6 +53,6 @@ def dlca(
     position, plan = np.zeros((3, len(made.radius))), halves(0, len(made.radius))
     joins = np.array(plan, dtype=np.int64).reshape(-1, 3).T.copy()
     spare = np.zeros_like(position), np.zeros(len(made.radius))
-    done = join_diffusing(room(made.stuff), position, *spare, made.stuff, joins, chance.places, TRIES)
-    refuse_unmet(done, len(plan), "a cluster", ADVICE)
-    return magnetised(at_home(position.T, made), moment, moments, magnetic, chance.moments)
+    done = join_diffusing(room(made.grain_set), position, *spare, made.grain_set, joins, chance.places, TRIES)
+    require_all_placed(done, len(plan), "a cluster", ADVICE)
+    return magnetised(centred_grains(position.T, made), moment, moments, magnetic, chance.moments)

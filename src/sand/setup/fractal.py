@@ -15,7 +15,7 @@ from ..units import si
 from .ballistic import joined
 from .growing import halves
 from .moments import magnetised
-from .population import Population, at_home, population, streams, whole
+from .population import Population, centred_grains, population, streams, whole
 
 CHOICES = 100
 """Meetings to choose from for each pair of clusters."""
@@ -69,7 +69,7 @@ def fractal(
     position = joined(made, plan, goals, chance.places, CHOICES)
     if count > SEED_SIZE:
         _refuse_missed(position, made, goals[-1])
-    return magnetised(at_home(position, made), moment, moments, magnetic, chance.moments)
+    return magnetised(centred_grains(position, made), moment, moments, magnetic, chance.moments)
 
 
 def _plan(count: int) -> list[tuple[int, int, int]]:
@@ -119,7 +119,7 @@ def refuse_impossible(made: Population, dimension: float, prefactor: float) -> N
 
 
 def _refuse_missed(position: np.ndarray, made: Population, goal: float) -> None:
-    mass = made.stuff.mass
+    mass = made.grain_set.mass
     middle = np.average(position, axis=0, weights=mass)
     size = math.sqrt(np.average(((position - middle) ** 2).sum(axis=1), weights=mass))
     if abs(size / goal - 1.0) > WRONG:

@@ -12,7 +12,7 @@ from ..box import Box
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..grains import Grains
 from ..material import Material
-from ..units import spoken
+from ..units import format_quantity
 
 APART = 1e-9
 """Gap that pairs which do not touch get, if single precision has brought them to overlap, in their mean radius."""
@@ -90,7 +90,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     if len(pair) and not known:
         kept += " unstrained, because the file does not say how they were strained"
     bonds = Bonds(pair, *(np.nan_to_num(given) for given in (frame.slide, frame.roll, frame.twist)))
-    note = f"step {frame.step}, {spoken(frame.time, 's')}, of an earlier run; {kept}"
+    note = f"step {frame.step}, {format_quantity(frame.time, 's')}, of an earlier run; {kept}"
     if moved > 0.0:
         note += f", grains moved by at most {moved:.2g} m to give them the overlaps they had"
     return Start(grains, bonds, frame.box, note)

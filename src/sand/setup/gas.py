@@ -16,7 +16,7 @@ from ..constants import BOLTZMANN, LIGHT
 from ..errors import BadInput, did_you_mean, warn
 from ..grains import Grains, moment_size, vector_for_all
 from ..material import Material
-from ..units import MELTED, MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
+from ..units import MELTED, MOST_GRAINS, format_quantity, in_unit, seed_given, si, whole_number
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
 """Variance of each spin component in units of kT/I: mean rotational energy kT/2 in all, (3/2)kT, or none."""
@@ -153,7 +153,7 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
     gap = CLEARANCE * float(radius.mean())
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
         raise BadInput(
-            f"a box of {spoken(lengths.min(), 'm')} is too small for grains of radius {spoken(radius.max(), 'm')}; "
+            f"a box of {format_quantity(lengths.min(), 'm')} is too small for grains of radius {format_quantity(radius.max(), 'm')}; "
             "take one of at least 3 diameters"
         )
     _refuse_full(radius, len(radius), box)
@@ -181,7 +181,9 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
             )
         if not told and wall.monotonic() > begun + PATIENCE:
             told = True
-            warn(f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller")
+            warn(
+                f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller"
+            )
     return placed
 
 

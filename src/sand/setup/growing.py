@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import BadInput
-from ._kernels.hash_grid import Crowd, Stuff, places_for
+from ._kernels.hash_grid import GrainSet, HashGrid, places_for
 
 CELL = 3.0
 """Width of the lowest cells, in largest radii: no grain reaches over more than two of them."""
@@ -13,16 +13,16 @@ TRIES = 100_000
 """Flights or walks of one grain or pair of clusters until they meet in a single contact."""
 
 
-def room(stuff: Stuff, width: float | None = None) -> Crowd:
+def room(grain_set: GrainSet, width: float | None = None) -> HashGrid:
     """A crowd with room for all grains, nobody there yet; `width` of its cells [m]."""
-    count = len(stuff.radius)
+    count = len(grain_set.radius)
     places = places_for(count, 1 << 40)
-    return Crowd(
+    return HashGrid(
         np.full(places, -1, dtype=np.int64),
         np.full(places, -1, dtype=np.int32),
         np.full(count, -1, dtype=np.int32),
         places - 1,
-        CELL * stuff.largest if width is None else width,
+        CELL * grain_set.largest if width is None else width,
     )
 
 
@@ -39,7 +39,7 @@ def halves(first: int, last: int) -> list[tuple[int, int, int]]:
     return [join for split in reversed(layers) for join in split]
 
 
-def refuse_unmet(done: int, wanted: int, what: str, advice: str) -> None:
+def require_all_placed(done: int, wanted: int, what: str, advice: str) -> None:
     """Raises BadInput where kernels have given up."""
     if done < wanted:
         raise BadInput(

@@ -16,8 +16,8 @@ from ..contact.mixing import pairing_between
 from ..errors import BadInput, shown
 from ..grains import Grains, materials_of
 from ..material import Material, as_material
-from ..units import MOST_GRAINS, in_unit, seed_given, si, spoken, whole_number
-from ._kernels.hash_grid import Stuff
+from ..units import MOST_GRAINS, format_quantity, in_unit, seed_given, si, whole_number
+from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0
 """Largest radius over smallest; beyond it nearly all grains of a power law are too small to matter."""
@@ -107,7 +107,7 @@ class PowerLaw:
 def _bounds(least: Any, most: Any) -> tuple[float, float]:
     low, high = (si(v, "m", f"{n} of the radii", above=0.0) for v, n in ((least, "least"), (most, "most")))
     if not low < high:
-        raise BadInput(f"radii: least = {spoken(low, 'm')} must be below most = {spoken(high, 'm')}")
+        raise BadInput(f"radii: least = {format_quantity(low, 'm')} must be below most = {format_quantity(high, 'm')}")
     _refuse_wide(low, high)
     return low, high
 
@@ -115,7 +115,7 @@ def _bounds(least: Any, most: Any) -> tuple[float, float]:
 def _refuse_wide(low: float, high: float) -> None:
     if high > WIDEST * low:
         raise BadInput(
-            f"radii from {spoken(low, 'm')} to {spoken(high, 'm')} differ by a factor of {high / low:.3g}; such grains "
+            f"radii from {format_quantity(low, 'm')} to {format_quantity(high, 'm')} differ by a factor of {high / low:.3g}; such grains "
             f"do not pack into one aggregate, at most {WIDEST:g} is allowed: raise the least or lower the most"
         )
 
@@ -160,7 +160,7 @@ class Population(NamedTuple):
 
     radius: np.ndarray  # (N,) [m]
     material: list[Material]  # N of them
-    stuff: Stuff  # the same for kernels
+    grain_set: GrainSet  # the same for kernels
 
 
 def population(count: int, radius: Any, material: Any, rng: np.random.Generator) -> Population:
@@ -187,7 +187,7 @@ def population(count: int, radius: Any, material: Any, rng: np.random.Generator)
         size = np.full(count, size)
     elif not isinstance(size, np.ndarray):
         size = size.draw(count, rng)
-    return Population(size, kinds, stuff_of(size, kinds))
+    return Population(size, kinds, grain_set_of(size, kinds))
 
 
 def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Material]:
@@ -203,7 +203,7 @@ def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Materia
     return [kinds[k] for k in index]
 
 
-def stuff_of(radius: np.ndarray, kinds: list[Material]) -> Stuff:
+def grain_set_of(radius: np.ndarray, kinds: list[Material]) -> GrainSet:
     """The grains for kernels.
 
     Raises
@@ -221,11 +221,11 @@ def stuff_of(radius: np.ndarray, kinds: list[Material]) -> Stuff:
             sunk = rest_overlap(rest_radius(gamma[a, b], reduced, modulus[a, b]), reduced)
             if sunk > DEEPEST * small:
                 raise BadInput(
-                    f"grains of {distinct[a].name} of radius {spoken(small, 'm')} would sink by {spoken(sunk, 'm')} "
+                    f"grains of {distinct[a].name} of radius {format_quantity(small, 'm')} would sink by {format_quantity(sunk, 'm')} "
                     f"into grains of {distinct[b].name}: too small for JKR contacts; take larger ones"
                 )
     mass = np.array([m.density for m in distinct])[index] * (4.0 / 3.0 * np.pi) * radius**3
-    return Stuff(radius, mass, index.astype(np.int64), gamma, modulus, float(radius.max()))
+    return GrainSet(radius, mass, index.astype(np.int64), gamma, modulus, float(radius.max()))
 
 
 def _sticky(material: Material) -> Material:
@@ -233,12 +233,14 @@ def _sticky(material: Material) -> Material:
     return material if material.surface_energy is not None else material.but(surface_energy=0.0)
 
 
-def rest_distances(stuff: Stuff, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def rest_distances(grain_set: GrainSet, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Distances of the centres of pairs of grains in contact at rest [m]: r1 + r2 − δ0."""
-    r1, r2 = stuff.radius[first], stuff.radius[second]
-    pair = stuff.material[first], stuff.material[second]
+    r1, r2 = grain_set.radius[first], grain_set.radius[second]
+    pair = grain_set.material[first], grain_set.material[second]
     reduced = r1 * r2 / (r1 + r2)
-    return r1 + r2 - rest_overlap(rest_radius(stuff.surface_energy[pair], reduced, stuff.modulus[pair]), reduced)
+    return (
+        r1 + r2 - rest_overlap(rest_radius(grain_set.surface_energy[pair], reduced, grain_set.modulus[pair]), reduced)
+    )
 
 
 class Streams(NamedTuple):
@@ -260,7 +262,7 @@ def streams(seed: Any) -> Streams:
     return Streams(np.random.default_rng(one), two.generate_state(1, np.uint64)[0], np.random.default_rng(three))
 
 
-def at_home(position: np.ndarray, made: Population) -> Grains:
+def centred_grains(position: np.ndarray, made: Population) -> Grains:
     """Grains at these places (N, 3) [m], at rest, their centre of mass at the origin."""
-    middle = np.average(position, axis=0, weights=made.stuff.mass)
+    middle = np.average(position, axis=0, weights=made.grain_set.mass)
     return Grains(position - middle, made.radius, made.material)

@@ -10,14 +10,14 @@ from ..box import Box
 from ..contact.law import Bond
 from ..contact.model import Contact
 from ..errors import BadInput
-from ..forces.base import FarForce, Force, GrainForce, compose, compose_far
+from ..forces.base import Force, GrainForce, LongRangeForce, compose, compose_long_range
 from ..forces.external.loops import is_ours
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
-from ..forces.pair.loops import NO_FAR_FORCE, FarSums, all_blocks
+from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
 from ..grains import Grains
 from ..integrate.adaptive import Adaptive
-from ..integrate.kernel_spec import Books, ContactRules, Plan, Rules, Stirring
+from ..integrate.kernel_spec import Books, ContactParameters, GasSettings, KernelSpec, StepParameters
 from ..integrate.step_control import IMPACT_PART, Control
 from ..integrate.task_queue import is_large
 from ..integrate.verlet import Verlet
@@ -32,12 +32,12 @@ from ..state.arrays import (
     FOR_LIST,
     FOR_RATES,
     SPARE,
-    contact_arrays,
-    far_arrays,
-    near_pairs,
+    empty_contact_arrays,
+    empty_long_range_arrays,
+    empty_pair_list,
 )
 from ..state.stages import stage_arrays
-from ..state.state import RECORDED, World
+from ..state.state import RECORDED, State
 from .checks import impossible, unusual
 from .engine import Engine
 from .initial_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
@@ -50,7 +50,7 @@ WIDE_FROM = 64
 """Fewest grains for the longest vectors: of less, much is left over that fills none."""
 IDLE = 1e5
 """Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
-STIR_PART = 0.05
+GAS_PERIOD_FRACTION = 0.05
 """Time between two kicks of the gas, in shortest stopping times.
 
 Kicks come at ends of steps or cycles, 2/3 to 4/3 of it apart; free grains diffuse h²/12τ² too fast, at most 4e-4.
@@ -61,8 +61,8 @@ class Given(NamedTuple):
     """The forces by kind."""
 
     contact: Contact | None
-    distant: list[FarForce]  # those that some grain feels
-    outside: list[GrainForce]
+    distant: list[LongRangeForce]  # those that some grain feels
+    external: list[GrainForce]
     gas: list[Gas]  # one or none
 
 
@@ -99,21 +99,21 @@ def build_engine(
     cutoffs = [f.choose(grains, box).radius for f in given.distant]
     flights = isinstance(stepping, Adaptive)
     found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], flights=flights)
-    far = _far(given, grains, box, [found.search.listed and r is not None for r in cutoffs])
+    long_range = _far(given, grains, box, [found.search.listed and r is not None for r in cutoffs])
     verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
     control = _control(grains, verlet, given, reach)
     if isinstance(stepping, Adaptive):
         stepping = stepping.settled(grains, control)
-    composed, numbers = compose(given.outside)
-    sums, far_numbers = compose_far([sums for _, sums, _ in far], [own for _, _, own in far])
-    rules = Rules(
+    composed, numbers = compose(given.external)
+    sums, far_numbers = compose_long_range([sums for _, sums, _ in long_range], [own for _, _, own in long_range])
+    rules = StepParameters(
         box.span,
         _contact_rules(given.contact, grains, verlet),
         far_numbers,
         numbers,
         found.search,
-        verlet.beat(bool(far)),
-        _books(given.outside, box),
+        verlet.beat(bool(long_range)),
+        _ledger_columns(given.external, box),
         _stirring(given.gas, grains, seed),
         control,
         stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
@@ -123,17 +123,19 @@ def build_engine(
     here.arrays.position[...] = box.wrap(grains.position).T
     start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
     room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
-    world = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
+    state = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + ("; in memory along a curve through space" if chosen.along_curve(len(grains)) else "")
-    engine = Engine(world, rules, warnings, given.outside, far, search, stepping, chosen, plan)
+    engine = Engine(state, rules, warnings, given.external, long_range, search, stepping, chosen, plan)
     held = seed_contacts(engine, given.contact, contacts)
     if given.contact is not None:
         refuse_overlaps(here, given.contact, start, held)
     return engine
 
 
-def _far(given: Given, grains: Grains, box: Box, listed: Sequence[bool]) -> list[tuple[FarForce, FarSums, Any]]:
+def _far(
+    given: Given, grains: Grains, box: Box, listed: Sequence[bool]
+) -> list[tuple[LongRangeForce, LongRangeSums, Any]]:
     """Each long-range force with its loops and numbers."""
     sums = [force.sums(box, own) for force, own in zip(given.distant, listed, strict=True)]
     if len(grains) >= WIDE_FROM:
@@ -144,54 +146,56 @@ def _far(given: Given, grains: Grains, box: Box, listed: Sequence[bool]) -> list
 def _given(forces: Sequence[Force], grains: Grains) -> Given:
     return Given(
         next((f for f in forces if isinstance(f, Contact)), None),
-        [f for f in forces if isinstance(f, FarForce) and f.acts_on(grains)],
+        [f for f in forces if isinstance(f, LongRangeForce) and f.acts_on(grains)],
         [f for f in forces if isinstance(f, GrainForce)],
         [f for f in forces if isinstance(f, Gas)],
     )
 
 
-def _plan(grains: Grains, given: Given, outside: Callable, sums: FarSums, verlet: Verlet, adaptive: bool) -> Plan:
+def _plan(
+    grains: Grains, given: Given, external: Callable, sums: LongRangeSums, verlet: Verlet, adaptive: bool
+) -> KernelSpec:
     """What the driver is compiled from."""
     # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
     way = verlet.far if given.distant and given.contact and verlet.most_steps > 1 else "every step"
-    return Plan(
-        outside,
+    return KernelSpec(
+        external,
         sums,
         split=way == "impulse",
         impulse=way == "impulse",
-        foretell=way.startswith("taylor"),
+        taylor=way.startswith("taylor"),
         gas=bool(given.gas),
         adaptive=adaptive,
-        crew=is_large(len(grains)),
-        keep=all(is_ours(f.formula) for f in given.outside),
+        queue=is_large(len(grains)),
+        keep=all(is_ours(f.formula) for f in given.external),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
     )
 
 
-def _world(grains: Grains, box: Box, rules: Rules, plan: Plan, room: int, *, all_pairs: bool) -> World:
+def _world(grains: Grains, box: Box, rules: StepParameters, plan: KernelSpec, room: int, *, all_pairs: bool) -> State:
     """The grains in their box, with `room` for contacts and pairs, and for whatever else plan and rules need."""
-    count, listed, alike = len(grains), rules.search.listed, rules.contact.alike
+    count, listed, uniform_contacts = len(grains), rules.search.listed, rules.contact.uniform_contacts
     channels = len(RECORDED) if rules.contact.damped or rules.contact.follow else ALWAYS
-    blocks = all_blocks(grains) if plan.far is not NO_FAR_FORCE and all_pairs else 0
+    blocks = all_blocks(grains) if plan.long_range is not NO_LONG_RANGE_FORCE and all_pairs else 0
     needed = set(FOR_LIST if listed else FOR_CELLS if rules.search.celled else ())
     needed |= set(FOR_IMPULSES if plan.impulse else ())
-    needed |= set(FOR_RATES if plan.foretell else ())
-    needed |= {"here", "source"} if blocks else set()
-    needed |= set(FOR_FORCES if plan.far is not NO_FAR_FORCE or plan.adaptive else ())
-    return World(
+    needed |= set(FOR_RATES if plan.taylor else ())
+    needed |= {"packed_position", "source"} if blocks else set()
+    needed |= set(FOR_FORCES if plan.long_range is not NO_LONG_RANGE_FORCE or plan.adaptive else ())
+    return State(
         grains,
         box,
-        contact_arrays(count, room, len(Bond._fields), alike=alike, channels=channels),
-        near_pairs(count, room, alike=alike),
-        far_arrays(
+        empty_contact_arrays(count, room, len(Bond._fields), uniform_contacts=uniform_contacts, channels=channels),
+        empty_pair_list(count, room, uniform_contacts=uniform_contacts),
+        empty_long_range_arrays(
             count,
             MATES * count if listed else IN_REACH if rules.search.celled else 0,
             blocks,
             needless={*FOR_FORCES, *FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
         ),
         stages=stage_arrays(count if plan.adaptive else 0),
-        alike=alike,
+        uniform_contacts=uniform_contacts,
     )
 
 
@@ -206,15 +210,15 @@ def _stride(grains: Grains, box: Box, found: Found) -> float:
     return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images
 
 
-def _books(outside: Sequence[GrainForce], box: Box) -> Books:
-    moored = any(getattr(f, "moored", False) for f in outside)
-    return Books(any(getattr(f, "timed", False) for f in outside), moored and not box.is_open)
+def _ledger_columns(external: Sequence[GrainForce], box: Box) -> Books:
+    position_dependent = any(getattr(f, "position_dependent", False) for f in external)
+    return Books(any(getattr(f, "time_dependent", False) for f in external), position_dependent and not box.is_open)
 
 
-def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> Stirring:
+def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
     if not gas:
-        return Stirring(math.inf, seed, VACUUM)
-    return Stirring(STIR_PART * gas[0].shortest_time(grains), seed, gas[0].rules())
+        return GasSettings(math.inf, seed, VACUUM)
+    return GasSettings(GAS_PERIOD_FRACTION * gas[0].shortest_time(grains), seed, gas[0].rules())
 
 
 def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
@@ -239,16 +243,16 @@ def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) 
 
 def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> Control:
     """What the choice of the step needs."""
-    steps = [own() for f in given.outside if (own := getattr(f, "longest_step", None)) is not None]
+    steps = [own() for f in given.external if (own := getattr(f, "longest_step", None)) is not None]
     idle = IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials)))
     return Control(
         fixed=0.0 if stepping.step == "auto" else stepping.step,
         reach=reach,
         energy_scale=max((f.energy_scale(grains) for f in given.distant), default=0.0),
         accuracy=stepping.accuracy,
-        outer_field=math.fsum(f.flux_density_size() for f in given.outside),
+        outer_field=math.fsum(f.flux_density_size() for f in given.external),
         impact=IMPACT_PART / stepping.steps_per_period,
-        longest=min([idle, *steps, *(STIR_PART * gas.shortest_time(grains) for gas in given.gas)]),
+        longest=min([idle, *steps, *(GAS_PERIOD_FRACTION * gas.shortest_time(grains) for gas in given.gas)]),
     )
 
 
@@ -259,16 +263,16 @@ def sound_crossing(grains: Grains, number: int) -> float:
     return radius * math.sqrt(material.density / material.young_modulus)
 
 
-def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactRules:
+def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactParameters:
     law = contact or Contact()
     # without a Contact nothing ever touches, and materials may lack what contacts need
     pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
-    return ContactRules(
+    return ContactParameters(
         on=contact is not None,
         pairings=pairings,
         release=law.beyond == "release",
         follow=law.stiffness == "dt97",
         damped=law.damping != "none",
         per_period=stepping.steps_per_period,
-        alike=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
+        uniform_contacts=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
     )

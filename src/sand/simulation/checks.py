@@ -8,9 +8,9 @@ import numpy as np
 
 from ..box import Box
 from ..contact.model import Contact
-from ..forces.base import FarForce, Force
+from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
-from ..units import is_word, spoken
+from ..units import format_quantity, is_word
 
 OUTSIDE = 1e-3
 """How far a centre may lie outside a periodic box, in sides of it: frames in single precision are mended by that."""
@@ -33,12 +33,12 @@ def unusual(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
     sticky = any(isinstance(force, Contact) for force in forces)
     largest = int(np.argmax(grains.radius))
     if sticky and grains.radius[largest] > LARGEST:
-        size = spoken(float(grains.radius[largest]), "m")
+        size = format_quantity(float(grains.radius[largest]), "m")
         warnings.append(
-            f"grain {largest} has a radius of {size}: contacts are made for dust, far below {spoken(LARGEST, 'm')}; "
+            f"grain {largest} has a radius of {size}: contacts are made for dust, far below {format_quantity(LARGEST, 'm')}; "
             "is the unit right?"
         )
-    alone = bool(forces) and not any(isinstance(force, FarForce) for force in forces)
+    alone = bool(forces) and not any(isinstance(force, LongRangeForce) for force in forces)
     if not sticky and not alone:
         warnings += _overlaps(grains, box)  # grains that feel only what surrounds them may be in one place
     return warnings
@@ -63,10 +63,15 @@ def _short_cutoffs(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
     problems = []
     for force in forces:
         cutoff = getattr(force, "cutoff", None)
-        if isinstance(force, FarForce) and cutoff is not None and not is_word(cutoff, "auto") and cutoff < diameter:
+        if (
+            isinstance(force, LongRangeForce)
+            and cutoff is not None
+            and not is_word(cutoff, "auto")
+            and cutoff < diameter
+        ):
             problems.append(
-                f"{force.name}: cutoff = {spoken(cutoff, 'm')} ends within a grain, whose diameter is "
-                f"{spoken(diameter, 'm')}; take a longer one, or 'auto'"
+                f"{force.name}: cutoff = {format_quantity(cutoff, 'm')} ends within a grain, whose diameter is "
+                f"{format_quantity(diameter, 'm')}; take a longer one, or 'auto'"
             )
     return problems
 
@@ -79,7 +84,7 @@ def _overlaps(grains: Grains, box: Box) -> list[str]:
         return []
     i, j = pair[deep[0]]
     return [
-        f"grains {i} and {j} overlap by {spoken(float(overlap[deep[0]]), 'm')}, and there is no sand.Contact() among "
+        f"grains {i} and {j} overlap by {format_quantity(float(overlap[deep[0]]), 'm')}, and there is no sand.Contact() among "
         "the forces: grains pass through each other"
     ]
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
 from ..errors import NoSuchKey, did_you_mean, shown
 from ..optional import optional
-from ..state.state import CONTACTS, RECORDED, World
+from ..state.state import CONTACTS, RECORDED, State
 
 COLUMNS = (
     ("pair", "", "the two grains"),
@@ -31,13 +31,13 @@ class ContactTable(Mapping[str, np.ndarray]):
     Columns are (C,), but `pair` is (C, 2) and vectors are (C, 3), laboratory frame.
     """
 
-    def __init__(self, world: World, follow: bool):
-        used = int(world.count[CONTACTS])
-        contacts = world.contacts
+    def __init__(self, state: State, follow: bool):
+        used = int(state.count[CONTACTS])
+        contacts = state.contacts
         scalars = len(CONTACT_ROWS)
         names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
         rows = np.zeros((scalars + 3 * len(names), used))
-        measure_contacts(world.grains.arrays, contacts, world.count, world.box.span, follow, rows)
+        measure_contacts(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
         self._columns: dict[str, np.ndarray] = {
             "pair": contacts.pair[:, :used].T.copy(),
             "formed": contacts.formed[:used].copy(),

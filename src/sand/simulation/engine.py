@@ -9,38 +9,38 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.gather import resort_sides
+from ..contact.gather import resort_contacts_by_grain
 from ..contact.initial import seed_contacts
-from ..forces.base import FarForce, GrainForce
+from ..forces.base import GrainForce, LongRangeForce
 from ..forces.external.loops import outside_shares_for
 from ..forces.pair.loops import shares_for
 from ..integrate.adaptive import Adaptive
 from ..integrate.adaptive_driver import flight_driver_for
 from ..integrate.driver import driver_for
-from ..integrate.kernel_spec import Plan, Rules, Stop
+from ..integrate.kernel_spec import KernelSpec, StepParameters, Stop
 from ..integrate.step_control import GROW_EVERY
-from ..integrate.task_queue import crew_for, new_crew, send_away, wants_help
+from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, worker_loops
 from ..integrate.verlet import Verlet
-from ..integrate.worker_threads import Hands
-from ..neighbours.cell_list import FULL, remake_far_list
+from ..integrate.worker_threads import WorkerThreads
+from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
-from ..neighbours.spatial_sort import RENEWED_EVERY, inverse, order_on_curve, rearrange, sort_columns
+from ..neighbours.spatial_sort import RENEWED_EVERY, inverse, rearrange, sort_columns, spatial_order
 from ..state.arrays import SPARE
 from ..state.state import (
+    CHECKED,
     CONTACT_STEP,
     CONTACTS,
-    FAR_SUMS,
     GRAIN1,
     GRAIN2,
-    GROWN,
-    LOOKED,
+    LONG_RANGE_SUMS,
     MADE,
-    MOVED,
     ORDERED,
     PAIRS,
+    SLIPPED,
     STAGE,
+    STEP_INCREASES,
     STEPS,
-    World,
+    State,
 )
 
 
@@ -56,7 +56,7 @@ class Engine:
         everything that does not change, as the kernels take it.
     warnings : list[str]
         what the forces had to say about these grains.
-    far : Sequence[tuple[FarForce, Any, Any]]
+    far : Sequence[tuple[LongRangeForce, Any, Any]]
         the long-range forces that some grain feels, with their loops and numbers.
     outside : Sequence[GrainForce]
         the per-grain forces.
@@ -68,35 +68,35 @@ class Engine:
         their settings, likewise, unless they are those of an earlier run.
     """
 
-    _world: World
-    rules: Rules
+    _world: State
+    rules: StepParameters
     warnings: list[str]
-    outside: Sequence[GrainForce]
-    far: Sequence[tuple[FarForce, Any, Any]]
+    external: Sequence[GrainForce]
+    long_range: Sequence[tuple[LongRangeForce, Any, Any]]
     search: str
     stepping: Verlet | Adaptive
     neighbours: Neighbours
-    _plan: Plan
+    _plan: KernelSpec
     _away: bool = field(init=False, default=False)  # are grains at places of their own now?
     _advance: Callable = field(init=False)
-    _hands: Hands | None = field(init=False, default=None)
+    _hands: WorkerThreads | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         self._advance = flight_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
-        if self._plan.crew:
-            self._hands = Hands(crew_for(self._plan)[1])
+        if self._plan.queue:
+            self._hands = WorkerThreads(worker_loops(self._plan)[1])
 
     @property
-    def world(self) -> World:
+    def state(self) -> State:
         """The state, its grains numbered as the user knows them."""
-        self.come_home()
+        self.restore_user_order()
         return self._world
 
-    @world.setter
-    def world(self, other: World) -> None:
+    @state.setter
+    def state(self, other: State) -> None:
         self._world, self._away = other, False
 
-    def come_home(self) -> None:
+    def restore_user_order(self) -> None:
         """Give every grain the number back that the user knows it by, until the next step is taken."""
         if self._away:
             rearrange(self._world, inverse(self._world.order))
@@ -112,11 +112,11 @@ class Engine:
         """Taken so far."""
         return self._world.steps
 
-    def _to_places(self) -> None:
+    def _sort_in_space(self) -> None:
         """Grains where steps are fast, if that is not where they are."""
         if not self._world.order.size or self.steps >= self._world.count[ORDERED] + RENEWED_EVERY:
-            w = self.world
-            w.order, w.count[ORDERED] = order_on_curve(w), w.steps
+            w = self.state
+            w.order, w.count[ORDERED] = spatial_order(w), w.steps
             rearrange(w, w.order)
             sort_columns(w)
             self._remake_list()
@@ -131,7 +131,7 @@ class Engine:
             return self._drive(until, last)
         while True:
             if self.time < until and self.steps < last:
-                self._to_places()
+                self._sort_in_space()
             renewed = self._world.count[ORDERED] + RENEWED_EVERY
             stop = self._drive(until, min(last, renewed))
             if not (stop is Stop.STEPS_DONE and renewed <= self.steps < last):
@@ -142,13 +142,13 @@ class Engine:
         w = self._world
         while True:
             stages = (w.stages,) if self._plan.adaptive else ()
-            arrays = (w.grains.arrays, w.contacts, w.near, w.far, *stages, w.clock, w.count, w.lost)
+            arrays = (w.grains.arrays, w.contacts, w.pair_list, w.long_range, *stages, w.clock, w.count, w.lost)
             rules = self._rules_with_crew()
             try:
                 stop = Stop(self._advance(*arrays, rules, float(until), int(last)))
             except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
                 if self._hands is not None:
-                    send_away(rules.crew)
+                    release_workers(rules.queue)
                 raise
             if stop is Stop.CONTACTS_FULL:
                 w.grow_contacts()
@@ -160,19 +160,19 @@ class Engine:
             else:
                 return stop
 
-    def _rules_with_crew(self) -> Rules:
+    def _rules_with_crew(self) -> StepParameters:
         """The rules for one call of the driver, with a crew at work if there is one."""
         if self._hands is None:
             return self.rules
         w = self._world
-        rules = self.rules._replace(crew=new_crew(len(w.grains), w.contacts.flag.size))
-        if wants_help(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
-            self._hands.call((w.grains.arrays, w.contacts, w.far, w.count, rules))
+        rules = self.rules._replace(queue=new_task_queue(len(w.grains), w.contacts.flag.size))
+        if benefits_from_workers(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
+            self._hands.call((w.grains.arrays, w.contacts, w.long_range, w.count, rules))
         return rules
 
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
         """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""
-        w = self.world
+        w = self.state
         if w.contacts.pair.shape[1] < len(pair):
             w.grow_contacts(len(pair))
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
@@ -181,49 +181,49 @@ class Engine:
 
     def begin(self) -> None:
         """Contacts of grains that touch at the start, nothing booked, and the first loads."""
-        w = self.world
+        w = self.state
         w.count[STAGE] = 1
-        w.count[LOOKED] = w.count[GROWN] = -GROW_EVERY
+        w.count[CHECKED] = w.count[STEP_INCREASES] = -GROW_EVERY
         w.clock[CONTACT_STEP] = math.inf
         self._drive(-math.inf, 1)
-        w.count[STEPS] = w.count[MADE] = w.count[MOVED] = w.count[FAR_SUMS] = 0
+        w.count[STEPS] = w.count[MADE] = w.count[SLIPPED] = w.count[LONG_RANGE_SUMS] = 0
         w.lost[:] = 0.0
         w.contacts.lost[:] = 0.0
 
-    def take_up(self, saved: dict[str, np.ndarray]) -> None:
+    def load_state(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
-        w = self.world
+        w = self.state
         w.from_arrays(saved)
         if w.order.size:  # lists depend on it
             rearrange(w, w.order)
             self._away = True
-        elif w.contacts.turn.size:
-            resort_sides(w.contacts, w.count, len(w.grains))
+        elif w.contacts.gather_order.size:
+            resort_contacts_by_grain(w.contacts, w.count, len(w.grains))
         if self.rules.search.listed and not self._list_lasts():
-            w.far.anchor[...] = w.grains.arrays.position
+            w.long_range.anchor[...] = w.grains.arrays.position
         self._remake_list()
 
     def _remake_list(self) -> None:
         """The list of the anchors, if there is one, for the numbers that grains have now."""
         w, search = self._world, self.rules.search
-        while search.listed and remake_far_list(w.far, w.box.span, search.reach) == FULL:
+        while search.listed and rebuild_verlet_list(w.long_range, w.box.span, search.reach) == FULL:
             w.grow_rows()
 
     def _list_lasts(self) -> bool:
         """False if a run of an earlier version had no list, or a wider one, for which grains may have gone farther."""
         w = self._world
-        if not np.isfinite(w.far.anchor).all():
+        if not np.isfinite(w.long_range.anchor).all():
             return False
-        moved = w.box.nearest((w.grains.arrays.position - w.far.anchor).T)
+        moved = w.box.nearest((w.grains.arrays.position - w.long_range.anchor).T)
         return bool((moved**2).sum(axis=1).max() <= (0.5 * self.rules.search.margin) ** 2)
 
     def energies_at_grains(self) -> dict[str, np.ndarray]:
         """Energy [J] of each grain, (N,), by force: half of each pair's, and what per-grain forces give."""
-        w = self.world
-        shares = {force.column: np.zeros(len(w.grains)) for force, _, _ in self.far}
-        for force, sums, numbers in self.far:
-            shares_for(sums.energies)(w.grains.arrays, w.far, self.rules.span, numbers, shares[force.column])
-        for outer in self.outside:
+        w = self.state
+        shares = {force.column: np.zeros(len(w.grains)) for force, _, _ in self.long_range}
+        for force, sums, numbers in self.long_range:
+            shares_for(sums.energies)(w.grains.arrays, w.long_range, self.rules.span, numbers, shares[force.column])
+        for outer in self.external:
             shares[outer.name] = np.zeros(len(w.grains))
             fill = outside_shares_for(outer.formula)
             fill(w.grains.arrays, w.time, outer.numbers(), shares[outer.name])
@@ -233,6 +233,6 @@ class Engine:
         """Energy [J] of all long-range and per-grain forces by column of the ledger."""
         return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
 
-    def culprits(self) -> tuple[int, ...]:
+    def limiting_grains(self) -> tuple[int, ...]:
         """The grains that the last stop was about."""
-        return tuple(sorted({int(self.world.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))
+        return tuple(sorted({int(self.state.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))

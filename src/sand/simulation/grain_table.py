@@ -21,15 +21,15 @@ def at_grains(engine: Engine) -> dict[str, np.ndarray]:
         contact's elastic energy to each of its grains), and one for each long-range force (half of each pair's energy;
         −½ μ·B for dipoles) and each per-grain force, under the names of their columns.
     """
-    world = engine.world
-    grains = world.grains
-    outside = [at(world.time) for force in engine.outside if (at := getattr(force, "flux_density_at", None))]
+    state = engine.state
+    grains = state.grains
+    external = [at(state.time) for force in engine.external if (at := getattr(force, "flux_density_at", None))]
     moving = 0.5 * grains.mass * (grains.velocity**2).sum(axis=1)
     spinning = 0.5 * grains.arrays.inertia * (grains.spin**2).sum(axis=1)
-    table = ContactTable(world, engine.rules.contact.follow)
+    table = ContactTable(state, engine.rules.contact.follow)
     half = 0.5 * np.sum([table[name] for name in ELASTIC], axis=0)
     contacts = np.zeros(len(grains))
     for side in range(2):
         np.add.at(contacts, table["pair"][:, side], half)
-    flux = np.sum([grains.field, *(np.broadcast_to(b, grains.field.shape) for b in outside)], axis=0)
+    flux = np.sum([grains.field, *(np.broadcast_to(b, grains.field.shape) for b in external)], axis=0)
     return {"flux_density": flux, "kinetic": moving + spinning, "contacts": contacts} | engine.energies_at_grains()

@@ -39,7 +39,7 @@ def seed_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | Non
     """Put the contacts of an earlier run into the world; returns their pairs (C, 2), sorted.  Raises BadInput."""
     if contacts is None or not len(contacts.pair):
         return NOTHING_TOUCHES.pair
-    count, pair = len(engine.world.grains), np.asarray(contacts.pair)
+    count, pair = len(engine.state.grains), np.asarray(contacts.pair)
     if contact is None:
         raise BadInput(f"{len(pair)} contacts are given, but there is no sand.Contact() among the forces; add it")
     shapes = tuple(np.shape(part) for part in contacts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES, measure_energies
 from ..errors import BadInput
 from ..grains import Grains
-from ..state.state import BROKEN, CONTACTS, MADE, MOVED, World
+from ..state.state import BROKEN, CONTACTS, MADE, SLIPPED, State
 
 MAGNETIC = "magnetic"
 """A column that every ledger has, with dipoles or without."""
@@ -26,7 +26,7 @@ WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
-def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, float]:
+def log_row(state: State, rules: Any, forces: dict[str, float]) -> dict[str, float]:
     """One row of the ledger: all energies [J], losses [J], momenta (SI), numbers of contacts and clusters.
 
     Parameters
@@ -37,20 +37,20 @@ def take_stock(world: World, rules: Any, forces: dict[str, float]) -> dict[str, 
         energy [J] of each long-range and per-grain force by column.
     """
     energies = np.empty(len(ENERGIES))
-    grains = world.grains.arrays
-    measure_energies(grains, world.contacts, world.count, world.box.span, rules.contact.follow, energies)
-    contacts = int(world.count[CONTACTS])
-    labels = cluster_labels(len(world.grains), world.contacts.pair[:, :contacts].T)
-    row: dict[str, float] = {"step": world.steps, "time": world.time}
+    grains = state.grains.arrays
+    measure_energies(grains, state.contacts, state.count, state.box.span, rules.contact.follow, energies)
+    contacts = int(state.count[CONTACTS])
+    labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
+    row: dict[str, float] = {"step": state.steps, "time": state.time}
     row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | {MAGNETIC: 0.0} | forces
-    row |= dict(zip(LOSSES, world.lost.tolist(), strict=True))
-    row["total"] = math.fsum([*energies.tolist(), *forces.values(), *world.lost.tolist()])
-    row |= dict(zip(MOMENTA, momenta(world.grains), strict=True))
+    row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
+    row["total"] = math.fsum([*energies.tolist(), *forces.values(), *state.lost.tolist()])
+    row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
         "contacts": contacts,
-        "made": int(world.count[MADE]),
-        "moved": int(world.count[MOVED]),
-        "broken": int(world.count[BROKEN]),
+        "made": int(state.count[MADE]),
+        "moved": int(state.count[SLIPPED]),
+        "broken": int(state.count[BROKEN]),
         "clusters": int(labels.max()) + 1,
         "mean_cluster_size": mean_cluster_size(labels),
         "largest_cluster": int(cluster_sizes(labels).max()),
@@ -106,10 +106,6 @@ class Ledger(Books):
         self.rows = [
             {name: kind(v) for name, kind, v in zip(columns, kinds, row, strict=True)} for row in table.tolist()
         ]
-
-    def restore(self, rows: Iterable[dict[str, float]]) -> None:
-        """Take over the rows of a ledger file."""
-        self.rows = list(rows)
 
     def runs_away(self, row: dict[str, float]) -> bool:
         """True if more than half of all energy that this row has, or dissipated, came from nowhere.

@@ -37,7 +37,7 @@ def tick_all(observers: Iterable[Observer], simulation: Simulation) -> None:
     """Every observer's `tick`, grains having the numbers that all but the drivers know."""
     for observer in observers:
         if type(observer).tick is not Observer.tick and getattr(observer, "looks_in_ticks", True):
-            simulation._engine.come_home()
+            simulation._engine.restore_user_order()
         observer.tick(simulation)
 
 

@@ -16,9 +16,9 @@ class Outcome(Enum):
     NOT_FINITE = "a speed or spin is no longer a finite number"
     RUNAWAY = "the energy runs away: more than half of it came from nowhere; the step is too long"
     NO_STEP = "no step can be taken: the physics asks for one too short for the clock"
-    FLEW_TOO_FAR = "a grain would fly more than half the smallest radius in one step: the step is too long"
-    SPUN_TOO_FAR = "a grain would turn by more than half a radian in one step: the step is too long"
-    CRUSHED = "two grains overlap by more than the smaller radius: too fast an impact, or too long a step"
+    TOO_FAST = "a grain would fly more than half the smallest radius in one step: the step is too long"
+    SPINS_TOO_FAST = "a grain would turn by more than half a radian in one step: the step is too long"
+    OVERCOMPRESSED = "two grains overlap by more than the smaller radius: too fast an impact, or too long a step"
 
     @property
     def is_physics(self) -> bool:
@@ -29,9 +29,9 @@ class Outcome(Enum):
 OF_STOP = {
     Stop.NOT_FINITE: Outcome.NOT_FINITE,
     Stop.NO_STEP: Outcome.NO_STEP,
-    Stop.FLEW_TOO_FAR: Outcome.FLEW_TOO_FAR,
-    Stop.SPUN_TOO_FAR: Outcome.SPUN_TOO_FAR,
-    Stop.CRUSHED: Outcome.CRUSHED,
+    Stop.TOO_FAST: Outcome.TOO_FAST,
+    Stop.SPINS_TOO_FAST: Outcome.SPINS_TOO_FAST,
+    Stop.OVERCOMPRESSED: Outcome.OVERCOMPRESSED,
 }
 
 

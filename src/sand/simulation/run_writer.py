@@ -15,7 +15,7 @@ from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
 from ..io.checkpoint import checkpoint_name, write_checkpoint
 from ..io.damage import sealed
-from ..io.ledger_table import LedgerFile, keep_if_damaged, read_ledger
+from ..io.ledger_table import LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
@@ -34,7 +34,7 @@ AT_OUTPUT_EVERY = 1.0
 COST = 0.01
 
 
-class Record:
+class RunWriter:
     """Keeps case.toml, trajectory.gsd, ledger.csv, checkpoints, summary.json and the figure.
 
     Parameters
@@ -133,11 +133,6 @@ class Record:
         except OSError as error:
             raise FilesFailed(f"cannot write to folder {self.folder}: {error.strerror}") from error
 
-    def earlier_rows(self, steps: int) -> list[dict[str, float]]:
-        """The rows of the ledger file up to a step, where the checkpoint has none."""
-        rows = read_ledger(self.folder / files.LEDGER)
-        return [row for row in rows if row["step"] <= steps]
-
     def write(self, simulation: Simulation, row: dict[str, float]) -> None:
         """A frame and a row."""
         if self._ledger is None:
@@ -147,7 +142,7 @@ class Record:
 
     def _frame(self, simulation: Simulation) -> None:
         assert self._trajectory is not None
-        w = simulation.world
+        w = simulation.state
         self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts)
 
     def tick(self, simulation: Simulation, at_output: bool = False) -> None:
@@ -161,7 +156,7 @@ class Record:
 
         A state that is not fit to go on from is not written: the last good one stays.
         """
-        assert simulation.world.count[STAGE] == 0
+        assert simulation.state.count[STAGE] == 0
         begun = wall.monotonic()
         if self._trajectory is not None:
             self._trajectory.flush(sync=True)
@@ -180,7 +175,7 @@ class Record:
             "lost": LOST,
         }
         if simulation.is_sound:
-            arrays = {**simulation.world.to_arrays(), "ledger": simulation.ledger.to_array()}
+            arrays = {**simulation.state.to_arrays(), "ledger": simulation.ledger.to_array()}
             write_checkpoint(self.folder, arrays, meta)
         self._saved = wall.monotonic()
         self._took = self._saved - begun

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from ..forces.base import FarForce
+from ..forces.base import LongRangeForce
 from .stop import SHORTEST
 
 
@@ -31,7 +31,7 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
     forces = {}
     for force in simulation.forces:
         forces[force.name] = dict(force.parameters())
-        if isinstance(force, FarForce):
+        if isinstance(force, LongRangeForce):
             radius = force.choose(simulation.start, simulation.box).radius
             forces[force.name]["cutoff"] = "none" if radius is None else radius
     lengths = ["open" if v is None else v for v in simulation.box.lengths]

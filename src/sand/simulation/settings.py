@@ -21,7 +21,7 @@ ADVICE = {
     "out": "sand.Simulation(sim.grains, sim.forces, out=…)",
 }
 """Arguments of a simulation that hold for all of its life, and how one with others is built."""
-RESULTS = ("time", "steps", "world", "start", "temperature", "ledger", "record", "choices", "is_sound")
+RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "record", "choices", "is_sound")
 """What follows from the run."""
 
 
@@ -83,7 +83,7 @@ def forces_given(value: Any) -> FixedList:
     return forces
 
 
-class Fixed:
+class ReadOnlySettings:
     """Base of `Simulation`: refuses assignments that the running code would not see, and misspelt names.
 
     `frame_every` and `observers` may be assigned at any time; classes derived from `Simulation` may add attributes.
@@ -100,16 +100,16 @@ class Fixed:
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Assign what may change.  Raises BadInput."""
-        if name in Fixed.READERS:
-            value = Fixed.READERS[name](value)
-        elif self._built and not name.startswith("_") and name not in Fixed.KEPT:
+        if name in ReadOnlySettings.READERS:
+            value = ReadOnlySettings.READERS[name](value)
+        elif self._built and not name.startswith("_") and name not in ReadOnlySettings.KEPT:
             if name in ADVICE:
                 what = f"{name} of a simulation cannot change once it is built"
                 raise NoSuchAttribute(f"{what}; build a new one: {ADVICE[name]}")
             if name in RESULTS:
                 raise NoSuchAttribute(f"{name} of a simulation follows from its run and cannot be assigned")
             if type(self).__module__.startswith("sand."):
-                advice = did_you_mean(name, (*Fixed.READERS, *ADVICE))
+                advice = did_you_mean(name, (*ReadOnlySettings.READERS, *ADVICE))
                 raise NoSuchAttribute(f"a simulation has no '{name}'; {advice}")
         object.__setattr__(self, name, value)
 
@@ -117,5 +117,7 @@ class Fixed:
         """Only asked for what is not there."""
         if name.startswith("_") or hasattr(type(self), name):
             return object.__getattribute__(self, name)  # raises what it raised before
-        public = [own for own in {**vars(self), **vars(Fixed), **vars(type(self))} if not own.startswith("_")]
+        public = [
+            own for own in {**vars(self), **vars(ReadOnlySettings), **vars(type(self))} if not own.startswith("_")
+        ]
         raise NoSuchAttribute(f"a simulation has no '{name}'; {did_you_mean(name, sorted(public))}")

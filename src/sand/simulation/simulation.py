@@ -21,20 +21,20 @@ from ..integrate.kernel_spec import Stop
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import Bonds
-from ..state.state import World
-from ..units import seed_given, spoken
+from ..state.state import State
+from ..units import format_quantity, seed_given
 from .assemble import build_engine
 from .contact_table import ContactTable
 from .displays import display
 from .grain_table import at_grains
-from .ledger import Ledger, kinetic_energies, take_stock
+from .ledger import Ledger, kinetic_energies, log_row
 from .observers import Observer, Schedule, tick_all
 from .outcome import OF_STOP, Outcome, Result
 from .pace import Pace
-from .run_writer import Record
-from .settings import Fixed, forces_given
+from .run_writer import RunWriter
+from .settings import ReadOnlySettings, forces_given
 from .signals import Signals
-from .stop import SHORTEST, ends_of
+from .stop import SHORTEST, stop_criteria
 
 BURST = 0.1
 """Wall time [s] the compiled driver stays away from Python, about."""
@@ -43,7 +43,7 @@ GUARD_EVERY = 10_000
 
 
 @checked
-class Simulation(Fixed):
+class Simulation(ReadOnlySettings):
     """Grains, forces and a box, and the time they have lived; only `frame_every` and `observers` can be assigned later.
 
     Parameters
@@ -108,27 +108,26 @@ class Simulation(Fixed):
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
         self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
         self.temperature = kinetic_temperature(grains)
-        self.ledger = Ledger([*(f.column for f, _, _ in self._engine.far), *(f.name for f in self._engine.outside)])
-        self.record = Record(out, overwrite, resumed=restart is not None) if out is not None else None
+        self.ledger = Ledger(
+            [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
+        )
+        self.record = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
         self.wall_seconds, self._begun = 0.0, restart is not None
         self._broken = ""  # why it cannot be run any further
         if restart is not None:
             arrays, meta = restart
-            self._engine.take_up(arrays)
+            self._engine.load_state(arrays)
             self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
-            self._chosen = meta.get("choices", {})
-            if "ledger" in arrays:
-                self.ledger.from_array(arrays["ledger"], meta["ledger"])
-            elif self.record:
-                self.ledger.restore(self.record.earlier_rows(self.steps))
+            self._chosen = meta["choices"]
+            self.ledger.from_array(arrays["ledger"], meta["ledger"])
         for text in self._engine.warnings:
             warn(text)
         self._built = True
 
     @property
-    def world(self) -> World:
+    def state(self) -> State:
         """The state."""
-        return self._engine.world
+        return self._engine.state
 
     @property
     def time(self) -> float:
@@ -148,13 +147,13 @@ class Simulation(Fixed):
     @property
     def grains(self) -> Grains:
         """The grains as they are now; their arrays are read only."""
-        return self.world.grains
+        return self.state.grains
 
     @property
     def contacts(self) -> ContactTable:
         """The contacts as they are now: displacements, shares of their limits, loads, energies, what each lost."""
         self._start()
-        return ContactTable(self.world, self._engine.rules.contact.follow)
+        return ContactTable(self.state, self._engine.rules.contact.follow)
 
     @property
     def choices(self) -> dict[str, str]:
@@ -167,7 +166,9 @@ class Simulation(Fixed):
             choose = getattr(force, "choose", None)
             if choose is not None:
                 radius, reason = choose(self.start, self.box)
-                told[f"{force.name} cut-off"] = f"{'none' if radius is None else spoken(radius, 'm')} ({reason})"
+                told[f"{force.name} cut-off"] = (
+                    f"{'none' if radius is None else format_quantity(radius, 'm')} ({reason})"
+                )
         return told | {"neighbours": self._engine.search}
 
     def loads(self) -> dict[str, Any]:
@@ -212,7 +213,7 @@ class Simulation(Fixed):
         """
         if self._broken:
             raise BadInput(f"this simulation cannot go on: {self._broken}")
-        end, last = ends_of(until, steps, self.time, self.steps, self.planned)
+        end, last = stop_criteria(until, steps, self.time, self.steps, self.planned)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
             self.frame_every = max((end - self.time) / 200.0, SHORTEST)
         try:
@@ -225,7 +226,7 @@ class Simulation(Fixed):
                     outcome = self._loop(end, last, signals)
                 finally:
                     self.wall_seconds += wall.monotonic() - begun
-                    self._engine.come_home()
+                    self._engine.restore_user_order()
             return self._close(outcome)
         except FilesFailed as error:
             if self.record:
@@ -262,7 +263,7 @@ class Simulation(Fixed):
             self._look()
 
     def _stock(self) -> dict[str, float]:
-        return take_stock(self.world, self._engine.rules, self._engine.force_energies())
+        return log_row(self.state, self._engine.rules, self._engine.force_energies())
 
     def _look(self) -> None:
         """A row of the ledger, a frame and everyone who looks on."""
@@ -305,7 +306,7 @@ class Simulation(Fixed):
                 return Outcome.INTERRUPTED
 
     def _close(self, outcome: Outcome) -> Result:
-        named = self._engine.culprits() if outcome.is_physics else ()
+        named = self._engine.limiting_grains() if outcome.is_physics else ()
         if outcome is Outcome.RUNAWAY:
             named = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
         if outcome.is_physics:

@@ -23,7 +23,7 @@ def duration(value: Any, name: str) -> float:
     return seconds
 
 
-def ends_of(
+def stop_criteria(
     until: Any, steps: int | None, time: float, taken: int, planned: tuple[float, float]
 ) -> tuple[float, float]:
     """The time [s] and the step that `Simulation.run(until, steps=steps)` ends at, infinite where it has no such end.

@@ -34,10 +34,12 @@ class ContactArrays(NamedTuple):
     bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
     side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
-    turn: np.ndarray  # (N + KINDS,) uint32: the grains as contact.gather takes them; (0,) for as they are numbered
+    gather_order: (
+        np.ndarray
+    )  # (N + KINDS,) uint32: the grains as contact.gather takes them; (0,) for as they are numbered
 
 
-class NearPairs(NamedTuple):
+class PairList(NamedTuple):
     """Pairs close enough to touch soon; the first count[PAIRS] columns are in use."""
 
     pair: np.ndarray  # (2, P) uint32
@@ -45,11 +47,13 @@ class NearPairs(NamedTuple):
     step: np.ndarray  # (P,) the step their contact needs [s]; (1,) where all are alike
     length: np.ndarray  # (P,) δ_c of their contact [m]; (1,) likewise
     anchor: np.ndarray  # (3, N) positions when the list was made [m]; scratch while cells make it
-    soon: np.ndarray  # (P/8,) uint32: the pairs that may touch next, the first watch[SOON]; all if there are too many
-    watch: np.ndarray  # (7,) what spares looking at all grains or pairs in every step: neighbours.skin
+    inner: (
+        np.ndarray
+    )  # (P/8,) uint32: the pairs that may touch next, the first watch[INNER_COUNT]; all if there are too many
+    skin: np.ndarray  # (7,) what spares looking at all grains or pairs in every step: neighbours.skin
 
 
-class FarArrays(NamedTuple):
+class LongRangeArrays(NamedTuple):
     """What long-range forces need: the list of pairs within reach, and the loads of their last summation.
 
     The list is one-sided, each pair stands in the rows of both its grains, and is kept in the order of cells:
@@ -59,34 +63,34 @@ class FarArrays(NamedTuple):
     anchor: np.ndarray  # (3, N) positions when the list was made [m]
     order: np.ndarray  # (N,) uint32: the grain at each place
     start: np.ndarray  # (N+1,) uint32: where each place's row of `mate` begins
-    mate: np.ndarray  # (P,) uint32: places of the neighbours
-    home: np.ndarray  # (N,) uint32: cell of each grain
+    neighbour: np.ndarray  # (P,) uint32: places of the neighbours
+    cell_of: np.ndarray  # (N,) uint32: cell of each grain
     cell: np.ndarray  # (M+1,) uint32: first place of each cell
-    here: np.ndarray  # (3, V) positions by place [m]; by grain in sums over all pairs
+    packed_position: np.ndarray  # (3, V) positions by place [m]; by grain in sums over all pairs
     source: np.ndarray  # (3, V) moments, or charges in the first row; (1, P) where no force needs it
     force: np.ndarray  # (3, N) far forces [N]; (3, 0) without any
     torque: np.ndarray  # (3, N) far torques [N m]; likewise
-    held_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
-    held_torque: np.ndarray  # (3, N) [N m]
+    slow_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
+    slow_torque: np.ndarray  # (3, N) [N m]
     force_rate: np.ndarray  # (3, N) their rates of change [N/s]
     torque_rate: np.ndarray  # (3, N) [N m/s]
     past_position: np.ndarray  # (3, N) at the last summation, or the one before [m]
     past_moment: np.ndarray  # (3, N) [A m²]
     path: np.ndarray  # (3, N) displacement since the last summation, summed over time [m s]
-    share: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
+    block_sums: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
-KEPT_FAR = ("anchor", "force", "torque", "held_force", "held_torque", "past_position", "past_moment", "path")
+SAVED_LONG_RANGE = ("anchor", "force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
 FOR_FORCES = ("force", "torque")
-FOR_CELLS = ("order", "home", "cell", "source")
-FOR_LIST = ("anchor", "start", "here", *FOR_CELLS)
-FOR_IMPULSES = ("held_force", "held_torque", "past_position", "path")
+FOR_CELLS = ("order", "cell_of", "cell", "source")
+FOR_LIST = ("anchor", "start", "packed_position", *FOR_CELLS)
+FOR_IMPULSES = ("slow_force", "slow_torque", "past_position", "path")
 FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
 """The far arrays that only long-range forces, cells, a list, or cycles of either kind, read and write."""
 FOR_ALL = ("bond", "step", "length")
 """Numbers of contacts and near pairs that are the same for all where grains are equal."""
-PICKED = ("soon", "watch", "turn")
+NOT_SAVED = ("inner", "skin", "gather_order")
 """Of contacts and near pairs, what it leaves out: it is picked or worked out anew."""
 KINDS = 64
 """Places behind all grains that sorting them by their contacts needs."""
@@ -102,7 +106,9 @@ CELLS_PER_GRAIN = 4
 """Most cells per grain; where grains are sparse, cells are larger than they need be."""
 
 
-def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collection[str] = ()) -> FarArrays:
+def empty_long_range_arrays(
+    grains: int, capacity: int, blocks: int = 1, *, needless: Collection[str] = ()
+) -> LongRangeArrays:
     """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list.
 
     Parameters
@@ -112,42 +118,44 @@ def far_arrays(grains: int, capacity: int, blocks: int = 1, *, needless: Collect
     needless : Collection[str], optional
         arrays that get no columns, since nothing will touch them.
     """
-    vectors = {name: np.zeros((3, grains)) for name in FarArrays._fields}
+    vectors = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
     v, p = whole(grains), max(int(capacity), 16)
     # without forces, cells keep one number there for each neighbour of a grain
     source = np.zeros((1, p) if "force" in needless else (3, v))
-    vectors |= {"here": np.zeros((3, v)), "source": source, "share": np.zeros((2 * blocks, 3, v))}
-    sizes = {"order": grains, "start": grains + 1, "mate": p, "home": grains}
+    vectors |= {"packed_position": np.zeros((3, v)), "source": source, "block_sums": np.zeros((2 * blocks, 3, v))}
+    sizes = {"order": grains, "start": grains + 1, "neighbour": p, "cell_of": grains}
     sizes["cell"] = CELLS_PER_GRAIN * grains + 28
     arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
-    return FarArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in needless}))
+    return LongRangeArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in needless}))
 
 
-def contact_arrays(grains: int, room: int, constants: int, *, alike: bool = False, channels: int = 6) -> ContactArrays:
+def empty_contact_arrays(
+    grains: int, room: int, constants: int, *, uniform_contacts: bool = False, channels: int = 6
+) -> ContactArrays:
     """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
     c = whole(max(int(room), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
     numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS else 0)}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
-        bond=np.zeros((constants, BLOCK if alike else c)),
+        bond=np.zeros((constants, BLOCK if uniform_contacts else c)),
         flag=np.zeros(c, np.uint8),
         bonded=np.zeros(c, np.uint8),
         lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
-        turn=np.zeros(grains + KINDS if grains >= TURNS_FROM else 0, np.uint32),
+        gather_order=np.zeros(grains + KINDS if grains >= TURNS_FROM else 0, np.uint32),
         **(vectors | numbers),
     )
 
 
-def near_pairs(grains: int, capacity: int, *, alike: bool = False) -> NearPairs:
+def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = False) -> PairList:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
     p, nowhere = whole(max(int(capacity), 16)), np.full((3, grains), np.inf)
-    pair, touching, soon = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p // PAIRS_PER_SOON, np.uint32)
-    kind = np.zeros((2, 1 if alike else p))
-    return NearPairs(pair, touching, kind[0], kind[1], nowhere, soon, np.full(7, -1.0))
+    pair, touching, inner = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p // PAIRS_PER_SOON, np.uint32)
+    kind = np.zeros((2, 1 if uniform_contacts else p))
+    return PairList(pair, touching, kind[0], kind[1], nowhere, inner, np.full(7, -1.0))
 
 
 def grown(arrays: Any, others: Collection[str], least: int) -> Any:

@@ -13,7 +13,7 @@ from ..analysis.ledger_columns import Books
 from ..analysis.tracking import SINGLE, Lineage
 from ..errors import BadInput
 from ..io import run_folder as files
-from ..io.live_trajectory import Following
+from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import BIG
 from ..version import __version__
@@ -29,11 +29,11 @@ FOLLOWED = 8_000_000
 STEADY = 1e-9
 """Directions of a field that differ by less are one."""
 
-FieldTold = tuple[str, Callable[[float], Sequence[float]]]
+FieldDescription = tuple[str, Callable[[float], Sequence[float]]]
 """A magnetic field in words, and its flux density [T] at a time [s]."""
 
 
-class Story:
+class RunDataset:
     """A run, told to a page; safe to be asked by several threads.
 
     Parameters
@@ -48,7 +48,7 @@ class Story:
         the ledger so far; None where there is none.
     summary : Callable[[], Mapping[str, Any] or None]
         how the run ended; None while it has not, empty where nobody knows.
-    field : FieldTold or None, optional
+    field : FieldDescription or None, optional
         the magnetic field, if there is one.
     chosen : slice, optional
         which frames are told; all by default.
@@ -64,13 +64,13 @@ class Story:
         *,
         books: Callable[[], Books | None],
         summary: Callable[[], Mapping[str, Any] | None],
-        field: FieldTold | None = None,
+        field: FieldDescription | None = None,
         chosen: slice = slice(None),
         compact: bool = False,
     ):
         self.frames, self.name, self.place, self.compact = frames, name, place, compact
         self.notes, self._lock = list[str](), threading.RLock()
-        self._books, self._summary, self._field = books, summary, field
+        self._ledger_columns, self._summary, self._field = books, summary, field
         self._asked = chosen
         self._begin()
         self.refresh()
@@ -172,8 +172,8 @@ class Story:
         torn = self.frames.torn
         left = [f"{torn} frame{'s' if torn > 1 else ''} at the end left out: not whole"] if torn else []
         silent = killed_note(self.frames.age) if self._ended is None else ""
-        self._books()  # looks whether the ledger is as it should be
-        wrong = [getattr(self._books, "problem", ""), (self._ended or {}).get(PROBLEM, "")]
+        self._ledger_columns()  # looks whether the ledger is as it should be
+        wrong = [getattr(self._ledger_columns, "problem", ""), (self._ended or {}).get(PROBLEM, "")]
         return [*self.notes, *left, *(text for text in (silent, *wrong) if text)]
 
     @property
@@ -216,7 +216,7 @@ class Story:
     def series(self) -> dict[str, Any]:
         """What happened over time, by the ledger; by the frames where there is none."""
         with self._lock:
-            books = self._books()
+            books = self._ledger_columns()
             return of_ledger(books) if books else of_frames(self.frames, self.grains_count)
 
     def dimension(self, k: int, grain: int) -> dict[str, Any]:
@@ -265,7 +265,7 @@ def _direction(vector: Sequence[float]) -> list[float]:
     return [float(f"{part / size:.9g}") if size > 0.0 else 0.0 for part in vector]
 
 
-def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
+def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunDataset:
     """The story of a run in a folder, or of a trajectory of SAND by itself.
 
     Raises
@@ -279,7 +279,7 @@ def story_of(path: str | Path, field: FieldTold | None = None) -> Story:
         if not place.is_file():
             lacks = f"there is no {files.TRAJECTORY} in it" if place.is_dir() else "there is no such folder or file"
             raise BadInput(f"{path} is neither the folder of a run nor a trajectory: {lacks}")
-        return Story(Following(place), place.stem, str(path), books=lambda: None, summary=dict, field=field)
-    frames = Following(folder / files.TRAJECTORY)
+        return RunDataset(LiveTrajectory(place), place.stem, str(path), books=lambda: None, summary=dict, field=field)
+    frames = LiveTrajectory(folder / files.TRAJECTORY)
     name = folder.resolve().name
-    return Story(frames, name, str(path), books=RunBooks(folder), summary=lambda: summary_of(folder), field=field)
+    return RunDataset(frames, name, str(path), books=RunBooks(folder), summary=lambda: summary_of(folder), field=field)

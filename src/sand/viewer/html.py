@@ -17,7 +17,7 @@ from ..analysis.fractal import FEWEST
 from ..errors import BadInput
 from ..io.page_bundle import Written, read_bundle
 from ..io.run_folder import plain
-from .dataset import Story
+from .dataset import RunDataset
 from .dimensions import Dimensions
 
 CLOSED = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data: blob:; media-src blob:; "
@@ -62,7 +62,7 @@ _BOTTOM = "</body>\n</html>\n"
 
 
 def write_page(
-    story: Story, path: str | Path, *, progress: Callable[[int, int], None] | None = None, bundle: Any = None
+    story: RunDataset, path: str | Path, *, progress: Callable[[int, int], None] | None = None, bundle: Any = None
 ) -> int:
     """One file with all frames of a story, which becomes a `compact` one; returns its bytes.
 
@@ -112,11 +112,11 @@ def write_page(
     return file.size
 
 
-def _title(story: Story) -> str:
+def _title(story: RunDataset) -> str:
     return f"{story.name} – SAND"
 
 
-def _measured(story: Story) -> int:
+def _measured(story: RunDataset) -> int:
     """Dimensions are worked out for every such frame."""
     if story.grains_count < FEWEST:
         return len(story) + 1
@@ -141,7 +141,7 @@ def _harmless(script: str) -> str:
     return re.sub("<(?=/script|!--)", r"\\x3c", lines, flags=re.IGNORECASE)
 
 
-def fitting(story: Story, most: float) -> int:
+def fitting(story: RunDataset, most: float) -> int:
     """Every which frame is to be told so that all of them take at most so many bytes."""
     return max(-(-story.size // int(most)), 1)
 

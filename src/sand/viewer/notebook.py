@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import plain
-from .dataset import Story
+from .dataset import RunDataset
 
 
 def has_widgets() -> bool:
@@ -16,7 +16,7 @@ def has_widgets() -> bool:
     return importlib.util.find_spec("anywidget") is not None
 
 
-def widget(story: Story) -> Any:
+def widget(story: RunDataset) -> Any:
     """A widget that shows a story.
 
     Raises
@@ -47,7 +47,7 @@ def _kind(script: str, styles: str) -> Any:
 
         _esm, _css = script, styles
 
-        def __init__(self, story: Story):
+        def __init__(self, story: RunDataset):
             super().__init__()
             self._story = story
             self.on_msg(self._asked)
@@ -59,7 +59,7 @@ def _kind(script: str, styles: str) -> Any:
     return GrainWidget
 
 
-def answered(story: Story, content: Any) -> tuple[dict[str, Any], list[bytes]]:
+def answered(story: RunDataset, content: Any) -> tuple[dict[str, Any], list[bytes]]:
     """The answer to a message, and its buffers; see grainview/README.md."""
     asked = content if isinstance(content, dict) else {}
     kind = asked.get("kind")

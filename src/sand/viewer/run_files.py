@@ -20,8 +20,8 @@ def killed_note(age: float) -> str:
     if age < STALE:
         return ""
     hours = age / 3600.0
-    spoken = f"{hours:.0f} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
-    return f"no frame for {spoken}: it may have been killed; sand resume goes on"
+    format_quantity = f"{hours:.0f} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
+    return f"no frame for {format_quantity}: it may have been killed; sand resume goes on"
 
 
 def run_folder(place: str | Path) -> Path | None:

@@ -24,7 +24,7 @@ from typing import Any
 from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import plain
-from .dataset import Story
+from .dataset import RunDataset
 from .html import SERVED, served
 
 LOOPBACK = "127.0.0.1"
@@ -86,7 +86,7 @@ class Server(ThreadingHTTPServer):
     allow_reuse_address = os.name == "posix"  # elsewhere it would let others take the port over
     request_queue_size = AT_ONCE
 
-    def __init__(self, story: Story, port: int = 0):
+    def __init__(self, story: RunDataset, port: int = 0):
         script, styles = read_bundle()
         self.story, self.token = story, secrets.token_urlsafe(24)
         self._lines: dict[int, _Line] = {}

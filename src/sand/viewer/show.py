@@ -13,7 +13,7 @@ from ..io.page_bundle import read_bundle
 from ..io.run_folder import VIEW
 from ..plotting.run_figure import in_notebook
 from .browser import open_page
-from .dataset import Story
+from .dataset import RunDataset
 from .html import fitting, write_page
 from .notebook import has_widgets, widget
 
@@ -21,7 +21,7 @@ LARGEST = 150e6
 """Bytes of frames in a page that nobody asked to be larger."""
 
 
-def show_story(story: Story, path: str | Path | None, folder: Path | None, instead: Callable[[], Any]) -> Any:
+def show_dataset(story: RunDataset, path: str | Path | None, folder: Path | None, instead: Callable[[], Any]) -> Any:
     """The widget in a notebook with anywidget, unless a `path` is given; else the page, written and opened.
 
     Parameters

@@ -9,13 +9,13 @@ import numpy as np
 
 from ..analysis.ledger_columns import Books
 from ..io.frame import Frame, stored_frame
-from .dataset import FieldTold, Story
+from .dataset import FieldDescription, RunDataset
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
 
-class Moment:
+class Snapshot:
     """One frame, as `io.live_trajectory.Following` has many."""
 
     torn = generation = 0
@@ -40,12 +40,12 @@ class Moment:
         return self._frame.pair
 
 
-def story_of_now(simulation: Simulation, field: FieldTold | None) -> Story:
+def snapshot_dataset(simulation: Simulation, field: FieldDescription | None) -> RunDataset:
     """The state of a simulation and what happened until then; later steps are not in it."""
-    world = simulation.world
-    stored: Any = stored_frame(world.steps, world.time, world.grains, world.box, simulation.contacts)
+    state = simulation.state
+    stored: Any = stored_frame(state.steps, state.time, state.grains, state.box, simulation.contacts)
     books = Books(simulation.ledger.columns, simulation.ledger.rows)
-    now = Moment(Frame(stored))
-    story = Story(now, "simulation", "in memory", books=lambda: books, summary=dict, field=field)
+    now = Snapshot(Frame(stored))
+    story = RunDataset(now, "simulation", "in memory", books=lambda: books, summary=dict, field=field)
     story.notes.append("this simulation keeps no files: its state of now, and what its ledger holds")
     return story

@@ -11,14 +11,14 @@ from pydantic import Field, ValidationError, field_validator
 
 from ...config.case import MaterialSection, Section
 from ...config.commands import refuse_other_command
-from ...config.errors import complaints
-from ...config.sections import PlaceName, Seed
+from ...config.errors import validation_errors
+from ...config.sections import PathName, Seed
 from ...errors import BadInput
 from ...io.run_folder import read_toml
 from ...material import PRESETS
 from ..collision_case import BodySection, Kind, wrong_bodies
 from .encounters import Flight
-from .problem import Asking, flight, impact_parameter
+from .problem import ErrorCollector, flight, impact_parameter
 
 
 class ScatterBody(BodySection):
@@ -54,7 +54,7 @@ class MeasureSection(Section):
     cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
     per_cell: Annotated[int, Field(ge=1, le=10**9, strict=True)] = 64
     seed: Seed = 0
-    out: PlaceName | None = None
+    out: PathName | None = None
 
     @field_validator("relative_error")
     @classmethod
@@ -75,7 +75,7 @@ class ScatterCase(Section):
 
     def flights(self) -> list[Flight]:
         """One set-up for each speed, and for each of `spins` of trajectories.  Raises BadInput, all mistakes."""
-        ask = Asking()
+        ask = ErrorCollector()
         materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
         bodies = {
             name: ask.take(lambda body=body, k=k: body.build(materials, 2 * self.measure.seed + k))  # type: ignore[misc]
@@ -142,7 +142,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     try:
         case = ScatterCase.model_validate(content)
     except ValidationError as error:
-        problems += [line for slip in error.errors() for line in complaints(slip, ScatterCase, {})]
+        problems += [line for slip in error.errors() for line in validation_errors(slip, ScatterCase, {})]
         raise BadInput(f"{path}: {problem}" for problem in problems) from None
     if problems:
         raise BadInput(f"{path}: {problem}" for problem in problems)

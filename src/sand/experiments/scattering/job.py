@@ -15,7 +15,7 @@ from ...io.run_folder import CASE, FIGURE, FLIGHTS, RESULTS, SCATTERING, read_to
 from ...io.table import GrowingTable, write_table
 from ...plotting.run_figure import save
 from ...simulation.run_writer import versions
-from ..collision_case import with_whole_paths
+from ..collision_case import with_absolute_paths
 from .case import ScatterCase
 from .cross_sections import measure, seed_of
 from .encounters import Flight
@@ -57,9 +57,9 @@ class Job:
 
     def __post_init__(self) -> None:
         place = self.folder / CASE
-        self.content = with_whole_paths(self.content)
+        self.content = with_absolute_paths(self.content)
         if self.resume and place.exists():
-            if with_whole_paths(read_toml(place)) != self.content:
+            if with_absolute_paths(read_toml(place)) != self.content:
                 raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
         else:
             write_toml(place, self.content, "sand scatter: what was asked for; sand resume reads it")
@@ -168,17 +168,17 @@ def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
 def _title(flights: list[Flight]) -> str:
     """What is scattered, in a line."""
     one = flights[0]
-    from ...units import spoken
+    from ...units import format_quantity
 
     def body(grains: Any) -> str:
         names = ", ".join(m.name for m in grains.materials)
-        radius = spoken(float(grains.radius.mean()), "m")
+        radius = format_quantity(float(grains.radius.mean()), "m")
         return f"{names}, r = {radius}" if len(grains) == 1 else f"{len(grains)} grains of {names}, r = {radius}"
 
     parts = [body(one.projectile)]
     if body(one.target) != parts[0]:
         parts.append(body(one.target))
-    heat = f", {spoken(one.temperature, 'K')}" if one.temperature > 0.0 else ""
+    heat = f", {format_quantity(one.temperature, 'K')}" if one.temperature > 0.0 else ""
     shape = "sphere" if one.sphere else "plane"
-    far = [spoken(f(each.distance for each in flights), "m") for f in (min, max)]
+    far = [format_quantity(f(each.distance for each in flights), "m") for f in (min, max)]
     return f"{' on '.join(parts)}{heat}; starts on a {shape}, {' to '.join(dict.fromkeys(far))}"

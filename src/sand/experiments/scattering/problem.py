@@ -16,7 +16,7 @@ from ...forces.vectors import three
 from ...grains import Grains
 from ...material import Material, as_material
 from ...theory.magnetic import thermal_speed
-from ...units import in_unit, si, spoken
+from ...units import format_quantity, in_unit, si
 from .encounters import Flight, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 
@@ -41,7 +41,7 @@ FARTHEST = 1e9
 """Largest start in sums of the radii."""
 
 
-class Asking:
+class ErrorCollector:
     """Collects what is wrong, so that all of it is told at once."""
 
     def __init__(self) -> None:
@@ -126,7 +126,7 @@ def flight(
 
 def _checked(given: dict[str, Any]) -> Flight:
     """All of what was given, checked, so that every mistake is told at once."""
-    ask = Asking()
+    ask = ErrorCollector()
     first, second = _bodies(ask, given)
     heat = ask.take(lambda: si(given["temperature"], "K", "temperature", least=0.0), 0.0)
     for name, allowed in WORDS.items():
@@ -152,7 +152,9 @@ def _checked(given: dict[str, Any]) -> Flight:
             away = ask.take(lambda: _distance(given["start"], first, second, speed, heat))
             touch = scales_of(first, second, speed).touch
             if gone and not gone > touch:
-                ask.problems.append(f"escape = {given['escape']!r} must lie beyond the contact, {spoken(touch, 'm')}")
+                ask.problems.append(
+                    f"escape = {given['escape']!r} must lie beyond the contact, {format_quantity(touch, 'm')}"
+                )
     ask.done()
     return Flight(
         first,
@@ -173,7 +175,7 @@ def _checked(given: dict[str, Any]) -> Flight:
     )
 
 
-def _bodies(ask: Asking, given: dict[str, Any]) -> tuple[Any, Any]:
+def _bodies(ask: ErrorCollector, given: dict[str, Any]) -> tuple[Any, Any]:
     """Projectile and target; None for what could not be made."""
     for name in ("projectile", "target"):
         if given[name] is not None and not isinstance(given[name], Grains):
@@ -256,8 +258,8 @@ def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: flo
         distance = si(start, "m", "start", above=0.0)
     if not distance > scales.touch:
         raise BadInput(
-            f"start = {start!r}, {spoken(distance, 'm')}, lies inside the contact: the bodies reach to "
-            f"{spoken(scales.touch, 'm')}; start farther out"
+            f"start = {start!r}, {format_quantity(distance, 'm')}, lies inside the contact: the bodies reach to "
+            f"{format_quantity(scales.touch, 'm')}; start farther out"
         )
     if not distance < FARTHEST * scales.touch:
         raise BadInput(f"start = {start!r} is out of all range: at most {FARTHEST:.0e} times r1 + r2")
@@ -284,5 +286,7 @@ def impact_parameter(value: Any, flying: Flight, name: str = "impact_parameter")
     if b < 0.0:
         raise BadInput(f"{name} = {value!r} must be at least 0 m")
     if flying.sphere and b >= flying.distance:
-        raise BadInput(f"{name} = {value!r} must be below the radius of the start, {spoken(flying.distance, 'm')}")
+        raise BadInput(
+            f"{name} = {value!r} must be below the radius of the start, {format_quantity(flying.distance, 'm')}"
+        )
     return b

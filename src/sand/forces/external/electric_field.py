@@ -35,7 +35,7 @@ class ElectricField:
     name = "electric"
     references = "Jackson 1975"
     formula = staticmethod(uniform_electric)
-    moored = True
+    position_dependent = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "strength", along_z(self.strength, "V/m", "electric: strength"))

@@ -10,7 +10,7 @@ from ...compiler.jit import formula
 from ...numerics.vec import add, axpy, cross, dot, scale
 
 
-class One(NamedTuple):
+class GrainState(NamedTuple):
     """One grain, as a per-grain force sees it."""
 
     position: tuple  # [m]

@@ -35,7 +35,7 @@ class Gravity:
     name = "gravity"
     references = "Newton 1687"
     formula = staticmethod(uniform_gravity)
-    moored = True
+    position_dependent = True
 
     def __post_init__(self) -> None:
         given = self.acceleration

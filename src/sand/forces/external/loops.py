@@ -5,13 +5,13 @@ import functools
 from ...box import nearest_image
 from ...compiler.jit import kernel, loop
 from ...numerics.vec import accrue, load, put
-from .formulas import One
+from .formulas import GrainState
 
 
 @loop
 def grain_at(grains, i):
     """Grain i as a per-grain formula sees it."""
-    return One(
+    return GrainState(
         load(grains.position, i),
         load(grains.velocity, i),
         load(grains.spin, i),

@@ -184,14 +184,14 @@ class Field:
         return uniform_field if self.shape == "constant" else field_in_time
 
     @property
-    def timed(self) -> bool:
+    def time_dependent(self) -> bool:
         """True if B changes in time: then −μ·B does so too, which is work of what makes the field."""
         return self.shape != "constant"
 
     def parameters(self) -> dict[str, Any]:
         """What the shape uses, in SI; a constant field is its flux density alone."""
         given = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items() if v is not None}
-        return given if self.timed else {"flux_density": given["flux_density"]}
+        return given if self.time_dependent else {"flux_density": given["flux_density"]}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warns when no grain has a moment."""

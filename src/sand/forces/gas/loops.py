@@ -13,7 +13,7 @@ TRANSLATION, ROTATION = range(2)
 """Streams of random numbers: what a deviate is for.  Others that draw from `numerics.random` take other numbers."""
 
 
-class GasRules(NamedTuple):
+class GasParameters(NamedTuple):
     """The gas's run-time numbers."""
 
     on: bool  # False: vacuum
@@ -26,7 +26,7 @@ class GasRules(NamedTuple):
     wind_z: float
 
 
-VACUUM = GasRules(False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+VACUUM = GasParameters(False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 """No gas: `gas_kick` does nothing."""
 
 
@@ -69,7 +69,7 @@ def gas_kick(grains, seed, number, elapsed, gas):
     elapsed
         [s] ≥ 0.
     gas
-        GasRules.
+        GasParameters.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def shortest_stopping_time(grains, gas):
     grains
         grains.GrainArrays.
     gas
-        GasRules.
+        GasParameters.
     """
     numbers = (gas.density, gas.mean_speed, gas.accommodation)
     fastest = max(

@@ -12,14 +12,14 @@ from ...box import Box
 from ...constants import BOLTZMANN, LIGHT
 from ...errors import FORBID_EXTRA, BadInput
 from ...grains import Grains
-from ...units import MELTED, si, spoken
+from ...units import MELTED, format_quantity, si
 from ..vectors import three
 from . import drag as law
-from .loops import GasRules, shortest_stopping_time
+from .loops import GasParameters, shortest_stopping_time
 
 RAREFIED = 10.0
 """Least mean free path, in radii, for molecules that hit a grain unaware of each other."""
-FASTEST = 0.5
+LARGEST_SPEED = 0.5
 """Speed relative to the wind, in mean molecular speeds, above which Epstein's linear law is at the edge: it then
 lacks 6 % of the drag of mirrors and 4 % of that of diffuse walls."""
 
@@ -110,12 +110,12 @@ class Gas:
         given = {key: value for key, value in asdict(self).items() if value is not None}
         return given | {"wind": list(self.wind)}
 
-    def rules(self) -> GasRules:
+    def rules(self) -> GasParameters:
         """The gas as the kernels take it."""
         energy = BOLTZMANN * self.temperature
         density = self.density or law.density_of(self.pressure, energy, self.molecule_mass)
         speed = law.mean_speed(energy, self.molecule_mass)
-        return GasRules(True, density, speed, energy if self.brownian else 0.0, self.accommodation, *self.wind)
+        return GasParameters(True, density, speed, energy if self.brownian else 0.0, self.accommodation, *self.wind)
 
     def shortest_time(self, grains: Grains) -> float:
         """The shortest time [s] in which a grain loses its motion through the gas, or its spin, to 1/e."""
@@ -128,10 +128,10 @@ class Gas:
             warnings.append(f"gas: temperature = {self.temperature:g} K: no material is solid above {MELTED:g} K")
         speed = np.linalg.norm(grains.velocity - np.array(self.wind), axis=1)
         fastest = int(np.argmax(speed))
-        if speed[fastest] > FASTEST * rules.mean_speed:
+        if speed[fastest] > LARGEST_SPEED * rules.mean_speed:
             warnings.append(
-                f"gas: grain {fastest} moves at {spoken(speed[fastest], 'm/s')} through a gas of mean molecular speed "
-                f"{spoken(rules.mean_speed, 'm/s')}; Epstein's law assumes far less than that: "
+                f"gas: grain {fastest} moves at {format_quantity(speed[fastest], 'm/s')} through a gas of mean molecular speed "
+                f"{format_quantity(rules.mean_speed, 'm/s')}; Epstein's law assumes far less than that: "
                 "its drag is then too weak"
             )
         if self.cross_section is not None:
@@ -139,7 +139,7 @@ class Gas:
             largest = float(grains.radius.max())
             if path < RAREFIED * largest:
                 warnings.append(
-                    f"gas: the mean free path is {spoken(path, 'm')}, the largest radius {spoken(largest, 'm')}; "
+                    f"gas: the mean free path is {format_quantity(path, 'm')}, the largest radius {format_quantity(largest, 'm')}; "
                     f"Epstein's law assumes a path above {RAREFIED:g} radii: its drag is then too strong"
                 )
         return warnings

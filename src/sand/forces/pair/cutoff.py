@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 from ...box import Box
 from ...errors import FORBID_EXTRA, BadInput, did_you_mean
 from ...grains import Grains
-from ...units import is_word, si, spoken
+from ...units import format_quantity, is_word, si
 from .dipole_formulas import Cutoff
 
 CUTS = ("smooth", "sharp")
@@ -37,15 +37,15 @@ def cutoff_given(cutoff: Any, name: str) -> float | None:
     return si(cutoff, "m", f"{name}: cutoff", above=0.0)
 
 
-def spoken_cut(cutoff: float | None, cut: str, box: Box, name: str) -> Choice:
+def describe_cutoff(cutoff: float | None, cut: str, box: Box, name: str) -> Choice:
     """The user's own cut-off as a choice.  Raises BadInput if it reaches beyond half the box."""
     if cutoff is None:
         where = "all pairs, open box" if box.is_open else "nearest images, energy jumps at half the box"
         return Choice(None, f"no cut-off asked for: {where}")
     if cutoff > 0.5 * box.shortest:
         raise BadInput(
-            f"{name}: cutoff = {spoken(cutoff, 'm')} reaches beyond half the box "
-            f"({spoken(0.5 * box.shortest, 'm')}); take a larger box or a cutoff up to that"
+            f"{name}: cutoff = {format_quantity(cutoff, 'm')} reaches beyond half the box "
+            f"({format_quantity(0.5 * box.shortest, 'm')}); take a larger box or a cutoff up to that"
         )
     return Choice(cutoff, f"{cut}, given by the user")
 
@@ -89,7 +89,7 @@ class WithCutoff:
     def choose(self, grains: Grains, box: Box) -> Choice:
         """The cut-off in force, with its reason.  Raises BadInput if it does not fit into the box."""
         if self.cutoff != "auto":
-            return spoken_cut(self.cutoff, self.cut, box, self.name)
+            return describe_cutoff(self.cutoff, self.cut, box, self.name)
         if box.is_open:
             return Choice(None, "open box: all pairs")
         return self.automatic(grains, 0.5 * box.shortest / ROOM)

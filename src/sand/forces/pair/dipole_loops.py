@@ -14,11 +14,11 @@ import numpy as np
 from ...box import nearest_image
 from ...compiler.jit import LONG_VECTORS, formula, loop
 from ...numerics.roots import seeded_inverse_root
-from ...numerics.simd import filled_up
+from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load, pair_load_at, pair_load_cut
 from .dipole_rates import pair_rates
-from .loops import FarSums, Parts, all_blocks
+from .loops import LongRangeSums, Parts, all_blocks
 
 ROWS_AT_ONCE = 256
 """Rows of the list in a block that one thread takes."""
@@ -30,7 +30,7 @@ NOWHERE = 1.0
 """A distance [m] of what is no pair, and has loads of 0 times something."""
 
 
-class DipoleRules(NamedTuple):
+class DipoleParameters(NamedTuple):
     """The numbers of the sums."""
 
     k: float  # μ₀/4π [T m/A]
@@ -45,23 +45,23 @@ def clear_field(grains):
 
 
 @loop
-def add_torques(grains, far, span, rules):
+def add_torques(grains, long_range, span, rules):
     """μ×B of the flux density summed before."""
     for i in range(grains.mass.size):
-        accrue(far.torque, i, cross(load(grains.moment, i), load(grains.field, i)))
+        accrue(long_range.torque, i, cross(load(grains.moment, i), load(grains.field, i)))
 
 
 @loop
-def pack_moments(grains, far, span, rules):
+def pack_moments(grains, long_range, span, rules):
     """Positions and moments in the order of the list, so that neighbours lie close in memory."""
     for s in range(grains.mass.size):
-        i = far.order[s]
-        put(far.here, s, load(grains.position, i))
-        put(far.source, s, load(grains.moment, i))
+        i = long_range.order[s]
+        put(long_range.packed_position, s, load(grains.position, i))
+        put(long_range.source, s, load(grains.moment, i))
 
 
 @loop
-def listed_rows(grains, far, span, rules, first, last):
+def listed_rows(grains, long_range, span, rules, first, last):
     """Listed pairs of the places first…last − 1 (uint64), with nearest images and a cut-off.
 
     Whole vectors, unless few pairs are left over: beyond its end a row goes on with what is no pair of it.
@@ -69,33 +69,35 @@ def listed_rows(grains, far, span, rules, first, last):
     few = np.uint64(FEW)
     for k in range(last - first):
         s = first + k
-        here, mine = load(far.here, s), load(far.source, s)
+        here, mine = load(long_range.packed_position, s), load(long_range.source, s)
         push = field = (0.0, 0.0, 0.0)
-        begin = np.uint64(far.start[s])
-        pairs = np.uint64(far.start[s + np.uint64(1)]) - begin
-        for m in range(filled_up(pairs, few)):
-            t = far.mate[begin + m]
-            f, b, _, _ = cut_pair(here, load(far.here, t), span, mine, load(far.source, t), rules, m < pairs)
+        begin = np.uint64(long_range.start[s])
+        pairs = np.uint64(long_range.start[s + np.uint64(1)]) - begin
+        for m in range(round_up_to_simd_width(pairs, few)):
+            t = long_range.neighbour[begin + m]
+            f, b, _, _ = cut_pair(
+                here, load(long_range.packed_position, t), span, mine, load(long_range.source, t), rules, m < pairs
+            )
             push, field = add(push, f), add(field, b)
-        i = far.order[s]
-        accrue(far.force, i, push)
+        i = long_range.order[s]
+        accrue(long_range.force, i, push)
         put(grains.field, i, field)
 
 
 @loop
-def listed_loads(grains, far, span, rules):
+def listed_loads(grains, long_range, span, rules):
     """All listed pairs."""
-    pack_moments(grains, far, span, rules)
-    listed_rows(grains, far, span, rules, np.uint64(0), np.uint64(grains.mass.size))
-    add_torques(grains, far, span, rules)
+    pack_moments(grains, long_range, span, rules)
+    listed_rows(grains, long_range, span, rules, np.uint64(0), np.uint64(grains.mass.size))
+    add_torques(grains, long_range, span, rules)
 
 
 @loop
-def listed_block(grains, far, span, rules, b):
+def listed_block(grains, long_range, span, rules, b):
     """Some rows of the list."""
     first = b * ROWS_AT_ONCE
     last = min(first + ROWS_AT_ONCE, grains.mass.size)
-    listed_rows(grains, far, span, rules, np.uint64(first), np.uint64(last))
+    listed_rows(grains, long_range, span, rules, np.uint64(first), np.uint64(last))
 
 
 @loop
@@ -116,41 +118,41 @@ def rates_of_pair(grains, pace, span, rules, i, j):
 
 
 @loop
-def finish_rates(grains, far):
+def finish_rates(grains, long_range):
     """Ṁ = μ̇×B + μ×Ḃ (Eq. 53 as it should read), where `torque_rate` holds Ḃ."""
     for i in range(grains.mass.size):
-        field_rate = load(far.torque_rate, i)
-        turning = cross(load(far.past_moment, i), load(grains.field, i))
-        put(far.torque_rate, i, add(turning, cross(load(grains.moment, i), field_rate)))
+        field_rate = load(long_range.torque_rate, i)
+        turning = cross(load(long_range.past_moment, i), load(grains.field, i))
+        put(long_range.torque_rate, i, add(turning, cross(load(grains.moment, i), field_rate)))
 
 
 @loop
-def cut_rates(grains, far, span, rules):
+def cut_rates(grains, long_range, span, rules):
     """Rates of force and torque over all pairs; `past_position` and `past_moment` hold ṙ and μ̇."""
     for i in range(grains.mass.size):
         for j in range(i):
-            f, b1, b2 = rates_of_pair(grains, far, span, rules, i, j)
-            accrue(far.force_rate, i, f)
-            accrue(far.force_rate, j, (-f[0], -f[1], -f[2]))
-            accrue(far.torque_rate, i, b1)
-            accrue(far.torque_rate, j, b2)
-    finish_rates(grains, far)
+            f, b1, b2 = rates_of_pair(grains, long_range, span, rules, i, j)
+            accrue(long_range.force_rate, i, f)
+            accrue(long_range.force_rate, j, (-f[0], -f[1], -f[2]))
+            accrue(long_range.torque_rate, i, b1)
+            accrue(long_range.torque_rate, j, b2)
+    finish_rates(grains, long_range)
 
 
 @loop
-def listed_rates(grains, far, span, rules):
+def listed_rates(grains, long_range, span, rules):
     """The same over listed pairs."""
     for s in range(grains.mass.size):
-        i = far.order[s]
-        for m in range(far.start[s], far.start[s + 1]):
-            f, b, _ = rates_of_pair(grains, far, span, rules, i, far.order[far.mate[m]])
-            accrue(far.force_rate, i, f)
-            accrue(far.torque_rate, i, b)
-    finish_rates(grains, far)
+        i = long_range.order[s]
+        for m in range(long_range.start[s], long_range.start[s + 1]):
+            f, b, _ = rates_of_pair(grains, long_range, span, rules, i, long_range.order[long_range.neighbour[m]])
+            accrue(long_range.force_rate, i, f)
+            accrue(long_range.torque_rate, i, b)
+    finish_rates(grains, long_range)
 
 
 @loop
-def energy_shares(grains, far, span, rules, shares):
+def energy_shares(grains, long_range, span, rules, shares):
     """Half the energy of each pair to each of its grains [J]: −½ μ·B, from the field summed last."""
     for i in range(grains.mass.size):
         mu, b = load(grains.moment, i), load(grains.field, i)
@@ -209,13 +211,15 @@ def rows_of(pair_loads: Callable) -> Callable:
     few = np.uint64(FEW)
 
     @loop
-    def add_rows(far, force, field, span, rules, first, last):
+    def add_rows(long_range, force, field, span, rules, first, last):
         for k in range(last - first):
             i = first + k
-            here, mine = load(far.here, i), load(far.source, i)
+            here, mine = load(long_range.packed_position, i), load(long_range.source, i)
             push = own = (0.0, 0.0, 0.0)
-            for j in range(filled_up(i, few)):
-                f, b1, b2, _ = pair_loads(here, load(far.here, j), span, mine, load(far.source, j), rules, j < i)
+            for j in range(round_up_to_simd_width(i, few)):
+                f, b1, b2, _ = pair_loads(
+                    here, load(long_range.packed_position, j), span, mine, load(long_range.source, j), rules, j < i
+                )
                 push, own = add(push, f), add(own, b1)
                 accrue(force, j, (-f[0], -f[1], -f[2]))
                 accrue(field, j, b2)
@@ -226,58 +230,58 @@ def rows_of(pair_loads: Callable) -> Callable:
 
 
 @loop
-def copy_moments(grains, far, span, rules):
+def copy_moments(grains, long_range, span, rules):
     """Positions and moments where there is room for whole vectors."""
     for i in range(grains.mass.size):
-        put(far.here, i, load(grains.position, i))
-        put(far.source, i, load(grains.moment, i))
+        put(long_range.packed_position, i, load(grains.position, i))
+        put(long_range.source, i, load(grains.moment, i))
 
 
 @loop
-def add_shares(grains, far, span, rules):
+def add_shares(grains, long_range, span, rules):
     """Forces, fields and torques from those of the blocks."""
     clear_field(grains)
     for b in range(all_blocks(grains)):
-        force, field = far.share[2 * b], far.share[2 * b + 1]
+        force, field = long_range.block_sums[2 * b], long_range.block_sums[2 * b + 1]
         for i in range(corner(grains, b + 1, all_blocks(grains))):
-            accrue(far.force, i, load(force, i))
+            accrue(long_range.force, i, load(force, i))
             accrue(grains.field, i, load(field, i))
-    add_torques(grains, far, span, rules)
+    add_torques(grains, long_range, span, rules)
 
 
-def all_pairs(pair_loads: Callable) -> FarSums:
+def all_pairs(pair_loads: Callable) -> LongRangeSums:
     """The sums over all pairs."""
     add_rows = rows_of(pair_loads)
 
     @loop
-    def block(grains, far, span, rules, b):
-        force, field = far.share[2 * b], far.share[2 * b + 1]
-        for i in range(far.here.shape[1]):
+    def block(grains, long_range, span, rules, b):
+        force, field = long_range.block_sums[2 * b], long_range.block_sums[2 * b + 1]
+        for i in range(long_range.packed_position.shape[1]):
             put(force, i, (0.0, 0.0, 0.0))
             put(field, i, (0.0, 0.0, 0.0))
         first, last = corner(grains, b, all_blocks(grains)), corner(grains, b + 1, all_blocks(grains))
-        add_rows(far, force, field, span, rules, first, last)
+        add_rows(long_range, force, field, span, rules, first, last)
 
     @loop
-    def loads(grains, far, span, rules):
-        copy_moments(grains, far, span, rules)
+    def loads(grains, long_range, span, rules):
+        copy_moments(grains, long_range, span, rules)
         if grains.mass.size <= FEW:  # no row reaches beyond the last grain
             clear_field(grains)
             last = np.uint64(grains.mass.size)
-            add_rows(far, far.force, grains.field, span, rules, np.uint64(0), last)
-            add_torques(grains, far, span, rules)
+            add_rows(long_range, long_range.force, grains.field, span, rules, np.uint64(0), last)
+            add_torques(grains, long_range, span, rules)
             return
         for b in range(all_blocks(grains)):
-            block(grains, far, span, rules, b)
-        add_shares(grains, far, span, rules)
+            block(grains, long_range, span, rules, b)
+        add_shares(grains, long_range, span, rules)
 
     parts = Parts(copy_moments, block, add_shares, all_blocks)
-    return FarSums(loads, cut_rates, energy_shares, loads_of_pair, parts)
+    return LongRangeSums(loads, cut_rates, energy_shares, loads_of_pair, parts)
 
 
 BARE = all_pairs(bare_pair)._replace(many=all_pairs(seeded_pair) if LONG_VECTORS else None)
 CUT = all_pairs(cut_pair)
-LISTED = FarSums(
+LISTED = LongRangeSums(
     listed_loads,
     listed_rates,
     energy_shares,

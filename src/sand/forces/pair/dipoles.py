@@ -12,11 +12,11 @@ from ...arguments import checked
 from ...box import Box
 from ...constants import BOLTZMANN, MAGNETIC
 from ...grains import Grains
-from ...units import spoken
+from ...units import format_quantity
 from .cutoff import ROOM, Choice, WithCutoff, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
-from .dipole_loops import BARE, CUT, LISTED, DipoleRules
-from .loops import FarSums
+from .dipole_loops import BARE, CUT, LISTED, DipoleParameters
+from .loops import LongRangeSums
 
 CAPTURE = 1.5
 """Automatic cut-off over b_max at thermal speed, in a large box."""
@@ -53,23 +53,24 @@ class Dipoles(WithCutoff):
         capture = CAPTURE * thermal_capture(grains)
         shortest = 4.0 * float(grains.radius.max())
         if 0.0 < capture < shortest < half:
-            would = f"{CAPTURE} b_max which would be {spoken(capture, 'm')}"
+            would = f"{CAPTURE} b_max which would be {format_quantity(capture, 'm')}"
             return Choice(shortest, f"{self.cut}, two grain diameters, beyond {would}")
         if 0.0 < capture < half:
             return Choice(capture, f"{self.cut}, {CAPTURE} b_max at the grains' thermal speed")
         return Choice(
-            half, f"{self.cut}, half the box / {ROOM}, inside {CAPTURE} b_max which would be {spoken(capture, 'm')}"
+            half,
+            f"{self.cut}, half the box / {ROOM}, inside {CAPTURE} b_max which would be {format_quantity(capture, 'm')}",
         )
 
-    def sums(self, box: Box, listed: bool) -> FarSums:
+    def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops that sum it: over listed pairs, or over all."""
         if listed:
             return LISTED
         return BARE if box.is_open and self.cutoff in (None, "auto") else CUT
 
-    def numbers(self, grains: Grains, box: Box) -> DipoleRules:
+    def numbers(self, grains: Grains, box: Box) -> DipoleParameters:
         """What the loops get."""
-        return DipoleRules(MAGNETIC, cutoff_for(self.choose(grains, box).radius, self.cut))
+        return DipoleParameters(MAGNETIC, cutoff_for(self.choose(grains, box).radius, self.cut))
 
     def acts_on(self, grains: Grains) -> bool:
         """False if no grain feels it."""

@@ -12,8 +12,8 @@ from ...box import Box
 from ...constants import COULOMB, GRAVITATION
 from ...grains import Grains
 from .cutoff import WithCutoff, cutoff_for
-from .inverse_square_loops import ALL, LISTED, CentralRules
-from .loops import FarSums
+from .inverse_square_loops import ALL, LISTED, InverseSquareParameters
+from .loops import LongRangeSums
 
 
 @checked
@@ -49,14 +49,14 @@ class Charges(WithCutoff):
         """What attracts or repels, (N,): charges [C], or masses [kg]."""
         return grains.mass if self.massive else grains.charge
 
-    def sums(self, box: Box, listed: bool) -> FarSums:
+    def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops that sum it: over listed pairs, or over all."""
         return LISTED if listed else ALL
 
-    def numbers(self, grains: Grains, box: Box) -> CentralRules:
+    def numbers(self, grains: Grains, box: Box) -> InverseSquareParameters:
         """What the loops get."""
         radius = self.choose(grains, box).radius
-        return CentralRules(self.constant, cutoff_for(radius, self.cut), self.massive)
+        return InverseSquareParameters(self.constant, cutoff_for(radius, self.cut), self.massive)
 
     def acts_on(self, grains: Grains) -> bool:
         """False if no grain feels it."""

@@ -6,10 +6,10 @@ from ...box import nearest_image
 from ...compiler.jit import loop
 from ...numerics.vec import accrue, axpy, load, put, scale, sub
 from .inverse_square_formulas import central_field, central_potential, central_rate
-from .loops import FarSums
+from .loops import LongRangeSums
 
 
-class CentralRules(NamedTuple):
+class InverseSquareParameters(NamedTuple):
     """The numbers of the sums."""
 
     k: float  # 1/(4πε₀) [N m²/C²], or −G [N m²/kg²]
@@ -30,64 +30,68 @@ def both(grains, rules, i, j):
 
 
 @loop
-def all_loads(grains, far, span, rules):
+def all_loads(grains, long_range, span, rules):
     """Forces of all pairs, nearest images."""
     for i in range(grains.mass.size):
         here, push = load(grains.position, i), (0.0, 0.0, 0.0)
         for j in range(i):
             f = central_field(nearest_image(sub(here, load(grains.position, j)), span), rules.k, rules.cutoff)
             push = axpy(strength(grains, rules, j), f, push)
-            accrue(far.force, j, scale(-both(grains, rules, i, j), f))
-        accrue(far.force, i, scale(strength(grains, rules, i), push))
+            accrue(long_range.force, j, scale(-both(grains, rules, i, j), f))
+        accrue(long_range.force, i, scale(strength(grains, rules, i), push))
 
 
 @loop
-def pack_charges(grains, far, rules):
+def pack_charges(grains, long_range, rules):
     """Positions and charges in the order of the list."""
     for s in range(grains.mass.size):
-        i = far.order[s]
-        put(far.here, s, load(grains.position, i))
-        far.source[0, s] = strength(grains, rules, i)
+        i = long_range.order[s]
+        put(long_range.packed_position, s, load(grains.position, i))
+        long_range.source[0, s] = strength(grains, rules, i)
 
 
 @loop
-def listed_loads(grains, far, span, rules):
+def listed_loads(grains, long_range, span, rules):
     """Forces of listed pairs."""
-    pack_charges(grains, far, rules)
+    pack_charges(grains, long_range, rules)
     for s in range(grains.mass.size):
-        here, push = load(far.here, s), (0.0, 0.0, 0.0)
-        for m in range(far.start[s], far.start[s + 1]):
-            t = far.mate[m]
-            apart = nearest_image(sub(here, load(far.here, t)), span)
-            push = axpy(far.source[0, t], central_field(apart, rules.k, rules.cutoff), push)
-        accrue(far.force, far.order[s], scale(far.source[0, s], push))
+        here, push = load(long_range.packed_position, s), (0.0, 0.0, 0.0)
+        for m in range(long_range.start[s], long_range.start[s + 1]):
+            t = long_range.neighbour[m]
+            apart = nearest_image(sub(here, load(long_range.packed_position, t)), span)
+            push = axpy(long_range.source[0, t], central_field(apart, rules.k, rules.cutoff), push)
+        accrue(long_range.force, long_range.order[s], scale(long_range.source[0, s], push))
 
 
 @loop
-def rate_of_pair(grains, far, span, rules, i, j):
+def rate_of_pair(grains, long_range, span, rules, i, j):
     """Rate of the force on i due to j [N/s]; `past_position` holds ṙ."""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    moving = sub(load(far.past_position, i), load(far.past_position, j))
+    moving = sub(load(long_range.past_position, i), load(long_range.past_position, j))
     return scale(both(grains, rules, i, j), central_rate(apart, moving, rules.k, rules.cutoff))
 
 
 @loop
-def all_rates(grains, far, span, rules):
+def all_rates(grains, long_range, span, rules):
     """Rates of force of all pairs."""
     for i in range(grains.mass.size):
         for j in range(i):
-            f = rate_of_pair(grains, far, span, rules, i, j)
-            accrue(far.force_rate, i, f)
-            accrue(far.force_rate, j, (-f[0], -f[1], -f[2]))
+            f = rate_of_pair(grains, long_range, span, rules, i, j)
+            accrue(long_range.force_rate, i, f)
+            accrue(long_range.force_rate, j, (-f[0], -f[1], -f[2]))
 
 
 @loop
-def listed_rates(grains, far, span, rules):
+def listed_rates(grains, long_range, span, rules):
     """Rates of force of listed pairs."""
     for s in range(grains.mass.size):
-        for m in range(far.start[s], far.start[s + 1]):
-            i = far.order[s]
-            accrue(far.force_rate, i, rate_of_pair(grains, far, span, rules, i, far.order[far.mate[m]]))
+        for m in range(long_range.start[s], long_range.start[s + 1]):
+            i = long_range.order[s]
+            accrue(
+                long_range.force_rate,
+                i,
+                rate_of_pair(grains, long_range, span, rules, i, long_range.order[long_range.neighbour[m]]),
+            )
 
 
 @loop
@@ -98,7 +102,7 @@ def pair_energy(grains, span, rules, i, j):
 
 
 @loop
-def all_energies(grains, far, span, rules, shares):
+def all_energies(grains, long_range, span, rules, shares):
     """Half the energy of each pair to each of its grains."""
     for i in range(grains.mass.size):
         for j in range(i):
@@ -108,11 +112,13 @@ def all_energies(grains, far, span, rules, shares):
 
 
 @loop
-def listed_energies(grains, far, span, rules, shares):
+def listed_energies(grains, long_range, span, rules, shares):
     """The same over listed pairs."""
     for s in range(grains.mass.size):
-        for m in range(far.start[s], far.start[s + 1]):
-            shares[far.order[s]] += 0.5 * pair_energy(grains, span, rules, far.order[s], far.order[far.mate[m]])
+        for m in range(long_range.start[s], long_range.start[s + 1]):
+            shares[long_range.order[s]] += 0.5 * pair_energy(
+                grains, span, rules, long_range.order[s], long_range.order[long_range.neighbour[m]]
+            )
 
 
 @loop
@@ -123,5 +129,5 @@ def loads_of_pair(grains, span, rules, i, j):
     return force, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
-ALL = FarSums(all_loads, all_rates, all_energies, loads_of_pair)
-LISTED = FarSums(listed_loads, listed_rates, listed_energies, loads_of_pair)
+ALL = LongRangeSums(all_loads, all_rates, all_energies, loads_of_pair)
+LISTED = LongRangeSums(listed_loads, listed_rates, listed_energies, loads_of_pair)

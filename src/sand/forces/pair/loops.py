@@ -9,12 +9,12 @@ from ...numerics.vec import add
 
 
 @loop
-def _no_sum(grains, far, span, numbers):
+def _no_sum(grains, long_range, span, numbers):
     """Neither loads nor rates, and nothing before or after blocks."""
 
 
 @loop
-def _nothing_in(grains, far, span, numbers, place):
+def _nothing_in(grains, long_range, span, numbers, place):
     """Neither a block nor energies."""
 
 
@@ -23,7 +23,7 @@ def _no_blocks(grains):
     return 0
 
 
-CREW_FROM = 1000
+PARALLEL_FROM = 1000
 """Fewest grains for which large loops are cut into blocks; below, a block is less work than to share it."""
 ALL_BLOCKS = 8
 """Blocks of a sum over all pairs, then."""
@@ -32,11 +32,11 @@ ALL_BLOCKS = 8
 @loop
 def all_blocks(grains):
     """Blocks of a sum over all pairs."""
-    return ALL_BLOCKS if grains.mass.size >= CREW_FROM else 1
+    return ALL_BLOCKS if grains.mass.size >= PARALLEL_FROM else 1
 
 
 class Parts(NamedTuple):
-    """The sum of loads in blocks that threads may share; `loads` of FarSums is their sum but for rounding."""
+    """The sum of loads in blocks that threads may share; `loads` of LongRangeSums is their sum but for rounding."""
 
     begin: Callable  # (grains, far, span, numbers): before the blocks
     block: Callable  # the same and the number of the block
@@ -44,7 +44,7 @@ class Parts(NamedTuple):
     blocks: Callable  # (grains,): how many there are, by the number of grains alone
 
 
-class FarSums(NamedTuple):
+class LongRangeSums(NamedTuple):
     """The loops of one long-range force; each gets (grains, far, span, its numbers)."""
 
     loads: Callable  # adds to far.force and far.torque
@@ -65,24 +65,24 @@ def _no_pair(grains, span, numbers, i, j):
     return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
-NO_FAR_FORCE = FarSums(_no_sum, _no_sum, _nothing_in, _no_pair)
+NO_LONG_RANGE_FORCE = LongRangeSums(_no_sum, _no_sum, _nothing_in, _no_pair)
 
 
 @functools.cache
-def far_together(first: FarSums, rest: FarSums) -> FarSums:
+def combined_sums(first: LongRangeSums, rest: LongRangeSums) -> LongRangeSums:
     """The sums of two; `numbers` is the pair of theirs.  Energies are asked for one by one (`shares_for`)."""
     first_loads, rest_loads, first_rates, rest_rates = first.loads, rest.loads, first.rates, rest.rates
     first_pair, rest_pair = first.pair, rest.pair
 
     @loop
-    def loads(grains, far, span, numbers):
-        first_loads(grains, far, span, numbers[0])
-        rest_loads(grains, far, span, numbers[1])
+    def loads(grains, long_range, span, numbers):
+        first_loads(grains, long_range, span, numbers[0])
+        rest_loads(grains, long_range, span, numbers[1])
 
     @loop
-    def rates(grains, far, span, numbers):
-        first_rates(grains, far, span, numbers[0])
-        rest_rates(grains, far, span, numbers[1])
+    def rates(grains, long_range, span, numbers):
+        first_rates(grains, long_range, span, numbers[0])
+        rest_rates(grains, long_range, span, numbers[1])
 
     @loop
     def pair(grains, span, numbers, i, j):
@@ -90,7 +90,7 @@ def far_together(first: FarSums, rest: FarSums) -> FarSums:
         force2, here2, there2 = rest_pair(grains, span, numbers[1], i, j)
         return add(force1, force2), add(here1, here2), add(there1, there2)
 
-    return FarSums(loads, rates, _nothing_in, pair, parts_together(first.parts, rest.parts))
+    return LongRangeSums(loads, rates, _nothing_in, pair, parts_together(first.parts, rest.parts))
 
 
 @functools.cache
@@ -100,21 +100,21 @@ def parts_together(first: Parts, rest: Parts) -> Parts:
     rest_begin, rest_block, rest_end, rest_blocks = rest
 
     @loop
-    def begin(grains, far, span, numbers):
-        first_begin(grains, far, span, numbers[0])
-        rest_begin(grains, far, span, numbers[1])
+    def begin(grains, long_range, span, numbers):
+        first_begin(grains, long_range, span, numbers[0])
+        rest_begin(grains, long_range, span, numbers[1])
 
     @loop
-    def block(grains, far, span, numbers, b):
+    def block(grains, long_range, span, numbers, b):
         if b < first_blocks(grains):
-            first_block(grains, far, span, numbers[0], b)
+            first_block(grains, long_range, span, numbers[0], b)
         if b < rest_blocks(grains):
-            rest_block(grains, far, span, numbers[1], b)
+            rest_block(grains, long_range, span, numbers[1], b)
 
     @loop
-    def end(grains, far, span, numbers):
-        first_end(grains, far, span, numbers[0])
-        rest_end(grains, far, span, numbers[1])
+    def end(grains, long_range, span, numbers):
+        first_end(grains, long_range, span, numbers[0])
+        rest_end(grains, long_range, span, numbers[1])
 
     @loop
     def blocks(grains):
@@ -127,7 +127,7 @@ def parts_together(first: Parts, rest: Parts) -> Parts:
 def shares_for(energies: Callable) -> Callable:
     """The compiled sum of each grain's part of the energy [J] of one long-range force."""
 
-    def fill_shares(grains, far, span, numbers, shares):
-        energies(grains, far, span, numbers, shares)
+    def fill_shares(grains, long_range, span, numbers, shares):
+        energies(grains, long_range, span, numbers, shares)
 
     return kernel(fill_shares)

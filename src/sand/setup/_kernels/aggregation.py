@@ -8,7 +8,7 @@ import math
 from ...compiler.jit import kernel, loop
 from ...numerics.random import normal_pair, random_words, uniform
 from ...numerics.vec import across, add, axpy, dot, load, norm, put, scale, sub
-from .hash_grid import EMPTY, clear, free_width, gap_at, head_around, join_crowd, rest_between, touches_other
+from .hash_grid import EMPTY, clear, free_width, gap_at, head_around, join_hash_grid, rest_between, touches_other
 
 DIRECTION, OFFSET, START, STEPS, RETURN, SIDEWAYS, TURN1, TURN2 = range(8)
 """What random numbers are for."""
@@ -36,9 +36,9 @@ def random_across(seed, number, grain, u):
 
 
 @loop
-def first_touch(crowd, position, stuff, b, start, u, way):
+def first_touch(crowd, position, grain_set, b, start, u, way):
     """Where on the line from `start` along u grain b first comes to rest at another, and which; `way` for a miss."""
-    reach = stuff.radius[b] + stuff.largest
+    reach = grain_set.radius[b] + grain_set.largest
     done = 0.0
     while done < way:
         here = axpy(done, u, start)
@@ -53,8 +53,8 @@ def first_touch(crowd, position, stuff, b, start, u, way):
                 to = sub(load(position, j), here)
                 along = dot(to, u)
                 miss = dot(to, to) - along * along
-                if miss < (stuff.radius[b] + stuff.radius[j]) ** 2:
-                    rest = rest_between(stuff, b, j)
+                if miss < (grain_set.radius[b] + grain_set.radius[j]) ** 2:
+                    rest = rest_between(grain_set, b, j)
                     # grains that are behind have been missed; none of them comes this far
                     if miss < rest * rest and along - math.sqrt(rest * rest - miss) <= best:
                         best, mate = along - math.sqrt(rest * rest - miss), j
@@ -66,17 +66,17 @@ def first_touch(crowd, position, stuff, b, start, u, way):
 
 
 @loop
-def stays(crowd, position, stuff, b, x, mate):
+def stays(crowd, position, grain_set, b, x, mate):
     """Put grain b at x, where it touches its mate, unless it touched another there; whether it stays."""
-    if touches_other(crowd, position, stuff, b, x, mate):
+    if touches_other(crowd, position, grain_set, b, x, mate):
         return False
     put(position, b, x)
-    join_crowd(crowd, b, x)
+    join_hash_grid(crowd, b, x)
     return True
 
 
 @kernel
-def grow_ballistic(crowd, position, stuff, first, last, extent, seed, tries):
+def grow_ballistic(crowd, position, grain_set, first, last, extent, seed, tries):
     """Grains first … last − 1 fly in from all sides, one by one, and stay where they touch first.
 
     Parameters
@@ -90,17 +90,17 @@ def grow_ballistic(crowd, position, stuff, first, last, extent, seed, tries):
         The next grain to fly (less than `last` if one met nobody in `tries` tries, or touched two), and the extent.
     """
     for b in range(first, last):
-        size = extent + stuff.radius[b]
+        size = extent + grain_set.radius[b]
         placed = False
         for number in range(tries):
             u, _ = random_direction(seed, number, b, DIRECTION)
             offset = scale(size, random_across(seed, number, b, u))
             back = math.sqrt(max(size * size - dot(offset, offset), 0.0))
             start = axpy(-back, u, offset)
-            way, mate = first_touch(crowd, position, stuff, b, start, u, 2.0 * back)
+            way, mate = first_touch(crowd, position, grain_set, b, start, u, 2.0 * back)
             x = axpy(way, u, start)
-            if mate != EMPTY and stays(crowd, position, stuff, b, x, mate):
-                extent = max(extent, norm(x) + stuff.radius[b])
+            if mate != EMPTY and stays(crowd, position, grain_set, b, x, mate):
+                extent = max(extent, norm(x) + grain_set.radius[b])
                 placed = True
                 break
         if not placed:
@@ -128,7 +128,7 @@ def returned(seed, number, grain, x, size):
 
 
 @loop
-def walk_in(crowd, position, stuff, first, last, bound, inner, size, address):
+def walk_in(crowd, position, grain_set, first, last, bound, inner, size, address):
     """Grains first … last − 1, placed about their own centre, diffuse as one until they touch the crowd at the origin.
 
     A walk on spheres: each step goes as far as nothing can be touched, in any direction.  `bound` keeps for each grain
@@ -156,15 +156,15 @@ def walk_in(crowd, position, stuff, first, last, bound, inner, size, address):
         for k in range(last - first):
             b = near + k if near + k < last else near + k - (last - first)
             here = add(x, load(position, b))
-            bound[b] = bound[b] - moved if moved < math.inf else norm(here) - stuff.radius[b] - inner
+            bound[b] = bound[b] - moved if moved < math.inf else norm(here) - grain_set.radius[b] - inner
             if bound[b] < best:
-                bound[b], j = gap_at(crowd, position, stuff, b, here)
+                bound[b], j = gap_at(crowd, position, grain_set, b, here)
                 if bound[b] < best:
                     best, who, whom = bound[b], b, j
         near = who
-        if whom != EMPTY and best < TOUCH * stuff.largest:
+        if whom != EMPTY and best < TOUCH * grain_set.largest:
             return x, who, whom, best
-        moved = max(best, TOUCH * stuff.largest)
+        moved = max(best, TOUCH * grain_set.largest)
         u, _ = random_direction(seed, turn, grain, STEPS)
         x = axpy(moved, u, x)
         if norm(x) > size * (1.0 + 1e-9):
@@ -176,26 +176,26 @@ def walk_in(crowd, position, stuff, first, last, bound, inner, size, address):
 
 
 @loop
-def pulled(position, stuff, x, offset, b, j):
+def pulled(position, grain_set, x, offset, b, j):
     """The centre of a body once its grain b has been pulled to rest at grain j, along the line of their centres."""
     apart = sub(add(x, offset), load(position, j))
     distance = norm(apart)
-    return axpy((rest_between(stuff, b, j) - distance) / distance, apart, x)
+    return axpy((rest_between(grain_set, b, j) - distance) / distance, apart, x)
 
 
 @kernel
-def grow_diffusing(crowd, position, bound, stuff, first, last, extent, seed, tries):
+def grow_diffusing(crowd, position, bound, grain_set, first, last, extent, seed, tries):
     """As `grow_ballistic` for grains that diffuse, all at the origin before; `bound` is room for N numbers."""
     for b in range(first, last):
         placed = False
         for number in range(tries):
-            size = extent + stuff.radius[b]
-            x, _, mate, _ = walk_in(crowd, position, stuff, b, b + 1, bound, extent, size, (seed, number, b))
+            size = extent + grain_set.radius[b]
+            x, _, mate, _ = walk_in(crowd, position, grain_set, b, b + 1, bound, extent, size, (seed, number, b))
             if mate == EMPTY:
                 continue
-            x = pulled(position, stuff, x, (0.0, 0.0, 0.0), b, mate)
-            if stays(crowd, position, stuff, b, x, mate):
-                extent = max(extent, norm(x) + stuff.radius[b])
+            x = pulled(position, grain_set, x, (0.0, 0.0, 0.0), b, mate)
+            if stays(crowd, position, grain_set, b, x, mate):
+                extent = max(extent, norm(x) + grain_set.radius[b])
                 placed = True
                 break
         if not placed:
@@ -204,8 +204,8 @@ def grow_diffusing(crowd, position, bound, stuff, first, last, extent, seed, tri
 
 
 @kernel
-def begin_crowd(crowd, position):
+def begin_hash_grid(crowd, position):
     """The first grain is there, at the origin."""
     clear(crowd)
     put(position, 0, (0.0, 0.0, 0.0))
-    join_crowd(crowd, 0, (0.0, 0.0, 0.0))
+    join_hash_grid(crowd, 0, (0.0, 0.0, 0.0))

@@ -10,12 +10,12 @@ from .aggregation import OFFSET, TURN1, TURN2, pulled, walk_in
 from .hash_grid import (
     APART,
     EMPTY,
-    Crowd,
+    HashGrid,
     add_to_cell,
     cell_key,
     cell_on_axis,
     clear,
-    join_crowd,
+    join_hash_grid,
     place_of,
     places_for,
     rest_between,
@@ -27,22 +27,22 @@ CLOSE_ENOUGH = 0.003
 
 
 @loop
-def middle_of(position, stuff, first, last):
+def middle_of(position, grain_set, first, last):
     """Centre of mass of grains first … last − 1, and their mass."""
     total, x = 0.0, (0.0, 0.0, 0.0)
     for i in range(first, last):
-        total += stuff.mass[i]
-        x = axpy(stuff.mass[i], load(position, i), x)
+        total += grain_set.mass[i]
+        x = axpy(grain_set.mass[i], load(position, i), x)
     return scale(1.0 / total, x), total
 
 
 @loop
-def gyration_square(position, stuff, first, last, middle, total):
+def gyration_square(position, grain_set, first, last, middle, total):
     """Σ m |x − x₀|² / Σ m [m²]"""
     square = 0.0
     for i in range(first, last):
         d = sub(load(position, i), middle)
-        square += stuff.mass[i] * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        square += grain_set.mass[i] * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     return square / total
 
 
@@ -56,13 +56,13 @@ def random_turn(seed, number, grain, stream):
 
 
 @loop
-def lay(position, work, stuff, first, last, middle, q):
+def lay(position, work, grain_set, first, last, middle, q):
     """Put the cluster into `work`, its centre at the origin and turned by q; returns its outer radius [m]."""
     outer = 0.0
     for i in range(first, last):
         x = turned(q, sub(load(position, i), middle))
         put(work, i, x)
-        outer = max(outer, norm(x) + stuff.radius[i])
+        outer = max(outer, norm(x) + grain_set.radius[i])
     return outer
 
 
@@ -73,7 +73,7 @@ def column(x, y, step, width):
 
 
 @loop
-def met(crowd, work, stuff, middle, last, dx, dy):
+def met(crowd, work, grain_set, middle, last, dx, dy):
     """Height at which the second cluster, coming from below at dx, dy, touches the first; and the two grains."""
     height, one, other = math.inf, EMPTY, EMPTY
     for b in range(middle, last):
@@ -84,8 +84,11 @@ def met(crowd, work, stuff, middle, last, dx, dy):
             j = crowd.head[at] if crowd.key[at] == key else EMPTY
             while j != EMPTY:
                 miss = (x - work[0, j]) ** 2 + (y - work[1, j]) ** 2
-                if miss < (stuff.radius[b] + stuff.radius[j]) ** 2 and work[2, j] - z - 2.0 * stuff.largest < height:
-                    rest = rest_between(stuff, b, j)
+                if (
+                    miss < (grain_set.radius[b] + grain_set.radius[j]) ** 2
+                    and work[2, j] - z - 2.0 * grain_set.largest < height
+                ):
+                    rest = rest_between(grain_set, b, j)
                     if miss < rest * rest and work[2, j] - math.sqrt(rest * rest - miss) - z < height:
                         height, one, other = work[2, j] - math.sqrt(rest * rest - miss) - z, b, j
                 j = crowd.before[j]
@@ -93,7 +96,7 @@ def met(crowd, work, stuff, middle, last, dx, dy):
 
 
 @loop
-def strained(crowd, work, stuff, middle, last, shift, one, other):
+def strained(crowd, work, grain_set, middle, last, shift, one, other):
     """Whether any pair of the two clusters touches but these two."""
     for b in range(middle, last):
         x = add(load(work, b), shift)
@@ -102,7 +105,7 @@ def strained(crowd, work, stuff, middle, last, shift, one, other):
             at = place_of(crowd, key)
             j = crowd.head[at] if crowd.key[at] == key else EMPTY
             while j != EMPTY:
-                touch = (stuff.radius[b] + stuff.radius[j]) * (1.0 + APART)
+                touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
                 d = sub(x, load(work, j))
                 if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= touch * touch and not (b == one and j == other):
                     return True
@@ -111,7 +114,7 @@ def strained(crowd, work, stuff, middle, last, shift, one, other):
 
 
 @loop
-def flown(table, position, work, stuff, ends, middles, address, wanted):
+def flown(table, position, work, grain_set, ends, middles, address, wanted):
     """One flight of the second cluster into the first, along z; both lie in `work`.
 
     Parameters
@@ -128,9 +131,9 @@ def flown(table, position, work, stuff, ends, middles, address, wanted):
     """
     seed, number, grain = address
     first, middle, last = ends
-    reach = lay(position, work, stuff, first, middle, middles[0], random_turn(seed, number, grain, TURN1))
-    reach += lay(position, work, stuff, middle, last, middles[1], random_turn(seed, number, grain, TURN2))
-    crowd = Crowd(table.key, table.head, table.before, places_for(middle - first, table.mask + 1) - 1, table.width)
+    reach = lay(position, work, grain_set, first, middle, middles[0], random_turn(seed, number, grain, TURN1))
+    reach += lay(position, work, grain_set, middle, last, middles[1], random_turn(seed, number, grain, TURN2))
+    crowd = HashGrid(table.key, table.head, table.before, places_for(middle - first, table.mask + 1) - 1, table.width)
     clear(crowd)
     for i in range(first, middle):
         add_to_cell(crowd, column(work[0, i], work[1, i], 4, crowd.width), i)
@@ -138,9 +141,9 @@ def flown(table, position, work, stuff, ends, middles, address, wanted):
     offset = min(reach, wanted) * math.sqrt(uniform(words[0]))
     angle = 2.0 * math.pi * uniform(words[1])
     dx, dy = offset * math.cos(angle), offset * math.sin(angle)
-    height, one, other = met(crowd, work, stuff, middle, last, dx, dy)
+    height, one, other = met(crowd, work, grain_set, middle, last, dx, dy)
     shift = (dx, dy, height)
-    return one != EMPTY and not strained(crowd, work, stuff, middle, last, shift, one, other), shift
+    return one != EMPTY and not strained(crowd, work, grain_set, middle, last, shift, one, other), shift
 
 
 @loop
@@ -162,7 +165,7 @@ def wanted_distance(goal, squares, masses):
 
 
 @kernel
-def join_ballistic(table, position, work, stuff, joins, goals, seed, tries, choices):
+def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, choices):
     """Pairs of clusters fly into each other, one pair after the other; each becomes one cluster.
 
     Parameters
@@ -181,17 +184,17 @@ def join_ballistic(table, position, work, stuff, joins, goals, seed, tries, choi
     """
     for k in range(goals.size):
         ends = (joins[0, k], joins[1, k], joins[2, k])
-        middle1, mass1 = middle_of(position, stuff, ends[0], ends[1])
-        middle2, mass2 = middle_of(position, stuff, ends[1], ends[2])
+        middle1, mass1 = middle_of(position, grain_set, ends[0], ends[1])
+        middle2, mass2 = middle_of(position, grain_set, ends[1], ends[2])
         wanted = math.inf
         if goals[k] < math.inf:
-            square1 = gyration_square(position, stuff, ends[0], ends[1], middle1, mass1)
-            square2 = gyration_square(position, stuff, ends[1], ends[2], middle2, mass2)
+            square1 = gyration_square(position, grain_set, ends[0], ends[1], middle1, mass1)
+            square2 = gyration_square(position, grain_set, ends[1], ends[2], middle2, mass2)
             wanted = wanted_distance(goals[k], (square1, square2), (mass1, mass2))
         best, chosen, found = math.inf, -1, 0
         for number in range(tries):
             address = (seed, number, joins[1, k])
-            good, shift = flown(table, position, work, stuff, ends, (middle1, middle2), address, wanted)
+            good, shift = flown(table, position, work, grain_set, ends, (middle1, middle2), address, wanted)
             if good:
                 found += 1
                 wrong = abs(norm(shift) - wanted) if wanted < math.inf else 0.0
@@ -202,37 +205,37 @@ def join_ballistic(table, position, work, stuff, joins, goals, seed, tries, choi
         if chosen < 0:
             return k
         address = (seed, chosen, joins[1, k])
-        good, shift = flown(table, position, work, stuff, ends, (middle1, middle2), address, wanted)
+        good, shift = flown(table, position, work, grain_set, ends, (middle1, middle2), address, wanted)
         settle(position, work, ends, shift)
     return goals.size
 
 
 @kernel
-def join_diffusing(table, position, work, bound, stuff, joins, seed, tries):
+def join_diffusing(table, position, work, bound, grain_set, joins, seed, tries):
     """As `join_ballistic`, for clusters that diffuse without turning; `bound` is room for N numbers."""
     for k in range(joins.shape[1]):
         ends = (joins[0, k], joins[1, k], joins[2, k])
-        middle1, _ = middle_of(position, stuff, ends[0], ends[1])
-        middle2, _ = middle_of(position, stuff, ends[1], ends[2])
+        middle1, _ = middle_of(position, grain_set, ends[0], ends[1])
+        middle2, _ = middle_of(position, grain_set, ends[1], ends[2])
         places = places_for(ends[1] - ends[0], table.mask + 1)
-        crowd = Crowd(table.key, table.head, table.before, places - 1, table.width)
+        crowd = HashGrid(table.key, table.head, table.before, places - 1, table.width)
         done = False
         for number in range(tries):
-            inner = lay(position, work, stuff, ends[0], ends[1], middle1, random_turn(seed, number, ends[1], TURN1))
+            inner = lay(position, work, grain_set, ends[0], ends[1], middle1, random_turn(seed, number, ends[1], TURN1))
             size = inner + lay(
-                position, work, stuff, ends[1], ends[2], middle2, random_turn(seed, number, ends[1], TURN2)
+                position, work, grain_set, ends[1], ends[2], middle2, random_turn(seed, number, ends[1], TURN2)
             )
             clear(crowd)
             for i in range(ends[0], ends[1]):
-                join_crowd(crowd, i, load(work, i))
+                join_hash_grid(crowd, i, load(work, i))
             address = (seed, number, ends[1])
-            x, one, other, _ = walk_in(crowd, work, stuff, ends[1], ends[2], bound, inner, size, address)
+            x, one, other, _ = walk_in(crowd, work, grain_set, ends[1], ends[2], bound, inner, size, address)
             if other == EMPTY:
                 continue
-            x = pulled(work, stuff, x, load(work, one), one, other)
+            x = pulled(work, grain_set, x, load(work, one), one, other)
             alone = True
             for b in range(ends[1], ends[2]):
-                if touches_other(crowd, work, stuff, b, add(x, load(work, b)), other if b == one else EMPTY):
+                if touches_other(crowd, work, grain_set, b, add(x, load(work, b)), other if b == one else EMPTY):
                     alone = False
                     break
             if alone:

@@ -24,17 +24,17 @@ def nearest_apart(d, side):
 
 
 @loop
-def landing(crowd, position, stuff, b, x, y, side, count):
+def landing(crowd, position, grain_set, b, x, y, side, count):
     """Height at which grain b, falling at x, y, comes to rest, and on which grain; EMPTY: on the floor at 0."""
-    height, mate = stuff.radius[b], EMPTY
+    height, mate = grain_set.radius[b], EMPTY
     for step in range(9):
         at = place_of(crowd, wrapped_key(x, y, step, crowd.width, count))
         j = crowd.head[at] if crowd.key[at] != EMPTY else EMPTY
         while j != EMPTY:
             dx, dy = nearest_apart(x - position[0, j], side), nearest_apart(y - position[1, j], side)
             miss = dx * dx + dy * dy
-            if miss < (stuff.radius[b] + stuff.radius[j]) ** 2:
-                rest = rest_between(stuff, b, j)
+            if miss < (grain_set.radius[b] + grain_set.radius[j]) ** 2:
+                rest = rest_between(grain_set, b, j)
                 if miss < rest * rest and position[2, j] + math.sqrt(rest * rest - miss) > height:
                     height, mate = position[2, j] + math.sqrt(rest * rest - miss), j
             j = crowd.before[j]
@@ -52,7 +52,7 @@ def image_near(position, j, x, side):
 
 
 @loop
-def touching_here(crowd, position, stuff, b, x, side, count, one, other):
+def touching_here(crowd, position, grain_set, b, x, side, count, one, other):
     """Whether grain b at x touches any grain but these two."""
     for step in range(9):
         at = place_of(crowd, wrapped_key(x[0], x[1], step, crowd.width, count))
@@ -60,7 +60,7 @@ def touching_here(crowd, position, stuff, b, x, side, count, one, other):
         while j != EMPTY:
             there = image_near(position, j, x, side)
             d = (x[0] - there[0], x[1] - there[1], x[2] - there[2])
-            touch = (stuff.radius[b] + stuff.radius[j]) * (1.0 + APART)
+            touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
             if dot(d, d) <= touch * touch and j != one and j != other:
                 return True
             j = crowd.before[j]
@@ -68,10 +68,10 @@ def touching_here(crowd, position, stuff, b, x, side, count, one, other):
 
 
 @loop
-def rolled(crowd, position, stuff, b, x, mate, side, count):
+def rolled(crowd, position, grain_set, b, x, mate, side, count):
     """Where grain b, at x on its mate, comes to rest at a second grain by rolling as little as can be; that grain."""
     origin = image_near(position, mate, x, side)
-    arm = rest_between(stuff, b, mate)
+    arm = rest_between(grain_set, b, mate)
     own = scale(1.0 / arm, (x[0] - origin[0], x[1] - origin[1], x[2] - origin[2]))
     best, place, second = -1.0, x, EMPTY
     for step in range(9):
@@ -80,7 +80,7 @@ def rolled(crowd, position, stuff, b, x, mate, side, count):
         while k != EMPTY:
             there = image_near(position, k, x, side)
             to = (there[0] - origin[0], there[1] - origin[1], there[2] - origin[2])
-            rest = rest_between(stuff, b, k)
+            rest = rest_between(grain_set, b, k)
             far = norm(to)
             if k != mate and abs(arm - rest) < far < arm + rest:
                 e = scale(1.0 / far, to)
@@ -90,15 +90,15 @@ def rolled(crowd, position, stuff, b, x, mate, side, count):
                 if size > 0.0 and abs(c) < 1.0:
                     way = axpy(math.sqrt(1.0 - c * c) / size, aside, scale(c, e))
                     new = axpy(arm, way, origin)
-                    nearer = dot(way, own) > best and new[2] >= stuff.radius[b]
-                    if nearer and not touching_here(crowd, position, stuff, b, new, side, count, mate, k):
+                    nearer = dot(way, own) > best and new[2] >= grain_set.radius[b]
+                    if nearer and not touching_here(crowd, position, grain_set, b, new, side, count, mate, k):
                         best, place, second = dot(way, own), new, k
             k = crowd.before[k]
     return place, second
 
 
 @kernel
-def deposit(crowd, position, stuff, side, count, seed, tries):
+def deposit(crowd, position, grain_set, side, count, seed, tries):
     """All grains fall one by one on a periodic square of this side [m], of count × count columns.
 
     One that has landed on another rolls on it to the nearest place where it touches a second.
@@ -109,16 +109,16 @@ def deposit(crowd, position, stuff, side, count, seed, tries):
         The next grain to fall: less than all if one touched more than it may in each of `tries` tries.
     """
     clear(crowd)
-    for b in range(stuff.radius.size):
+    for b in range(grain_set.radius.size):
         placed = False
         for number in range(tries):
             words = random_words(seed, number, b, START)
             x, y = side * uniform(words[0]), side * uniform(words[1])
-            z, mate = landing(crowd, position, stuff, b, x, y, side, count)
+            z, mate = landing(crowd, position, grain_set, b, x, y, side, count)
             place, second = (x, y, z), EMPTY
             if mate != EMPTY:
-                place, second = rolled(crowd, position, stuff, b, place, mate, side, count)
-            if second != EMPTY or not touching_here(crowd, position, stuff, b, place, side, count, mate, second):
+                place, second = rolled(crowd, position, grain_set, b, place, mate, side, count)
+            if second != EMPTY or not touching_here(crowd, position, grain_set, b, place, side, count, mate, second):
                 place = (place[0] % side, place[1] % side, place[2])
                 put(position, b, place)
                 add_to_cell(crowd, wrapped_key(place[0], place[1], 4, crowd.width, count), b)
@@ -126,4 +126,4 @@ def deposit(crowd, position, stuff, side, count, seed, tries):
                 break
         if not placed:
             return b
-    return stuff.radius.size
+    return grain_set.radius.size

@@ -27,7 +27,7 @@ _SIDE = 1 << 20
 _SPREAD = -7046029254386353131  # 2⁶⁴ over the golden ratio, odd, as a signed number
 
 
-class Stuff(NamedTuple):
+class GrainSet(NamedTuple):
     """What the grains of a growing aggregate are."""
 
     radius: np.ndarray  # (N,) [m]
@@ -38,7 +38,7 @@ class Stuff(NamedTuple):
     largest: float  # largest radius [m]
 
 
-class Crowd(NamedTuple):
+class HashGrid(NamedTuple):
     """The cells; `mask` + 1 places of the table are in use, a power of two."""
 
     key: np.ndarray  # (places,) which cell has this place, or EMPTY
@@ -49,12 +49,14 @@ class Crowd(NamedTuple):
 
 
 @formula
-def rest_between(stuff, i, j):
+def rest_between(grain_set, i, j):
     """Distance of the centres of grains i and j in contact at rest [m]: r1 + r2 − δ0; r1 + r2 without adhesion."""
-    r1, r2 = stuff.radius[i], stuff.radius[j]
-    a, b = stuff.material[i], stuff.material[j]
+    r1, r2 = grain_set.radius[i], grain_set.radius[j]
+    a, b = grain_set.material[i], grain_set.material[j]
     reduced = r1 * r2 / (r1 + r2)
-    return r1 + r2 - rest_overlap(rest_radius(stuff.surface_energy[a, b], reduced, stuff.modulus[a, b]), reduced)
+    return (
+        r1 + r2 - rest_overlap(rest_radius(grain_set.surface_energy[a, b], reduced, grain_set.modulus[a, b]), reduced)
+    )
 
 
 @formula
@@ -107,7 +109,7 @@ def add_to_cell(crowd, key, i):
 
 
 @loop
-def join_crowd(crowd, i, x):
+def join_hash_grid(crowd, i, x):
     """Grain i is at x, on all levels."""
     width = crowd.width
     key = cell_key(0, cell_on_axis(x[0], width), cell_on_axis(x[1], width), cell_on_axis(x[2], width))
@@ -154,9 +156,9 @@ def head_around(crowd, x, step):
 
 
 @loop
-def gap_at(crowd, position, stuff, b, x):
+def gap_at(crowd, position, grain_set, b, x):
     """Gap [m] between the surface of grain b at x and the nearest one, or less; and that grain, EMPTY if far."""
-    reach = stuff.radius[b] + stuff.largest
+    reach = grain_set.radius[b] + grain_set.largest
     free = free_width(crowd, x)
     if free > 0.0:
         return free - reach, EMPTY
@@ -165,7 +167,7 @@ def gap_at(crowd, position, stuff, b, x):
         j = head_around(crowd, x, step)
         while j != EMPTY:
             apart = sub(x, load(position, j))
-            touch = stuff.radius[b] + stuff.radius[j]
+            touch = grain_set.radius[b] + grain_set.radius[j]
             square = dot(apart, apart)
             if square < (best + touch) ** 2:
                 best, nearest = math.sqrt(square) - touch, j
@@ -174,13 +176,13 @@ def gap_at(crowd, position, stuff, b, x):
 
 
 @loop
-def touches_other(crowd, position, stuff, b, x, mate):
+def touches_other(crowd, position, grain_set, b, x, mate):
     """Whether grain b at x touches any grain but `mate`."""
     for step in range(27):
         j = head_around(crowd, x, step)
         while j != EMPTY:
             apart = sub(x, load(position, j))
-            touch = (stuff.radius[b] + stuff.radius[j]) * (1.0 + APART)
+            touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
             if j != mate and dot(apart, apart) <= touch * touch:
                 return True
             j = crowd.before[j]
