@@ -24,7 +24,7 @@ PINNING = 0.01
 
 
 def starts():
-    """Return grains without spin, starting on planes and spheres at several distances."""
+    """Yield names and options for grains without spin, starting on planes and spheres at several distances."""
     for shape in ("plane", "sphere"):
         for start in ("1 R_m", "2 b_max", "4 b_max", "10 b_max", "20 b_max", "40 b_max"):
             yield f"no spin, {shape}, {start}", THERMAL | {"start": start, "start_shape": shape}
@@ -33,7 +33,7 @@ def starts():
 
 
 def spins():
-    """Return grains with thermal spins, and grains with speeds around the thermal speed."""
+    """Yield names and options for grains with thermal spins and for speeds around the thermal speed."""
     for spin in ("kT/2", "equipartition"):
         for start in ("1 R_m", "4 b_max", "10 b_max", "20 b_max"):
             yield f"spin {spin}, plane, {start}", THERMAL | {"spin": spin, "start": start}
@@ -44,7 +44,7 @@ def spins():
 
 
 def pinned():
-    """Return moments fixed by an external field at angles to the velocity, at 80 K.
+    """Yield names and options for moments fixed by an external field at angles to the velocity, at 80 K.
 
     The angles are Gauss-Legendre points of the isotropic mean.
     """

@@ -36,7 +36,7 @@ def main() -> None:
     mass, moment = float(grain.mass[0]), float(np.linalg.norm(grain.moment[0]))
     mean_speed = np.sqrt(8.0 / np.pi)  # mean of the Maxwell distribution, in units of the thermal speed
     rows = []
-    print("  N1   N2   sigma [m2]        sigma v [m3/s]   ratio to Eq. 14: N^1   N^0.63")
+    print("  N1   N2   sigma [m2]        sigma v [m3/s]     /Eq. 14: N^1   N^0.63")
     for small, large in combinations_with_replacement(SIZES, 2):
         found = cross_section(
             temperature="100 K",
