@@ -1,8 +1,10 @@
-"""What the paper's cross-sections mean: sigma for many readings of "two iron grains meet", as a table.
+"""Capture cross-sections of two iron grains for different initial conditions, as a table.
 
-    python examples/cross_sections.py [relative error, 0.01]
+The three values in the paper cannot come from one set of initial conditions; the table covers the possible ones.
 
-Nine minutes on one core at 1 %; docs/physics/cross-sections.md explains the rows.
+Run it with:  python examples/cross_sections.py [RELATIVE_ERROR]
+RELATIVE_ERROR is 0.01 by default, which takes nine minutes on one core.  The rows are explained in
+docs/physics/cross-sections.md.
 """
 
 import csv
@@ -18,11 +20,11 @@ from sand.experiments.scattering import cross_section
 IRON = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg", "temperature": "100 K"}
 THERMAL = IRON | {"speed": 1, "speed_unit": "thermal"}
 PINNING = 0.01
-"""Flux density [T] that holds the moments, a thousand times the field of one grain at b_max from it."""
+"""Flux density [T] that fixes the moments: a thousand times the field of a grain at the distance b_max."""
 
 
 def starts():
-    """Cold grains from planes and spheres at several distances."""
+    """Yield names and options for grains without spin, starting on planes and spheres at several distances."""
     for shape in ("plane", "sphere"):
         for start in ("1 R_m", "2 b_max", "4 b_max", "10 b_max", "20 b_max", "40 b_max"):
             yield f"no spin, {shape}, {start}", THERMAL | {"start": start, "start_shape": shape}
@@ -31,7 +33,7 @@ def starts():
 
 
 def spins():
-    """Thermal spins, and the speeds around the thermal one."""
+    """Yield names and options for grains with thermal spins and for speeds around the thermal speed."""
     for spin in ("kT/2", "equipartition"):
         for start in ("1 R_m", "4 b_max", "10 b_max", "20 b_max"):
             yield f"spin {spin}, plane, {start}", THERMAL | {"spin": spin, "start": start}
@@ -42,7 +44,10 @@ def spins():
 
 
 def pinned():
-    """Moments held by an outside field at angles to the flight, 80 K: Gauss points of an isotropic mean."""
+    """Yield names and options for moments fixed by an external field at angles to the velocity, at 80 K.
+
+    The angles are Gauss-Legendre points of the isotropic mean.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(5)
     for cosine, weight in zip(0.5 * (nodes + 1.0), 0.5 * weights, strict=True):
         axis = np.array([cosine, math.sqrt(1.0 - cosine**2), 0.0])
@@ -61,7 +66,7 @@ def pinned():
 
 
 def main(relative_error: float) -> None:
-    """Print a row for each."""
+    """Print one row per set of initial conditions, and the mean over the fixed directions."""
     warnings.simplefilter("ignore")
     table = csv.writer(sys.stdout, lineterminator="\n")
     table.writerow(("set-up", "enhancement", "error", "c", "c_error", "flights", "bound", "failed"))

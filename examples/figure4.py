@@ -1,8 +1,8 @@
-"""The paper's Figure 4: a straight chain struck by a fast grain ends T-shaped; hit-and-stick would not.
+"""Figure 4 of the paper: a fast grain strikes a straight chain, which becomes T-shaped; hit-and-stick gives no T.
 
 Run it with:  python examples/figure4.py [figure4.png]
-It prints what became of each chain and draws the map of where T, straight, bent and broken chains arise.
-Half a minute, most of it the compilation of the first run.
+The script prints the final shape of the chain and draws maps of impact speed and position with the final shape
+(T, straight, bent or broken).  It takes half a minute, most of it for compilation in the first run.
 """
 
 import sys
@@ -18,8 +18,8 @@ from sand.plotting.run_figure import save
 
 warnings.filterwarnings("ignore", message="contacts of iron")
 
-PLACES = np.linspace(-1.1, 0.3, 29)
-RELEASE = sand.Contact(beyond="release")  # the literal SAND: beyond its limit a displacement is released
+POSITIONS = np.linspace(-1.1, 0.3, 29)
+RELEASE = sand.Contact(beyond="release")  # as in the paper: displacements beyond the critical value are reset to zero
 CASES = (
     ("20 nm iron, release", sand.IRON, "10 nm", RELEASE, range(100, 320, 20), 100),
     ("20 nm iron, clamp", sand.IRON, "10 nm", sand.Contact(), range(100, 320, 20), 100),
@@ -29,23 +29,25 @@ CASES = (
 
 
 def main(out: str = "figure4.png") -> None:
-    """Strike, tell, draw."""
-    speed, place = 240.0, -0.6
-    hit = chain_impact.strike(sand.IRON, "10 nm", speed=speed, place=place, contact=RELEASE)
+    """Simulate one impact, compute the maps, and draw the figure."""
+    speed, position = 240.0, -0.6
+    hit = chain_impact.strike(sand.IRON, "10 nm", speed=speed, place=position, contact=RELEASE)
     shape = chain_impact.shape_of(hit)
-    stuck = chain_impact.stick_at_first_touch(sand.IRON, 1e-8, place)
-    print(f"iron, {speed:g} m/s at {place:g} r: {shape.name}, crossbar at {shape.crossbar:.0f} degrees to the chain,")
+    stuck = chain_impact.stick_at_first_touch(sand.IRON, 1e-8, position)
+    print(
+        f"iron, {speed:g} m/s at {position:g} r: {shape.name}, crossbar at {shape.crossbar:.0f} degrees to the chain,"
+    )
     print(f"the struck end grain rolled by {shape.rolled:.0f} degrees; hit-and-stick gives: {stuck.name}")
     maps = []
     for title, material, radius, contact, speeds, steps in CASES:
         fine = sand.Verlet(steps_per_period=steps)
-        names = chain_impact.shape_map(material, radius, speeds, PLACES, contact=contact, stepping=fine)
-        maps.append(Map(title, list(speeds), PLACES, names))
+        names = chain_impact.shape_map(material, radius, speeds, POSITIONS, contact=contact, stepping=fine)
+        maps.append(Map(title, list(speeds), POSITIONS, names))
         print(f"{title}: T in {np.mean(names == 'T'):.1%} of the map")
     pictures = [
         Picture("before", hit.start.position, 1e-8),
         Picture(f"after, {speed:g} m/s: {shape.name}", hit.grains.position, 1e-8),
-        Picture("hit-and-stick", chain_impact.first_touch(sand.IRON, 1e-8, place)[0], 1e-8),
+        Picture("hit-and-stick", chain_impact.first_touch(sand.IRON, 1e-8, position)[0], 1e-8),
     ]
     save(chain_figure(pictures, maps), Path(out))
     print(f"figure: {out}")

@@ -1,7 +1,7 @@
-"""How the growth of magnetic grains depends on heat, on an outside field and on a gas.
+"""Growth of magnetic grains at different temperatures, in an external field and in a gas.
 
 Run it with:  python examples/growth_variants.py --boxes 3 --until "4 us" --workers 2 --out variants
-Interrupted, the same command goes on; `sand analyse variants/cold variants/hot` compares two of them.
+After an interruption, the same command continues.  `sand analyse variants/cold variants/hot` compares two variants.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ VARIANTS = {
 
 
 def variant(name: str, until: str) -> dict:
-    """The case of growth.toml with some tables changed."""
+    """Return the case of growth.toml with the changes of a variant."""
     case = copy.deepcopy(CASE)
     case["run"]["until"] = until
     for table, changes in VARIANTS[name].items():
@@ -35,7 +35,7 @@ def variant(name: str, until: str) -> dict:
 
 
 def main() -> None:
-    """Grow each variant and tell what came of it."""
+    """Simulate each variant and print its final size and exponents."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--boxes", type=int, default=3)
     parser.add_argument("--until", default="4 us")
@@ -43,15 +43,15 @@ def main() -> None:
     parser.add_argument("--out", default="variants")
     parser.add_argument("--only", choices=list(VARIANTS), action="append")
     options = parser.parse_args()
-    print(f"{'':10} {'S at the end':>16} {'z':>12} {'gamma':>12} {'D_f':>12}")
+    print(f"{'':10} {'final S':>16} {'z':>12} {'gamma':>12} {'D_f':>12}")
     with executor_for(options.workers) as executor:
         for name in options.only or VARIANTS:
             folder = Path(options.out) / name.replace(" ", "-")
             grow(variant(name, options.until), range(1, options.boxes + 1), folder, executor)
             growth = ensemble_in(folder).growth
-            laws = [(growth.z, "exponent"), (growth.moment, "exponent"), (growth.dimension, "value")]
-            told = ["-" if law is None else f"{getattr(law, key):.2f} ± {law.error:.2f}" for law, key in laws]
-            print(f"{name:10} {growth.mean[-1]:8.2f} ± {growth.error[-1]:.2f}", *(f"{one:>12}" for one in told))
+            fits = [(growth.z, "exponent"), (growth.moment, "exponent"), (growth.dimension, "value")]
+            columns = ["-" if fit is None else f"{getattr(fit, key):.2f} ± {fit.error:.2f}" for fit, key in fits]
+            print(f"{name:10} {growth.mean[-1]:8.2f} ± {growth.error[-1]:.2f}", *(f"{text:>12}" for text in columns))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""A collision kernel from flown cross-sections: chains of 1, 2 and 4 magnetic iron grains, thermal, spinning.
+"""Collision kernel from simulated cross-sections of chains of 1, 2 and 4 magnetic iron grains with thermal spin.
 
 Run it with:  python examples/measured_kernel.py 0.1 kernel
-The first word is the error of each cross-section; the second names kernel.csv (SI) and kernel.txt (cgs, for DustPy).
+The first argument is the relative error of each cross-section.  The second is the name of the output files, kernel.csv
+(SI units) and kernel.txt (cgs units, for DustPy).
 """
 
 from __future__ import annotations
@@ -22,17 +23,20 @@ SIZES = (1, 2, 4)
 
 
 def body(grains: int) -> sand.Grains:
-    """A chain, its moments head to tail."""
+    """Return a straight chain with moments in head-to-tail alignment."""
     return sand.setup.chain(grains, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg")
 
 
 def main() -> None:
-    """Fly each pair at the mean speed of the lighter one; compare with Eq. 14 for moments N and N^0.63."""
+    """Compute the cross-section of each pair and compare with Eq. 14 for moments proportional to N and N^0.63.
+
+    Each pair starts with the mean thermal speed of the lighter chain.
+    """
     grain = body(1)
     mass, moment = float(grain.mass[0]), float(np.linalg.norm(grain.moment[0]))
-    mean_speed = np.sqrt(8.0 / np.pi)  # of a Maxwell distribution, in thermal speeds
+    mean_speed = np.sqrt(8.0 / np.pi)  # mean of the Maxwell distribution, in units of the thermal speed
     rows = []
-    print("  N1   N2   sigma [m2]        sigma v [m3/s]   of Eq. 14: N^1   N^0.63")
+    print("  N1   N2   sigma [m2]        sigma v [m3/s]     /Eq. 14: N^1   N^0.63")
     for small, large in combinations_with_replacement(SIZES, 2):
         found = cross_section(
             temperature="100 K",
@@ -46,16 +50,16 @@ def main() -> None:
             seed=1,
         )
         rows.append((small * mass, large * mass, found.sigma, found.speed))
-        rate, shares = found.sigma * found.speed, []
+        rate, ratios = found.sigma * found.speed, []
         for exponent in (1.0, 0.63):
             kernel = kinetics.capture(
                 "10 nm", mass, moment, "100 K", exponent=exponent, reading="aligned", speed="thermal"
             )
-            shares.append(rate / float(kernel(small * mass, large * mass)))
+            ratios.append(rate / float(kernel(small * mass, large * mass)))
         error = found.sigma_error / found.sigma
         print(
             f"{small:4} {large:4}   {found.sigma:.3g} ± {error:4.0%}   {rate:14.3g}   ",
-            f"{shares[0]:13.2f} {shares[1]:8.2f}",
+            f"{ratios[0]:13.2f} {ratios[1]:8.2f}",
         )
     kernel = kernel_table.measured(rows)
     masses = mass * np.geomspace(SIZES[0], SIZES[-1], 5)
