@@ -9,7 +9,7 @@ import warnings
 import sand
 from sand.simulation.run_writer import versions
 
-from . import files, main_job, regimes, scaling
+from . import compare, files, main_job, regimes, scaling
 from .long_range import growth, savings, tell
 from .rows import all_rows
 from .table import HEAD, about, line, tell_about
@@ -28,11 +28,19 @@ def main() -> None:
         "--main-job", action="store_true", help="time the main job and write docs/main-job.json, instead"
     )
     parser.add_argument("--regimes", action="store_true", help="physical time per hour and its accuracy, instead")
+    parser.add_argument("--compare", metavar="REV", help="this working tree beside another revision, in turns, instead")
+    parser.add_argument("--rounds", type=int, default=compare.ROUNDS, help="of --compare, at least 6 (default 7)")
     options = parser.parse_args()
+    if options.compare and options.rounds < 6:
+        parser.error(f"--rounds {options.rounds}: an interval of 95 % needs at least 6 rounds")
     warnings.simplefilter("ignore")
     sand.set_threads(1)  # a row that needs more says so
     if options.main_job:
         print(main_job.write())
+        return
+    if options.compare:
+        compared = compare.compare(options.compare, options.rounds)
+        print(json.dumps({"revision": options.compare, "rows": compared})) if options.json else compare.show(compared)
         return
     if options.page:
         from . import page  # needs Playwright and a Chromium
