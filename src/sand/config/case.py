@@ -70,7 +70,6 @@ class MaterialSection(Section):
     """[materials.NAME]: a new material, or changes to the one it is `like`."""
 
     like: str | None = None
-    """Preset to start from; without it density, Young's modulus and Poisson's ratio are required."""
     density: Any = None
     surface_energy: Any = None
     young_modulus: Any = None
