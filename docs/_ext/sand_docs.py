@@ -47,7 +47,7 @@ def keys_of(model: Any) -> list[tuple[str, str, str]]:
 
 
 class Records(SphinxDirective):
-    """`records:: NAME`: a table of the fields of a pydantic model, or of a tuple or dict of dataclasses or named tuples."""
+    """`records:: NAME`: a table of the fields of a pydantic model, or of a tuple or dict of records."""
 
     required_arguments = 1
 
@@ -68,9 +68,6 @@ class Records(SphinxDirective):
         return [nodes.table("", group, classes=["colwidths-auto"])]
 
 
-_SECTION = re.compile(r"(Args|Attributes|Raises|Returns):.*|-{3,}")
-
-
 def escaped(line: str) -> str:
     """A line of text in which |x| is a magnitude and * a product; both stay as they are in `backticks`."""
     bullet = re.match(r" *\* |", line)[0]
@@ -87,7 +84,7 @@ def plain_text(app: Any, what: str, name: str, thing: Any, options: Any, lines: 
     out: list[str] = []
     literal = table = sections = False
     for line, before in zip(lines, ["", *lines], strict=False):
-        if _SECTION.fullmatch(line):
+        if re.fullmatch("-{3,}", line):  # the heading of a section
             sections = before not in ("Notes", "Examples")
         indented = line.startswith("    ") and not sections
         if indented and not before.strip() and not literal:
