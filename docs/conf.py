@@ -43,6 +43,8 @@ autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 # `code` in docstrings
 default_role = "code"
+# values such as "200 A m^2/kg" are for copying
+smartquotes = False
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "substitution"]
 # measured by `python -m benchmarks --main-job`
