@@ -1,4 +1,4 @@
-"""Sphinx: the pages are Markdown, their code blocks are executed, the reference is written from the source.
+"""Sphinx: the pages are Markdown, their code blocks are executed, the reference is made from the docstrings.
 
 Build with:  sphinx-build -W --keep-going -b html docs docs/_build/html
 """
@@ -18,10 +18,33 @@ author = "The SAND developers"
 copyright = "The SAND developers, BSD 3-clause licence"
 version = release = __version__
 
-extensions = ["myst_nb", "sphinx.ext.mathjax", "sphinx-mathjax-offline", "sand_reference", "offline"]
-source_suffix = {".md": "myst-nb"}
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx_click",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",
+    "sand_docs",
+    "offline",
+]
+source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "_ext", "**.ipynb_checkpoints"]
 nitpicky = True
+# aliases of types of other packages, whose pages would be needed to link them
+nitpick_ignore_regex = [("py:class", r"(collections|numpy|typing)\..*")]
+
+# Docstrings name types, shapes and units in words, so annotations stay out of the signatures.
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+autodoc_preserve_defaults = True
+# autodoc lists the members
+numpydoc_show_class_members = False
+# `code` in docstrings
+default_role = "code"
+# values such as "200 A m^2/kg" are for copying
+smartquotes = False
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "substitution"]
 # measured by `python -m benchmarks --main-job`

@@ -35,10 +35,19 @@ class RunSection(Section):
     """[run]: how long (a time, or a number of steps), how often, which seed, where to."""
 
     until: Duration | None = None
+    """End of the run [s], simulated time; either this or `steps` is required."""
     steps: Steps | None = None
+    """End of the run as a number of steps, completed to the end of the cycle; with both, whichever is reached first."""
     frame_every: Duration | None = None
+    """Time between frames and rows of the ledger [s]; by default 1/200 of the run."""
     seed: Seed = 0
+<<<<<<< HEAD
     out: PathName | None = None
+=======
+    """Seed of all random numbers: initial conditions and random kicks of a gas."""
+    out: PlaceName | None = None
+    """Folder of the run."""
+>>>>>>> docgen
 
     @model_validator(mode="after")
     def _ends(self) -> RunSection:
@@ -51,6 +60,7 @@ class BoxSection(Section):
     """[box]: periodic = one length or three, "open" for an open axis; nothing: open space."""
 
     periodic: Any = None
+    """Length of a cube or list of three lengths [m], "open" for an open axis; none: open space."""
 
     @field_validator("periodic", mode="after")
     @classmethod
@@ -87,16 +97,31 @@ class GrainsSection(Section):
     """[grains]: a gas of grains, or those of a `file`: a frame of a trajectory, or a body; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
+    """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
     number: Count | None = None
+    """Number of grains."""
     radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
+    """Radius of each grain [m]; for a body from a file only if the file has none."""
     material: str | list[str] = "iron"
+    """Preset or name in [materials]; for a body from a file it takes precedence over the file's material."""
     moment: Any = None
+    """Moment of each grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moment."""
     charge: quantity("C") | None = None  # type: ignore[valid-type]
+    """Charge of each grain [C]; none: no charge."""
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
+    """Temperature of velocities and spins [K]."""
     spins: str = "kT/2"
+<<<<<<< HEAD
     file: PathName | None = None
+=======
+    """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
+    file: PlaceName | None = None
+    """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
+>>>>>>> docgen
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
+    """Index of the frame of a trajectory; −1 is the last."""
     length: str | None = None
+    """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
 
     @field_validator("moment")
     @classmethod

@@ -47,17 +47,33 @@ class BodySection(Section):
     """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
 
     kind: Kind
+<<<<<<< HEAD
     path: PathName | None = None
+=======
+    """Builder (as for `sand build`), or `file`."""
+    path: PlaceName | None = None
+    """File of the body; required with `kind = "file"`."""
+>>>>>>> docgen
     length: str | None = None
+    """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
     grains: Count | None = None
+    """Number of grains; required except for a grain, a lattice or a file."""
     shape: list[Count] | None = None
+    """Grains along the three sides of a lattice, such as [5, 5, 5]; required for `lattice` and `hexagonal`."""
     radius: Any = None
+    """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; optional for a file."""
     material: str = "silica"
+    """Preset or name in [materials]."""
     moment: Any = None
+    """Moment of each magnetic grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moments."""
     moments: str | None = None
+    """Directions of the moments: `random`, `aligned` or `relaxed`."""
     magnetic: Any = None
+    """Fraction of the grains that have a moment, 0 … 1; none: 1."""
     dimension: Any = None
+    """Fractal dimension; for `kind = "fractal"` only."""
     prefactor: Any = None
+    """Fractal prefactor; for `kind = "fractal"` only."""
 
     @field_validator("radius")
     @classmethod
@@ -112,11 +128,21 @@ class ImpactSection(Section):
     """[impact]: how they meet, and how often."""
 
     speed: quantity("m/s", above=0.0)  # type: ignore[valid-type]
+    """Relative speed of the centres of mass [m/s]."""
     impact_parameter: Any = 0.0
+    """Impact parameter [m], or a fraction of the sum of the outer radii, "0.5 b"."""
     along: Literal["x", "y", "z"] = "x"
+    """Direction of flight of the projectile."""
     turn: bool = True
+    """Rotate both bodies at random, by the seed."""
     seeds: list[Seed] = Field(default_factory=lambda: [1], min_length=1)
+<<<<<<< HEAD
     out: PathName | None = None
+=======
+    """One collision is run for each seed."""
+    out: PlaceName | None = None
+    """Folder of the results."""
+>>>>>>> docgen
 
     @field_validator("impact_parameter")
     @classmethod

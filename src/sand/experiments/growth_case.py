@@ -19,6 +19,7 @@ class GrowSection(Section):
     """[grow]: one box for each seed."""
 
     seeds: list[Seed] = Field(min_length=1)
+    """One box is run for each seed."""
 
 
 class GrowthCase(Case):

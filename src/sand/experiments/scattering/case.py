@@ -25,6 +25,7 @@ class ScatterBody(BodySection):
     """[projectile] and [target]: a grain, or an aggregate as in `sand collide`."""
 
     kind: Kind = "grain"
+    """Builder (as for `sand build`), or `file`."""
 
 
 class FlightSection(Section):
@@ -48,13 +49,25 @@ class MeasureSection(Section):
     """[measure]: what is wanted, how well."""
 
     job: Literal["cross-section", "map", "trajectories"] = "cross-section"
+    """Quantity to compute: cross-sections, a map of hit probabilities, or trajectories."""
     relative_error: Any = 0.02
+    """Relative standard error of cross-sections at which sampling stops, 1e-4 … 0.5."""
     impact_parameters: list[Any] = Field(default_factory=list)
+    """Impact parameters of trajectories [m], or as text "0.95 b_max"."""
     spins: list[Any] = Field(default_factory=list)
+    """Spins of trajectories, each as `flight.spin`; they replace it."""
     cells: Annotated[int, Field(ge=1, le=1000, strict=True)] = 24
+    """Cells of a map along the impact parameter."""
     per_cell: Annotated[int, Field(ge=1, le=10**9, strict=True)] = 64
+    """Trajectories per cell of a map."""
     seed: Seed = 0
+<<<<<<< HEAD
     out: PathName | None = None
+=======
+    """Seed of all random numbers."""
+    out: PlaceName | None = None
+    """Folder of the results."""
+>>>>>>> docgen
 
     @field_validator("relative_error")
     @classmethod
