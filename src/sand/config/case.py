@@ -41,13 +41,9 @@ class RunSection(Section):
     frame_every: Duration | None = None
     """Time between frames and rows of the ledger [s]; by default 1/200 of the run."""
     seed: Seed = 0
-<<<<<<< HEAD
-    out: PathName | None = None
-=======
     """Seed of all random numbers: initial conditions and random kicks of a gas."""
-    out: PlaceName | None = None
+    out: PathName | None = None
     """Folder of the run."""
->>>>>>> docgen
 
     @model_validator(mode="after")
     def _ends(self) -> RunSection:
@@ -111,13 +107,9 @@ class GrainsSection(Section):
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
     """Temperature of velocities and spins [K]."""
     spins: str = "kT/2"
-<<<<<<< HEAD
-    file: PathName | None = None
-=======
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
-    file: PlaceName | None = None
+    file: PathName | None = None
     """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
->>>>>>> docgen
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
     """Index of the frame of a trajectory; −1 is the last."""
     length: str | None = None

@@ -47,13 +47,9 @@ class BodySection(Section):
     """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
 
     kind: Kind
-<<<<<<< HEAD
-    path: PathName | None = None
-=======
     """Builder (as for `sand build`), or `file`."""
-    path: PlaceName | None = None
+    path: PathName | None = None
     """File of the body; required with `kind = "file"`."""
->>>>>>> docgen
     length: str | None = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
     grains: Count | None = None
@@ -136,13 +132,9 @@ class ImpactSection(Section):
     turn: bool = True
     """Rotate both bodies at random, by the seed."""
     seeds: list[Seed] = Field(default_factory=lambda: [1], min_length=1)
-<<<<<<< HEAD
-    out: PathName | None = None
-=======
     """One collision is run for each seed."""
-    out: PlaceName | None = None
+    out: PathName | None = None
     """Folder of the results."""
->>>>>>> docgen
 
     @field_validator("impact_parameter")
     @classmethod

@@ -61,13 +61,9 @@ class MeasureSection(Section):
     per_cell: Annotated[int, Field(ge=1, le=10**9, strict=True)] = 64
     """Trajectories per cell of a map."""
     seed: Seed = 0
-<<<<<<< HEAD
-    out: PathName | None = None
-=======
     """Seed of all random numbers."""
-    out: PlaceName | None = None
+    out: PathName | None = None
     """Folder of the results."""
->>>>>>> docgen
 
     @field_validator("relative_error")
     @classmethod
