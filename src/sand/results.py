@@ -54,9 +54,16 @@ class Run:
 
     def __init__(self, folder: str | Path):
         self.folder = Path(folder)
+        if self.folder.is_file():
+            raise BadInput(f"{folder} is a file; give the folder of a run")
         if not self.folder.is_dir():
             raise BadInput(f"there is no folder {folder}")
         if not (self.folder / files.TRAJECTORY).exists():
+            if any((self.folder / name).exists() for name in (files.COLLISION, files.OUTCOMES)):
+                raise BadInput(
+                    f"{folder} holds many collisions, which keep no trajectories; for the frames of one give its seed "
+                    "and a folder: sand collide CASE.toml --seeds SEED --out DIR"
+                )
             if (self.folder / files.CASE).exists():
                 raise BadInput(f"{folder} has no {files.TRAJECTORY} yet; wait until its run has written a frame")
             raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")

@@ -6,14 +6,18 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import sand
 from sand.cli.interrupt import Watch
 from sand.cli.main import main
 from sand.experiments import collision_case
 from sand.io.checkpoint import newest_checkpoint
 from sand.io.table import GrowingOutcomes
+
+from ..physics.setups import struck_chain
 
 pytestmark = pytest.mark.compiled("contacts")
 COLLISION = """
@@ -304,3 +308,31 @@ def test_control_characters_do_not_reach_the_terminal(place, capsys):
         assert "\\x1b" in shown
     assert main(["info", name, "--json"]) == 0
     assert "\x7f" not in capsys.readouterr().out
+
+
+@pytest.mark.compiled("contacts")
+def test_the_summary_of_an_interrupted_run_is_that_of_its_last_step(tmp_path):
+    """Contacts and drift of summary.json are those of the state, not of the last frame; the ledger has no new row."""
+    sim = struck_chain()
+    sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="1 s")
+
+    class Interrupt(sand.Observer):
+        def tick(self, simulation):
+            if simulation.contacts["pair"].shape[0] > 6:
+                signal.raise_signal(signal.SIGINT)
+
+    sim.observers = [Interrupt()]
+    with pytest.raises(sand.Interrupted):
+        sim.run(until="1 s")
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))
+    assert summary["contacts"] == len(sim.contacts["pair"]) > sim.ledger.rows[-1]["contacts"]
+    assert len(sim.ledger.rows) == 1
+    assert summary["time"] == sim.time > sim.ledger.rows[-1]["time"]
+
+
+def test_a_folder_of_case_files_is_no_job(tmp_path, capsys):
+    """`sand resume` of a folder in which the user keeps a case file of `sand collide` starts nothing."""
+    shutil.copy(Path(__file__).parents[2] / "examples" / "collision.toml", tmp_path)
+    assert main(["resume", str(tmp_path)]) == 2
+    assert "to start it: sand collide" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["collision.toml"]

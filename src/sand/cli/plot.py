@@ -85,6 +85,8 @@ def _asked(
     wrong += [f"--what {name!r} is none; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
     if alone:
         wrong += [f"--what {name}: {source} has no ledger; give a run's folder" for name in names if name in HISTORY]
+    if how["cluster"] is not None and what is not None and (others := [name for name in names if name != STILL]):
+        wrong.append(f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out")
     size = _size(how["size"])
     if size is None:
         wrong.append(f"--size {how['size']!r} must be width x height in pixels, such as 1600x1000")

@@ -141,7 +141,8 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
     every = simulation.frame_every
     if every is None:  # what `run` will choose
         every = (end - simulation.time) / 200.0
-    frames = f"a frame every {format_quantity(every, 's')}" if math.isfinite(every) else "frames at start and end"
+    several = every <= end - simulation.time
+    frames = f"a frame every {format_quantity(every, 's')}" if several else "frames at start and end"
     goals = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
     goals += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
     start = f"from {format_quantity(simulation.time, 's')} " if simulation.time > 0.0 else ""

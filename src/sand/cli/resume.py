@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,16 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput
-from ..io.run_folder import CASE, COLLISION, GROWTH, ONE_COLLISION, SCATTERING, read_json, read_toml
+from ..io.run_folder import (
+    CASE,
+    COLLISION,
+    GROWTH,
+    ONE_COLLISION,
+    SCATTERING,
+    read_json,
+    read_toml,
+    was_written_by_sand,
+)
 from ..threads import set_threads
 from . import options, report
 from .exits import DONE
@@ -61,9 +71,13 @@ def _kind(folder: Path) -> str:
     """The command that began what is in a folder.  Raises BadInput for what is none."""
     if folder.is_file():
         raise BadInput(f"{folder} is a file; give the folder of a run")
-    if (folder / ONE_COLLISION).exists():
-        return "collide"
-    kind = command_for(read_toml(folder / CASE)) if (folder / CASE).exists() else None
+    one = folder / ONE_COLLISION
+    case = one if one.exists() else folder / CASE
+    kind = command_for(read_toml(case)) if case.exists() else None
+    if kind not in (None, "run") and not was_written_by_sand(case):
+        raise BadInput(
+            f"{folder} is not the folder of a run or job: {case.name} in it is a case file; to start it: sand {kind} {case}"
+        )
     return kind or "run"
 
 
@@ -99,11 +113,18 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
 def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as_json: bool) -> int:
     """Go on with a run; returns the exit code."""
     from ..config.build import resume
+    from ..units import format_quantity
     from .launch import End, launch
 
     simulation = report.with_notes(lambda: resume(place))
     if asked is not None and asked <= simulation.time:
         raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, where {place} stands")
+    if asked is not None and asked < simulation.planned[0] < math.inf:
+        planned = format_quantity(simulation.planned[0], "s")
+        raise BadInput(
+            f"--until = {until!r} is earlier than {planned}, the planned end of {place}, which would be forgotten; "
+            "leave --until out, and stop the run with Ctrl-C when you like"
+        )
     if asked is None and _is_there(simulation):
         return _nothing_to_do(simulation, place, quiet=quiet, as_json=as_json)
     end = None if asked is None else End(asked)

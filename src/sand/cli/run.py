@@ -52,6 +52,11 @@ def command(
     """
     end = options.seconds(until)
     set_threads(threads)
+    if case is not None and Path(case).is_dir():
+        raise BadInput(
+            f"{case} is a folder; to go on with a run: sand resume {case}; to start from its last frame: "
+            f"sand run --from {case}"
+        )
     from ..config.build import simulation_of
     from ..config.case import GrainsSection, read_case
     from .launch import End, launch, refuse_folder

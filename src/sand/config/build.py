@@ -196,7 +196,9 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
     if not any(place.glob("checkpoint-*.npz")):
-        raise BadInput(f"{place} holds no checkpoint to go on from")
+        raise BadInput(
+            f"{place} holds no checkpoint to resume from; to start a new run from its last frame: sand run --from {place}"
+        )
     with writing(place):
         arrays, meta = newest_checkpoint(place)
     case = _case_of_checkpoint(place, meta)

@@ -89,7 +89,7 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
             if not overwrite:
                 raise BadInput(
                     f"folder {folder} exists and is not empty; give another one, remove it, "
-                    "or say that it may be overwritten"
+                    "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
             with writing(folder):
                 damaged = set_aside_in(folder, (*OURS, "checkpoint-*.npz"))
@@ -276,6 +276,15 @@ def _refuse_extremes(path: str | Path, content: dict[str, Any]) -> None:
         layer = deeper
     if layer:
         raise BadInput(f"{path}: tables and lists lie more than {DEEPEST} deep in each other")
+
+
+def was_written_by_sand(path: Path) -> bool:
+    """Whether a case file in a folder was written by a run or job, and not by the user: its first line says so."""
+    try:
+        first = path.read_text("utf-8").partition("\n")[0]
+    except (OSError, UnicodeDecodeError):
+        return False
+    return first.startswith("# sand ") or "as understood by SAND" in first
 
 
 def write_toml(path: Path, content: dict[str, Any], comment: str) -> None:

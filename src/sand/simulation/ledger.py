@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -90,6 +91,16 @@ class Ledger(Books):
             return False
         self.rows.append(row)
         return True
+
+    def with_row(self, row: dict[str, float]) -> Ledger:
+        """The ledger with one more row; the rows themselves if this step is the last one logged.
+
+        Used for the summary of an interrupted run: the ledger of the run itself must not depend on interruptions.
+        """
+        more = copy.copy(self)
+        more.rows = list(self.rows)
+        more.add(row)
+        return more
 
     def to_array(self) -> np.ndarray:
         """All rows (K, columns), for a checkpoint; whole numbers below 2⁵³ are exact in it."""

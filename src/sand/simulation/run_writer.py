@@ -22,6 +22,7 @@ from ..io.trajectory import TrajectoryWriter
 from ..state.state import CLOCK, COUNT, LOST, STAGE
 from ..version import __version__
 from .displays import display
+from .ledger import Ledger
 from .outcome import Outcome, Result
 from .serialise import case_of
 
@@ -190,12 +191,12 @@ class RunWriter:
         if self._trajectory is not None:
             self._trajectory.rescue()
 
-    def close(self, simulation: Simulation, result: Result) -> None:
+    def close(self, simulation: Simulation, result: Result, ledger: Ledger) -> None:
         """Checkpoint, summary and figure; a further `run` opens the trajectory again."""
         self.save(simulation)
         if self._trajectory is not None:
             self._trajectory.close()
-        summary = summary_of(simulation, result) | (self._ledger.described() if self._ledger else {})
+        summary = summary_of(simulation, result, ledger) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
         # whoever interrupts a run does not want to wait for its figure
         if self.draws and result.outcome is not Outcome.INTERRUPTED:
@@ -207,9 +208,9 @@ class RunWriter:
             display("save figure", simulation, self.folder / files.FIGURE)
 
 
-def summary_of(simulation: Simulation, result: Result) -> dict[str, Any]:
+def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[str, Any]:
     """Everything a table of many runs wants to know of one."""
-    last = simulation.ledger.rows[-1]
+    last = ledger.rows[-1]
     grain_steps = result.steps * len(simulation.grains)
     return {
         "outcome": result.outcome.name.lower(),
@@ -225,9 +226,9 @@ def summary_of(simulation: Simulation, result: Result) -> dict[str, Any]:
         "clusters": last["clusters"],
         "mean_cluster_size": last["mean_cluster_size"],
         "largest_cluster": last["largest_cluster"],
-        "dissipated": simulation.ledger.dissipated,
+        "dissipated": ledger.dissipated,
         "drift": result.drift,
-        "drift_per_kT": simulation.ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
+        "drift_per_kT": ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
         "temperature_at_start": simulation.temperature,
         "seed": simulation.seed,
         "choices": simulation.choices,

@@ -95,7 +95,7 @@ class ReadOnlySettings:
         "frame_every": time_between_frames,
         "observers": observers_given,
     }
-    KEPT = ("recipe", "origin", "planned", "wall_seconds")
+    KEPT = ("recipe", "origin", "planned")
     """What the package itself assigns later."""
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -112,14 +112,17 @@ class Simulation(ReadOnlySettings):
             [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
         )
         self.record = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
-        self.wall_seconds, self._begun = 0.0, restart is not None
+        self._wall_seconds: float = 0.0
+        self._began_at: float | None = None  # before this call of `run`, and its start
+        self._begun = restart is not None
         self._broken = ""  # why it cannot be run any further
         if restart is not None:
             arrays, meta = restart
             self._engine.load_state(arrays)
-            self.temperature, self.wall_seconds = meta["temperature"], meta["wall_seconds"]
-            self._chosen = meta["choices"]
-            self.ledger.from_array(arrays["ledger"], meta["ledger"])
+            self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
+            self._chosen = meta.get("choices", {})
+            if "ledger" in arrays:
+                self.ledger.from_array(arrays["ledger"], meta["ledger"])
         for text in self._engine.warnings:
             warn(text)
         self._built = True
@@ -138,6 +141,12 @@ class Simulation(ReadOnlySettings):
     def steps(self) -> int:
         """Taken so far."""
         return self._engine.steps
+
+    @property
+    def wall_seconds(self) -> float:
+        """Wall time spent in all calls of `run` so far, earlier processes included [s]."""
+        running = 0.0 if self._began_at is None else wall.monotonic() - self._began_at
+        return self._wall_seconds + running
 
     @property
     def is_sound(self) -> bool:
@@ -220,12 +229,12 @@ class Simulation(ReadOnlySettings):
             self._start()
             if self.record:
                 self.record.open(self, end, last)
-            begun = wall.monotonic()
+            self._began_at = wall.monotonic()
             with Signals() as signals:
                 try:
                     outcome = self._loop(end, last, signals)
                 finally:
-                    self.wall_seconds += wall.monotonic() - begun
+                    self._wall_seconds, self._began_at = self.wall_seconds, None
                     self._engine.restore_user_order()
             return self._close(outcome)
         except FilesFailed as error:
@@ -311,9 +320,10 @@ class Simulation(ReadOnlySettings):
             named = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
         if outcome.is_physics:
             self._look()
-        result = Result(outcome, self.steps, self.time, self.ledger.drift, named)
+        ledger = self.ledger.with_row(self._stock())
+        result = Result(outcome, self.steps, self.time, ledger.drift, named)
         if self.record:
-            self.record.close(self, result)
+            self.record.close(self, result, ledger)
         for observer in self.observers:
             observer.close(self, result)
         if outcome is Outcome.INTERRUPTED:
