@@ -76,7 +76,7 @@ def main_job(quick: bool) -> dict[str, Any]:
         sim = simulation_of(read_case(MAIN_JOB), Path(place) / "run")
         sim.run(steps=1)
         seconds = part * thread(lambda: sim.run(until=UNTIL / part))
-    name = f"main job, {sim.world.steps:.2g} steps"
+    name = f"main job, {sim.state.steps:.2g} steps"
     return row(f"{name}: its first tenth × 10" if quick else name, seconds, "s", 25.0)
 
 

@@ -83,7 +83,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
         return sand.Simulation(grains, forces, box="1.2 um", seed=2, **options)
 
     whole, cramped = start(), start()
-    cramped.state.long_range = cramped.state.long_range._replace(mate=np.zeros(16, np.uint32))
+    cramped.state.long_range = cramped.state.long_range._replace(neighbour=np.zeros(16, np.uint32))
     assert whole._engine.rules.search.listed
     whole.run(steps=3000)
     saved = {name: array.copy() for name, array in whole.state.to_arrays().items()}
@@ -107,10 +107,10 @@ def test_growing_arrays_changes_nothing():
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), alike=alike)
-        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, alike=alike), alike
+        sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), uniform_contacts=alike)
+        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=alike), alike
         rules = sim._engine.rules
-        sim._engine.rules = rules._replace(contact=rules.contact._replace(alike=alike))
+        sim._engine.rules = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
         sim.run(until=1e-9)
         ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in FOR_ALL})
     assert sim.state.count[CONTACTS] > 16
@@ -159,7 +159,7 @@ grains = random_aggregate(5, 7, radii=(5e-9, 1e-8), moment="300 A m^2/kg", veloc
 field = sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")
 sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), field])
 sim.run(steps=120)
-np.savez(sys.argv[1], position=sim.grains.position, spin=sim.grains.spin, lost=sim.world.lost, time=sim.time)
+np.savez(sys.argv[1], position=sim.grains.position, spin=sim.grains.spin, lost=sim.state.lost, time=sim.time)
 """
 
 

@@ -112,7 +112,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     before, world = state(sim), sim.state
     crew = new_task_queue(len(world.grains), world.contacts.flag.size)
     crew.words[WORD] = LEAVE << TASK
-    rules = sim._engine.rules._replace(crew=crew)
+    rules = sim._engine.rules._replace(queue=crew)
     worker_loops(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
     assert crew.words[INSIDE] == 0
     assert state(sim) == before

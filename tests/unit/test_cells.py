@@ -33,7 +33,7 @@ def rows(position, box, reach):
     far = empty_long_range_arrays(count, 8)
     far.anchor[...] = position.T
     while cells.rebuild_verlet_list(far, box.span, reach) == cells.FULL:
-        far = far._replace(mate=np.zeros(2 * far.neighbour.size, np.uint32))
+        far = far._replace(neighbour=np.zeros(2 * far.neighbour.size, np.uint32))
     found = np.zeros((count, count), int)
     for place in range(count):
         mates = far.order[far.neighbour[far.start[place] : far.start[place + 1]]]
@@ -264,7 +264,7 @@ def test_a_row_of_cells_may_need_more_room_than_there_is():
     """Room for 16 neighbours of one grain is found to be too little, and grows: the same pairs."""
     grains = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
     once, short = (sand.Simulation(grains, [sand.Contact()], neighbours=Neighbours("cells")) for _ in range(2))
-    short.state.long_range = short.state.long_range._replace(mate=np.zeros(16, np.uint32))
+    short.state.long_range = short.state.long_range._replace(neighbour=np.zeros(16, np.uint32))
     for sim in (once, short):
         sim.state.pair_list.anchor[:] = np.inf
         sim.run(steps=2)
@@ -327,7 +327,7 @@ def test_rows_that_are_too_long_are_listed_with_more_room():
     radius[30] = 2e-7
     sim = sand.Simulation(sand.Grains(position, radius, sand.SILICA), [sand.Contact()], neighbours=Neighbours("cells"))
     world = sim.state
-    world.long_range = world.long_range._replace(mate=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
+    world.long_range = world.long_range._replace(neighbour=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
     assert world.pair_list.pair.shape[1] == 16
     sim.run(steps=1)
     world = sim.state

@@ -69,7 +69,7 @@ def test_what_may_touch_soon_is_what_is_close():
     gap = 2.0 * SOON_PART * reach
 
     def picked(room):
-        near = w.pair_list._replace(soon=np.zeros(room, np.uint32), watch=w.pair_list.skin.copy())
+        near = w.pair_list._replace(inner=np.zeros(room, np.uint32), skin=w.pair_list.skin.copy())
         build_inner_list(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
         if inner_list_is_full(near, w.count):

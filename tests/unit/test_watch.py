@@ -14,7 +14,6 @@ from sand.state.state import (
     LARGEST_SPEED,
     LARGEST_SPIN,
     LONG_RANGE_SKIN,
-    LOST_IN_CONTACTS,
     MADE,
     PAIR_LIST_SKIN,
     REBUILT,
@@ -162,23 +161,6 @@ def test_what_is_no_number_is_the_largest(sign):
     arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
     assert np.isnan(largest_speeds(arrays)[0]) and np.isfinite(largest_speeds(arrays)[1])
     assert np.isnan(largest_displacement(arrays, anchor, span))
-
-
-@pytest.mark.compiled("contacts")
-@pytest.mark.parametrize("damping", ["none", "viscoelastic"])
-@pytest.mark.parametrize("channels", ["one row for each", "as many as this law has"])
-def test_what_contacts_lost_is_read_from_every_format(damping, channels):
-    """Formats 1 to 3 have a row for breaking among what each contact lost; format 1 has all seven in every law."""
-    place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [3.996e-8, 0, 0]])
-    sim = sand.Simulation(sand.Grains(place, 1e-8, sand.SILICA), [sand.Contact(damping=damping)])
-    sim.run(steps=1)
-    saved = sim.state.to_arrays()
-    seven = np.arange(14.0).reshape(7, 2)
-    law = 5 if damping == "none" else 7
-    sim.state.from_arrays(saved | {"contacts/lost": seven if channels == "one row for each" else seven[:law]})
-    for row, name in enumerate(LOST_IN_CONTACTS):
-        if name != "breaking":
-            assert sim.contacts[f"lost_{name}"].tolist() == (seven[row].tolist() if row < law else [0.0, 0.0])
 
 
 @pytest.mark.compiled("contacts")
