@@ -162,7 +162,7 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
         (["run", "small.toml", "--seed", "1.5"], "--seed"),
         (["run", "small.toml", "--out", "small.toml"], "small.toml is a file"),
         (["run", "small.toml", "--out", "small.toml/deeper"], "small.toml is a file"),
-        (["run", "."], "cannot read ."),
+        (["run", "."], "sand resume ."),
         (["resume", "nowhere"], "there is no folder nowhere"),
         (["resume", "."], "no checkpoint"),
         (["info", "nowhere"], "there is no file or folder nowhere"),
@@ -384,6 +384,7 @@ def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number
     assert "sand resume small" in capsys.readouterr().out
     end = str(meta["time"] + 5e-8)
     assert main(["resume", "small", "--until", end, "--quiet"]) == 0
+    assert "instead of 1 s" in capsys.readouterr().err
     assert main(["run", "small.toml", "--until", end, "--out", "whole", "--quiet"]) == 0
     assert same_state(place / "small", place / "whole")
 

@@ -30,7 +30,7 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 
 @click.command("resume", short_help="Go on with what was interrupted, in the folder of any command.")
 @click.argument("folder", metavar="DIR", type=options.PLACE)
-@options.end_of_run('Of a run: a later end than planned, such as "10 us".')
+@options.end_of_run('Of a run: a new end instead of the planned one, such as "10 us".')
 @options.workers
 @options.scheduler
 @options.threads
@@ -120,11 +120,8 @@ def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as
     if asked is not None and asked <= simulation.time:
         raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, where {place} stands")
     if asked is not None and asked < simulation.planned[0] < math.inf:
-        planned = format_quantity(simulation.planned[0], "s")
-        raise BadInput(
-            f"--until = {until!r} is earlier than {planned}, the planned end of {place}, which would be forgotten; "
-            "leave --until out, and stop the run with Ctrl-C when you like"
-        )
+        planned, new = format_quantity(simulation.planned[0], "s"), format_quantity(asked, "s")
+        report.note(f"{place} now ends at {new} instead of {planned}, as --until is earlier than the planned end")
     if asked is None and _is_there(simulation):
         return _nothing_to_do(simulation, place, quiet=quiet, as_json=as_json)
     end = None if asked is None else End(asked)
