@@ -58,8 +58,8 @@ export class Squares {
   private readonly simplified: three.RawShaderMaterial;
 
   /**
-   * @param vertexShader and fragmentShader are compiled twice: ray-cast, and simplified (with SIMPLE defined) for objects
-   *   a few pixels wide, whose depth is that of the square
+   * @param vertexShader and fragmentShader are compiled twice: ray-cast, and simplified (with SIMPLE defined) for
+   *   objects a few pixels wide, whose depth is that of the square
    * @param uniforms including the columns
    * @param smooth whether the canvas is multisampled, so that edges can be antialiased
    */

@@ -32,7 +32,7 @@ export function grainRows(i: number, frame: Frame, dataset: Dataset): Row[] {
   const rows: Row[] = [
     ["position", components(vector(frame.position, i, manifest.unit), "m", 5)],
     ["radius", quantity(grains.radius[i] * manifest.unit, "m")],
-    ["material", manifest.materials[grains.material[i]] ?? "not dataset"],
+    ["material", manifest.materials[grains.material[i]] ?? "not known"],
     ["mass", quantity(grains.mass[i], "kg")],
     ["velocity", magnitudeAndComponents(vector(frame.velocity, i), "m/s")],
     ["spin", magnitudeAndComponents(vector(frame.spin, i), "rad/s")],
