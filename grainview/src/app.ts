@@ -266,7 +266,7 @@ export class App implements FrameDisplay, LiveRun {
     this.page.canvas.setAttribute("aria-label", `${picture.description}; press ? for keys`);
   }
 
-  /** Add new frames of a run that goes on; the last frame follows the run if the user wants that. */
+  /** Add new frames of a running simulation; advance to the newest if the last one is shown and "live" is set. */
   append(more: Manifest, series: Series): void {
     const { manifest, state, picture, player } = this;
     const atEnd = state.number("frame") >= manifest.times.length - 1;

@@ -1,4 +1,4 @@
-// A run that is still going: the page polls its source for new frames.
+// A running simulation: the page polls its source for new frames.
 
 import { type Dataset, QUANTITIES } from "./data/quantities";
 import type { Manifest, Series, Source } from "./data/types";
@@ -24,7 +24,7 @@ export interface DataChoices {
   offer(id: string, options: [value: string, label: string][]): void;
 }
 
-/** Set the options that these data allow, which grow while a run goes on; returns the names of these settings. */
+/** Set the options that these data allow, which increase while a run continues; returns the names of these settings. */
 export function offerChoices(settings: DataChoices, dataset: Dataset, series: Series): string[] {
   const available = QUANTITIES.filter((q) => q.available?.(dataset) ?? true);
   settings.offer("colour", available.map((q) => [q.id, q.label]));

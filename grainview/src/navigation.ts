@@ -19,7 +19,7 @@ export class FrameNavigation {
   showing: Promise<void> = Promise.resolve();
   private requested = 0;
 
-  /** @param count number of frames, which grows while the run goes on */
+  /** @param count number of frames, which grows while the run continues */
   constructor(
     private readonly settings: Settings,
     private readonly frames: FrameStore,

@@ -142,7 +142,7 @@ export class Picture {
     world.stage.redraw();
   }
 
-  /** Box lengths; zeros where there is no box to be seen. */
+  /** Box lengths; zeros if no box is drawn. */
   private get boxLengths(): number[] {
     const visible = this.frame && !this.shown && this.dataset.manifest.periodic.some(Boolean);
     return visible && this.frame ? this.frame.box : [0, 0, 0];

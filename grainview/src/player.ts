@@ -17,7 +17,7 @@ export class Player {
   onPlaying: (on: boolean) => void = () => undefined;
 
   /**
-   * @param count number of frames, which grows while the run goes on
+   * @param count number of frames, which grows while the run continues
    * @param go shows a frame
    */
   constructor(

@@ -109,7 +109,7 @@ def test_every_colouring_has_its_legend(view):
 
 
 def test_numbers_of_the_legend(view):
-    """They are the ends of the range, in the unit that is named; Minimum and Maximum are in SI; angles take no prefix."""
+    """Ends of the range in the unit that is named; Minimum and Maximum are in SI units; angles take no prefix."""
     view.put(colour="spin")
     view.control("low").fill("1e8")
     view.control("low").press("Enter")
