@@ -1,42 +1,48 @@
-// The app: brings source, stage, settings and the parts of the page together.
+// Creates the parts of the page and connects them. Only boot.ts and main.ts use this class.
 
-import { copyAddress, lookAs, lookText } from "./address";
-import { Choosing } from "./choosing";
+import { actionsOf } from "./actions";
+import { AddressBar } from "./address";
+import { CameraController } from "./camera";
 import { Frames } from "./data/frames";
-import { fieldDirection, type Known } from "./data/quantities";
-import type { Manifest, Series, Source } from "./data/types";
+import { type Dataset, fieldDirection } from "./data/quantities";
+import type { Frame, Manifest, Series, Source } from "./data/types";
+import { Exporter } from "./exporter";
 import { headerButtons, type Layout } from "./layout";
-import { tellRun } from "./live";
+import { appendFrames, type LiveRun, offerChoices, runStatus } from "./live";
+import { type FrameDisplay, FrameNavigation } from "./navigation";
 import { Picture } from "./picture";
-import { Player } from "./player";
+import { type Playback, Player } from "./player";
+import { lookFromText, lookToText } from "./scene/look";
 import type { Stage } from "./scene/stage";
 import { DARK, LIGHT, World } from "./scene/world";
+import { Selection } from "./selection";
 import type { State } from "./state";
-import { actionsOf } from "./actions";
-import { Studio } from "./studio";
 import { openDialog } from "./ui/dialogs";
-import { replaceKeepingFocus } from "./ui/dom";
+import { onClick, replaceKeepingFocus } from "./ui/dom";
 import { Inspector } from "./ui/inspector";
 import { type Action, Keys } from "./ui/keys";
 import { legend } from "./ui/legend";
+import { Note } from "./ui/note";
 import { Overlay } from "./ui/overlay";
 import { Panel } from "./ui/panel";
 import { LinkedPlot } from "./ui/plot";
+import { isDark, onSystemThemeChange } from "./ui/theme";
 import { nearestFrame, TimeLine } from "./ui/timeline";
-import { Views } from "./views";
 
-/** Settings that need no new picture. */
-const QUIET = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "field", "ortho", "size"]);
-/** Pixels; narrower pages begin without the panel of settings. */
+/** Settings that do not change the colours, positions or visibility of what is drawn. */
+const NO_REFRESH = new Set(["speed", "loop", "live", "plot", "look", "frame", "theme", "field", "ortho", "size"]);
+/** Width of the page [pixels] below which the panel of settings is hidden at first. */
 const NARROW = 720;
-const SYSTEM_DARK = window.matchMedia("(prefers-color-scheme: dark)");
 
-export class App {
+const CONTEXT_LOST = "The browser lost the graphics card (WebGL context); if the picture does not return, reload.";
+
+export class App implements FrameDisplay, LiveRun {
   readonly frames: Frames;
   readonly world: World;
   readonly picture: Picture;
   readonly player: Player;
-  readonly choosing: Choosing;
+  readonly navigation: FrameNavigation;
+  readonly selection: Selection;
   readonly timeline: TimeLine;
   readonly plot: LinkedPlot;
   readonly overlay: Overlay;
@@ -44,152 +50,166 @@ export class App {
   readonly panel: Panel;
   readonly actions: Action[];
   readonly keys: Keys;
-  readonly views: Views;
-  readonly studio: Studio;
-  /** Brings the address up to now. */
-  beforeCopying: () => void = () => undefined;
-  private showing: Promise<void> = Promise.resolve();
-  private wanted = 0;
+  readonly camera: CameraController;
+  readonly exporter: Exporter;
+  readonly note: Note;
+  private readonly address: AddressBar | null;
 
   constructor(
     readonly source: Source,
     readonly state: State,
     readonly stage: Stage,
-    readonly known: Known,
-    public series: Series,
+    readonly dataset: Dataset,
+    private series: Series,
     readonly page: Layout,
-    ownPage: boolean,
+    ownsAddress: boolean,
   ) {
+    const count = (): number => this.manifest.times.length;
+    const go = (frame: number): Promise<void> => this.navigation.go(frame);
+    this.note = new Note(page.note);
     this.frames = new Frames(source);
     this.world = new World(stage);
-    this.picture = new Picture(this.world, state, this.frames, known);
-    this.overlay = new Overlay(stage, known.manifest.unit);
-    this.inspector = new Inspector(() => this.choosing.clear());
-    this.player = new Player(state, () => this.manifest.times.length, (k) => this.go(k));
-    const { picture, world, inspector, overlay } = this;
-    const isPlaying = (): boolean => this.player.playing;
-    this.choosing = new Choosing(state, picture, world, inspector, overlay, known, source, isPlaying);
-    this.plot = new LinkedPlot((time) => void this.go(nearestFrame(this.manifest.times, time)));
-    this.timeline = new TimeLine({
-      play: () => this.player.toggle(),
-      step: (by) => void this.go(state.number("frame") + by),
-      go: (k) => void this.go(k),
-      event: (direction) => this.toEvent(direction),
+    this.picture = new Picture(this.world, state, this.frames, dataset);
+    this.overlay = new Overlay(stage, dataset.manifest.unit);
+    this.inspector = new Inspector(() => this.selection.clear());
+    this.navigation = new FrameNavigation(state, this.frames, count, this);
+    this.player = new Player(state, count, go);
+    const playback: Playback = {
+      toggle: () => this.player.toggle(),
+      go: (frame) => void go(frame),
+      step: (by) => void this.navigation.step(by),
+      toEvent: (direction) => {
+        const frame = this.timeline.eventFrom(state.number("frame"), direction);
+        if (frame !== null) void go(frame);
+      },
+    };
+    this.selection = new Selection({
+      settings: state, picture: this.picture, scene: this.world, camera: stage, inspector: this.inspector,
+      ruler: this.overlay, dataset, source, isPlaying: () => this.player.playing,
     });
-    this.views = new Views(stage, this.picture, this.choosing);
-    this.studio = new Studio(this);
+    this.plot = new LinkedPlot((time) => void go(nearestFrame(this.manifest.times, time)));
+    this.timeline = new TimeLine(playback);
+    this.camera = new CameraController(stage, this.picture, this.selection);
+    this.exporter = new Exporter({
+      root: page.root, world: this.world, manifest: dataset.manifest, settings: state, picture: this.picture,
+      playback: { stop: () => this.player.stop(), go }, isDark: () => isDark(state),
+      notify: (message) => this.notify(message),
+    });
+    this.address = ownsAddress
+      ? new AddressBar(state, (text) => void this.applyAddress(text), (message) => this.note.showBriefly(message))
+      : null;
     this.panel = new Panel(state);
-    this.actions = actionsOf(this).filter((a) => ownPage || a.id !== "link"); // a notebook has its own address
+    const commands = {
+      help: () => void openDialog(page.root, "Keys and help", ...this.keys.help()),
+      togglePanel: () => this.togglePanel(),
+      copyAddress: this.address && ((): void => void this.address?.copy()),
+    };
+    const { camera, selection, exporter } = this;
+    this.actions = actionsOf({ playback, camera, selection, exports: exporter, page: commands });
     this.keys = new Keys(state, this.actions);
-    this.place(ownPage);
-    this.wire(ownPage);
+    page.header.append(headerButtons({
+      ...commands, centre: () => camera.centre(), savePicture: () => exporter.openDialog("png"),
+    }));
+    this.fillPage();
+    this.connectStage();
+    onClick(page.canvas, (x, y) => this.selection.clickAt(x, y));
+    this.keys.listen(ownsAddress ? document : page.root);
+    this.player.onPlaying = (on) => {
+      this.timeline.setPlaying(on);
+      if (!on) this.refresh();
+    };
+    onSystemThemeChange(() => this.setTheme());
+    state.onChange((id) => this.settingChanged(id));
   }
 
   get manifest(): Manifest {
-    return this.known.manifest;
+    return this.dataset.manifest;
   }
 
-  get dark(): boolean {
-    const theme = this.state.get<string>("theme");
-    return theme === "dark" || (theme === "auto" && SYSTEM_DARK.matches);
+  get isConnected(): boolean {
+    return this.page.root.isConnected;
   }
 
-  private place(ownPage: boolean): void {
+  private fillPage(): void {
     const { page } = this;
+    page.root.dataset.lmSuppressShortcuts = "true"; // JupyterLab turns its shortcuts off while the page has the focus
     page.title.textContent = this.manifest.name;
     page.view.append(this.overlay.element, this.inspector.element);
     page.side.append(this.panel.element);
     page.bottom.append(this.timeline.element, this.plot.element);
-    page.header.append(headerButtons({
-      centre: () => this.views.centre(), picture: () => this.studio.ask("png"),
-      link: ownPage ? () => void copyAddress(this) : null,
-      help: () => this.help(), panel: () => this.togglePanel(),
-    }));
     this.timeline.setFrames(this.manifest.times, this.series.events);
-    tellRun(this);
+    this.showStatus();
     if (page.root.clientWidth < NARROW) this.togglePanel();
   }
 
-  private wire(ownPage: boolean): void {
+  private connectStage(): void {
     const { stage, page, state } = this;
-    new ResizeObserver(() => stage.resize(page.view.clientWidth, page.view.clientHeight)).observe(page.view);
-    stage.resize(page.view.clientWidth, page.view.clientHeight);
+    const resize = (): void => stage.resize(page.view.clientWidth, page.view.clientHeight);
+    new ResizeObserver(resize).observe(page.view);
+    resize();
     const drawWorld = stage.onDraw;
     stage.onDraw = () => {
       drawWorld();
       this.overlay.draw();
     };
-    const lost = "The browser has taken the graphics card away from this page; if the picture stays away, reload it.";
-    stage.onLost = (away) => {
-      if (away) return this.tell(lost);
-      if (page.note.textContent === lost) this.tell("");
-      this.setTheme(); // a new context does not know the background
+    stage.onContextChange = (lost) => {
+      if (lost) return this.notify(CONTEXT_LOST);
+      if (this.note.message === CONTEXT_LOST) this.notify("");
+      this.setTheme(); // a new context has no background colour
     };
     stage.onLook = () => {
-      stage.reach = this.picture.reachFrom(stage.look.target); // the haze must not depend on where the eye was before
-      state.set("look", lookText(stage));
+      stage.reach = this.picture.reachFrom(stage.look.target); // the haze must not depend on earlier cameras
+      state.set("look", lookToText(stage.look));
     };
-    let down: [number, number] | null = null;
-    page.canvas.addEventListener("pointerdown", (e) => (down = [e.clientX, e.clientY]));
-    page.canvas.addEventListener("pointerup", (e) => {
-      const still = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) < 4;
-      const box = page.canvas.getBoundingClientRect();
-      if (still) this.choosing.clickAt(e.clientX - box.left, e.clientY - box.top);
-    });
-    this.keys.listen(ownPage ? document : page.root);
-    page.root.dataset.lmSuppressShortcuts = "true"; // JupyterLab keeps off while the page has the focus
-    this.player.onPlaying = (on) => {
-      this.timeline.setPlaying(on);
-      this.timeline.told.setAttribute("aria-live", on ? "off" : "polite");
-      if (!on) this.redress();
-    };
-    SYSTEM_DARK.addEventListener("change", () => this.setTheme());
-    state.onChange((id) => this.changed(id));
   }
 
-  /** The first picture; settings are as the address has them. */
-  async begin(look: string): Promise<void> {
+  /** Show the first frame; the settings are those of the address. */
+  async start(look: string): Promise<void> {
     const first = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
     this.picture.setFrame(await this.frames.nearest(first, this.manifest.times.length));
-    this.picture.dress(false);
-    this.applyLook();
+    this.picture.update(false);
+    this.applyViewSettings();
     this.setTheme();
-    await this.go(first);
-    this.lookFirst(look);
+    await this.navigation.go(first);
+    this.setInitialLook(look);
+    this.address?.connect();
   }
 
-  /** Where the camera begins: as a text says, or all in sight. */
-  private lookFirst(text: string): void {
-    if (!lookAs(this.stage, text)) this.views.reset();
-    this.choosing.anchor();
+  /** Set the camera to the parameters of a text, or, if it is invalid, to the overview. */
+  private setInitialLook(text: string): void {
+    const look = lookFromText(text);
+    if (look) this.stage.look = look;
+    else this.camera.reset();
+    this.selection.anchor();
     this.stage.draw();
   }
 
-  /** What somebody has written into the address. */
-  async takeAddress(text: string): Promise<void> {
+  /** Apply an address that the user has edited. */
+  private async applyAddress(text: string): Promise<void> {
     this.player.stop();
     this.state.fromAddress(text);
-    const look = this.state.get<string>("look"); // what follows may move the camera
-    await this.go(this.state.number("frame"));
-    this.lookFirst(look);
+    const look = this.state.get<string>("look"); // showing the frame may move the camera
+    await this.navigation.go(this.state.number("frame"));
+    this.setInitialLook(look);
   }
 
-  private changed(id: string): void {
-    if (id === "frame") void this.show();
+  private settingChanged(id: string): void {
+    const { state, selection } = this;
+    if (id === "frame") void this.navigation.show();
     if (id === "theme") this.setTheme();
-    if (["ortho", "size", "shade", "field"].includes(id)) this.applyLook();
+    if (["ortho", "size", "shade", "field"].includes(id)) this.applyViewSettings();
     if (id === "plot") this.showPlot();
-    if (id === "follow") this.choosing.follow();
-    if (id === "grain" && this.state.get<boolean>("follow")) this.choosing.turnTo();
-    const aims = (id === "follow" || id === "isolate") && this.state.get<boolean>(id);
-    if (aims && this.state.number("grain") < 0) this.tellBriefly("Choose a grain first: click it, or press y.");
-    if (QUIET.has(id)) return;
+    if (id === "follow") selection.follow();
+    if (id === "grain" && state.get<boolean>("follow")) selection.followSelected();
+    const needsGrain = (id === "follow" || id === "isolate") && state.get<boolean>(id);
+    if (needsGrain && state.number("grain") < 0) this.note.showBriefly("Select a grain first: click it, or press y.");
+    if (NO_REFRESH.has(id)) return;
     const before = this.picture.shown;
-    this.redress();
-    if (id === "isolate" || id === "grain") this.views.turnToAlone(before);
+    this.refresh();
+    if (id === "isolate" || id === "grain") this.camera.fitIsolated(before);
   }
 
-  private applyLook(): void {
+  private applyViewSettings(): void {
     const { state, stage, world } = this;
     stage.setOrthographic(state.get("ortho"));
     world.uniforms.uSize.value = state.number("size");
@@ -199,97 +219,81 @@ export class App {
   }
 
   private setTheme(): void {
-    this.page.root.dataset.theme = this.dark ? "dark" : "light";
-    this.world.setTheme(this.dark ? DARK : LIGHT);
+    const dark = isDark(this.state);
+    this.page.root.dataset.theme = dark ? "dark" : "light";
+    this.world.setTheme(dark ? DARK : LIGHT);
     this.timeline.drawTicks();
     this.showPlot();
   }
 
-  showPlot(): void {
+  private showPlot(): void {
     const plot = this.series.plots.find((p) => p.id === this.state.get("plot")) ?? this.series.plots[0];
-    if (plot) this.plot.show(this.series, plot, this.dark);
+    if (plot) this.plot.show(this.series, plot, isDark(this.state));
   }
 
-  /** Go to a frame; what is beyond the last is the last. */
-  go(frame: number): Promise<void> {
-    const last = this.manifest.times.length - 1;
-    const k = Math.min(Math.max(Math.round(Math.min(frame, last)), 0), last);
-    if (k === this.state.number("frame")) void this.show();
-    else this.state.set("frame", k);
-    return this.showing;
+  private showStatus(): void {
+    this.page.status.textContent = this.page.status.title = runStatus(this.manifest);
   }
 
-  private show(): Promise<void> {
-    const k = Math.min(this.state.number("frame"), this.manifest.times.length - 1);
-    this.wanted = k;
-    this.showing = this.frames.get(k).then(
-      (frame) => {
-        if (this.wanted !== k) return this.showing; // a later wish
-        this.picture.setFrame(frame);
-        this.redress();
-        this.choosing.follow();
-        this.stage.draw();
-        this.timeline.show(k, frame.step);
-        this.plot.moveTo(frame.time);
-        this.tell("");
-        const ahead = k + 1 < this.manifest.times.length ? k + 1 : 0;
-        this.frames.prefetch(ahead, this.manifest.times.length);
-        return undefined;
-      },
-      (error: Error) => {
-        if (this.wanted !== k) return this.showing;
-        this.player.stop();
-        this.timeline.show(k, this.manifest.steps[k]);
-        this.plot.moveTo(this.manifest.times[k]);
-        this.tell(error.message);
-        return undefined;
-      },
-    );
-    return this.showing;
+  showFrame(k: number, frame: Frame): void {
+    this.picture.setFrame(frame);
+    this.refresh();
+    this.selection.follow();
+    this.stage.draw();
+    this.timeline.show(k, frame.step);
+    this.plot.moveTo(frame.time);
+    this.notify("");
   }
 
-  /** Draw the frame anew with the settings of now. */
-  redress(): void {
+  showError(k: number, error: Error): void {
+    this.player.stop();
+    this.timeline.show(k, this.manifest.steps[k]);
+    this.plot.moveTo(this.manifest.times[k]);
+    this.notify(error.message);
+  }
+
+  /** Update everything that depends on the frame, the settings or the selection. */
+  refresh(): void {
     const { picture } = this;
     if (!picture.frame) return;
-    picture.dress(this.player.playing);
+    picture.update(this.player.playing);
     this.stage.reach = picture.reachFrom(this.stage.look.target);
     this.overlay.field = fieldDirection(this.manifest, picture.frame.frame);
-    this.choosing.show();
-    replaceKeepingFocus(this.page.legend, legend(picture.key, (grain) => this.choosing.choose(grain)));
+    this.selection.show();
+    replaceKeepingFocus(this.page.legend, legend(picture.key, (grain) => this.selection.selectGrain(grain)));
     const scaled = picture.quantity.kind === "sequential";
     for (const id of ["palette", "log", "low", "high"]) this.panel.enable(id, scaled);
-    const contacts = picture.frame.pair.length / 2;
-    const told = `${this.manifest.grains} grains, ${contacts} contacts, coloured by ${picture.quantity.label}`;
-    this.page.canvas.setAttribute("aria-label", `${told}; press ? for keys`);
+    this.page.canvas.setAttribute("aria-label", `${picture.description}; press ? for keys`);
   }
 
-  /** A sentence over the picture; nothing takes it away. */
-  tell(sentence: string): void {
-    this.page.note.textContent = sentence;
-    this.page.note.hidden = !sentence;
+  /** Add new frames of a running simulation; advance to the newest if the last one is shown and "live" is set. */
+  append(more: Manifest, series: Series): void {
+    const { manifest, state, picture, player } = this;
+    const atEnd = state.number("frame") >= manifest.times.length - 1;
+    appendFrames(manifest, more);
+    this.series = series;
+    for (const id of offerChoices(state, this.dataset, series)) this.panel.refill(id);
+    this.timeline.setFrames(manifest.times, series.events);
+    this.showPlot();
+    this.showStatus();
+    const advance = atEnd && state.get<boolean>("live") && !player.playing && !this.exporter.busy;
+    if (advance) void this.navigation.go(Infinity);
+    else if (picture.frame) this.timeline.show(picture.frame.frame, picture.frame.step);
+    if (!advance && !player.playing) this.refresh(); // the ranges of the colour scales may have changed
   }
 
-  /** A sentence that goes away by itself. */
-  tellBriefly(sentence: string): void {
-    this.tell(sentence);
-    window.setTimeout(() => this.page.note.textContent === sentence && this.tell(""), 2500);
+  notify(message: string): void {
+    this.note.show(message);
   }
 
-  help(): void {
-    const words =
-      "Drag to turn, with the right button or two fingers to move, wheel or pinch to go nearer. Click a grain or a " +
-      "contact for its numbers. The address of the page holds the view: share it, or keep it.";
-    openDialog(this.page.root, "Keys and help", words, this.keys.help());
+  private togglePanel(): void {
+    const hidden = this.page.root.classList.toggle("gv-panel-hidden");
+    this.page.header.querySelector(".gv-shows-panel")?.setAttribute("aria-expanded", String(!hidden));
   }
 
-  togglePanel(): void {
-    const away = this.page.root.classList.toggle("gv-panel-away");
-    this.page.header.querySelector(".gv-shows-panel")?.setAttribute("aria-expanded", String(!away));
-  }
-
-  toEvent(direction: 1 | -1): void {
-    const frame = this.timeline.eventFrom(this.state.number("frame"), direction);
-    if (frame !== null) void this.go(frame);
+  dispose(): void {
+    this.player.stop();
+    this.plot.dispose();
+    this.stage.dispose();
   }
 }

@@ -1,4 +1,4 @@
-// The parts of the page and where they are.
+// The elements of the page and their arrangement.
 
 import { h } from "./ui/dom";
 import { button } from "./ui/icons";
@@ -7,53 +7,60 @@ export interface Layout {
   root: HTMLElement;
   header: HTMLElement;
   title: HTMLElement;
-  told: HTMLElement;
+  status: HTMLElement;
   canvas: HTMLCanvasElement;
-  view: HTMLElement;
+  view: HTMLElement; // canvas with legend, inspector and overlay
   legend: HTMLElement;
   bottom: HTMLElement;
   side: HTMLElement;
   note: HTMLElement;
 }
 
-/** An empty page in an element. */
-export function layout(place: HTMLElement): Layout {
+/** Build an empty page in an element. */
+export function layout(parent: HTMLElement): Layout {
   const title = h("h1", {});
-  const told = h("p", { class: "gv-told" });
+  const status = h("p", { class: "gv-status" });
   const canvas = h("canvas", { class: "gv-canvas", role: "img", tabindex: 0, "aria-label": "Grains" });
   const legend = h("section", { class: "gv-legend", "aria-label": "Legend" });
   const note = h("p", { class: "gv-note", role: "alert", hidden: true });
   const view = h("div", { class: "gv-view" }, canvas, legend, note);
   const bottom = h("div", { class: "gv-bottom" });
   const side = h("div", { class: "gv-side" });
-  const header = h("header", {}, h("div", { class: "gv-names" }, title, told));
+  const header = h("header", {}, h("div", { class: "gv-names" }, title, status));
   const root = h("div", { class: "gv", tabindex: -1 }, header, h("main", {}, view, side), bottom);
-  place.replaceChildren(root);
-  return { root, header, title, told, canvas, view, legend, bottom, side, note };
+  parent.replaceChildren(root);
+  return { root, header, title, status, canvas, view, legend, bottom, side, note };
 }
 
-/** A page that says why there is nothing to see. */
-export function sorry(place: HTMLElement, sentence: string): void {
-  place.replaceChildren(
-    h("div", { class: "gv gv-sorry", role: "alert" }, h("h1", {}, "Nothing to show"), h("p", {}, sentence)),
+/** Show an error message in place of the page. */
+export function showFailure(parent: HTMLElement, message: string): void {
+  parent.replaceChildren(
+    h("div", { class: "gv gv-failure", role: "alert" }, h("h1", {}, "Nothing to show"), h("p", {}, message)),
   );
 }
 
+export interface HeaderCommands {
+  centre: () => void;
+  savePicture: () => void;
+  copyAddress: (() => void) | null; // null: no button
+  help: () => void;
+  togglePanel: () => void;
+}
+
 /** Buttons at the right of the header. */
-export function headerButtons(
-  press: Record<"centre" | "picture" | "help" | "panel", () => void> & { link: (() => void) | null },
-): HTMLElement {
-  const panel = button("panel", "Settings", press.panel, "`");
+export function headerButtons(commands: HeaderCommands): HTMLElement {
+  const { copyAddress } = commands;
+  const panel = button("panel", "Settings", commands.togglePanel, "`");
   panel.classList.add("gv-shows-panel");
   panel.setAttribute("aria-controls", "gv-panel");
   panel.setAttribute("aria-expanded", "true");
   return h(
     "nav",
     { "aria-label": "Page" },
-    button("centre", "Centre", press.centre, "z"),
-    button("camera", "Picture or movie", press.picture, "s"),
-    ...(press.link ? [button("link", "Copy the address of this view", press.link, "j")] : []),
-    button("help", "Keys and help", press.help, "?"),
+    button("centre", "Centre", commands.centre, "z"),
+    button("camera", "Picture or movie", commands.savePicture, "s"),
+    ...(copyAddress ? [button("link", "Copy the address of this view", copyAddress, "j")] : []),
+    button("help", "Keys and help", commands.help, "?"),
     panel,
   );
 }

@@ -1,74 +1,76 @@
-// A run that is still going: what has come since, and how it stands.
+// A running simulation: the page polls its source for new frames.
 
-import type { App } from "./app";
-import { type Known, QUANTITIES } from "./data/quantities";
-import type { Manifest, Series } from "./data/types";
-import type { State } from "./state";
+import { type Dataset, QUANTITIES } from "./data/quantities";
+import type { Manifest, Series, Source } from "./data/types";
 
-/** Seconds between questions whether a run has gone on. */
-const EVERY = 1;
+/** Seconds between two polls. */
+const INTERVAL = 1;
 
-/** What can be chosen with these data, which become more while a run goes on; names of the settings. */
-export function offerChoices(state: State, known: Known, series: Series): string[] {
-  const there = QUANTITIES.filter((q) => q.available?.(known) ?? true);
-  state.offer("colour", there.map((q) => [q.id, q.label]));
-  state.offer("plot", series.plots.map((p) => [p.id, p.title]));
+/** Consecutive failures after which polling ends. */
+const MAX_FAILURES = 5;
+
+/** The page, as polling needs it. */
+export interface LiveRun {
+  readonly manifest: Manifest;
+  /** False once the page has been removed from its document. */
+  readonly isConnected: boolean;
+  /** Add the frames of a partial manifest, and replace the series. */
+  append(more: Manifest, series: Series): void;
+  notify(message: string): void;
+}
+
+/** Settings whose options depend on the data. */
+export interface DataChoices {
+  offer(id: string, options: [value: string, label: string][]): void;
+}
+
+/** Set the options that these data allow, which increase while a run continues; returns the names of these settings. */
+export function offerChoices(settings: DataChoices, dataset: Dataset, series: Series): string[] {
+  const available = QUANTITIES.filter((q) => q.available?.(dataset) ?? true);
+  settings.offer("colour", available.map((q) => [q.id, q.label]));
+  settings.offer("plot", series.plots.map((p) => [p.id, p.title]));
   return ["colour", "plot"];
 }
 
-/** How the run stands, beside its name. */
-export function tellRun({ manifest, page }: App): void {
-  const counted = (count: number, what: string): string => `${count} ${what}${count === 1 ? "" : "s"}`;
+/** The line beside the name of the run: grains, frames, outcome, field, note. */
+export function runStatus(manifest: Manifest): string {
+  const counted = (count: number, noun: string): string => `${count} ${noun}${count === 1 ? "" : "s"}`;
   const parts = [counted(manifest.grains, "grain"), counted(manifest.times.length, "frame")];
   if (manifest.running) parts.push("still running");
   else if (manifest.outcome) parts.push(manifest.outcome);
   if (manifest.field) parts.push(manifest.field.text);
   if (manifest.note) parts.push(manifest.note);
-  page.told.textContent = page.told.title = parts.join("  ·  ");
+  return parts.join("  ·  ");
 }
 
-/** What has come since. */
-function take(app: App, more: Manifest, series: Series): void {
-  const { manifest, state, picture } = app;
-  const atEnd = state.number("frame") >= manifest.times.length - 1;
+/** Add the frames of a partial manifest to a manifest. */
+export function appendFrames(manifest: Manifest, more: Manifest): void {
   manifest.times.push(...more.times);
   manifest.steps.push(...more.steps);
   if (manifest.field && more.field?.directions) manifest.field.directions = more.field.directions;
   const { running, outcome, note, bytes, ranges } = more;
   Object.assign(manifest, { running, outcome, note, bytes, ranges });
-  app.series = series;
-  for (const id of offerChoices(state, app.known, series)) app.panel.refill(id);
-  app.timeline.setFrames(manifest.times, series.events);
-  app.showPlot();
-  tellRun(app);
-  const goesAlong = atEnd && state.get<boolean>("live") && !app.player.playing && !app.studio.busy;
-  if (goesAlong) void app.go(Infinity);
-  else if (picture.frame) app.timeline.show(picture.frame.frame, picture.frame.step);
-  if (!goesAlong && !app.player.playing) app.redress(); // scales may have changed
 }
 
-/** Questions without an answer, one after another, after which none is asked any more. */
-const GIVEN_UP = 5;
-
-/** Ask again and again, while a run goes on. */
-export async function goAlong(app: App): Promise<void> {
-  let failed = 0;
-  while (app.manifest.running) {
-    await new Promise((on) => setTimeout(on, 1000 * EVERY));
-    if (!app.page.root.isConnected) return;
+/** Poll until the run has ended. */
+export async function pollRun(run: LiveRun, source: Pick<Source, "manifest" | "series">): Promise<void> {
+  let failures = 0;
+  while (run.manifest.running) {
+    await new Promise((resolve) => setTimeout(resolve, 1000 * INTERVAL));
+    if (!run.isConnected) return;
     try {
-      const more = await app.source.manifest(app.manifest.times.length);
-      if (more.generation !== app.manifest.generation) {
-        app.tell("This run was begun anew: load the page again to see it.");
+      const more = await source.manifest(run.manifest.times.length);
+      if (more.generation !== run.manifest.generation) {
+        run.notify("The run was restarted: reload the page to see it.");
         return;
       }
-      const news = more.times.length || more.running !== app.manifest.running;
-      if (news) take(app, more, await app.source.series());
-      if (failed) app.tell("");
-      failed = 0;
+      const changed = more.times.length || more.running !== run.manifest.running;
+      if (changed) run.append(more, await source.series());
+      if (failures) run.notify("");
+      failures = 0;
     } catch (error) {
-      app.tell((error as Error).message);
-      if (++failed === GIVEN_UP) return;
+      run.notify((error as Error).message);
+      if (++failures === MAX_FAILURES) return;
     }
   }
 }

@@ -1,4 +1,4 @@
-// Where the page begins: of its own accord in a page of SAND, and `render` for a notebook (anywidget).
+// Entry points: a page of SAND starts by itself; a notebook calls `render` (anywidget).
 
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
@@ -10,31 +10,27 @@ import { type Model, WidgetSource } from "./widget";
 
 declare global {
   interface Window {
-    sandView?: App | null; // for tests, and for those who want to script the page
+    sandView?: App | null; // for tests and for scripts in the browser's console
   }
 }
 
-const place = document.getElementById("grainview");
-if (place) {
-  const source = EmbeddedSource.isThere() || location.protocol === "file:" ? new EmbeddedSource() : new ServerSource();
-  void show(place, source, true).then((app) => {
+const parent = document.getElementById("grainview");
+if (parent) {
+  const embedded = EmbeddedSource.isPresent() || location.protocol === "file:";
+  void show(parent, embedded ? new EmbeddedSource() : new ServerSource(), true).then((app) => {
     window.sandView = app;
-    place.dataset.ready = app ? "yes" : "no"; // for tests: a policy may forbid them to wait for anything but elements
+    parent.dataset.ready = app ? "yes" : "no"; // tests wait for this attribute
   });
 }
 
 function render({ model, el }: { model: Model; el: HTMLElement }): () => void {
-  const inside = h("div", { class: "gv-cell" });
-  el.append(inside);
+  const cell = h("div", { class: "gv-cell" });
+  el.append(cell);
   const source = new WidgetSource(model);
-  const coming = show(inside, source, false);
+  const started = show(cell, source, false);
   return () => {
     source.close();
-    void coming.then((app) => {
-      app?.player.stop();
-      app?.plot.dispose();
-      app?.stage.dispose();
-    });
+    void started.then((app) => app?.dispose());
   };
 }
 

@@ -1,49 +1,51 @@
-// From a frame and the settings to what is on the stage: places, colours, contacts, arrows, trails.
+// The picture of a frame: positions, colours, contacts, arrows and trails that the settings ask for.
 
 import * as three from "three";
-import { bondPaint, bondPieces, loadScale } from "./data/bonds";
-import { maskOf, wholePositions } from "./data/clusters";
+import { bondColours, bondPieces, loadScale } from "./data/bonds";
+import { clusterMask, unwrappedPositions } from "./data/clusters";
 import { paint, type Painted, type Scale } from "./data/colours";
-import type { Frames } from "./data/frames";
 import { type KeyPart, keyOf } from "./data/key";
-import { coverOf } from "./data/openness";
-import { type Known, QUANTITIES, type Quantity } from "./data/quantities";
+import { occlusion } from "./data/occlusion";
+import { type Dataset, QUANTITIES, type Quantity } from "./data/quantities";
 import { type Frame, SINGLE } from "./data/types";
 import { ARROW } from "./scene/arrows";
-import { MOST_TRAILS, trailSegments } from "./scene/lines";
+import { MAX_TRAILS, trailSegments } from "./scene/lines";
 import type { World } from "./scene/world";
-import type { State } from "./state";
+import type { SettingValues } from "./state";
 
-/** With more grains, shade from neighbours waits until there is time. */
-const MANY = 30_000;
+/** Number of grains above which shading by neighbours is computed only while the page is idle. */
+const DEFERRED_SHADING = 30_000;
+
+/** Range of shading by neighbours, in median radii. */
+const SHADING_RANGE = 5;
 
 export class Picture {
   frame: Frame | null = null;
-  whole: Float32Array = new Float32Array();
+  unwrapped: Float32Array = new Float32Array();
   painted: Painted | null = null;
   bondScale: Scale | null = null;
-  patient = false; // frames are saved: each shall be complete, however long it takes
-  private later = 0;
-  private readonly middle: number; // radius of the middle one of the grains
+  complete = false; // compute everything at once, as saved frames need it
+  private timer = 0;
+  private readonly medianRadius: number;
 
   constructor(
     private readonly world: World,
-    private readonly state: State,
-    private readonly frames: Frames,
-    private readonly known: Known,
+    private readonly settings: SettingValues,
+    private readonly frames: { get(k: number): Promise<Frame> },
+    private readonly dataset: Dataset,
   ) {
-    const radii = Float32Array.from(known.grains.radius).sort();
-    this.middle = radii[radii.length >> 1] ?? 1;
+    const radii = Float32Array.from(dataset.grains.radius).sort();
+    this.medianRadius = radii[radii.length >> 1] ?? 1;
   }
 
   get quantity(): Quantity {
-    return QUANTITIES.find((q) => q.id === this.state.get("colour")) ?? QUANTITIES[0];
+    return QUANTITIES.find((q) => q.id === this.settings.get("colour")) ?? QUANTITIES[0];
   }
 
-  /** Places at which grains are drawn. */
-  get place(): Float32Array {
-    const whole = ["whole", "isolate", "follow"].some((id) => this.state.get<boolean>(id));
-    return whole ? this.whole : this.frame?.position ?? this.whole;
+  /** Positions at which grains are drawn. */
+  get positions(): Float32Array {
+    const unwrap = ["whole", "isolate", "follow"].some((id) => this.settings.get<boolean>(id));
+    return unwrap ? this.unwrapped : this.frame?.position ?? this.unwrapped;
   }
 
   /** Which grains are shown; null: all. */
@@ -51,125 +53,134 @@ export class Picture {
     return this.world.shown;
   }
 
-  /** What its colours mean. */
+  /** Content of the legend. */
   get key(): KeyPart[] {
     const { painted, bondScale: scale } = this;
-    return painted && scale ? keyOf(this.quantity, painted, this.known, { kind: this.state.get("bonds"), scale }) : [];
+    if (!painted || !scale) return [];
+    return keyOf(this.quantity, painted, this.dataset, { kind: this.settings.get("bonds"), scale });
+  }
+
+  /** The content in words, for screen readers. */
+  get description(): string {
+    const contacts = (this.frame?.pair.length ?? 0) / 2;
+    return `${this.dataset.manifest.grains} grains, ${contacts} contacts, coloured by ${this.quantity.label}`;
   }
 
   setFrame(frame: Frame): void {
     this.frame = frame;
-    this.whole = wholePositions(frame, this.known.manifest.periodic);
+    this.unwrapped = unwrappedPositions(frame, this.dataset.manifest.periodic);
   }
 
-  /** Everything anew, of this frame and these settings. */
-  dress(playing: boolean): void {
-    const { frame, state, world, known } = this;
+  /** Update the scene to the present frame and settings. */
+  update(playing: boolean): void {
+    const { frame, settings, world, dataset } = this;
     if (!frame) return;
-    this.painted = paint(this.quantity, frame, known, {
-      low: state.number("low"), high: state.number("high"), log: state.get("log"), palette: state.get("palette"),
+    this.painted = paint(this.quantity, frame, dataset, {
+      low: settings.number("low"), high: settings.number("high"), log: settings.get("log"),
+      palette: settings.get("palette"),
     });
     world.shown = this.shownGrains(frame);
     const colour = this.painted.colour;
     if (world.shown) world.shown.forEach((on, i) => on || (colour[4 * i + 3] = 0));
-    world.setGrains(this.place, known.grains.radius, colour);
-    this.shadeSoon(playing);
-    this.dressBonds();
-    world.setArrows(state.get<boolean>("arrows") ? frame.moment : null);
-    const boxed = state.get<boolean>("box") && !world.shown && known.manifest.periodic.some(Boolean);
-    world.setBox(boxed ? frame.box : null);
-    void this.dressTrails();
+    world.setGrains(this.positions, dataset.grains.radius, colour);
+    this.updateShading(playing);
+    this.updateBonds();
+    world.setArrows(settings.get<boolean>("arrows") ? frame.moment : null);
+    const drawBox = settings.get<boolean>("box") && !world.shown && dataset.manifest.periodic.some(Boolean);
+    world.setBox(drawBox ? frame.box : null);
+    void this.updateTrails();
   }
 
-  /** Shade from neighbours; in a crowd, once nothing else is to be done: until then that of the frame before stays. */
-  private shadeSoon(playing: boolean): void {
-    window.clearTimeout(this.later);
+  /** Update shading by neighbours; with many grains after a delay, until which that of the previous frame is kept. */
+  private updateShading(playing: boolean): void {
+    window.clearTimeout(this.timer);
     const shade = (): void => {
-      const much = Math.min(1, 2 * this.state.number("shade"));
-      this.world.setCover(much > 0 ? coverOf(this.place, 5 * this.middle).map((c) => c * much) : null);
+      const strength = Math.min(1, 2 * this.settings.number("shade"));
+      const range = SHADING_RANGE * this.medianRadius;
+      this.world.setOcclusion(strength > 0 ? occlusion(this.positions, range).map((c) => c * strength) : null);
     };
-    if (this.known.manifest.grains <= MANY || this.patient) shade();
-    else if (!playing) this.later = window.setTimeout(shade, 250);
+    if (this.dataset.manifest.grains <= DEFERRED_SHADING || this.complete) shade();
+    else if (!playing) this.timer = window.setTimeout(shade, 250);
   }
 
-  dressBonds(): void {
-    const { frame, state, world, known } = this;
+  private updateBonds(): void {
+    const { frame, settings, world, dataset } = this;
     if (!frame) return;
-    const kind = state.get<string>("bonds");
-    this.bondScale = loadScale(known.manifest, frame);
-    const brush = bondPaint(kind, frame, known.manifest, this.bondScale);
-    const pieces = kind === "off" ? null : bondPieces(frame, this.place, world.shown, known.manifest, brush);
-    world.setBonds(pieces, state.number("bar") * this.middle);
+    const kind = settings.get<string>("bonds");
+    this.bondScale = loadScale(dataset.manifest, frame);
+    const colourOf = bondColours(kind, frame, dataset.manifest, this.bondScale);
+    const pieces = kind === "off" ? null : bondPieces(frame, this.positions, world.shown, dataset.manifest, colourOf);
+    world.setBonds(pieces, settings.number("bar") * this.medianRadius);
   }
 
   private shownGrains(frame: Frame): Uint8Array | null {
-    const grain = this.state.number("grain");
-    return this.state.get<boolean>("isolate") && grain >= 0 ? maskOf(frame, grain) : null;
+    const grain = this.settings.number("grain");
+    return this.settings.get<boolean>("isolate") && grain >= 0 ? clusterMask(frame, grain) : null;
   }
 
-  /** Trails come when their frames have come. */
-  private async dressTrails(): Promise<void> {
-    const { frame, state, world, known } = this;
-    const length = state.number("trails");
+  /** Update the trails once the frames they need are loaded. */
+  private async updateTrails(): Promise<void> {
+    const { frame, settings, world, dataset } = this;
+    const length = settings.number("trails");
     world.trails.lines.visible = length > 0;
     if (!frame || !length || !this.painted) return;
     const first = Math.max(frame.frame - length, 0);
     const numbers = Array.from({ length: frame.frame - first + 1 }, (_, k) => first + k);
-    const asked = await Promise.allSettled(numbers.map((k) => this.frames.get(k)));
-    const earlier = asked.flatMap((one) => (one.status === "fulfilled" ? [one.value] : [])); // without unreadable ones
-    if (this.frame !== frame || state.number("trails") !== length) return; // it is too late for these
-    const who: number[] = [];
-    const grain = state.number("grain");
+    const results = await Promise.allSettled(numbers.map((k) => this.frames.get(k)));
+    const earlier = results.flatMap((r) => (r.status === "fulfilled" ? [r.value] : [])); // without unreadable frames
+    if (this.frame !== frame || settings.number("trails") !== length) return; // superseded
+    const grains: number[] = [];
+    const grain = settings.number("grain");
     const name = grain >= 0 ? frame.cluster[grain] : -1;
-    for (let i = 0; i < known.manifest.grains && who.length < MOST_TRAILS; i++) {
-      if (grain < 0 || i === grain || (name !== SINGLE && frame.cluster[i] === name)) who.push(i);
+    for (let i = 0; i < dataset.manifest.grains && grains.length < MAX_TRAILS; i++) {
+      if (grain < 0 || i === grain || (name !== SINGLE && frame.cluster[i] === name)) grains.push(i);
     }
-    const box = frame.box.map((l, a) => (known.manifest.periodic[a] ? l : Infinity));
-    const shift = this.place.map((x, e) => x - frame.position[e]); // by boxes, where clusters are kept whole
-    const { ends, colours } = trailSegments(earlier.map((f) => f.position), who, this.painted.colour, box, shift);
+    const box = frame.box.map((l, a) => (dataset.manifest.periodic[a] ? l : Infinity));
+    const shift = this.positions.map((x, e) => x - frame.position[e]); // by box lengths, where clusters are unwrapped
+    const { ends, colours } = trailSegments(earlier.map((f) => f.position), grains, this.painted.colour, box, shift);
     world.trails.set(ends, colours);
     world.stage.redraw();
   }
 
-  /** Lengths of the box, 0 where it is not drawn. */
-  private get boxed(): number[] {
-    const boxed = this.frame && !this.shown && this.known.manifest.periodic.some(Boolean);
-    return boxed && this.frame ? this.frame.box : [0, 0, 0];
+  /** Box lengths; zeros if no box is drawn. */
+  private get boxLengths(): number[] {
+    const visible = this.frame && !this.shown && this.dataset.manifest.periodic.some(Boolean);
+    return visible && this.frame ? this.frame.box : [0, 0, 0];
   }
 
-  /** Radius about a place within which all there is lies. */
+  /** Radius of the sphere about a target that contains all grains shown, and the box. */
   reachFrom(target: number[]): number {
-    return Math.max(this.world.reachFrom(target), Math.hypot(...this.boxed) / 2 + Math.hypot(...target));
+    return Math.max(this.world.reachFrom(target), Math.hypot(...this.boxLengths) / 2 + Math.hypot(...target));
   }
 
   /**
-   * Height of the picture that holds the grains of a mask (null: all there is, the box too), its middle a target; of
-   * both cameras, whichever needs more.
+   * Height of the view, centred at a target, that contains the grains of a mask (null: all grains and the box); the
+   * larger of those of the perspective and the orthographic camera.
    */
   heightFor(target: number[], from: number[], up: number[], aspect: number, mask: Uint8Array | null): number {
-    const away = new three.Vector3(...from).normalize();
-    const side = new three.Vector3(...up).cross(away).normalize();
-    const upwards = new three.Vector3().crossVectors(away, side);
+    const forward = new three.Vector3(...from).normalize();
+    const side = new three.Vector3(...up).cross(forward).normalize();
+    const upwards = new three.Vector3().crossVectors(forward, side);
     const v = new three.Vector3();
-    let most = 0;
-    const hold = (x: number, y: number, z: number, radius: number): void => {
+    let max = 0;
+    const include = (x: number, y: number, z: number, radius: number): void => {
       v.set(x - target[0], y - target[1], z - target[2]);
       const half = Math.max(Math.abs(v.dot(upwards)) + radius, (Math.abs(v.dot(side)) + radius) / aspect);
-      // the eye is two heights away: what is nearer than the target looks larger
-      const height = 2 * half + Math.max(v.dot(away), 0) / 2;
-      if (height > most) most = height; // what is nowhere is held by none
+      // the eye is two heights away from the target: points in front of the target appear larger
+      const height = 2 * half + Math.max(v.dot(forward), 0) / 2;
+      if (height > max) max = height; // false for NaN positions
     };
-    const { place } = this;
-    this.known.grains.radius.forEach((r, i) => {
-      if (!mask || mask[i]) hold(place[3 * i], place[3 * i + 1], place[3 * i + 2], (ARROW / 2) * r);
+    const { positions } = this;
+    this.dataset.grains.radius.forEach((r, i) => {
+      if (!mask || mask[i]) include(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2], (ARROW / 2) * r);
     });
-    const [a, b, c] = mask ? [0, 0, 0] : this.boxed.map((length) => length / 2);
-    if (a) for (const x of [-a, a]) for (const y of [-b, b]) for (const z of [-c, c]) hold(x, y, z, 0);
-    return most || 1;
+    const [a, b, c] = mask ? [0, 0, 0] : this.boxLengths.map((length) => length / 2);
+    if (a) for (const x of [-a, a]) for (const y of [-b, b]) for (const z of [-c, c]) include(x, y, z, 0);
+    return max || 1;
   }
 
-  /** The number of the contact between two grains, told as "i-j"; −1: they do not touch. */
-  contactOf(pair: string): number {
+  /** Index of the contact between two grains, given as "i-j"; −1 if they are not in contact. */
+  contactIndex(pair: string): number {
     const match = /^(\d+)-(\d+)$/.exec(pair);
     if (!match || !this.frame) return -1;
     const [i, j] = [Number(match[1]), Number(match[2])];

@@ -24,8 +24,8 @@ SIZE = {"width": 800, "height": 560}
 """Of the window: software draws a large one slowly."""
 SETTLED = """async () => {
   const app = window.sandView;
-  for (let before = null; app && before !== app.showing; ) { before = app.showing; await before; }
-  while (app?.frames.asked.size) await Promise.allSettled([...app.frames.asked.values()]);
+  for (let before = null; app && before !== app.navigation.showing; ) { before = app.navigation.showing; await before; }
+  while (app?.frames.pending.size) await Promise.allSettled([...app.frames.pending.values()]);
   await new Promise((on) => setTimeout(on, 0));
   await new Promise((on) => requestAnimationFrame(() => requestAnimationFrame(on)));
 }"""
@@ -102,7 +102,7 @@ class Driven:
         self.tab.evaluate("() => { document.querySelector('dialog')?.close(); document.activeElement?.blur(); }")
         self.run("app.state.fromAddress('')")
         self.settle()
-        self.run("app.views.reset()")
+        self.run("app.camera.reset()")
         self.settle()
 
     def press(self, *keys: str) -> None:
@@ -130,6 +130,6 @@ class Driven:
 
     def place_of(self, grain: int) -> tuple[float, float]:
         """Where a grain is in the window [pixels]."""
-        x, y, _ = self.run("app.stage.screenOf(app.picture.place.slice(3 * told[0], 3 * told[0] + 3))", grain)
+        x, y, _ = self.run("app.stage.screenOf(app.picture.positions.slice(3 * told[0], 3 * told[0] + 3))", grain)
         box = self.tab.locator("canvas.gv-canvas").bounding_box()
         return box["x"] + x, box["y"] + y

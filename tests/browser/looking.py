@@ -104,7 +104,7 @@ class View:
 
     def go(self, k: int) -> Any:
         """Show the k-th frame; gives it as the file has it."""
-        self.page.evaluate("(k) => sandView.go(k)", k)
+        self.page.evaluate("(k) => sandView.navigation.go(k)", k)
         self.frame = self.shown.frames[k]
         return self.frame
 

@@ -143,7 +143,7 @@ def test_nonsense_is_ignored(tabs, address, text):
         assert view.get("frame") == max(frame - 1, 0) == view.run("app.picture.frame.frame")
         assert not view.tab.locator(".gv-note").is_visible()
         # and once more, written into the address of a page that is open already
-        view.run("app.go(3)")
+        view.run("app.navigation.go(3)")
         view.settle()
         view.tab.evaluate("(text) => { location.hash = ''; location.hash = text; }", text)
         view.tab.wait_for_timeout(30)

@@ -163,7 +163,7 @@ def test_one_unreadable_frame(view, file, tmp_path, content):
     view.tab.wait_for_selector("button[aria-label=Play]")
     assert view.get("frame") == 3 and note.is_visible()
     with view.tab.expect_download() as coming:
-        view.run("app.studio.make({ kind: 'sequence', width: 64, height: 64, from: 2, to: 4 })")
+        view.run("app.exporter.save({ kind: 'sequence', width: 64, height: 64, from: 2, to: 4 })")
     with zipfile.ZipFile(coming.value.path()) as files:
         assert files.namelist() == ["frame-000002.png", "frame-000004.png"]
     view.tab.locator(".gv-note", has_text="could not be shown: frames 3.").wait_for()

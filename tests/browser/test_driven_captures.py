@@ -171,14 +171,14 @@ def test_saving_is_stopped(untouched):
     """Esc ends a long sequence: nothing is saved, and the page says so."""
     downloads = []
     untouched.tab.on("download", lambda one: downloads.append(one))
-    untouched.run("void app.studio.make({ kind: 'sequence', width: 900, height: 600, from: 0, to: 7 })")
+    untouched.run("void app.exporter.save({ kind: 'sequence', width: 900, height: 600, from: 0, to: 7 })")
     untouched.press("Escape")
     note = untouched.tab.locator(".gv-note", has_text="Stopped")
     note.wait_for()
     untouched.settle()
-    assert not downloads and not untouched.run("app.studio.busy")
+    assert not downloads and not untouched.run("app.exporter.busy")
     untouched.put(grain=2)
-    untouched.run("app.tell('')")
+    untouched.run("app.notify('')")
 
 
 def test_frames_given_the_wrong_way_round(untouched):

@@ -25,19 +25,19 @@ def view(page, run) -> Iterator[Driven]:
 
 def until(view: Driven, words: str) -> None:
     """The line beside the name says so."""
-    view.tab.locator(".gv-told", has_text=words).wait_for()
+    view.tab.locator(".gv-status", has_text=words).wait_for()
     view.settle()
 
 
 def test_the_page_goes_along(view, run):
     """From the last frame to the new last; from another it stays; ticks and plot grow; the end is told."""
-    assert "3 frames · still running" in " ".join(view.text(".gv-told").split())
+    assert "3 frames · still running" in " ".join(view.text(".gv-status").split())
     view.press("End")
     run.go_on(2)
     until(view, "5 frames")
     assert view.get("frame") == 4 == view.run("app.picture.frame.frame")
     assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(4.0)
-    assert [mark["frame"] for mark in view.run("app.timeline.marks")] == [MERGED]
+    assert [mark["frame"] for mark in view.run("app.timeline.events")] == [MERGED]
     line, over = (view.tab.locator(f".gv-plot {part}").bounding_box() for part in (".gv-cursor", ".u-over"))
     assert line["x"] == pytest.approx(over["x"] + view.run("app.plot.chart.valToPos(4, 'x')"), abs=1.5)
     view.press("ArrowLeft")
@@ -53,7 +53,7 @@ def test_the_page_goes_along(view, run):
     run.end()
     until(view, "ended as wished")
     assert view.get("frame") == PARTED
-    assert "8 frames" in view.text(".gv-told") and "still running" not in view.text(".gv-told")
+    assert "8 frames" in view.text(".gv-status") and "still running" not in view.text(".gv-status")
     asked = []
     view.tab.on("request", lambda request: asked.append(request.url))
     view.tab.wait_for_timeout(1300)
@@ -99,5 +99,5 @@ def test_a_run_begun_anew(view, run):
     """The page says so, and asks no more: what it has is of the run before."""
     (run.folder / "trajectory.gsd").unlink()
     SmallRun(run.folder, 2, ended=False)
-    view.tab.locator(".gv-note", has_text="begun anew").wait_for()
+    view.tab.locator(".gv-note", has_text="restarted").wait_for()
     assert view.run("app.picture.frame.frame") == 2

@@ -21,7 +21,7 @@ def test_one_cluster_alone(view):
     for grain, drawn in ((10, False), (8, False), (1, True)):
         column, line = (round(v) for v in np.subtract(view.place_of(grain), (corner["x"], corner["y"])))
         assert (alone[line, column].tolist() != alone[0, -1].tolist()) == drawn, grain
-    x = np.array(view.run("[0, 1, 2, 3].map((i) => app.picture.place[3 * i])"))
+    x = np.array(view.run("[0, 1, 2, 3].map((i) => app.picture.positions[3 * i])"))
     unit = view.run("app.manifest.unit") / 10e-9
     assert np.allclose(np.diff(x) * unit, 1.99, atol=1e-4)
     chosen = view.run("[...new Set(app.world.pieces.contact)].sort()")
@@ -37,7 +37,7 @@ def room(view: Driven, *grains: int) -> float:
     canvas = view.tab.locator("canvas.gv-canvas").bounding_box()
     size = np.array([canvas["width"], canvas["height"]])
     at = np.array([view.place_of(grain) for grain in grains]) - [canvas["x"], canvas["y"]] - size / 2
-    radius = view.run("app.known.grains.radius[told[0]] * app.stage.pixelsPerLength", grains[0])
+    radius = view.run("app.dataset.grains.radius[told[0]] * app.stage.pixelsPerLength", grains[0])
     return float((2 * (np.abs(at) + radius) / size).max())
 
 
@@ -109,7 +109,7 @@ def test_every_colouring_has_its_legend(view):
 
 
 def test_numbers_of_the_legend(view):
-    """They are the ends of the range, in the unit that is named; From and To are in SI; angles take no prefix."""
+    """Ends of the range in the unit that is named; Minimum and Maximum are in SI units; angles take no prefix."""
     view.put(colour="spin")
     view.control("low").fill("1e8")
     view.control("low").press("Enter")
@@ -137,7 +137,7 @@ def test_no_number_is_taken_back(view):
 
 
 def test_letters_in_a_field_are_not_keys(view):
-    """Typing m in From leaves the arrows."""
+    """Typing m in Minimum leaves the arrows."""
     view.put(colour="speed")
     view.control("low").focus()
     view.press("m", "b", "2")
@@ -181,14 +181,14 @@ def test_trails_end_where_grains_are(view, whole):
     unit = view.run("app.manifest.unit") / 10e-9
     assert len(ends) == 2 * GRAINS
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() * unit < SIDE / 2
-    place = np.array(view.run("[...app.picture.place]")).reshape(-1, 3)
+    place = np.array(view.run("[...app.picture.positions]")).reshape(-1, 3)
     assert np.allclose(ends[GRAINS:, 1], place, atol=1e-5)
 
 
 def test_parallel_rays_see_what_is_near(view):
     """Near by, what lies in front of the camera is not cut away: the same view, set anew, is the same picture."""
     view.put(ortho=True, shade=0)
-    view.run("app.views.zoom(1 / 1.2)")
+    view.run("app.camera.zoom(1 / 1.2)")
     view.tab.mouse.move(*view.place_of(9))
     for _ in range(6):
         view.tab.mouse.wheel(0, -400)
@@ -220,5 +220,5 @@ def test_another_cluster_is_followed(view):
     """Choosing it turns the camera to it at once; the next frame does not make the camera jump."""
     view.put(frame=1, grain=10, follow=True)
     view.put(grain=11)
-    target, place = view.look()["target"], view.run("[...app.picture.place.slice(33, 36)]")
+    target, place = view.look()["target"], view.run("[...app.picture.positions.slice(33, 36)]")
     assert np.allclose(target, place, atol=1e-4)

@@ -55,7 +55,7 @@ def test_measuring(view):
     assert "19.9 nm" in view.text(".gv-inspector") and "19.9 nm" in view.tab.locator(".gv-ruler-name").text_content()
     view.press("Escape")
     view.press("u")
-    assert "choose two grains" in view.text(".gv-inspector")
+    assert "select two grains" in view.text(".gv-inspector")
     for grain in (10, 11):
         view.tab.mouse.click(*view.place_of(grain))
     view.settle()

@@ -16,7 +16,7 @@ NAMELESS = """() => [...document.querySelectorAll("button, input, select, canvas
   .filter((e) => !(e.getAttribute("aria-label") || e.textContent.trim() || e.labels?.length
                    || document.querySelector(`label[for="${e.id}"]`)))
   .map((e) => e.outerHTML)"""
-OUTSIDE = """() => [...document.querySelectorAll("button, input, select, canvas.gv-canvas, .gv-time, .gv-told")]
+OUTSIDE = """() => [...document.querySelectorAll("button, input, select, canvas.gv-canvas, .gv-time, .gv-status")]
   .filter((e) => e.checkVisibility())
   .map((e) => [e.getBoundingClientRect(), e.outerHTML])
   .filter(([box]) => box.left < -1 || box.right > innerWidth + 1 || box.width < 1)"""
@@ -77,7 +77,7 @@ def test_numbers_leave_room_on_a_phone(phone):
     phone.put(grain=2)
     view, box = (phone.tab.locator(name).bounding_box() for name in (".gv-view", ".gv-inspector"))
     assert box["height"] < 0.5 * view["height"] and box["x"] >= 0
-    phone.tab.get_by_role("button", name="Choose nothing").click()
+    phone.tab.get_by_role("button", name="Clear selection").click()
     phone.settle()
     assert not phone.tab.locator(".gv-inspector").is_visible()
 
@@ -110,7 +110,7 @@ def test_screen_readers(page, address):
         view.press("Escape")
     assert page.locator("html").get_attribute("lang") == "en"
     assert page.get_by_role("heading", level=1).inner_text() == "small"
-    assert page.get_by_role("region", name="What is chosen").locator("th").first.get_attribute("scope") == "row"
+    assert page.get_by_role("region", name="Selection").locator("th").first.get_attribute("scope") == "row"
     for name in ("Time line", "Time", "Colour", "Show"):
         assert page.get_by_role("group", name=name, exact=True).count() == 1
 

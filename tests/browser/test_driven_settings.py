@@ -60,10 +60,10 @@ def seen(name: str) -> Callable[[Driven], object]:
 
 def followed(view: Driven) -> object:
     """Where the camera looks at, once the chosen cluster has moved."""
-    view.run("app.go(3)")
+    view.run("app.navigation.go(3)")
     view.settle()
     target = view.look()["target"]
-    middle = view.run("app.choosing.middle()")
+    middle = view.run("app.selection.centre()")
     return bool(np.allclose(target, middle, atol=1e-3))
 
 
@@ -76,7 +76,7 @@ def measuring(view: Driven) -> object:
 
 def played(view: Driven) -> object:
     """Frames gone on in a second."""
-    view.run("app.go(0)")
+    view.run("app.navigation.go(0)")
     view.settle()
     view.run("app.player.toggle()")
     view.tab.wait_for_timeout(500)
@@ -86,7 +86,7 @@ def played(view: Driven) -> object:
 
 def around(view: Driven) -> object:
     """Whether it plays on behind the last frame."""
-    view.run("app.go(6)")
+    view.run("app.navigation.go(6)")
     view.put(speed=30)
     view.settle()
     view.run("app.player.toggle()")
@@ -108,7 +108,7 @@ EFFECTS: dict[str, tuple[dict, Callable[[Driven], object], bool]] = {
     "arrows": ({}, arrows, True),
     "box": ({}, seen("app.world.box.lines.visible"), True),
     "field": ({}, seen("document.querySelectorAll('.gv-axis').length"), False),
-    "whole": ({}, seen("app.picture.place[0] > 0 === app.picture.place[9] > 0"), True),
+    "whole": ({}, seen("app.picture.positions[0] > 0 === app.picture.positions[9] > 0"), True),
     "isolate": ({"grain": 5}, shown, True),
     "trails": ({"frame": 5}, seen("[app.world.trails.lines.visible, app.state.get('trails')]"), True),
     "shade": ({}, seen("app.world.uniforms.uHaze.value"), True),

@@ -25,7 +25,7 @@ MEAN, MUCH, SHARE = 1.0, 48, 1e-3
 LARGEST = 150_000
 STILL = """async () => {
   const wish = { kind: "png", width: 640, height: 420, transparent: false, from: 0, to: 0 };
-  const bytes = new Uint8Array(await (await sandView.studio.still(wish)).arrayBuffer());
+  const bytes = new Uint8Array(await (await sandView.exporter.image(wish)).arrayBuffer());
   let text = "";
   for (let k = 0; k < bytes.length; k += 4096) text += String.fromCharCode(...bytes.subarray(k, k + 4096));
   return btoa(text);
@@ -58,6 +58,6 @@ def test_a_missing_grain_is_noticed(page, shows):
     from PIL import Image
 
     view = View(page, shows("hundred"), frame=1, theme="light")
-    page.evaluate("() => { const place = sandView.world.place; place[3 * 92] += 2; sandView.redress(); }")
+    page.evaluate("() => { const place = sandView.world.positions; place[3 * 92] += 2; sandView.refresh(); }")
     now = Image.open(io.BytesIO(base64.b64decode(view.page.evaluate(STILL)))).convert("RGB")
     assert differs(np.asarray(now), np.asarray(Image.open(PICTURES / "hundred.png").convert("RGB")))

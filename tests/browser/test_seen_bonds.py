@@ -170,7 +170,7 @@ def test_a_click_chooses_the_contact_that_is_there(page, shows, source):
             agree(row["force"], frame.force[c], 5e-3)
             size(row["force"], float(np.linalg.norm(frame.force[c])))
             for m, mode in enumerate(("stretch", "slide", "roll", "twist")):
-                told = row[f"{mode}, of its limit"]
+                told = row[f"{mode} / limit"]
                 assert told == "not known" if np.isnan(frame.share[c, m]) else abs(
                     numbers(told)[0] - frame.share[c, m]) < 2e-3  # fmt: skip
             tried, halves = tried + 1, halves + cut[c]

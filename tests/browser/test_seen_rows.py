@@ -29,11 +29,11 @@ def test_rows_of_a_cluster(page, shows, kind, grains, source):
         moments, alignments = aggregate_moments(frame.moment, labels)
         for grain in {"two": (1,), "hundred": (0, 30, 40, 60, 88), "ten-thousand": (4321,)}[kind]:
             view.set(grain=grain)
-            page.wait_for_selector("caption:text-is('its cluster')")
+            page.wait_for_selector("caption:text-is('cluster')")
             who = np.flatnonzero(labels == labels[grain])
             held = np.searchsorted(who, frame.pair[labels[frame.pair[:, 0]] == labels[grain]])
             place = unwrapped(frame.position[who], held, frame.box)
-            row = view.rows()["its cluster"]
+            row = view.rows()["cluster"]
             assert int(row["grains N"]) == len(who) and int(row["contacts"]) == len(held)
             agree(row["mass"], mass[who].sum())
             agree(row["radius of gyration"], gyration_radius(place, mass[who]))
@@ -42,7 +42,7 @@ def test_rows_of_a_cluster(page, shows, kind, grains, source):
             moment, summed = moments[labels[grain]], np.linalg.norm(frame.moment[who], axis=1).sum()
             assert np.abs(numbers(row["moment"]) - moment).max() < 6e-3 * np.linalg.norm(moment) + 5e-4 * summed
             size(row["moment"], float(np.linalg.norm(moment)))
-            agree(row["over the sum of sizes"], alignments[labels[grain]])
+            agree(row["|Σμ| / Σ|μ|"], alignments[labels[grain]])
             check_dimension(view, place)
 
 
@@ -50,7 +50,7 @@ def check_dimension(view: View, place: np.ndarray) -> None:
     """D ± error, with three digits and one, or why there is none."""
     cell = "tr:has(th:text-is('fractal dimension')) td"
     view.page.wait_for_selector(f"{cell}:not(:text-is('…'))")
-    text = view.rows()["its cluster"]["fractal dimension"]
+    text = view.rows()["cluster"]["fractal dimension"]
     try:
         found = correlation_dimension(place)
     except BadInput:

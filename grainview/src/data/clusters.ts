@@ -1,14 +1,14 @@
-// Clusters of a frame: made whole across periodic faces, measured.
+// Clusters of a frame: unwrapping across periodic faces, sizes, members, properties.
 
 import { type Frame, type Grains, SINGLE } from "./types";
 
-/** The shortest way from one place to another: x, y, z of `to − from`, by the nearest image. */
-export function nearest(d: number, length: number, periodic: boolean): number {
+/** One component of a difference of positions, by the nearest image. */
+export function nearestImage(d: number, length: number, periodic: boolean): number {
   return periodic ? d - length * Math.round(d / length) : d;
 }
 
-/** Contacts of each grain: those of grain i are `other[first[i]] … other[first[i + 1] − 1]`. */
-export function adjacency(count: number, pair: Uint32Array): { first: Uint32Array; other: Uint32Array } {
+/** Neighbours in contact (compressed rows): those of grain i are `other[first[i]] … other[first[i + 1] − 1]`. */
+function adjacency(count: number, pair: Uint32Array): { first: Uint32Array; other: Uint32Array } {
   const first = new Uint32Array(count + 1);
   for (let e = 0; e < pair.length; e++) first[pair[e] + 1]++;
   for (let i = 0; i < count; i++) first[i + 1] += first[i];
@@ -27,43 +27,44 @@ export function coordination(count: number, pair: Uint32Array): Float32Array {
   return contacts;
 }
 
-/** Positions in which clusters are not cut by faces: each is where its centre is in the box. */
-export function wholePositions(frame: Frame, periodic: boolean[]): Float32Array {
+/** Positions with clusters unwrapped across periodic faces; the centre of each cluster is inside the box. */
+export function unwrappedPositions(frame: Frame, periodic: boolean[]): Float32Array {
   const count = frame.position.length / 3;
-  const place = Float32Array.from(frame.position);
-  if (!periodic.some(Boolean)) return place;
+  const positions = Float32Array.from(frame.position);
+  if (!periodic.some(Boolean)) return positions;
   const { first, other } = adjacency(count, frame.pair);
-  const seen = new Uint8Array(count);
+  const visited = new Uint8Array(count);
   const queue = new Uint32Array(count);
   for (let start = 0; start < count; start++) {
-    if (seen[start] || first[start] === first[start + 1]) continue;
+    if (visited[start] || first[start] === first[start + 1]) continue;
     let [head, tail] = [0, 1];
     queue[0] = start;
-    seen[start] = 1;
+    visited[start] = 1;
     while (head < tail) {
       const i = queue[head++];
       for (let e = first[i]; e < first[i + 1]; e++) {
         const j = other[e];
-        if (seen[j]) continue;
-        seen[j] = 1;
+        if (visited[j]) continue;
+        visited[j] = 1;
         queue[tail++] = j;
         for (let a = 0; a < 3; a++) {
-          place[3 * j + a] = place[3 * i + a] + nearest(place[3 * j + a] - place[3 * i + a], frame.box[a], periodic[a]);
+          const d = positions[3 * j + a] - positions[3 * i + a];
+          positions[3 * j + a] = positions[3 * i + a] + nearestImage(d, frame.box[a], periodic[a]);
         }
       }
     }
-    centreInBox(place, queue.subarray(0, tail), frame.box, periodic);
+    centreInBox(positions, queue.subarray(0, tail), frame.box, periodic);
   }
-  return place;
+  return positions;
 }
 
-function centreInBox(place: Float32Array, who: Uint32Array, box: number[], periodic: boolean[]): void {
+function centreInBox(positions: Float32Array, members: Uint32Array, box: number[], periodic: boolean[]): void {
   for (let a = 0; a < 3; a++) {
     if (!periodic[a]) continue;
-    let middle = 0;
-    for (const i of who) middle += place[3 * i + a] / who.length;
-    const shift = box[a] * Math.round(middle / box[a]);
-    if (shift) for (const i of who) place[3 * i + a] -= shift;
+    let centre = 0;
+    for (const i of members) centre += positions[3 * i + a] / members.length;
+    const shift = box[a] * Math.round(centre / box[a]);
+    if (shift) for (const i of members) positions[3 * i + a] -= shift;
   }
 }
 
@@ -74,17 +75,17 @@ export function clusterSizes(frame: Frame): Map<number, number> {
   return sizes;
 }
 
-/** Grains of the cluster that a grain is in; itself if it is single. */
+/** Grains of the cluster of a grain; the grain alone if it is single. */
 export function membersOf(frame: Frame, grain: number): number[] {
   const name = frame.cluster[grain];
   if (name === SINGLE) return [grain];
-  const who: number[] = [];
-  frame.cluster.forEach((n, i) => n === name && who.push(i));
-  return who;
+  const members: number[] = [];
+  frame.cluster.forEach((n, i) => n === name && members.push(i));
+  return members;
 }
 
-/** 1 for the grains of the cluster that a grain is in, itself if it is single; 0 for all others. */
-export function maskOf(frame: Frame, grain: number): Uint8Array {
+/** Mask (1 or 0) of the grains of the cluster of a grain; the grain alone if it is single. */
+export function clusterMask(frame: Frame, grain: number): Uint8Array {
   const name = frame.cluster[grain];
   return Uint8Array.from(frame.cluster, (n, i) => Number(name === SINGLE ? i === grain : n === name));
 }
@@ -95,22 +96,27 @@ export interface ClusterSummary {
   mass: number;
   centre: number[];
   velocity: number[];
-  gyration: number;
+  gyration: number; // radius of gyration
   moment: number[];
-  alignment: number;
+  alignment: number; // |Σμ| / Σ|μ|
 }
 
-/** A cluster's numbers; lengths in units of the manifest's `unit`, `place` from `wholePositions`. */
-export function measureCluster(frame: Frame, grains: Grains, place: Float32Array, who: number[]): ClusterSummary {
+/** Properties of a cluster; lengths in the manifest's `unit`, positions from `unwrappedPositions`. */
+export function measureCluster(
+  frame: Frame,
+  grains: Grains,
+  positions: Float32Array,
+  members: number[],
+): ClusterSummary {
   const centre = [0, 0, 0];
   const velocity = [0, 0, 0];
   const moment = [0, 0, 0];
-  let [mass, sizes, squares] = [0, 0, 0];
-  for (const i of who) {
+  let [mass, moments, squares] = [0, 0, 0];
+  for (const i of members) {
     mass += grains.mass[i];
-    sizes += Math.hypot(frame.moment[3 * i], frame.moment[3 * i + 1], frame.moment[3 * i + 2]);
+    moments += Math.hypot(frame.moment[3 * i], frame.moment[3 * i + 1], frame.moment[3 * i + 2]);
     for (let a = 0; a < 3; a++) {
-      centre[a] += grains.mass[i] * place[3 * i + a];
+      centre[a] += grains.mass[i] * positions[3 * i + a];
       velocity[a] += grains.mass[i] * frame.velocity[3 * i + a];
       moment[a] += frame.moment[3 * i + a];
     }
@@ -119,18 +125,20 @@ export function measureCluster(frame: Frame, grains: Grains, place: Float32Array
     centre[a] /= mass;
     velocity[a] /= mass;
   }
-  for (const i of who) for (let a = 0; a < 3; a++) squares += grains.mass[i] * (place[3 * i + a] - centre[a]) ** 2;
-  const inside = new Set(who);
+  for (const i of members) {
+    for (let a = 0; a < 3; a++) squares += grains.mass[i] * (positions[3 * i + a] - centre[a]) ** 2;
+  }
+  const isMember = new Set(members);
   let contacts = 0;
-  for (let e = 0; e < frame.pair.length; e += 2) if (inside.has(frame.pair[e])) contacts++;
+  for (let e = 0; e < frame.pair.length; e += 2) if (isMember.has(frame.pair[e])) contacts++;
   return {
-    grains: who.length,
+    grains: members.length,
     contacts,
     mass,
     centre,
     velocity,
     gyration: Math.sqrt(squares / mass),
     moment,
-    alignment: sizes > 0 ? Math.hypot(...moment) / sizes : NaN,
+    alignment: moments > 0 ? Math.hypot(...moment) / moments : NaN,
   };
 }

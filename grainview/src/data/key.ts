@@ -1,18 +1,18 @@
-// What the colours of a picture mean, as numbers and words: for the legend of the page and pictures that are saved.
+// Content of the legend, on the page and on saved pictures.
 
 import { MODES } from "./bonds";
-import { colourOfMaterial, colourOfName, css, type Painted, type Scale } from "./colours";
-import type { Known, Quantity } from "./quantities";
+import { colourOfMaterial, colourOfCluster, css, type Painted, type Scale } from "./colours";
+import type { Dataset, Quantity } from "./quantities";
 import { digits, prefixed } from "./units";
 
-/** A row of a key: a colour and what it stands for; `grain`: one of those it stands for; no colour: only words. */
+/** A row of the legend: colour (null: text only) and text; for a cluster, one of its grains. */
 export interface Swatch {
   colour: string | null;
   text: string;
   grain?: number;
 }
 
-/** A bar of colours, numbers under its ends and middle. */
+/** A colour bar; numbers below its ends and its middle. */
 export interface Bar {
   title: string;
   bar: string[];
@@ -21,17 +21,17 @@ export interface Bar {
 
 export type KeyPart = Bar | { title: string; rows: Swatch[] };
 
-const NAMED = 6; // clusters that are named
+const MAX_CLUSTERS = 6; // rows for clusters
 
 function bar(scale: Scale, label: string, unit: string): KeyPart {
   const size = Math.max(Math.abs(scale.low), Math.abs(scale.high));
-  const [one, name] = prefixed(size, unit);
+  const [factor, name] = prefixed(size, unit);
   const middle = scale.log ? Math.sqrt(scale.low * scale.high) : (scale.low + scale.high) / 2;
-  const numbers = [scale.low, middle, scale.high].map((v) => digits(v / one, 3));
+  const numbers = [scale.low, middle, scale.high].map((v) => digits(v / factor, 3));
   return { title: name ? `${label} (${name})` : label, bar: scale.palette.map(css), numbers };
 }
 
-function clusters(painted: Painted, { manifest }: Known): KeyPart {
+function clusters(painted: Painted, { manifest }: Dataset): KeyPart {
   const sizes = new Map<number, [count: number, grain: number]>();
   let single = 0;
   painted.values.forEach((name, grain) => {
@@ -39,33 +39,33 @@ function clusters(painted: Painted, { manifest }: Known): KeyPart {
     else sizes.set(name, [(sizes.get(name)?.[0] ?? 0) + 1, sizes.get(name)?.[1] ?? grain]);
   });
   const largest = [...sizes].sort((a, b) => b[1][0] - a[1][0] || a[0] - b[0]);
-  const rows: Swatch[] = largest.slice(0, NAMED).map(([name, [count, grain]]) => (
-    { colour: css(colourOfName(name, manifest)), text: `${count} grains`, grain }
+  const rows: Swatch[] = largest.slice(0, MAX_CLUSTERS).map(([name, [count, grain]]) => (
+    { colour: css(colourOfCluster(name, manifest)), text: `${count} grains`, grain }
   ));
-  const rest = largest.length - NAMED;
+  const rest = largest.length - MAX_CLUSTERS;
   if (rest > 0) rows.push({ colour: null, text: `and ${rest} more` });
   if (single) rows.push({ colour: manifest.colours.single, text: `${single} single` });
   return { title: "clusters", rows };
 }
 
-function materials({ manifest }: Known): KeyPart {
+function materials({ manifest }: Dataset): KeyPart {
   const rows = manifest.materials.map((text, i) => ({ colour: css(colourOfMaterial(i, manifest)), text }));
   return { title: "material", rows };
 }
 
-/** The key of a frame as it is drawn. */
+/** The legend of a frame as it is drawn. */
 export function keyOf(
   quantity: Quantity,
   painted: Painted,
-  known: Known,
+  dataset: Dataset,
   bonds: { kind: string; scale: Scale },
 ): KeyPart[] {
   const parts: KeyPart[] = [];
   if (painted.scale) parts.push(bar(painted.scale, quantity.label, quantity.unit));
-  else parts.push(quantity.id === "material" ? materials(known) : clusters(painted, known));
-  if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + pushes", "N"));
+  else parts.push(quantity.id === "material" ? materials(dataset) : clusters(painted, dataset));
+  if (bonds.kind === "load") parts.push(bar(bonds.scale, "normal force, + repulsive", "N"));
   if (bonds.kind === "mode") {
-    const { modes, within } = known.manifest.colours;
+    const { modes, within } = dataset.manifest.colours;
     const rows = MODES.map((mode, m) => ({ colour: modes[m], text: mode as string }));
     parts.push({ title: "contacts at the limit of", rows: [...rows, { colour: within, text: "within all limits" }] });
   }

@@ -1,4 +1,4 @@
-// Packets: a header and arrays, see README.md.
+// Decoding of packets: a header and arrays, see README.md.
 
 import type { Frame, Grains } from "./types";
 
@@ -16,7 +16,7 @@ type Numbers = Float32Array | Uint32Array | Uint8Array;
 
 let halves: Float32Array | null = null;
 
-/** Every half-precision number, by its bits: older browsers do not know them. */
+/** All half-precision numbers, by their bits; older browsers have no Float16Array. */
 function halfTable(): Float32Array {
   if (halves) return halves;
   halves = new Float32Array(65536);
@@ -48,10 +48,10 @@ function decodeArray(buffer: ArrayBuffer, begin: number, entry: Entry): Numbers 
   return scale === 1 ? values : values.map((v) => v * scale);
 }
 
-/** The header and the arrays by name; throws an Error that a reader understands. */
-export function decode(buffer: ArrayBuffer): { header: Record<string, unknown>; arrays: Record<string, Numbers> } {
+/** Header, and arrays by name. */
+function decode(buffer: ArrayBuffer): { header: Record<string, unknown>; arrays: Record<string, Numbers> } {
   const magic = new TextDecoder().decode(new Uint8Array(buffer, 0, Math.min(8, buffer.byteLength)));
-  if (magic !== MAGIC) throw new Error("what came is not of SAND: the file may be cut off, or of another version");
+  if (magic !== MAGIC) throw new Error("not a packet of SAND: the file may be cut off, or written by another version");
   const length = new DataView(buffer).getUint32(8, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 12, length)));
   const arrays: Record<string, Numbers> = {};
@@ -59,7 +59,7 @@ export function decode(buffer: ArrayBuffer): { header: Record<string, unknown>; 
     try {
       arrays[entry.name] = decodeArray(buffer, 12 + length + entry.offset, entry);
     } catch {
-      throw new Error(`a frame is cut off within its ${entry.name}; write the page again`);
+      throw new Error(`a packet is cut off in its array “${entry.name}”; export the page again`);
     }
   }
   return { header, arrays };
@@ -71,7 +71,7 @@ export function decodeGrains(buffer: ArrayBuffer): Grains {
 
 export function decodeFrame(buffer: ArrayBuffer): Frame {
   const { header, arrays } = decode(buffer);
-  // halves are twice as large once they are numbers
+  // decoding of half precision allocates new arrays, in addition to the buffer
   const bytes = new Set(Object.values(arrays).map((a) => a.buffer)).size === 1
     ? buffer.byteLength
     : Object.values(arrays).reduce((sum, a) => sum + a.byteLength, 0) + buffer.byteLength;

@@ -1,9 +1,9 @@
-// What grains can be coloured by: one table, from which controls, legends and rows of numbers are made.
+// Quantities of grains: one table, from which controls, legends and tables of values are generated.
 
 import { clusterSizes, coordination } from "./clusters";
 import { type Frame, type Grains, type Manifest, SINGLE } from "./types";
 
-export interface Known {
+export interface Dataset {
   manifest: Manifest;
   grains: Grains;
 }
@@ -13,35 +13,38 @@ export interface Quantity {
   label: string;
   unit: string;
   kind: "names" | "sequential" | "diverging";
-  available?: (known: Known) => boolean;
-  values: (frame: Frame, known: Known) => Float32Array;
+  available?: (dataset: Dataset) => boolean;
+  values: (frame: Frame, dataset: Dataset) => Float32Array;
 }
 
-function sizes3(vectors: Float32Array): Float32Array {
+function magnitudes(vectors: Float32Array): Float32Array {
   const out = new Float32Array(vectors.length / 3);
   for (let i = 0; i < out.length; i++) out[i] = Math.hypot(vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]);
   return out;
 }
 
-/** A sum of moments shorter than this share of the sum of their sizes is none. */
-const NONE = 1e-9;
+/** |Σμ| / Σ|μ| up to which the moments of a cluster cancel. */
+const CANCELLED = 1e-9;
 
-/** Total moments of named clusters; of those that have none, zeros. */
+/** Total moments of clusters by name; zero where the moments cancel. */
 function clusterMoments(frame: Frame): Map<number, [number, number, number]> {
   const sums = new Map<number, [number, number, number]>();
-  const sizes = new Map<number, number>();
+  const magnitudeSums = new Map<number, number>();
   frame.cluster.forEach((name, i) => {
     if (name === SINGLE) return;
     const sum = sums.get(name) ?? [0, 0, 0];
     for (let a = 0; a < 3; a++) sum[a] += frame.moment[3 * i + a];
     sums.set(name, sum);
-    const size = Math.hypot(frame.moment[3 * i], frame.moment[3 * i + 1], frame.moment[3 * i + 2]);
-    sizes.set(name, (sizes.get(name) ?? 0) + size);
+    const magnitude = Math.hypot(frame.moment[3 * i], frame.moment[3 * i + 1], frame.moment[3 * i + 2]);
+    magnitudeSums.set(name, (magnitudeSums.get(name) ?? 0) + magnitude);
   });
-  for (const [name, sum] of sums) if (Math.hypot(...sum) <= NONE * (sizes.get(name) ?? 0)) sum.fill(0);
+  for (const [name, sum] of sums) {
+    if (Math.hypot(...sum) <= CANCELLED * (magnitudeSums.get(name) ?? 0)) sum.fill(0);
+  }
   return sums;
 }
 
+/** Cosine of the angle between a vector of an array and another vector; NaN if either is zero. */
 function cosine(m: Float32Array, i: number, b: ArrayLike<number>): number {
   const [x, y, z] = [m[3 * i], m[3 * i + 1], m[3 * i + 2]];
   const size = Math.hypot(x, y, z) * Math.hypot(b[0], b[1], b[2]);
@@ -54,7 +57,7 @@ export function fieldDirection(manifest: Manifest, frame: number): number[] | nu
   return field?.directions?.[frame] ?? field?.direction ?? null;
 }
 
-function kinetic(frame: Frame, { grains, manifest }: Known): Float32Array {
+function kineticEnergy(frame: Frame, { grains, manifest }: Dataset): Float32Array {
   const out = new Float32Array(grains.mass.length);
   for (let i = 0; i < out.length; i++) {
     const [v, w] = [frame.velocity, frame.spin];
@@ -66,7 +69,7 @@ function kinetic(frame: Frame, { grains, manifest }: Known): Float32Array {
   return out;
 }
 
-const hasMoments = ({ manifest }: Known): boolean => !manifest.ranges.moment || manifest.ranges.moment[1] > 0;
+const hasMoments = ({ manifest }: Dataset): boolean => !manifest.ranges.moment || manifest.ranges.moment[1] > 0;
 
 export const QUANTITIES: Quantity[] = [
   {
@@ -74,7 +77,7 @@ export const QUANTITIES: Quantity[] = [
     values: (frame) => Float32Array.from(frame.cluster, (n) => (n === SINGLE ? NaN : n)),
   },
   {
-    id: "size", label: "size of its cluster", unit: "grains", kind: "sequential",
+    id: "size", label: "cluster size", unit: "grains", kind: "sequential",
     values: (frame) => {
       const sizes = clusterSizes(frame);
       return Float32Array.from(frame.cluster, (n) => sizes.get(n) ?? 1);
@@ -88,9 +91,9 @@ export const QUANTITIES: Quantity[] = [
     id: "coordination", label: "contacts", unit: "", kind: "sequential",
     values: (frame, { manifest }) => coordination(manifest.grains, frame.pair),
   },
-  { id: "speed", label: "speed", unit: "m/s", kind: "sequential", values: (frame) => sizes3(frame.velocity) },
-  { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => sizes3(frame.spin) },
-  { id: "kinetic_energy", label: "kinetic energy", unit: "J", kind: "sequential", values: kinetic },
+  { id: "speed", label: "speed", unit: "m/s", kind: "sequential", values: (frame) => magnitudes(frame.velocity) },
+  { id: "spin", label: "spin", unit: "rad/s", kind: "sequential", values: (frame) => magnitudes(frame.spin) },
+  { id: "kinetic_energy", label: "kinetic energy", unit: "J", kind: "sequential", values: kineticEnergy },
   {
     id: "alignment", label: "alignment in cluster", unit: "", kind: "diverging",
     available: hasMoments,
@@ -101,7 +104,7 @@ export const QUANTITIES: Quantity[] = [
   },
   {
     id: "field_alignment", label: "alignment with field", unit: "", kind: "diverging",
-    available: (known) => known.manifest.field !== null && hasMoments(known),
+    available: (dataset) => dataset.manifest.field !== null && hasMoments(dataset),
     values: (frame, { manifest }) => {
       const b = fieldDirection(manifest, frame.frame) ?? [0, 0, 0];
       return Float32Array.from(frame.cluster, (_, i) => cosine(frame.moment, i, b));

@@ -1,20 +1,20 @@
-// Sources: the loopback server, and the blocks of a single file.  The notebook's is in widget.ts.
+// Data sources: the loopback server, and the blocks of a single file. For that of a notebook see widget.ts.
 
 import { decodeFrame, decodeGrains } from "./packet";
 import type { Dimension, Frame, Grains, Manifest, Series, Source } from "./types";
 
-/** Asks the server that the page came from. */
+/** Loads the data from the server of the page. */
 export class ServerSource implements Source {
   private async get(address: string): Promise<Response> {
-    let answer: Response;
+    let response: Response;
     try {
-      answer = await fetch(address, { cache: "no-store" });
+      response = await fetch(address, { cache: "no-store" });
     } catch {
-      throw new Error("the server does not answer: `sand view` has ended; start it again and open the new address");
+      throw new Error("the server does not respond: `sand view` has ended; start it again and open the new address");
     }
-    if (answer.ok) return answer;
-    const told = await answer.json().catch(() => ({}));
-    throw new Error(told.error ?? `the server answers ${answer.status}`);
+    if (response.ok) return response;
+    const content = await response.json().catch(() => ({}));
+    throw new Error(content.error ?? `the server replied with status ${response.status}`);
   }
 
   async manifest(since: number): Promise<Manifest> {
@@ -38,19 +38,19 @@ export class ServerSource implements Source {
   }
 }
 
-const damaged = (name: string): Error => new Error(`this file is damaged in its part “${name}”; ask for it again`);
+const damaged = (name: string): Error => new Error(`this file is damaged in its block “${name}”; export it again`);
 
-/** Reads the blocks that `sand view --html` has put into the page itself. */
+/** Reads the blocks that `sand view --html` writes into the page. */
 export class EmbeddedSource implements Source {
-  private told: Manifest | null = null;
+  private parsed: Manifest | null = null;
 
-  static isThere(): boolean {
+  static isPresent(): boolean {
     return document.querySelector('script[id^="sand-"]') !== null;
   }
 
   private text(name: string): string {
     const block = document.getElementById(`sand-${name}`);
-    if (!block?.textContent) throw new Error(`this file is cut off: “${name}” is missing; ask for it again`);
+    if (!block?.textContent) throw new Error(`this file is cut off: its block “${name}” is missing; export it again`);
     return block.textContent;
   }
 
@@ -66,20 +66,20 @@ export class EmbeddedSource implements Source {
   private async packet(name: string): Promise<ArrayBuffer> {
     const text = this.text(name);
     if (typeof DecompressionStream === "undefined") {
-      throw new Error("This browser is too old for this page: it cannot unpack it (DecompressionStream is missing).");
+      throw new Error("this browser is too old for this page: it has no DecompressionStream");
     }
     try {
-      const packed = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
-      const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-      return await new Response(plain).arrayBuffer();
+      const compressed = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
+      const stream = new Blob([compressed]).stream().pipeThrough(new DecompressionStream("gzip"));
+      return await new Response(stream).arrayBuffer();
     } catch {
       throw damaged(name);
     }
   }
 
   async manifest(): Promise<Manifest> {
-    this.told ??= this.json<Manifest>("manifest");
-    return this.told;
+    this.parsed ??= this.json<Manifest>("manifest");
+    return this.parsed;
   }
 
   async series(): Promise<Series> {
@@ -96,8 +96,8 @@ export class EmbeddedSource implements Source {
 
   async dimension(k: number, grain: number): Promise<Dimension> {
     const name = (await this.frame(k)).cluster[grain];
-    const known = this.told?.dimensions?.[k]?.[String(name)];
-    if (known) return { value: known[0], error: known[1] };
-    return { reason: "not in this file: only clusters of 32 grains and more have one, the largest of each frame" };
+    const stored = this.parsed?.dimensions?.[k]?.[String(name)];
+    if (stored) return { value: stored[0], error: stored[1] };
+    return { reason: "not in this file, which has it for the largest clusters of each frame only, with 32 grains and more" };
   }
 }

@@ -1,4 +1,4 @@
-// What a source hands over; README.md says what everything means.
+// Data from a source; README.md defines the meaning of every key.
 
 export type Colour3 = [number, number, number];
 
@@ -10,7 +10,7 @@ export interface Field {
 
 export interface Manifest {
   format: number;
-  generation: number; // another one: the run was begun anew
+  generation: number; // changes when the run is restarted
   name: string;
   version: string;
   grains: number;
@@ -38,7 +38,7 @@ export interface Manifest {
   dimensions: Record<string, [number | null, number | null]>[] | null;
 }
 
-/** Of the grains, what never changes; radius in units of the manifest's `unit`, the rest SI. */
+/** Constant properties of the grains; radius in the manifest's `unit`, all others in SI units. */
 export interface Grains {
   radius: Float32Array;
   mass: Float32Array;
@@ -46,7 +46,7 @@ export interface Grains {
   charge: Float32Array;
 }
 
-/** One frame; positions, as lengths of the box, in the manifest's `unit`, everything else SI. */
+/** One frame; positions and box in the manifest's `unit`, all others in SI units. */
 export interface Frame {
   frame: number;
   step: number;
@@ -88,7 +88,7 @@ export interface Series {
 
 export type Dimension = { value: number | null; error: number | null } | { reason: string };
 
-/** Where a page has its data from: a server, blocks of its own file, or a notebook's kernel. */
+/** The data source of a page: a server, blocks of its own file, or the kernel of a notebook. */
 export interface Source {
   manifest(since: number): Promise<Manifest>;
   series(): Promise<Series>;
@@ -97,5 +97,5 @@ export interface Source {
   dimension(k: number, grain: number): Promise<Dimension>;
 }
 
-/** The name of grains without a contact. */
+/** The cluster name of grains without a contact. */
 export const SINGLE = 0xffffffff;

@@ -1,4 +1,4 @@
-// Contacts as round bars between the centres of two grains: where these have their true size, a collar at the neck.
+// Contacts as cylinders between the centres of two grains; at true grain size only a collar at the neck is visible.
 
 import type { Bonds } from "../data/bonds";
 import { COMMON } from "./glsl";
@@ -31,15 +31,15 @@ void main() {
   vec3 along = normalize(vAxis);
   vec3 side = cross(along, toEye);
   side = dot(side, side) < 1e-6 ? vec3(1.0, 0.0, 0.0) : normalize(side);
-#ifdef PLAIN
-  // the square lies at the side of the bar that faces the eye
+#ifdef SIMPLE
+  // the square is on the side of the bar that faces the eye
   vec3 front = normalize(cross(side, along));
   vOnQuad = middle + front * uBar + corner.x * 0.5 * vAxis + corner.y * side * uBar;
 #else
-  // it faces the eye and holds the outline of the bar, ends and all
-  vec3 ahead = cross(toEye, side);
-  float half_ = 0.5 * abs(dot(vAxis, ahead)) + uBar * (0.2 + abs(dot(along, toEye)));
-  vOnQuad = middle + corner.x * half_ * ahead + corner.y * side * uBar * 1.2;
+  // the square faces the eye and contains the outline of the bar, including its ends
+  vec3 axial = cross(toEye, side);
+  float halfLength = 0.5 * abs(dot(vAxis, axial)) + uBar * (0.2 + abs(dot(along, toEye)));
+  vOnQuad = middle + corner.x * halfLength * axial + corner.y * side * uBar * 1.2;
 #endif
   gl_Position = projectionMatrix * vec4(vOnQuad, 1.0);
   if (colour.a < 0.5 || (!isOrtho() && max(a.z, b.z) > 0.0)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -55,9 +55,9 @@ flat in vec3 vAxis;
 flat in vec3 vColour;
 out vec4 outColour;
 
-#ifdef PLAIN
+#ifdef SIMPLE
 void main() {
-  outColour = vec4(plainlyLit(vColour, vec3(0.0, 0.5 * vAcross, 0.8), 1.0, -vOnQuad.z), 1.0);
+  outColour = vec4(simplyLit(vColour, vec3(0.0, 0.5 * vAcross, 0.8), 1.0, -vOnQuad.z), 1.0);
 }
 #else
 void main() {
@@ -65,27 +65,27 @@ void main() {
   vec3 ray = rayDirection(vOnQuad);
   float size = length(vAxis);
   vec3 axis = vAxis / size;
-  vec3 off = origin - vFrom;
+  vec3 offset = origin - vFrom;
   vec3 rayAcross = ray - dot(ray, axis) * axis;
-  vec3 offAcross = off - dot(off, axis) * axis;
+  vec3 offsetAcross = offset - dot(offset, axis) * axis;
   float a = dot(rayAcross, rayAcross);
-  float b = dot(rayAcross, offAcross);
-  float c = dot(offAcross, offAcross) - uBar * uBar;
-  float room = b * b - a * c;
-  if (room < 0.0) discard;
-  float steep = dot(ray, axis);
-  float at = a < 1e-12 ? -1.0 : dot(off, axis) + (-b - sqrt(room)) / a * steep;
+  float b = dot(rayAcross, offsetAcross);
+  float c = dot(offsetAcross, offsetAcross) - uBar * uBar;
+  float discriminant = b * b - a * c;
+  if (discriminant < 0.0) discard;
+  float rayAlong = dot(ray, axis);
+  float position = a < 1e-12 ? -1.0 : dot(offset, axis) + (-b - sqrt(discriminant)) / a * rayAlong;
   vec3 p, normal;
-  if (at >= 0.0 && at <= size && a >= 1e-12) {
-    p = origin + (-b - sqrt(room)) / a * ray;
-    normal = (p - vFrom - at * axis) / uBar;
+  if (position >= 0.0 && position <= size && a >= 1e-12) {
+    p = origin + (-b - sqrt(discriminant)) / a * ray;
+    normal = (p - vFrom - position * axis) / uBar;
   } else {
     // the flat end that faces the eye
-    float end = steep > 0.0 ? 0.0 : size;
-    p = origin + (end - dot(off, axis)) / steep * ray;
-    vec3 beside = p - vFrom - end * axis;
-    if (dot(beside, beside) > uBar * uBar) discard;
-    normal = steep > 0.0 ? -axis : axis;
+    float end = rayAlong > 0.0 ? 0.0 : size;
+    p = origin + (end - dot(offset, axis)) / rayAlong * ray;
+    vec3 across = p - vFrom - end * axis;
+    if (dot(across, across) > uBar * uBar) discard;
+    normal = rayAlong > 0.0 ? -axis : axis;
   }
   outColour = vec4(lit(vColour, normal, -ray, 1.0, -p.z), 1.0);
   gl_FragDepth = depthOf(p);
@@ -110,9 +110,9 @@ export class BondsMesh extends Squares {
     const count = pieces.contact.length;
     this.uniforms.uBar.value = bar;
     for (const [column, ends] of [[this.from, pieces.from], [this.to, pieces.to]] as const) {
-      const places = column.write(count);
+      const values = column.write(count);
       for (let k = 0; k < count; k++) {
-        for (let a = 0; a < 3; a++) places[4 * k + a] = ends[3 * k + a];
+        for (let a = 0; a < 3; a++) values[4 * k + a] = ends[3 * k + a];
       }
     }
     this.colour.write(count).set(pieces.colour);

@@ -1,4 +1,4 @@
-// What the shaders share: rays through a pixel, light, depth.  All in the space of the camera.
+// Functions of all shaders: rays through a pixel, lighting, depth; in camera coordinates.
 
 export const COMMON = /* glsl */ `
 precision highp float;
@@ -6,9 +6,9 @@ precision highp int;
 
 uniform mat4 projectionMatrix;
 uniform vec3 uBackground;
-uniform vec2 uDepth;    // distances at which the haze begins and is fullest
+uniform vec2 uDepth;    // distances at which the haze begins and is strongest
 uniform float uHaze;    // its strength, 0 to 1
-uniform float uAmbient; // light from all sides; less in the dark theme
+uniform float uAmbient; // ambient light; weaker in the dark theme
 
 bool isOrtho() { return projectionMatrix[3][3] == 1.0; }
 
@@ -21,21 +21,21 @@ float depthOf(vec3 p) {
   return 0.5 * clip.z / clip.w + 0.5;
 }
 
-// what a key light and the sky make of something a few pixels wide
-vec3 plainlyLit(vec3 colour, vec3 normal, float open, float distance) {
+// simplified lighting for objects a few pixels wide: key light and sky
+vec3 simplyLit(vec3 colour, vec3 normal, float openness, float distance) {
   float key = max(dot(normal, vec3(-0.41, 0.6, 0.69)), 0.0);
-  float light = (uAmbient * (0.78 + 0.22 * normal.y) + 0.66 * key) * open;
+  float light = (uAmbient * (0.78 + 0.22 * normal.y) + 0.66 * key) * openness;
   return mix(colour * light, uBackground, uHaze * smoothstep(uDepth.x, uDepth.y, distance));
 }
 
-// a key light over the left shoulder, a fill from the right, the sky
-vec3 lit(vec3 colour, vec3 normal, vec3 toEye, float open, float distance) {
+// key light from the upper left, fill light from the right, sky, highlight and rim
+vec3 lit(vec3 colour, vec3 normal, vec3 toEye, float openness, float distance) {
   vec3 key = normalize(vec3(-0.45, 0.65, 0.75));
   vec3 fill = normalize(vec3(0.8, -0.1, 0.35));
   float sky = 0.5 + 0.5 * normal.y;
-  float light = uAmbient * (0.55 + 0.45 * sky) * open
-    + 0.62 * max(dot(normal, key), 0.0) * (0.45 + 0.55 * open) + 0.14 * max(dot(normal, fill), 0.0) * open;
-  float shine = 0.16 * pow(max(dot(normal, normalize(key + toEye)), 0.0), 40.0) * open;
+  float light = uAmbient * (0.55 + 0.45 * sky) * openness
+    + 0.62 * max(dot(normal, key), 0.0) * (0.45 + 0.55 * openness) + 0.14 * max(dot(normal, fill), 0.0) * openness;
+  float shine = 0.16 * pow(max(dot(normal, normalize(key + toEye)), 0.0), 40.0) * openness;
   float rim = 0.78 + 0.22 * smoothstep(0.0, 0.45, dot(normal, toEye));
   vec3 shaded = colour * light * rim + shine;
   float haze = uHaze * smoothstep(uDepth.x, uDepth.y, distance);

@@ -1,4 +1,4 @@
-// Thin lines: edges of the box, trails of grains.
+// Line segments: edges of the box, trails of grains.
 
 import * as three from "three";
 
@@ -12,18 +12,18 @@ export class Segments {
     this.lines.frustumCulled = false;
   }
 
-  /** Ends of segments (2 K, 3), and colours (2 K, 4) where there are any. */
+  /** Ends of K segments (2 K, 3), and optionally their colours (2 K, 4). */
   set(ends: Float32Array, colours?: Uint8Array): void {
     this.lines.geometry.dispose();
     const geometry = new three.BufferGeometry();
     geometry.setAttribute("position", new three.BufferAttribute(ends, 3));
     if (colours) geometry.setAttribute("color", new three.BufferAttribute(colours, 4, true));
-    geometry.boundingSphere = new three.Sphere(); // is not looked at, but would be worked out each time
+    geometry.boundingSphere = new three.Sphere(); // unused, but three.js would compute it otherwise
     this.lines.geometry = geometry;
   }
 }
 
-/** The twelve edges of a box about the origin. */
+/** The twelve edges of a box centred at the origin. */
 export function boxEdges(lengths: number[]): Float32Array {
   const ends: number[] = [];
   for (let axis = 0; axis < 3; axis++) {
@@ -43,32 +43,31 @@ export function boxEdges(lengths: number[]): Float32Array {
   return new Float32Array(ends);
 }
 
-/** Grains that leave a trail at most: more would hide everything. */
-export const MOST_TRAILS = 3000;
+/** Maximum number of trails: more would hide the grains. */
+export const MAX_TRAILS = 3000;
 
 /**
- * Ways of grains through frames, the oldest first, fading: segments and their colours.  A grain that left the box on
- * one side and came in on the other is not followed through it.  `shift` (N, 3) is from places in the box to those at
- * which grains are drawn.
+ * Segments, and their fading colours, of the paths of some grains through frames, the oldest first. Steps across a
+ * periodic face are left out. `shift` (N, 3) is the difference between drawn positions and positions in the box.
  */
 export function trailSegments(
-  places: Float32Array[],
-  who: number[],
+  positions: Float32Array[],
+  grains: number[],
   colour: Uint8Array,
   box: number[],
   shift: Float32Array,
 ): { ends: Float32Array; colours: Uint8Array } {
-  const most = Math.max(places.length - 1, 0) * who.length;
-  const ends = new Float32Array(6 * most);
-  const colours = new Uint8Array(8 * most);
+  const capacity = Math.max(positions.length - 1, 0) * grains.length;
+  const ends = new Float32Array(6 * capacity);
+  const colours = new Uint8Array(8 * capacity);
   let used = 0;
-  for (let k = 1; k < places.length; k++) {
-    const [before, now] = [places[k - 1], places[k]];
-    const [tail, head] = [255 * ((k - 1) / (places.length - 1)), 255 * (k / (places.length - 1))];
-    for (const i of who) {
-      let jump = false;
-      for (let a = 0; a < 3; a++) jump ||= !(Math.abs(now[3 * i + a] - before[3 * i + a]) <= 0.5 * box[a]);
-      if (jump) continue;
+  for (let k = 1; k < positions.length; k++) {
+    const [before, now] = [positions[k - 1], positions[k]];
+    const [tail, head] = [255 * ((k - 1) / (positions.length - 1)), 255 * (k / (positions.length - 1))];
+    for (const i of grains) {
+      let crosses = false;
+      for (let a = 0; a < 3; a++) crosses ||= !(Math.abs(now[3 * i + a] - before[3 * i + a]) <= 0.5 * box[a]);
+      if (crosses) continue;
       for (let a = 0; a < 3; a++) {
         ends[6 * used + a] = before[3 * i + a] + shift[3 * i + a];
         ends[6 * used + 3 + a] = now[3 * i + a] + shift[3 * i + a];

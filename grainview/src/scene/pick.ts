@@ -1,4 +1,4 @@
-// What lies under a pixel: every grain and every contact is asked where the ray meets it.
+// Picking: the first grain or contact along the ray through a pixel, by testing all of them.
 
 import type { Ray } from "three";
 import type { Bonds } from "../data/bonds";
@@ -12,7 +12,7 @@ export interface Hit {
 /** The first grain along a ray. */
 export function pickGrain(
   ray: Ray,
-  place: Float32Array,
+  positions: Float32Array,
   radius: Float32Array,
   size: number,
   shown: Uint8Array | null,
@@ -22,19 +22,19 @@ export function pickGrain(
   let [best, nearest] = [-1, Infinity];
   for (let i = 0; i < radius.length; i++) {
     if (shown && !shown[i]) continue;
-    const [x, y, z] = [place[3 * i] - ox, place[3 * i + 1] - oy, place[3 * i + 2] - oz];
+    const [x, y, z] = [positions[3 * i] - ox, positions[3 * i + 1] - oy, positions[3 * i + 2] - oz];
     const b = x * dx + y * dy + z * dz;
     const r = radius[i] * size;
-    const room = r * r - (x * x + y * y + z * z - b * b);
-    if (room < 0) continue;
-    const t = b - Math.sqrt(room);
+    const discriminant = r * r - (x * x + y * y + z * z - b * b);
+    if (discriminant < 0) continue;
+    const t = b - Math.sqrt(discriminant);
     if (t > 0 && t < nearest) [best, nearest] = [i, t];
   }
   return best < 0 ? null : { kind: "grain", index: best, distance: nearest };
 }
 
-/** The first contact along a ray, its bar as thick as it is drawn. */
-export function pickContact(ray: Ray, bonds: Bonds, bar: number): Hit | null {
+/** The first contact along a ray; bars are cylinders of the given radius. */
+export function pickContact(ray: Ray, bonds: Bonds, radius: number): Hit | null {
   const o = ray.origin.toArray();
   const d = ray.direction.toArray();
   let [best, nearest] = [-1, Infinity];
@@ -52,16 +52,16 @@ export function pickContact(ray: Ray, bonds: Bonds, bar: number): Hit | null {
       da += d[a] * axis[a];
       oa += off[a] * axis[a];
     }
-    let [A, B, C] = [0, 0, -bar * bar];
+    let [A, B, C] = [0, 0, -radius * radius];
     for (let a = 0; a < 3; a++) {
       const [dp, op] = [d[a] - da * axis[a], off[a] - oa * axis[a]];
       A += dp * dp;
       B += dp * op;
       C += op * op;
     }
-    const room = B * B - A * C;
-    if (room < 0) continue;
-    let t = A < 1e-12 ? NaN : (-B - Math.sqrt(room)) / A;
+    const discriminant = B * B - A * C;
+    if (discriminant < 0) continue;
+    let t = A < 1e-12 ? NaN : (-B - Math.sqrt(discriminant)) / A;
     const at = oa + t * da;
     if (!(at >= 0 && at <= size)) {
       t = ((da > 0 ? 0 : size) - oa) / da; // the flat end that faces the eye

@@ -1,14 +1,14 @@
-// Many squares in one geometry, each with its own numbers: what grains, contacts and arrows are drawn with.
+// Many squares in one geometry, each with its own data; grains, contacts and arrows are drawn on them.
 //
-// The numbers are in textures, one texel for a square, and every vertex fetches those of its square.  Instancing would
-// do the same, but software that draws without a graphics card takes each instance for a drawing of its own, which at
-// 100 000 grains is seconds; and numbers repeated at each corner would be four times as much to hand over.
+// The data are in textures, one texel per square, which every vertex of the square fetches. Instancing was not chosen
+// because software renderers treat each instance as a separate draw call, which takes seconds for 100 000 grains, nor
+// vertex attributes, which would transfer the data of a square four times.
 
 import * as three from "three";
 
-const WIDE = 2048; // texels in a row
+const ROW = 2048; // texels per row
 
-/** What vertex shaders begin with: corner (±1, ±1) and number of the square of the vertex at hand, its numbers. */
+/** Functions of the vertex shaders: the corner (±1, ±1) of a vertex, and the data of its square. */
 export const SQUARE = /* glsl */ `
 vec2 cornerOf(int vertex) {
   int k = vertex & 3;
@@ -17,28 +17,28 @@ vec2 cornerOf(int vertex) {
 
 vec4 fetched(highp sampler2D column, int vertex) {
   int square = vertex >> 2;
-  return texelFetch(column, ivec2(square & ${WIDE - 1}, square / ${WIDE}), 0);
+  return texelFetch(column, ivec2(square & ${ROW - 1}, square / ${ROW}), 0);
 }
 `;
 
-/** Four numbers for each square, in a texture that grows. */
+/** Four numbers per square, in a texture that grows as needed. */
 export class Column<Numbers extends Float32Array | Uint8Array> {
   readonly uniform: three.IUniform<three.DataTexture>;
 
-  constructor(private readonly Kind: new (length: number) => Numbers) {
+  constructor(private readonly ArrayType: new (length: number) => Numbers) {
     this.uniform = { value: this.texture(1) };
   }
 
   private texture(rows: number): three.DataTexture {
-    const bytes = (this.Kind as unknown) === Uint8Array;
-    const data = new this.Kind(4 * WIDE * rows) as Uint8Array<ArrayBuffer> | Float32Array<ArrayBuffer>;
+    const bytes = (this.ArrayType as unknown) === Uint8Array;
+    const data = new this.ArrayType(4 * ROW * rows) as Uint8Array<ArrayBuffer> | Float32Array<ArrayBuffer>;
     const type = bytes ? three.UnsignedByteType : three.FloatType;
-    return new three.DataTexture(data, WIDE, rows, three.RGBAFormat, type);
+    return new three.DataTexture(data, ROW, rows, three.RGBAFormat, type);
   }
 
-  /** The array of numbers with room for so many squares, to be written; it is handed over at the next drawing. */
+  /** The array to be written, with capacity for `count` squares; it is transferred at the next drawing. */
   write(count: number): Numbers {
-    const rows = Math.max(Math.ceil(count / WIDE), 1);
+    const rows = Math.max(Math.ceil(count / ROW), 1);
     const old = this.uniform.value;
     if (rows > old.image.height) {
       this.uniform.value = this.texture(Math.ceil(rows * 1.1));
@@ -53,15 +53,15 @@ export class Column<Numbers extends Float32Array | Uint8Array> {
 /** A mesh of squares. */
 export class Squares {
   readonly mesh: three.Mesh<three.BufferGeometry, three.RawShaderMaterial>;
-  private room = 0;
-  private readonly fine: three.RawShaderMaterial;
-  private readonly plain: three.RawShaderMaterial;
+  private capacity = 0;
+  private readonly detailed: three.RawShaderMaterial;
+  private readonly simplified: three.RawShaderMaterial;
 
   /**
-   * @param vertexShader both for what is seen from near, ray-cast, and (with PLAIN defined) for what is small: a few
-   *   pixels wide, its depth that of the square, so that nothing is asked for each pixel
-   * @param uniforms columns of numbers are among them
-   * @param smooth the canvas has several samples for a pixel, so edges can be between
+   * @param vertexShader and fragmentShader are compiled twice: ray-cast, and simplified (with SIMPLE defined) for
+   *   objects a few pixels wide, whose depth is that of the square
+   * @param uniforms including the columns
+   * @param smooth whether the canvas is multisampled, so that edges can be antialiased
    */
   constructor(
     vertexShader: string,
@@ -70,39 +70,39 @@ export class Squares {
     smooth: boolean,
   ) {
     const common = { uniforms, glslVersion: three.GLSL3, side: three.DoubleSide };
-    this.fine = new three.RawShaderMaterial({
+    this.detailed = new three.RawShaderMaterial({
       ...common, vertexShader, fragmentShader, alphaToCoverage: smooth, defines: smooth ? { SMOOTH: "" } : {},
-      // an edge that covers half a pixel must not make the canvas half transparent there
+      // partially covered pixels at edges must stay opaque
       blending: three.CustomBlending, blendSrc: three.OneFactor, blendDst: three.ZeroFactor,
       blendSrcAlpha: three.OneFactor, blendDstAlpha: three.OneFactor, blendEquationAlpha: three.MaxEquation,
     });
-    this.plain = new three.RawShaderMaterial({ ...common, vertexShader, fragmentShader, defines: { PLAIN: "" } });
-    this.mesh = new three.Mesh(new three.BufferGeometry(), this.fine);
+    this.simplified = new three.RawShaderMaterial({ ...common, vertexShader, fragmentShader, defines: { SIMPLE: "" } });
+    this.mesh = new three.Mesh(new three.BufferGeometry(), this.detailed);
     this.mesh.frustumCulled = false;
   }
 
-  set isPlain(on: boolean) {
-    this.mesh.material = on ? this.plain : this.fine;
+  set isSimplified(on: boolean) {
+    this.mesh.material = on ? this.simplified : this.detailed;
   }
 
   set visible(on: boolean) {
     this.mesh.visible = on;
   }
 
-  /** How many squares there are. */
+  /** Number of squares that are drawn. */
   set count(count: number) {
-    if (count > this.room || !this.room) this.grow(Math.ceil(count * 1.25) + 16);
+    if (count > this.capacity || !this.capacity) this.grow(Math.ceil(count * 1.25) + 16);
     this.mesh.geometry.setDrawRange(0, 6 * count);
   }
 
-  private grow(room: number): void {
-    const corners = new Uint32Array(6 * room);
-    for (let k = 0; k < room; k++) {
+  private grow(capacity: number): void {
+    const corners = new Uint32Array(6 * capacity);
+    for (let k = 0; k < capacity; k++) {
       for (const [e, c] of [0, 1, 2, 0, 2, 3].entries()) corners[6 * k + e] = 4 * k + c;
     }
     this.mesh.geometry.dispose();
     this.mesh.geometry = new three.BufferGeometry();
     this.mesh.geometry.setIndex(new three.BufferAttribute(corners, 1));
-    this.room = room;
+    this.capacity = capacity;
   }
 }

@@ -1,29 +1,21 @@
-// The stage: renderer, two cameras of which one is used, the mouse.  It draws when something has changed, not before.
+// Renderer, perspective and orthographic camera, and mouse controls. It draws only when something has changed.
 
 import * as three from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Look } from "./look";
 
-export class NoWebGL extends Error {}
-
-/** How the eye looks: at what, from where (unit vector), upwards, how much is seen (height of the picture). */
-export interface Look {
-  target: [number, number, number];
-  from: [number, number, number];
-  up: [number, number, number];
-  height: number;
-}
-
-const ANGLE = (2 * Math.atan(0.25) * 180) / Math.PI; // the eye is two heights of the picture away
+/** Vertical field of view [degrees]: the eye is two heights of the view away from the target. */
+const FIELD_OF_VIEW = (2 * Math.atan(0.25) * 180) / Math.PI;
 
 const NO_WEBGL =
-  "This browser cannot draw in 3-D: WebGL 2 is missing or switched off. Try another browser, or switch on hardware " +
-  "acceleration in its settings; `sand plot` makes pictures without a browser.";
+  "This browser cannot draw in 3D: WebGL 2 is not available. Try another browser, or enable hardware acceleration in " +
+  "its settings; `sand plot` makes pictures without a browser.";
 
-/** Whether the browser draws without a graphics card. */
-function drawsSlowly(): boolean {
+/** Whether the browser renders in software, without a graphics card. */
+function rendersInSoftware(): boolean {
   const context = document.createElement("canvas").getContext("webgl2");
-  const named = context?.getExtension("WEBGL_debug_renderer_info");
-  const name = named ? String(context?.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
+  const extension = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = extension ? String(context?.getParameter(extension.UNMASKED_RENDERER_WEBGL)) : "";
   context?.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
 }
@@ -31,25 +23,26 @@ function drawsSlowly(): boolean {
 export class Stage {
   readonly scene = new three.Scene();
   readonly renderer: three.WebGLRenderer;
-  readonly perspective = new three.PerspectiveCamera(ANGLE, 1, 0.1, 1000);
+  readonly perspective = new three.PerspectiveCamera(FIELD_OF_VIEW, 1, 0.1, 1000);
   readonly orthographic = new three.OrthographicCamera(-1, 1, 1, -1, 0.1, 1000);
   readonly controls: OrbitControls;
-  /** Whether the machine draws without a graphics card. */
+  /** Whether the browser renders in software. */
   readonly slow: boolean;
   camera: three.PerspectiveCamera | three.OrthographicCamera = this.perspective;
   width = 1;
   height = 1;
-  reach = 10; // radius of all there is, about the target
+  reach = 10; // radius of the sphere about the target that contains everything
   onLook: () => void = () => undefined;
   onDraw: () => void = () => undefined;
-  onLost: (lost: boolean) => void = () => undefined;
-  private asked = false;
+  /** Called when the WebGL context is lost (true) or restored (false). */
+  onContextChange: (lost: boolean) => void = () => undefined;
+  private scheduled = false;
   private disposed = false;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.slow = drawsSlowly();
+    this.slow = rendersInSoftware();
     const context = canvas.getContext("webgl2", { antialias: !this.slow, alpha: true, preserveDrawingBuffer: true });
-    if (!context) throw new NoWebGL(NO_WEBGL);
+    if (!context) throw new Error(NO_WEBGL);
     this.renderer = new three.WebGLRenderer({ canvas, context });
     this.renderer.setPixelRatio(this.slow ? 1 : Math.min(window.devicePixelRatio, 2));
     this.camera.up.set(0, 0, 1);
@@ -57,10 +50,10 @@ export class Stage {
     this.controls = this.newControls();
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
-      this.onLost(true);
+      this.onContextChange(true);
     });
     canvas.addEventListener("webglcontextrestored", () => {
-      this.onLost(false);
+      this.onContextChange(false);
       this.redraw();
     });
   }
@@ -90,17 +83,17 @@ export class Stage {
 
   get look(): Look {
     const target = this.controls.target;
-    const away = this.camera.position.clone().sub(target);
+    const offset = this.camera.position.clone().sub(target);
     const height = this.isOrthographic
       ? (this.orthographic.top - this.orthographic.bottom) / this.orthographic.zoom
-      : 2 * away.length() * Math.tan((ANGLE * Math.PI) / 360);
+      : 2 * offset.length() * Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
     return {
-      target: target.toArray(), from: away.normalize().toArray(), up: this.camera.up.toArray() as Look["up"], height,
+      target: target.toArray(), from: offset.normalize().toArray(), up: this.camera.up.toArray() as Look["up"], height,
     };
   }
 
   set look(look: Look) {
-    const distance = look.height / (2 * Math.tan((ANGLE * Math.PI) / 360));
+    const distance = look.height / (2 * Math.tan((FIELD_OF_VIEW * Math.PI) / 360));
     const target = new three.Vector3(...look.target);
     for (const camera of [this.perspective, this.orthographic]) {
       camera.up.set(...look.up);
@@ -128,8 +121,9 @@ export class Stage {
     return this.width / this.height;
   }
 
-  /** Cameras suit the picture's shape and hold all there is. */
-  fit(aspect = this.aspect): void {
+  /** Adjust both cameras to the aspect ratio of the canvas, and their near and far planes to the content. */
+  private fit(): void {
+    const { aspect } = this;
     this.perspective.aspect = aspect;
     this.orthographic.left = this.orthographic.bottom * aspect;
     this.orthographic.right = this.orthographic.top * aspect;
@@ -143,25 +137,25 @@ export class Stage {
     this.camera.updateMatrixWorld();
   }
 
-  /** Draw soon, once for however many wishes. */
+  /** Schedule a drawing with the next animation frame. */
   redraw(): void {
-    if (this.asked) return;
-    this.asked = true;
-    requestAnimationFrame(() => this.asked && this.draw());
+    if (this.scheduled) return;
+    this.scheduled = true;
+    requestAnimationFrame(() => this.scheduled && this.draw());
   }
 
   draw(): void {
     if (this.disposed) return;
-    this.asked = false;
+    this.scheduled = false;
     this.fit();
     this.onDraw();
     this.renderer.render(this.scene, this.camera);
   }
 
-  /** Where a place is on the canvas: pixels from its upper left, and depth; null behind the eye. */
-  screenOf(place: ArrayLike<number>): [number, number, number] | null {
+  /** Projection of a position: pixels from the upper left corner of the canvas, and depth; null behind the eye. */
+  screenOf(position: ArrayLike<number>): [number, number, number] | null {
     this.camera.updateMatrixWorld();
-    const v = new three.Vector3(place[0], place[1], place[2]).project(this.camera);
+    const v = new three.Vector3(position[0], position[1], position[2]).project(this.camera);
     if (v.z > 1 || v.z < -1) return null;
     return [(0.5 + 0.5 * v.x) * this.width, (0.5 - 0.5 * v.y) * this.height, v.z];
   }
@@ -171,12 +165,12 @@ export class Stage {
     this.camera.updateMatrixWorld();
     const caster = new three.Raycaster();
     caster.setFromCamera(new three.Vector2((2 * x) / this.width - 1, 1 - (2 * y) / this.height), this.camera);
-    // with parallel rays there is no eye: what lies in front of it is seen, too
+    // the orthographic camera also shows what is behind its position
     if (this.isOrthographic) caster.ray.origin.addScaledVector(caster.ray.direction, -this.orthographic.far);
     return caster.ray;
   }
 
-  /** Pixels of the canvas for a length of one at the target. */
+  /** Pixels of the canvas per unit length at the target. */
   get pixelsPerLength(): number {
     return this.height / this.look.height;
   }

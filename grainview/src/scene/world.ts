@@ -1,4 +1,4 @@
-// All that is on the stage: grains, contacts, arrows, box, trails; told what to show by the app.
+// The objects of the scene: grains, contacts, arrows, box, trails.
 
 import * as three from "three";
 import type { Bonds } from "../data/bonds";
@@ -8,7 +8,7 @@ import { BondsMesh } from "./bonds";
 import { GrainsMesh } from "./grains";
 import { boxEdges, Segments } from "./lines";
 import { type Hit, pickContact, pickGrain } from "./pick";
-import { Stage } from "./stage";
+import type { Stage } from "./stage";
 
 export interface Theme {
   background: string;
@@ -33,27 +33,27 @@ export class World {
     uAmbient: { value: 0.5 },
     uSize: { value: 1 },
     uPixel: { value: 1 },
-    uLeast: { value: 14 },
+    uMinLength: { value: 14 },
   };
   readonly grains: GrainsMesh;
   readonly bonds: BondsMesh;
   readonly arrows: ArrowsMesh;
   readonly box = new Segments(false);
   readonly trails = new Segments(true);
-  place: Float32Array = new Float32Array();
+  positions: Float32Array = new Float32Array();
   radius: Float32Array = new Float32Array();
   shown: Uint8Array | null = null;
   pieces: Bonds | null = null;
   haze = 0.5;
-  private bar = 1;
-  private middle = 1; // radius of the middle one of the grains
+  private bar = 1; // radius of contacts
+  private medianRadius = 1;
 
   constructor(readonly stage: Stage) {
     this.grains = new GrainsMesh(this.uniforms, !stage.slow);
     this.bonds = new BondsMesh(this.uniforms, !stage.slow);
-    this.arrows = new ArrowsMesh(this.uniforms, this.grains.place.uniform, !stage.slow);
-    const parts = [this.trails.lines, this.box.lines, this.grains.mesh, this.bonds.mesh, this.arrows.mesh];
-    stage.scene.add(...parts);
+    this.arrows = new ArrowsMesh(this.uniforms, this.grains.position.uniform, !stage.slow);
+    const objects = [this.trails.lines, this.box.lines, this.grains.mesh, this.bonds.mesh, this.arrows.mesh];
+    stage.scene.add(...objects);
     stage.onDraw = () => this.beforeDraw();
   }
 
@@ -63,28 +63,28 @@ export class World {
     this.uniforms.uTip.value.copy(linear(theme.tip));
     this.uniforms.uAmbient.value = theme.dark ? 0.52 : 0.68;
     this.box.lines.material.color.setStyle(theme.line, three.LinearSRGBColorSpace);
-    this.stage.renderer.outputColorSpace = three.LinearSRGBColorSpace; // colours are meant as they are given
+    this.stage.renderer.outputColorSpace = three.LinearSRGBColorSpace; // colours are used without conversion
     const colour = new three.Color().setStyle(theme.background, three.LinearSRGBColorSpace);
     this.stage.renderer.setClearColor(colour, transparent ? 0 : 1);
     this.stage.redraw();
   }
 
-  setGrains(place: Float32Array, radius: Float32Array, colour: Uint8Array): void {
-    if (radius !== this.radius) this.middle = Float32Array.from(radius).sort()[radius.length >> 1] ?? 1;
-    [this.place, this.radius] = [place, radius];
-    this.grains.set(place, radius, colour);
+  setGrains(positions: Float32Array, radius: Float32Array, colour: Uint8Array): void {
+    if (radius !== this.radius) this.medianRadius = Float32Array.from(radius).sort()[radius.length >> 1] ?? 1;
+    [this.positions, this.radius] = [positions, radius];
+    this.grains.set(positions, radius, colour);
     this.stage.redraw();
   }
 
-  /** Directions (N, 3) in which grains are covered by others, as long as they are much; null: all are in the open. */
-  setCover(cover: Float32Array | null): void {
-    this.grains.setCover(this.radius.length, cover);
+  /** Set the occlusion of grains by others (N, 3), see data/occlusion.ts; null: none. */
+  setOcclusion(occlusion: Float32Array | null): void {
+    this.grains.setOcclusion(this.radius.length, occlusion);
     this.stage.redraw();
   }
 
-  /** Marks of grains: 1 chosen, 2 an end of what is measured. */
+  /** Mark grains: 1 selected, 2 measured. */
   setMarks(marks: Map<number, number>): void {
-    this.grains.mark(this.radius.length, marks);
+    this.grains.setMarks(this.radius.length, marks);
     this.stage.redraw();
   }
 
@@ -95,7 +95,7 @@ export class World {
     this.stage.redraw();
   }
 
-  /** Arrows along the moments (N, 3); null: none. */
+  /** Draw arrows along the moments (N, 3); null: none. */
   setArrows(moment: Float32Array | null): void {
     this.arrows.visible = moment !== null;
     if (moment) this.arrows.set(moment, this.radius, this.shown);
@@ -108,18 +108,18 @@ export class World {
     this.stage.redraw();
   }
 
-  /** Radius about a place within which all shown grains lie, arrows included. */
+  /** Radius of the sphere about a target that contains all shown grains and their arrows. */
   reachFrom(target: number[]): number {
-    let most = 0;
+    let max = 0;
     for (let i = 0; i < this.radius.length; i++) {
       if (this.shown && !this.shown[i]) continue;
-      const x = this.place[3 * i] - target[0];
-      const y = this.place[3 * i + 1] - target[1];
-      const z = this.place[3 * i + 2] - target[2];
-      const away = Math.sqrt(x * x + y * y + z * z) + ARROW * this.radius[i];
-      if (away > most && away < Infinity) most = away; // a grain may have no place
+      const x = this.positions[3 * i] - target[0];
+      const y = this.positions[3 * i + 1] - target[1];
+      const z = this.positions[3 * i + 2] - target[2];
+      const distance = Math.sqrt(x * x + y * y + z * z) + ARROW * this.radius[i];
+      if (distance > max && distance < Infinity) max = distance; // positions may be NaN
     }
-    return most || 1;
+    return max || 1;
   }
 
   private beforeDraw(): void {
@@ -129,15 +129,15 @@ export class World {
     uniforms.uDepth.value.set(distance - 0.35 * depth, distance + depth);
     uniforms.uHaze.value = this.haze;
     uniforms.uPixel.value = stage.pixelsPerLength * (stage.isOrthographic ? 1 : distance);
-    // what is a few pixels wide needs no ray for each of them
-    const pixels = this.middle * stage.pixelsPerLength * stage.renderer.getPixelRatio();
-    for (const part of [this.grains, this.bonds, this.arrows]) part.isPlain = pixels < (stage.slow ? 7 : 3);
+    // objects a few pixels wide are drawn without ray-casting
+    const pixels = this.medianRadius * stage.pixelsPerLength * stage.renderer.getPixelRatio();
+    for (const squares of [this.grains, this.bonds, this.arrows]) squares.isSimplified = pixels < (stage.slow ? 7 : 3);
   }
 
   /** The grain or contact at a pixel of the canvas. */
   pick(x: number, y: number): Hit | null {
     const ray = this.stage.rayAt(x, y);
-    const grain = pickGrain(ray, this.place, this.radius, this.uniforms.uSize.value, this.shown);
+    const grain = pickGrain(ray, this.positions, this.radius, this.uniforms.uSize.value, this.shown);
     const contact = this.pieces ? pickContact(ray, this.pieces, this.bar) : null;
     return contact && (!grain || contact.distance < grain.distance) ? contact : grain;
   }

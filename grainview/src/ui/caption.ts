@@ -1,4 +1,4 @@
-// What is written on pictures and movies that are saved: the time, what the colours mean, a bar of length.
+// The caption of saved pictures and movies: time, legend and scale bar.
 
 import type { Bar, KeyPart } from "../data/key";
 import type { Theme } from "../scene/world";
@@ -9,22 +9,22 @@ export interface Caption {
   key: KeyPart[];
   bar: LengthBar;
   theme: Theme;
-  halo: boolean; // around letters, so that they are read before grains, too
+  halo: boolean; // outline around letters, so that they can be read in front of grains
 }
 
 type Pen = CanvasRenderingContext2D;
 
-/** Pixels of a picture in which letters are as high as on the page, and the least letters can be read with. */
-const [WIDE, HIGH, LETTERS, LEAST] = [800, 500, 12, 9];
+/** Width and height of a picture [pixels] at which the font has its size on the page, that size, and the minimum. */
+const [WIDTH, HEIGHT, FONT_SIZE, MIN_FONT_SIZE] = [800, 500, 12, 9];
 
-/** How much larger than on the page letters and bars are in a picture of this size. */
-export function growth(width: number, height: number): number {
-  return Math.max(Math.min(width / WIDE, height / HIGH), LEAST / LETTERS);
+/** Scale of letters and bars in a picture of this size, relative to the page. */
+export function captionScale(width: number, height: number): number {
+  return Math.max(Math.min(width / WIDTH, height / HEIGHT), MIN_FONT_SIZE / FONT_SIZE);
 }
 
-/** One line of text, its middle at a height. */
-function write(pen: Pen, text: string, x: number, y: number, one: number, { theme, halo }: Caption): void {
-  pen.lineWidth = 3 * one;
+/** One line of text, vertically centred at y. */
+function write(pen: Pen, text: string, x: number, y: number, scale: number, { theme, halo }: Caption): void {
+  pen.lineWidth = 3 * scale;
   pen.lineJoin = "round";
   pen.strokeStyle = theme.background;
   if (halo) pen.strokeText(text, x, y);
@@ -32,78 +32,78 @@ function write(pen: Pen, text: string, x: number, y: number, one: number, { them
   pen.fillText(text, x, y);
 }
 
-function font(pen: Pen, one: number, bold = false): void {
-  pen.font = `${bold ? "600 " : ""}${LETTERS * one}px system-ui, -apple-system, "Segoe UI", Roboto, sans-serif`;
+function font(pen: Pen, scale: number, bold = false): void {
+  pen.font = `${bold ? "600 " : ""}${FONT_SIZE * scale}px system-ui, -apple-system, "Segoe UI", Roboto, sans-serif`;
   pen.textBaseline = "middle";
 }
 
-/** A bar of colours in a row, numbers at its ends and middle under it; how high both are. */
-function drawBar(pen: Pen, x: number, y: number, one: number, part: Bar, all: Caption): number {
-  const wide = 200 * one;
-  const shades = pen.createLinearGradient(x, 0, x + wide, 0);
-  part.bar.forEach((colour, i) => shades.addColorStop(i / Math.max(part.bar.length - 1, 1), colour));
-  pen.fillStyle = shades;
-  pen.fillRect(x, y, wide, 10 * one);
+/** A colour bar with numbers below its ends and its middle; returns the height of both. */
+function drawBar(pen: Pen, x: number, y: number, scale: number, part: Bar, caption: Caption): number {
+  const width = 200 * scale;
+  const gradient = pen.createLinearGradient(x, 0, x + width, 0);
+  part.bar.forEach((colour, i) => gradient.addColorStop(i / Math.max(part.bar.length - 1, 1), colour));
+  pen.fillStyle = gradient;
+  pen.fillRect(x, y, width, 10 * scale);
   part.numbers.forEach((text, i) => {
     pen.textAlign = (["left", "center", "right"] as const)[i];
-    write(pen, text, x + (i / 2) * wide, y + 20 * one, one, all);
+    write(pen, text, x + (i / 2) * width, y + 20 * scale, scale, caption);
   });
   pen.textAlign = "left";
-  return 30 * one;
+  return 30 * scale;
 }
 
-/** The time and the key, from the upper left down. */
-function drawKey(pen: Pen, one: number, all: Caption): void {
-  const x = 14 * one;
-  let y = 20 * one;
+/** Time and legend, downwards from the upper left corner. */
+function drawKey(pen: Pen, scale: number, caption: Caption): void {
+  const x = 14 * scale;
+  let y = 20 * scale;
   pen.textAlign = "left";
-  font(pen, one, true);
-  write(pen, all.time, x, y, one, all);
-  y += 26 * one;
-  for (const part of all.key) {
-    font(pen, one, true);
-    write(pen, part.title, x, y, one, all);
-    font(pen, one);
-    y += 14 * one;
+  font(pen, scale, true);
+  write(pen, caption.time, x, y, scale, caption);
+  y += 26 * scale;
+  for (const part of caption.key) {
+    font(pen, scale, true);
+    write(pen, part.title, x, y, scale, caption);
+    font(pen, scale);
+    y += 14 * scale;
     if ("bar" in part) {
-      y += drawBar(pen, x, y, one, part, all);
+      y += drawBar(pen, x, y, scale, part, caption);
     } else {
       for (const { colour, text } of part.rows) {
         if (colour !== null) {
           pen.fillStyle = colour;
           pen.beginPath();
-          pen.arc(x + 5.5 * one, y + 5 * one, 5.5 * one, 0, 2 * Math.PI);
+          pen.arc(x + 5.5 * scale, y + 5 * scale, 5.5 * scale, 0, 2 * Math.PI);
           pen.fill();
         }
-        write(pen, text, x + (colour === null ? 0 : 17 * one), y + 5 * one, one, all);
-        y += 20 * one;
+        write(pen, text, x + (colour === null ? 0 : 17 * scale), y + 5 * scale, scale, caption);
+        y += 20 * scale;
       }
     }
-    y += 14 * one;
+    y += 14 * scale;
   }
 }
 
-function drawLength(pen: Pen, one: number, all: Caption): void {
+function drawScaleBar(pen: Pen, scale: number, caption: Caption): void {
   const { width, height } = pen.canvas;
-  const [right, low] = [width - 18 * one, height - 18 * one];
-  const left = right - all.bar.pixels;
-  pen.strokeStyle = all.theme.ink;
-  pen.lineWidth = 1.6 * one;
+  const [right, bottom] = [width - 18 * scale, height - 18 * scale];
+  const left = right - caption.bar.pixels;
+  pen.strokeStyle = caption.theme.ink;
+  pen.lineWidth = 1.6 * scale;
   pen.lineJoin = "miter";
   pen.beginPath();
-  pen.moveTo(left, low - 4 * one);
-  pen.lineTo(left, low);
-  pen.lineTo(right, low);
-  pen.lineTo(right, low - 4 * one);
+  pen.moveTo(left, bottom - 4 * scale);
+  pen.lineTo(left, bottom);
+  pen.lineTo(right, bottom);
+  pen.lineTo(right, bottom - 4 * scale);
   pen.stroke();
-  font(pen, one);
+  font(pen, scale);
   pen.textAlign = "right";
-  write(pen, all.bar.text, right, low - 12 * one, one, all);
+  write(pen, caption.bar.text, right, bottom - 12 * scale, scale, caption);
 }
 
-/** Write on a picture. */
-export function writeCaption(pen: Pen, all: Caption): void {
-  const one = growth(pen.canvas.width, pen.canvas.height);
-  drawKey(pen, one, all);
-  drawLength(pen, one, all);
+/** Draw the caption on a picture. */
+export function writeCaption(pen: Pen, caption: Caption): void {
+  const scale = captionScale(pen.canvas.width, pen.canvas.height);
+  drawKey(pen, scale, caption);
+  drawScaleBar(pen, scale, caption);
 }

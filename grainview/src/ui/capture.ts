@@ -1,48 +1,48 @@
-// Pictures and movies of what is seen.
+// Pictures (PNG), image sequences (zip) and movies (WebM) of the canvas, and their download.
 
 import { zipSync } from "fflate";
 import { DARK, LIGHT, type World } from "../scene/world";
 
-export interface Wish {
+export interface ImageOptions {
   width: number;
   height: number;
   transparent: boolean;
   dark: boolean;
-  write: ((pen: CanvasRenderingContext2D) => void) | null; // on the picture, while the stage is of its size
+  write: ((pen: CanvasRenderingContext2D) => void) | null; // draws the caption while the stage has this size
 }
 
-/** Largest side of a picture. */
-export const LARGEST = 8192;
+/** Maximum width and height of a picture [pixels]. */
+export const MAX_SIZE = 8192;
 
-/** The picture as a PNG of a chosen size; drawn twice as large and made smaller, so that edges are smooth. */
-export async function picture(world: World, wish: Wish): Promise<Blob> {
+/** Render a PNG of the given size, with twofold supersampling where the graphics card allows it. */
+export async function renderPng(world: World, options: ImageOptions): Promise<Blob> {
   const { stage } = world;
   const { renderer } = stage;
   const before = { ratio: renderer.getPixelRatio(), width: stage.width, height: stage.height };
-  const most = renderer.capabilities.maxTextureSize;
-  const fine = 2 * Math.max(wish.width, wish.height) <= Math.min(most, LARGEST) ? 2 : 1;
+  const limit = Math.min(renderer.capabilities.maxTextureSize, MAX_SIZE);
+  const supersampling = 2 * Math.max(options.width, options.height) <= limit ? 2 : 1;
   const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [wish.width, wish.height];
+  [canvas.width, canvas.height] = [options.width, options.height];
   try {
-    renderer.setPixelRatio(fine);
-    renderer.setSize(wish.width, wish.height, false);
-    [stage.width, stage.height] = [wish.width, wish.height];
-    world.setTheme(wish.dark ? DARK : LIGHT, wish.transparent);
+    renderer.setPixelRatio(supersampling);
+    renderer.setSize(options.width, options.height, false);
+    [stage.width, stage.height] = [options.width, options.height];
+    world.setTheme(options.dark ? DARK : LIGHT, options.transparent);
     stage.draw();
     const pen = canvas.getContext("2d");
-    if (!pen) throw new Error("this browser gives no canvas for a picture of this size; take a smaller one");
+    if (!pen) throw new Error("the browser has no canvas for a picture of this size; choose a smaller one");
     pen.imageSmoothingQuality = "high";
-    pen.drawImage(stage.canvas, 0, 0, wish.width, wish.height);
-    wish.write?.(pen);
+    pen.drawImage(stage.canvas, 0, 0, options.width, options.height);
+    options.write?.(pen);
   } finally {
     renderer.setPixelRatio(before.ratio);
-    world.setTheme(wish.dark ? DARK : LIGHT);
+    world.setTheme(options.dark ? DARK : LIGHT);
     stage.resize(before.width, before.height);
     stage.draw();
   }
-  return new Promise((give, fail) => {
+  return new Promise((resolve, reject) => {
     const done = (blob: Blob | null): void =>
-      blob ? give(blob) : fail(new Error("this picture is too large for the browser"));
+      blob ? resolve(blob) : reject(new Error("this picture is too large for the browser"));
     canvas.toBlob(done, "image/png");
   });
 }
@@ -55,51 +55,51 @@ export function download(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 30_000);
 }
 
-/** Pictures of many frames as one zip: frame-000000.png and so on; those of which there are none are left out. */
-export async function sequence(frames: number[], draw: (frame: number) => Promise<Blob | null>): Promise<Blob> {
+/** A zip of pictures named frame-000000.png and so on; frames for which `draw` returns null are left out. */
+export async function imageSequence(frames: number[], draw: (frame: number) => Promise<Blob | null>): Promise<Blob> {
   const files: Record<string, Uint8Array> = {};
   for (const frame of frames) {
-    const one = await draw(frame);
-    if (!one) continue;
-    files[`frame-${String(frame).padStart(6, "0")}.png`] = new Uint8Array(await one.arrayBuffer());
+    const image = await draw(frame);
+    if (!image) continue;
+    files[`frame-${String(frame).padStart(6, "0")}.png`] = new Uint8Array(await image.arrayBuffer());
   }
   return new Blob([zipSync(files, { level: 0 }) as Uint8Array<ArrayBuffer>], { type: "application/zip" });
 }
 
-const pause = (long: number): Promise<void> => new Promise((go) => setTimeout(go, long));
+const pause = (milliseconds: number): Promise<void> => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
-const FORMS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+const FORMATS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
-/** Whether this browser can write a movie. */
+/** Whether this browser can record a movie. */
 export function canRecord(): boolean {
-  return typeof MediaRecorder !== "undefined" && FORMS.some((form) => MediaRecorder.isTypeSupported(form));
+  return typeof MediaRecorder !== "undefined" && FORMATS.some((format) => MediaRecorder.isTypeSupported(format));
 }
 
-/** Frames as a WebM movie of what a canvas shows, so many a second. */
-export async function movie(
+/** Record a WebM movie of a canvas; `draw` draws a frame on it, or returns false to leave the frame out. */
+export async function recordMovie(
   canvas: HTMLCanvasElement,
   frames: number[],
-  perSecond: number,
-  show: (frame: number) => Promise<boolean>,
+  framesPerSecond: number,
+  draw: (frame: number) => Promise<boolean>,
 ): Promise<Blob> {
   const stream = canvas.captureStream(0);
   const track = stream.getVideoTracks()[0] as CanvasCaptureMediaStreamTrack;
-  const form = FORMS.find((f) => MediaRecorder.isTypeSupported(f));
-  const recorder = new MediaRecorder(stream, { mimeType: form, videoBitsPerSecond: 12e6 });
+  const format = FORMATS.find((f) => MediaRecorder.isTypeSupported(f));
+  const recorder = new MediaRecorder(stream, { mimeType: format, videoBitsPerSecond: 12e6 });
   const parts: Blob[] = [];
   recorder.ondataavailable = (event) => parts.push(event.data);
-  const done = new Promise<void>((end) => (recorder.onstop = () => end()));
+  const stopped = new Promise<void>((resolve) => (recorder.onstop = () => resolve()));
   recorder.start();
   for (const frame of frames) {
-    const begun = performance.now();
-    if (!(await show(frame))) continue;
+    const start = performance.now();
+    if (!(await draw(frame))) continue;
     track.requestFrame();
-    await pause(Math.max(1000 / perSecond - (performance.now() - begun), 0));
+    await pause(Math.max(1000 / framesPerSecond - (performance.now() - start), 0));
   }
-  track.requestFrame(); // the last one again: a recorder that stops too soon loses it
+  track.requestFrame(); // the last one again: a recorder that is stopped too early loses it
   await pause(300);
   recorder.stop();
-  await done;
+  await stopped;
   track.stop();
   return new Blob(parts, { type: "video/webm" });
 }

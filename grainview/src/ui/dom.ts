@@ -1,8 +1,8 @@
-// Elements of the page, made in one line each.
+// Creation of elements, and helpers for them.
 
 type Attributes = Record<string, string | number | boolean | ((event: Event) => void) | undefined>;
 
-/** An element; attributes that are functions listen, those that are false or undefined are left out. */
+/** Create an element. Functions become event listeners; attributes that are false or undefined are left out. */
 export function h<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   attributes: Attributes = {},
@@ -24,10 +24,24 @@ export function svg(tag: string, attributes: Record<string, string | number> = {
   return element;
 }
 
-/** New content for an element; a button in it that has the focus passes it on to the one in its place. */
+/** Replace the content of an element; if a button in it has the focus, the new button at the same index gets it. */
 export function replaceKeepingFocus(element: HTMLElement, content: Node[]): void {
   const buttons = (): HTMLElement[] => [...element.querySelectorAll("button")];
   const at = buttons().indexOf(document.activeElement as HTMLElement);
   element.replaceChildren(...content);
   if (at >= 0) (buttons()[at] ?? buttons().at(-1))?.focus();
+}
+
+/** Distance [pixels] between pressing and releasing above which a press is a drag and not a click. */
+const DRAG = 4;
+
+/** Call a function for clicks on an element that are no drags, with positions relative to the element [pixels]. */
+export function onClick(element: HTMLElement, action: (x: number, y: number) => void): void {
+  let down: [number, number] | null = null;
+  element.addEventListener("pointerdown", (e) => (down = [e.clientX, e.clientY]));
+  element.addEventListener("pointerup", (e) => {
+    const clicked = down && Math.hypot(e.clientX - down[0], e.clientY - down[1]) < DRAG;
+    const box = element.getBoundingClientRect();
+    if (clicked) action(e.clientX - box.left, e.clientY - box.top);
+  });
 }

@@ -1,4 +1,4 @@
-// Signs on buttons, drawn: not every system has a font with them.
+// Icons of buttons, as paths: not every system has a font with them.
 
 import { h, svg } from "./dom";
 
@@ -7,10 +7,10 @@ const PATHS = {
   pause: "M4 3h3v10H4zM9 3h3v10H9z",
   first: "M3 3h2v10H3zM13 3v10L6 8z",
   last: "M11 3h2v10h-2zM3 3l7 5-7 5z",
-  back: "M11 3v10L4 8z",
-  on: "M5 3l7 5-7 5z",
-  eventBack: "M7.5 3v10L1.5 8zM14 3v10L8 8z",
-  eventOn: "M8.5 3l6 5-6 5zM2 3l6 5-6 5z",
+  previous: "M11 3v10L4 8z",
+  next: "M5 3l7 5-7 5z",
+  previousEvent: "M7.5 3v10L1.5 8zM14 3v10L8 8z",
+  nextEvent: "M8.5 3l6 5-6 5zM2 3l6 5-6 5z",
   centre: "M8 1v4M8 11v4M1 8h4M11 8h4M8 8m-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0-7 0",
   camera: "M2 5h3l1-2h4l1 2h3v8H2zM8 9m-2.4 0a2.4 2.4 0 1 0 4.8 0a2.4 2.4 0 1 0-4.8 0",
   link: "M7 9a3 3 0 0 0 4.3 0l2-2A3 3 0 0 0 9 2.7l-1 1M9 7a3 3 0 0 0-4.3 0l-2 2A3 3 0 0 0 7 13.3l1-1",
@@ -19,18 +19,18 @@ const PATHS = {
   close: "M4 4l8 8M12 4l-8 8",
 } as const;
 
-export type Sign = keyof typeof PATHS;
+type Icon = keyof typeof PATHS;
 
-const FILLED = new Set<Sign>(["play", "pause", "first", "last", "back", "on", "eventBack", "eventOn"]);
+const FILLED = new Set<Icon>(["play", "pause", "first", "last", "previous", "next", "previousEvent", "nextEvent"]);
 
-export function icon(sign: Sign): SVGElement {
-  const picture = svg("svg", { viewBox: "0 0 16 16", class: "gv-icon", "aria-hidden": "true" });
-  picture.append(svg("path", { d: PATHS[sign], class: FILLED.has(sign) ? "gv-filled" : "gv-drawn" }));
-  return picture;
+export function icon(name: Icon): SVGElement {
+  const element = svg("svg", { viewBox: "0 0 16 16", class: "gv-icon", "aria-hidden": "true" });
+  element.append(svg("path", { d: PATHS[name], class: FILLED.has(name) ? "gv-filled" : "gv-drawn" }));
+  return element;
 }
 
-/** A button with a sign on it, and words for those who cannot see it. */
-export function button(sign: Sign, label: string, press: () => void, key = ""): HTMLButtonElement {
+/** A button with an icon, a label for screen readers, and its key in the tooltip. */
+export function button(name: Icon, label: string, press: () => void, key = ""): HTMLButtonElement {
   const title = key ? `${label} (${key})` : label;
-  return h("button", { type: "button", "aria-label": label, title, click: press }, icon(sign));
+  return h("button", { type: "button", "aria-label": label, title, click: press }, icon(name));
 }

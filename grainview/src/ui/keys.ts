@@ -1,6 +1,6 @@
-// Everything by keyboard: actions, and the settings that have keys; the help is made of the same two tables.
+// Keyboard control of actions and settings; the help is generated from the same two tables.
 
-import type { State } from "../state";
+import type { Setting } from "../state";
 import { h } from "./dom";
 
 export interface Action {
@@ -10,42 +10,55 @@ export interface Action {
   run: () => void;
 }
 
+/** Settings that keys change. */
+export interface SteppedSettings {
+  readonly settings: Setting[];
+  step(id: string, direction: 1 | -1): void;
+}
+
 const NAMES: Record<string, string> = {
   " ": "space", ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Escape: "Esc",
 };
 
-/** Actions that a key which is held down does not repeat. */
-const ONCE = new Set(["play", "help", "picture", "movie", "quick", "link", "panel"]);
+/** Actions that a held key does not repeat. */
+const NO_REPEAT = new Set(["play", "help", "picture", "movie", "save-now", "link", "panel"]);
 
-const SLIDES = /^(Arrow\w+|Home|End|PageUp|PageDown)$/;
+/** Keys that move the slider that has the focus. */
+const SLIDER_KEYS = /^(Arrow\w+|Home|End|PageUp|PageDown)$/;
 
-function pressed(event: KeyboardEvent): string {
-  // signs that a keyboard has on its third level come with Ctrl and Alt, or Alt, of which nothing is meant
-  const third = event.key.length === 1 && (event.getModifierState("AltGraph") || (event.altKey && !event.ctrlKey));
-  if (third) return event.key;
-  const before = `${event.ctrlKey || event.metaKey ? "Ctrl+" : ""}${event.altKey ? "Alt+" : ""}`;
+/** Help on the mouse. */
+const MOUSE =
+  "Drag to rotate; drag with the right button or two fingers to pan; use the wheel or pinch to zoom. Click a grain " +
+  "or a contact for its values. The address of the page contains the view and can be shared or bookmarked.";
+
+/** Name of a key with its modifiers, as in the tables. */
+function keyName(event: KeyboardEvent): string {
+  // characters of the third level of a keyboard are typed with AltGr or Alt, which are then no modifiers
+  const thirdLevel = event.key.length === 1 && (event.getModifierState("AltGraph") || (event.altKey && !event.ctrlKey));
+  if (thirdLevel) return event.key;
+  const modifiers = `${event.ctrlKey || event.metaKey ? "Ctrl+" : ""}${event.altKey ? "Alt+" : ""}`;
   const shift = event.shiftKey && event.key.length > 1 ? "Shift+" : "";
-  return before + shift + event.key;
+  return modifiers + shift + event.key;
 }
 
 export class Keys {
   constructor(
-    private readonly state: State,
+    private readonly settings: SteppedSettings,
     private readonly actions: Action[],
   ) {}
 
-  /** What a key does; false if nothing. Switches do not flicker while one is `held`. */
+  /** Execute a key; false if it has no effect. A held key does not repeat toggles. */
   press(key: string, held = false): boolean {
     const action = this.actions.find((a) => a.keys.includes(key));
     if (action) {
-      if (!held || !ONCE.has(action.id)) action.run();
+      if (!held || !NO_REPEAT.has(action.id)) action.run();
       return true;
     }
-    for (const setting of this.state.settings) {
+    for (const setting of this.settings.settings) {
       if (held && setting.key === key && setting.kind === "toggle") return true;
-      if (setting.key === key) this.state.step(setting.id, 1);
-      else if (setting.down === key) this.state.step(setting.id, -1);
-      else if (setting.kind === "choice" && setting.key?.toUpperCase() === key) this.state.step(setting.id, -1);
+      if (setting.key === key) this.settings.step(setting.id, 1);
+      else if (setting.down === key) this.settings.step(setting.id, -1);
+      else if (setting.kind === "choice" && setting.key?.toUpperCase() === key) this.settings.step(setting.id, -1);
       else continue;
       return true;
     }
@@ -53,31 +66,31 @@ export class Keys {
   }
 
   listen(element: HTMLElement | Document): void {
-    element.addEventListener("keydown", (happened) => {
-      const event = happened as KeyboardEvent;
+    element.addEventListener("keydown", (e) => {
+      const event = e as KeyboardEvent;
       const target = event.target as HTMLElement;
       const typing = target.matches("input[type=text], select, textarea");
-      const sliding = target.matches("input[type=range]") && SLIDES.test(event.key);
-      const pushing = target.matches("button, input[type=checkbox]") && (event.key === " " || event.key === "Enter");
-      if (target.ownerDocument.querySelector(".gv dialog[open]")) return; // Esc closes it, the rest has to wait
-      if (typing || sliding || pushing || event.defaultPrevented) return;
-      if (this.press(pressed(event), event.repeat)) event.preventDefault();
+      const sliding = target.matches("input[type=range]") && SLIDER_KEYS.test(event.key);
+      const pressing = target.matches("button, input[type=checkbox]") && (event.key === " " || event.key === "Enter");
+      if (target.ownerDocument.querySelector(".gv dialog[open]")) return; // Esc closes it, other keys have no effect
+      if (typing || sliding || pressing || event.defaultPrevented) return;
+      if (this.press(keyName(event), event.repeat)) event.preventDefault();
     });
   }
 
-  /** The table behind “?”. */
-  help(): HTMLElement {
-    const told = (key: string): string => key.replace(/\b(Arrow\w+|Escape)\b|^ $/g, (name) => NAMES[name] ?? name);
+  /** Content of the help: usage of the mouse, and all keys. */
+  help(): (Node | string)[] {
+    const displayed = (key: string): string => key.replace(/\b(Arrow\w+|Escape)\b|^ $/g, (name) => NAMES[name] ?? name);
     const row = (keys: string[], label: string): HTMLElement =>
-      h("div", {}, h("dt", {}, ...keys.map((k) => h("kbd", {}, told(k)))), h("dd", {}, label));
+      h("div", {}, h("dt", {}, ...keys.map((k) => h("kbd", {}, displayed(k)))), h("dd", {}, label));
     const rows = this.actions.map((a) => row(a.keys, a.label));
-    for (const s of this.state.settings) {
+    for (const s of this.settings.settings) {
       if (!s.key || (s.kind === "choice" && !s.options?.length)) continue;
-      const back = s.kind === "choice" ? s.key.toUpperCase() : s.down; // if it means nothing else
-      const free = back && !this.actions.some((a) => a.keys.includes(back));
-      const other = this.state.settings.some((t) => t !== s && (t.key === back || t.down === back));
-      rows.push(row(free && !other ? [s.key, back] : [s.key], s.label));
+      const reverse = s.kind === "choice" ? s.key.toUpperCase() : s.down;
+      const isAction = this.actions.some((a) => reverse && a.keys.includes(reverse));
+      const isSetting = this.settings.settings.some((t) => t !== s && (t.key === reverse || t.down === reverse));
+      rows.push(row(reverse && !isAction && !isSetting ? [s.key, reverse] : [s.key], s.label));
     }
-    return h("dl", { class: "gv-keys" }, ...rows);
+    return [MOUSE, h("dl", { class: "gv-keys" }, ...rows)];
   }
 }

@@ -1,4 +1,4 @@
-// What the colours mean, on the page: a bar with its range and unit, or names.
+// The legend on the page: a colour bar with range and unit, or a list of names.
 
 import type { KeyPart, Swatch } from "../data/key";
 import { h } from "./dom";
@@ -9,20 +9,20 @@ function bar(colours: string[], numbers: string[]): HTMLElement[] {
   return [strip, h("div", { class: "gv-ends" }, ...numbers.map((text) => h("span", {}, text)))];
 }
 
-function row({ colour, text, grain }: Swatch, choose: (grain: number) => void): HTMLElement {
+function row({ colour, text, grain }: Swatch, select: (grain: number) => void): HTMLElement {
   if (colour === null) return h("li", { class: "gv-faint" }, text);
   const dot = h("span", { class: "gv-dot" });
   dot.style.background = colour;
-  const press = { type: "button", title: "choose this cluster", click: () => choose(grain ?? -1) };
-  return h("li", {}, dot, grain === undefined ? text : h("button", press, text));
+  const attributes = { type: "button", title: "select this cluster", click: () => select(grain ?? -1) };
+  return h("li", {}, dot, grain === undefined ? text : h("button", attributes, text));
 }
 
-/** The key of a frame; rows of clusters choose them. */
-export function legend(parts: KeyPart[], choose: (grain: number) => void): HTMLElement[] {
+/** Elements of the legend; a click on a row of a cluster selects it. */
+export function legend(parts: KeyPart[], select: (grain: number) => void): HTMLElement[] {
   return parts.map((part) => {
     const content = "bar" in part
       ? bar(part.bar, part.numbers)
-      : [h("ul", {}, ...part.rows.map((one) => row(one, choose)))];
+      : [h("ul", {}, ...part.rows.map((swatch) => row(swatch, select)))];
     return h("div", {}, h("div", { class: "gv-legend-title" }, part.title), ...content);
   });
 }

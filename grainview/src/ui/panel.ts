@@ -1,18 +1,25 @@
-// The panel of controls, made from the table of settings.
+// The panel of controls, generated from the table of settings.
 
-import type { Setting, State } from "../state";
+import type { Setting, Settings } from "../state";
 import { h } from "./dom";
 
 const GROUPS = ["Colour", "Show", "Contacts", "Camera", "Time"];
+
+/** Settings that controls show and change. */
+export interface ControlledSettings extends Settings {
+  readonly settings: Setting[];
+  setting(id: string): Setting;
+  onChange(listener: (id: string) => void): void;
+}
 
 export class Panel {
   readonly element = h("aside", { class: "gv-panel", "aria-label": "Settings", id: "gv-panel" });
   private readonly rows = new Map<string, HTMLElement>();
 
-  constructor(private readonly state: State) {
+  constructor(private readonly settings: ControlledSettings) {
     for (const group of GROUPS) {
       const part = h("fieldset", {}, h("legend", {}, group));
-      for (const setting of state.settings.filter((s) => s.group === group && s.kind !== "hidden")) {
+      for (const setting of settings.settings.filter((s) => s.group === group && s.kind !== "hidden")) {
         if (setting.kind === "choice" && !setting.options?.length) continue;
         const row = this.row(setting);
         this.rows.set(setting.id, row);
@@ -20,7 +27,7 @@ export class Panel {
       }
       this.element.append(part);
     }
-    state.onChange((id) => this.update(id));
+    settings.onChange((id) => this.update(id));
   }
 
   private row(setting: Setting): HTMLElement {
@@ -29,53 +36,53 @@ export class Panel {
     const label = h("label", { for: id, title }, setting.label);
     const row = h("div", { class: `gv-row gv-${setting.kind}` });
     row.append(...(setting.kind === "toggle" ? [this.input(setting, id), label] : [label, this.input(setting, id)]));
-    if (setting.kind === "range") row.append(h("output", { for: id }, String(this.state.get(setting.id))));
+    if (setting.kind === "range") row.append(h("output", { for: id }, String(this.settings.get(setting.id))));
     return row;
   }
 
   private input(setting: Setting, id: string): HTMLElement {
-    const { state } = this;
+    const { settings } = this;
     if (setting.kind === "choice") {
       const options = (setting.options ?? []).map(([value, label]) => h("option", { value }, label));
-      const change = (e: Event): void => state.set(setting.id, (e.target as HTMLSelectElement).value);
+      const change = (e: Event): void => settings.set(setting.id, (e.target as HTMLSelectElement).value);
       const select = h("select", { id, change }, ...options);
-      select.value = state.get<string>(setting.id);
+      select.value = settings.get<string>(setting.id);
       return select;
     }
     if (setting.kind === "toggle") {
-      const change = (e: Event): void => state.set(setting.id, (e.target as HTMLInputElement).checked);
+      const change = (e: Event): void => settings.set(setting.id, (e.target as HTMLInputElement).checked);
       const box = h("input", { id, type: "checkbox", change });
-      box.checked = state.get<boolean>(setting.id);
+      box.checked = settings.get<boolean>(setting.id);
       return box;
     }
     if (setting.kind === "number") {
       const change = (e: Event): void => {
         const text = (e.target as HTMLInputElement).value.trim();
-        state.set(setting.id, text === "" ? NaN : Number(text));
-        this.update(setting.id); // what is no number goes away
+        settings.set(setting.id, text === "" ? NaN : Number(text));
+        this.update(setting.id); // removes invalid text
       };
       return h("input", { id, type: "text", inputmode: "decimal", placeholder: "auto (SI)", change });
     }
-    const input = (e: Event): void => state.set(setting.id, Number((e.target as HTMLInputElement).value));
+    const input = (e: Event): void => settings.set(setting.id, Number((e.target as HTMLInputElement).value));
     const slider = h("input", { id, type: "range", min: setting.from, max: setting.to, step: setting.by, input });
-    slider.value = String(state.get(setting.id));
+    slider.value = String(settings.get(setting.id));
     return slider;
   }
 
-  /** There is more, or less, to choose from. */
+  /** Update the options of a choice. */
   refill(id: string): void {
     const select = this.rows.get(id)?.querySelector("select");
-    const options = this.state.setting(id).options ?? [];
+    const options = this.settings.setting(id).options ?? [];
     if (!select || select.options.length === options.length) return;
     select.replaceChildren(...options.map(([value, label]) => h("option", { value }, label)));
     this.update(id);
   }
 
-  /** Show a setting's value of now. */
+  /** Show the present value of a setting. */
   update(id: string): void {
     const row = this.rows.get(id);
     if (!row) return;
-    const value = this.state.get(id);
+    const value = this.settings.get(id);
     const input = row.querySelector("input, select") as HTMLInputElement;
     if (input.type === "checkbox") input.checked = Boolean(value);
     else input.value = Number.isNaN(value) ? "" : String(value);
@@ -83,7 +90,7 @@ export class Panel {
     if (output) output.textContent = String(value);
   }
 
-  /** Settings that mean nothing now are grey. */
+  /** Enable or disable a control. */
   enable(id: string, on: boolean): void {
     const input = this.rows.get(id)?.querySelector("input, select") as HTMLInputElement | null;
     if (input) input.disabled = !on;
