@@ -24,7 +24,7 @@ def _all_pairs(grains, far, span, rules):
     cut_loads(grains, far, span, rules)
 
 
-all_pairs = kernel(_all_pairs, keep=False)
+all_pairs = kernel(_all_pairs, cached=False)
 
 
 def rows(position, box, reach):

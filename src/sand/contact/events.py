@@ -28,7 +28,7 @@ from . import law as contact_law
 from .law import speed_gained
 from .pair_types import bond_of
 from .slip import record_of, strain_before
-from .update import BROKE, WAITS, bond_at, damping_at, pose_at, uniform_contacts, write_loads
+from .update import BROKEN_FLAG, PENDING_FLAG, bond_at, damping_at, pose_at, uniform_contacts, write_loads
 
 
 @loop
@@ -84,7 +84,7 @@ def damp(grains, contacts, span, c, dt):
 def damp_contacts(grains, contacts, count, lost, span, dt):
     """Damping of all contacts."""
     for c in range(count[CONTACTS]):
-        if contacts.flag[c] != BROKE:
+        if contacts.flag[c] != BROKEN_FLAG:
             book(contacts.lost, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
 
 
@@ -132,7 +132,7 @@ def break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt):
     # the damping force acted until the break: half a step by Verlet, the rest by the impulse
     book(contacts.lost, lost, c, DAMPING, -damping_at(contacts, c) * opening * (dt - since))
     count[BROKEN] += 1
-    contacts.flag[c] = BROKE
+    contacts.flag[c] = BROKEN_FLAG
     put(contacts.push, c, (0.0, 0.0, 0.0))
     put(contacts.torque1, c, (0.0, 0.0, 0.0))
     put(contacts.torque2, c, (0.0, 0.0, 0.0))
@@ -145,7 +145,7 @@ def update_flagged_contacts(grains, contacts, pair_list, count, lost, span, law,
     """Break or move the contacts that wait for it; returns True if any broke."""
     parted = False
     for c in range(count[CONTACTS]):
-        if contacts.flag[c] != WAITS:
+        if contacts.flag[c] != PENDING_FLAG:
             continue
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
@@ -182,7 +182,7 @@ def compact_contacts(contacts, count):
     """Close the gaps that broken contacts leave; the order of the others stays."""
     kept = 0
     for c in range(count[CONTACTS]):
-        if contacts.flag[c] == BROKE:
+        if contacts.flag[c] == BROKEN_FLAG:
             continue
         if kept != c:
             for row in range(2):
@@ -217,7 +217,7 @@ def _touches(grains, pair_list, span, p):
 
 
 @loop
-def new_touches(grains, pair_list, count, span):
+def count_new_contacts(grains, pair_list, count, span):
     """How many pairs have come to touch, out of those that may."""
     found = 0
     if inner_list_is_full(pair_list, count):
@@ -258,7 +258,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
 
 
 @rare
-def make_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt):
+def form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt):
     """Form the contacts of pairs that came to touch inside the step, and book −U(0).
 
     The grains flew freely to where they are, a time τ = overlap / closing speed w beyond the touch.  An impulse along

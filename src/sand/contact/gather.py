@@ -9,12 +9,12 @@ import math
 
 from ..compiler.jit import kernel, loop, rare
 from ..numerics.vec import add, load, put, sub
-from ..state.arrays import KINDS
+from ..state.arrays import GATHER_CLASSES
 from ..state.state import CONTACTS
 
 BLOCK = 64
 """Grains in a block; their contacts stay in the first cache."""
-MOST = math.isqrt(KINDS) - 1
+MOST = math.isqrt(GATHER_CLASSES) - 1
 """Grains that are the first, or the second, of so many contacts or more are not told apart."""
 DENSE = 3
 """Contacts per grain from which most grains have equally many, as they are numbered."""
@@ -36,7 +36,7 @@ def _gather_at(grains, contacts, g):
 
 
 @loop
-def gather_by_number(grains, contacts, first, last):
+def gather_in_index_order(grains, contacts, first, last):
     """`gather` where grains take no turns: in small worlds."""
     for k in range(last - first):
         _gather_at(grains, contacts, first + k)
@@ -52,7 +52,7 @@ def gather(grains, contacts, first, last):
         for k in range(last - first):
             _gather_at(grains, contacts, contacts.gather_order[first + k])
     else:
-        gather_by_number(grains, contacts, first, last)
+        gather_in_index_order(grains, contacts, first, last)
 
 
 @rare
@@ -101,12 +101,12 @@ def _take_turns(contacts, n, total):
             turn[g] = g
         if total < DENSE * n:
             # the places behind all grains count the kinds, and then say where the next of each goes
-            for k in range(KINDS):
+            for k in range(GATHER_CLASSES):
                 turn[n + k] = 0
             for g in range(first, last):
                 turn[n + _kind(contacts, g)] += 1
             place = first
-            for k in range(KINDS):
+            for k in range(GATHER_CLASSES):
                 place, turn[n + k] = place + int(turn[n + k]), place
             for g in range(first, last):
                 kind = _kind(contacts, g)

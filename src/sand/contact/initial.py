@@ -13,7 +13,7 @@ from .update import bond_at, write_loads
 
 
 @kernel
-def seed_contacts(grains, contacts, count, span, law, pair, slide, roll, twist):
+def add_initial_contacts(grains, contacts, count, span, law, pair, slide, roll, twist):
     """Append contacts with given displacements; returns the first one stretched beyond its break, or −1.
 
     Parameters

@@ -16,7 +16,16 @@ from ..state.arrays import BLOCK as JUDGED_TOGETHER
 from ..state.state import BREAKING, ROLLING, SLIDING, SLIPPED, TWISTING
 from . import jkr, tangential
 from . import law as contact_law
-from .update import SLIPPED_FLAGS, WAITS, bond_in, contact_loop, pose_after, twist_gain, uniform_contacts, whole_vectors
+from .update import (
+    PENDING_FLAG,
+    SLIPPED_FLAG,
+    bond_in,
+    contact_loop,
+    padded_contact_count,
+    pose_after,
+    twist_gain,
+    uniform_contacts,
+)
 
 BLOCK = np.uint64(JUDGED_TOGETHER)
 """Contacts that are judged together."""
@@ -115,7 +124,7 @@ def _slip_loop(grains, contacts, first, last, column, span, law, dt):
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if odd else SLIPPED_FLAGS if moves else 0
+        contacts.flag[c] = PENDING_FLAG if odd else SLIPPED_FLAG if moves else 0
         _keep_record(contacts.lost, c, lost[0], lost[1], lost[2])
         waiting += 1.0 if odd else 0.0
         moved += 1.0 if moves else 0.0
@@ -147,7 +156,7 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
             rolled += part.rolled
             twisted += part.twisted
         else:
-            whole = whole_vectors(contacts, end)
+            whole = padded_contact_count(contacts, end)
             waiting += contact_loop(grains, contacts, begin, whole, end, column, span, law, dt)
     return SlipSums(waiting, moved, slid, rolled, twisted)
 

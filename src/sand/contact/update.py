@@ -16,7 +16,7 @@ from .pair_types import kinds
 
 FEW = 4
 """Contacts that are faster done one by one than as a vector."""
-WAITS, BROKE, SLIPPED_FLAGS = 1, 2, 3
+PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG = 1, 2, 3
 """Flags of a contact that passed a limit: to be settled; broken in this step; moved in the pass over all contacts."""
 
 
@@ -121,13 +121,13 @@ def contact_loop(grains, contacts, first, last, used, column, span, law, dt):
         put(contacts.push, c, push)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if beyond else 0
+        contacts.flag[c] = PENDING_FLAG if beyond else 0
         waiting += 1.0 if beyond & (c < used) else 0.0
     return waiting
 
 
 @loop
-def whole_vectors(contacts, number):
+def padded_contact_count(contacts, number):
     """The number of columns to pass over for so many contacts: if many are left over, they are a vector of their own.
 
     What is beyond the contacts in use is worked out as well, and never read.  Both are uint64.
