@@ -84,8 +84,8 @@ FAULTS = (
           "v[2] - span.z * np.rint(v[2] * span.inverse_z)", "v[2]",
           "unit/test_box.py::test_nearest_image_is_the_shortest"),
     Fault("sliding forgets where it ends", "factor 2", "formula", "contact/law.py",
-          "slide = dot(add(before.slide, left.slide), sub(reached.slide, left.slide))",
-          "slide = dot(before.slide, sub(reached.slide, left.slide))",
+          "slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))",
+          "slide = dot(start.slide, sub(end.slide, left.slide))",
           "physics/test_contact_law.py::test_what_yielding_dissipates"),
     # loops
     Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "neighbours/cell_list.py",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact.events import inner_list_is_full
+from sand.contact.events import inner_list_overflowed
 from sand.integrate.step_parts import SOON_PART
 from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
 from sand.simulation import engine as engines
@@ -228,7 +228,7 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
         w.pair_list.touching[: i.size] == 0
     )
     assert close.sum() > 5
-    assert not inner_list_is_full(w.pair_list, w.count)
+    assert not inner_list_overflowed(w.pair_list, w.count)
     assert set(np.flatnonzero(close)) <= set(w.pair_list.inner[: int(w.pair_list.skin[INNER_COUNT])].tolist())
 
 

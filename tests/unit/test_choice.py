@@ -7,7 +7,7 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
-from sand.contact.events import inner_list_is_full
+from sand.contact.events import inner_list_overflowed
 from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
 from sand.integrate.step_parts import SOON_PART
 from sand.neighbours.pair_list import build_inner_list
@@ -72,7 +72,7 @@ def test_what_may_touch_soon_is_what_is_close():
         near = w.pair_list._replace(soon=np.zeros(room, np.uint32), watch=w.pair_list.skin.copy())
         build_inner_list(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
-        if inner_list_is_full(near, w.count):
+        if inner_list_overflowed(near, w.count):
             return {tuple(sorted(pair)) for pair in near.pair[:, : w.count[PAIRS]].T.tolist()}
         soon = near.inner[: int(near.skin[INNER_COUNT])].tolist()
         assert len(set(soon)) == len(soon)

@@ -8,7 +8,7 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
-from sand.contact.gather import BLOCK, DENSE, MOST, gather, resort_contacts_by_grain
+from sand.contact.gather import BLOCK, DENSE_FROM, LARGEST_CLASS, gather, resort_contacts_by_grain
 from sand.integrate.motion import gather_and_kick, kick, kick_and_drift_for
 from sand.integrate.task_queue import GRAINS_PER_BLOCK
 from sand.state.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
@@ -84,14 +84,14 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     Where contacts are many all come by number.
     """
     _, contacts, pair = some(1.0)
-    many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], MOST)
-    kind = many[0] * (MOST + 1) + many[1]
+    many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], LARGEST_CLASS)
+    kind = many[0] * (LARGEST_CLASS + 1) + many[1]
     turn = contacts.gather_order[:GRAINS]
     assert len(set(kind.tolist())) > 10
     for first in range(0, GRAINS, BLOCK):
         block = np.arange(first, min(first + BLOCK, GRAINS))
         assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
-    _, crowded, _ = some(DENSE + 0.5)
+    _, crowded, _ = some(DENSE_FROM + 0.5)
     assert crowded.turn[:GRAINS].tolist() == list(range(GRAINS))
 
 

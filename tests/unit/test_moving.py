@@ -8,11 +8,11 @@ import pytest
 from sand.box import Box
 from sand.compiler.jit import kernel
 from sand.contact.events import update_flagged_contacts
-from sand.contact.law import Bond, bond_between, strain_of
+from sand.contact.law import Bond, bond_between, displacements_of
 from sand.contact.model import Contact
-from sand.contact.slip import contact_pass, log_slip_sums, strain_before
+from sand.contact.slip import contact_pass, log_slip_sums, displacements_before
 from sand.contact.tangential import pointers_for
-from sand.contact.update import BROKEN_FLAG, PENDING_FLAG, SLIPPED_FLAG, contact_loop, pose_at, twist_gain
+from sand.contact.update import BROKEN_FLAG, PENDING_FLAG, SLIPPED_FLAG, contact_loop, pose_at, twist_increment
 from sand.grains import GrainArrays, Grains
 from sand.integrate.kernel_spec import ContactParameters
 from sand.integrate.motion import kick_and_drift_for
@@ -143,10 +143,10 @@ def test_the_strain_before_a_step_is_that_of_grains_put_back():
     for c in range(PAIRS):
         bond, radii = Bond(*contacts.bond[:, c]), (grains.radius[c], grains.radius[c + PAIRS])
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        found.append(np.hstack(strain_before(grains, contacts, c, pose, bond, STEP)))
-        twist = contacts.twist[c] - twist_gain(grains, contacts, c, pose, STEP)
+        found.append(np.hstack(displacements_before(grains, contacts, c, pose, bond, STEP)))
+        twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, STEP)
         then = pose_at(back, contacts, span, c, twist)
-        expected.append(np.hstack(strain_of(then, sum(radii) - then.distance, *radii, bond)))
+        expected.append(np.hstack(displacements_of(then, sum(radii) - then.distance, *radii, bond)))
     found, expected = np.array(found), np.array(expected)
     assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
 

@@ -24,18 +24,30 @@ from ..state.state import (
     TWISTING,
 )
 from . import jkr, tangential
-from . import law as contact_law
-from .law import speed_gained
+from .law import (
+    Displacements,
+    Pose,
+    after_slip,
+    breaking_loss,
+    contact_speed_gain,
+    damping_force,
+    displacements_of,
+    exceeds_limits,
+    forming_loss,
+    scaled_stiffness,
+    slip_losses,
+    stiffness_loss,
+)
 from .pair_types import bond_of
-from .slip import record_of, strain_before
-from .update import BROKEN_FLAG, PENDING_FLAG, bond_at, damping_at, pose_at, uniform_contacts, write_loads
+from .slip import displacements_before, loss_row
+from .update import BROKEN_FLAG, PENDING_FLAG, bond_at, pose_at, stored_damping_force, uniform_contacts, write_loads
 
 
 @loop
-def book(own, lost, c, channel, energy):
+def log_loss(own, lost, c, channel, energy):
     """Add an energy [J] lost by contact c to the books and to its own record, `own` (L, C), if that has room."""
     lost[channel] += energy
-    row = record_of(channel)
+    row = loss_row(channel)
     if channel != BREAKING and row < own.shape[0]:
         own[row, c] += energy
 
@@ -43,20 +55,20 @@ def book(own, lost, c, channel, energy):
 @loop
 def log_slip_losses(own, lost, c, energies):
     """The same for the three tangential modes."""
-    book(own, lost, c, SLIDING, energies[0])
-    book(own, lost, c, ROLLING, energies[1])
-    book(own, lost, c, TWISTING, energies[2])
+    log_loss(own, lost, c, SLIDING, energies[0])
+    log_loss(own, lost, c, ROLLING, energies[1])
+    log_loss(own, lost, c, TWISTING, energies[2])
 
 
 @loop
-def keep_damping(contacts, c, force):
+def store_damping_force(contacts, c, force):
     """Remember the damping force [N] of contact c, where there is any."""
     if contacts.damped.size > 0:
         contacts.damped[c] = force
 
 
 @rare
-def damp(grains, contacts, span, c, dt):
+def add_damping_force(grains, contacts, span, c, dt):
     """Add the damping force to the loads of contact c; returns the energy [J] it took in the step.
 
     It acts on the closing speed at the end of the step, foretold with the loads of its start.  Its work is
@@ -72,11 +84,11 @@ def damp(grains, contacts, span, c, dt):
     closing = -dot(axpy(0.5 * dt, pull, moving), n)
     overlap = grains.radius[i] + grains.radius[j] - distance
     y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    force = contact_law.damping_force(overlap, y, closing, bond)
+    force = damping_force(overlap, y, closing, bond)
     accrue(contacts.push, c, scale(force, n))
     earlier = axpy(-dt, moving, apart)
-    before = damping_at(contacts, c) / math.sqrt(dot(earlier, earlier))
-    keep_damping(contacts, c, force)
+    before = stored_damping_force(contacts, c) / math.sqrt(dot(earlier, earlier))
+    store_damping_force(contacts, c, force)
     return -0.5 * dt * (before * dot(earlier, moving) + force * dot(n, moving))
 
 
@@ -85,7 +97,7 @@ def damp_contacts(grains, contacts, count, lost, span, dt):
     """Damping of all contacts."""
     for c in range(count[CONTACTS]):
         if contacts.flag[c] != BROKEN_FLAG:
-            book(contacts.lost, lost, c, DAMPING, damp(grains, contacts, span, c, dt))
+            log_loss(contacts.lost, lost, c, DAMPING, add_damping_force(grains, contacts, span, c, dt))
 
 
 @rare
@@ -95,16 +107,16 @@ def log_stiffness_work(grains, contacts, count, lost, span, dt):
         bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
-        before = strain_before(grains, contacts, c, pose, bond, dt)
-        strain = contact_law.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        earlier, now = stiffened_at(before.overlap, bond), stiffened_at(strain.overlap, bond)
-        book(contacts.lost, lost, c, STIFFNESS, contact_law.lost_to_stiffness(before, strain, earlier, now))
+        before = displacements_before(grains, contacts, c, pose, bond, dt)
+        displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
+        earlier, now = scaled_to_overlap(before.overlap, bond), scaled_to_overlap(displacements.overlap, bond)
+        log_loss(contacts.lost, lost, c, STIFFNESS, stiffness_loss(before, displacements, earlier, now))
 
 
 @loop
-def stiffened_at(overlap, bond):
+def scaled_to_overlap(overlap, bond):
     """The bond with the stiffnesses that follow this overlap."""
-    return contact_law.stiffened(bond, jkr.root(jkr.stretch(overlap, bond.pull_off_overlap)), True)
+    return scaled_stiffness(bond, jkr.root(jkr.stretch(overlap, bond.pull_off_overlap)), True)
 
 
 @loop
@@ -126,17 +138,17 @@ def break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt):
     opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
     late = -bond.break_overlap - overlap
     since = min(late / opening, dt) if opening > 0.0 else 0.0
-    energy, force = contact_law.breaking(bond)
-    apply_pair_impulse(grains, i, j, pose.n, (force + damping_at(contacts, c)) * (0.5 * dt - since))
-    book(contacts.lost, lost, c, BREAKING, energy)
+    energy, force = breaking_loss(bond)
+    apply_pair_impulse(grains, i, j, pose.n, (force + stored_damping_force(contacts, c)) * (0.5 * dt - since))
+    log_loss(contacts.lost, lost, c, BREAKING, energy)
     # the damping force acted until the break: half a step by Verlet, the rest by the impulse
-    book(contacts.lost, lost, c, DAMPING, -damping_at(contacts, c) * opening * (dt - since))
+    log_loss(contacts.lost, lost, c, DAMPING, -stored_damping_force(contacts, c) * opening * (dt - since))
     count[BROKEN] += 1
     contacts.flag[c] = BROKEN_FLAG
     put(contacts.push, c, (0.0, 0.0, 0.0))
     put(contacts.torque1, c, (0.0, 0.0, 0.0))
     put(contacts.torque2, c, (0.0, 0.0, 0.0))
-    keep_damping(contacts, c, 0.0)
+    store_damping_force(contacts, c, 0.0)
     mark_separated(pair_list, count, i, j)
 
 
@@ -151,24 +163,24 @@ def update_flagged_contacts(grains, contacts, pair_list, count, lost, span, law,
         r1, r2 = grains.radius[i], grains.radius[j]
         bond = bond_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        strain = contact_law.strain_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        if contact_law.beyond_limits(strain, pose.n, bond):
-            before = strain_before(grains, contacts, c, pose, bond, dt)
-            y = jkr.root(jkr.stretch(strain.overlap, bond.pull_off_overlap))
-            now = contact_law.stiffened(bond, y, law.follow)
-            if strain.overlap < -bond.break_overlap:
+        displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
+        if exceeds_limits(displacements, pose.n, bond):
+            before = displacements_before(grains, contacts, c, pose, bond, dt)
+            y = jkr.root(jkr.stretch(displacements.overlap, bond.pull_off_overlap))
+            now = scaled_stiffness(bond, y, law.follow)
+            if displacements.overlap < -bond.break_overlap:
                 zero = (0.0, 0.0, 0.0)
-                gone = contact_law.Strain(strain.overlap, zero, zero, 0.0)
-                slid, rolled, twisted = contact_law.lost_by_yielding(before, strain, gone, now)
-                book(contacts.lost, lost, c, BREAKING, slid + rolled + twisted)
+                gone = Displacements(displacements.overlap, zero, zero, 0.0)
+                slid, rolled, twisted = slip_losses(before, displacements, gone, now)
+                log_loss(contacts.lost, lost, c, BREAKING, slid + rolled + twisted)
                 break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt)
                 parted = True
                 continue
-            wish = contact_law.yielded(strain, pose.n, bond, law.release)
+            wish = after_slip(displacements, pose.n, bond, law.release)
             n1, n2 = tangential.pointers_for(wish.slide, wish.roll, pose.n, r1, r2)
-            moved = contact_law.Pose(pose.n, pose.distance, n1, n2, wish.twist)
-            left = contact_law.strain_of(moved, strain.overlap, r1, r2, bond)
-            log_slip_losses(contacts.lost, lost, c, contact_law.lost_by_yielding(before, strain, left, now))
+            moved = Pose(pose.n, pose.distance, n1, n2, wish.twist)
+            left = displacements_of(moved, displacements.overlap, r1, r2, bond)
+            log_slip_losses(contacts.lost, lost, c, slip_losses(before, displacements, left, now))
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
             contacts.twist[c] = left.twist
@@ -198,7 +210,7 @@ def compact_contacts(contacts, count):
                     contacts.bond[row, kept] = contacts.bond[row, c]
             for row in range(contacts.lost.shape[0]):
                 contacts.lost[row, kept] = contacts.lost[row, c]
-            keep_damping(contacts, kept, damping_at(contacts, c))
+            store_damping_force(contacts, kept, stored_damping_force(contacts, c))
             contacts.twist[kept] = contacts.twist[c]
             contacts.formed[kept] = contacts.formed[c]
             contacts.flag[kept] = contacts.flag[c]
@@ -208,7 +220,7 @@ def compact_contacts(contacts, count):
 
 
 @loop
-def _touches(grains, pair_list, span, p):
+def _is_new_contact(grains, pair_list, span, p):
     """1 if pair p has come to touch (D ≤ r1 + r2), else 0."""
     i, j = pair_list.pair[0, p], pair_list.pair[1, p]
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
@@ -220,12 +232,12 @@ def _touches(grains, pair_list, span, p):
 def count_new_contacts(grains, pair_list, count, span):
     """How many pairs have come to touch, out of those that may."""
     found = 0
-    if inner_list_is_full(pair_list, count):
+    if inner_list_overflowed(pair_list, count):
         for p in range(count[PAIRS]):
-            found += _touches(grains, pair_list, span, p)
+            found += _is_new_contact(grains, pair_list, span, p)
     else:
         for k in range(int(pair_list.skin[INNER_COUNT])):
-            found += _touches(grains, pair_list, span, pair_list.inner[k])
+            found += _is_new_contact(grains, pair_list, span, pair_list.inner[k])
     return found
 
 
@@ -244,7 +256,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     contacts.formed[c] = formed
     contacts.flag[c] = 0
     contacts.bonded[c] = 0
-    keep_damping(contacts, c, 0.0)
+    store_damping_force(contacts, c, 0.0)
     for row in range(contacts.lost.shape[0]):
         contacts.lost[row, c] = 0.0
     bond = bond_of(grains, law.pairings, i, j)
@@ -259,7 +271,7 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
 
 @rare
 def form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt):
-    """Form the contacts of pairs that came to touch inside the step, and book −U(0).
+    """Form the contacts of pairs that came to touch inside the step, and log_loss −U(0).
 
     The grains flew freely to where they are, a time τ = overlap / closing speed w beyond the touch.  An impulse along
     n gives them the speed w' of their contact, less what velocity Verlet still adds: to first order F (τ − dt/2).
@@ -278,20 +290,20 @@ def form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt
         since = min((reach - distance) / closing, dt) if closing > 0.0 else 0.0
         c = add_contact(grains, contacts, count, span, law, i, j, clock[TIME] + dt - since)
         if law.damped:
-            damp(grains, contacts, span, c, 0.0)
-            book(contacts.lost, lost, c, DAMPING, damping_at(contacts, c) * closing * since)
+            add_damping_force(grains, contacts, span, c, 0.0)
+            log_loss(contacts.lost, lost, c, DAMPING, stored_damping_force(contacts, c) * closing * since)
         reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
         # a step of 0 s finds what touches already
-        gain = speed_gained(reach - distance, closing, reduced, bond_at(contacts, c), dt) if dt > 0.0 else 0.0
-        owed = damping_at(contacts, c) * since - reduced * gain
+        gain = contact_speed_gain(reach - distance, closing, reduced, bond_at(contacts, c), dt) if dt > 0.0 else 0.0
+        owed = stored_damping_force(contacts, c) * since - reduced * gain
         apply_pair_impulse(grains, i, j, n, owed - 0.5 * dt * dot(load(contacts.push, c), n))
-        book(contacts.lost, lost, c, FORMING, contact_law.forming(bond_at(contacts, c)))
+        log_loss(contacts.lost, lost, c, FORMING, forming_loss(bond_at(contacts, c)))
         pair_list.touching[p] = 1
         count[MADE] += 1
 
 
 @loop
-def inner_list_is_full(pair_list, count):
+def inner_list_overflowed(pair_list, count):
     """Are all near pairs to be looked at, instead of the first watch[INNER_COUNT] of `soon`?"""
     return pair_list.skin[INNER_COUNT] == count[PAIRS]
 

@@ -14,9 +14,9 @@ from ..state.state import CONTACTS
 
 BLOCK = 64
 """Grains in a block; their contacts stay in the first cache."""
-MOST = math.isqrt(GATHER_CLASSES) - 1
+LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
 """Grains that are the first, or the second, of so many contacts or more are not told apart."""
-DENSE = 3
+DENSE_FROM = 3
 """Contacts per grain from which most grains have equally many, as they are numbered."""
 
 
@@ -78,38 +78,38 @@ def sort_contacts_by_grain(contacts, count, n):
         start[g] = start[g + 1]
     start[n] = 2 * total
     if contacts.gather_order.size > 0:
-        _take_turns(contacts, n, total)
+        _set_gather_order(contacts, n, total)
 
 
 @loop
-def _kind(contacts, g):
+def _gather_class(contacts, g):
     """A number for how many contacts grain g has, as the first and as the second of the two."""
     firsts = 0
     for s in range(contacts.start[g], contacts.start[g + 1]):
         firsts += 1 - int(contacts.side[s] & 1)
     seconds = int(contacts.start[g + 1]) - int(contacts.start[g]) - firsts
-    return min(firsts, MOST) * (MOST + 1) + min(seconds, MOST)
+    return min(firsts, LARGEST_CLASS) * (LARGEST_CLASS + 1) + min(seconds, LARGEST_CLASS)
 
 
 @loop
-def _take_turns(contacts, n, total):
+def _set_gather_order(contacts, n, total):
     """Fill `turn`: the grains of each block by their kind; by their numbers where contacts are many."""
     turn = contacts.gather_order
     for first in range(0, n, BLOCK):
         last = min(first + BLOCK, n)
         for g in range(first, last):
             turn[g] = g
-        if total < DENSE * n:
-            # the places behind all grains count the kinds, and then say where the next of each goes
+        if total < DENSE_FROM * n:
+            # the places behind all grains count the pair_type_count, and then say where the next of each goes
             for k in range(GATHER_CLASSES):
                 turn[n + k] = 0
             for g in range(first, last):
-                turn[n + _kind(contacts, g)] += 1
+                turn[n + _gather_class(contacts, g)] += 1
             place = first
             for k in range(GATHER_CLASSES):
                 place, turn[n + k] = place + int(turn[n + k]), place
             for g in range(first, last):
-                kind = _kind(contacts, g)
+                kind = _gather_class(contacts, g)
                 turn[turn[n + kind]] = g
                 turn[n + kind] += 1
 

@@ -37,7 +37,7 @@ POLYNOMIAL = (
     -5.7004524231251032e-06,
     2.6965646040310146e-07,
 )
-STRETCH_OF_POLYNOMIAL = 3.5
+POLYNOMIAL_RANGE = 3.5
 """Largest s the polynomial serves; δ = 11.25 δ_c."""
 
 ROOT_AT_TOUCH = (2.0 / 3.0) ** (1.0 / 3.0)
@@ -45,7 +45,7 @@ ROOT_AT_TOUCH = (2.0 / 3.0) ** (1.0 / 3.0)
 
 
 @formula
-def root_in_reach(s):
+def polynomial_root(s):
     """y = √(a/a₀) from s = √(1 + δ/δ_c), 0 ≤ s ≤ 3.5, without a branch; relative error 1e-14."""
     c = POLYNOMIAL
     p = c[9] + s * c[10]
@@ -66,8 +66,8 @@ def root_in_reach(s):
 @formula
 def root(s):
     """y = √(a/a₀) from s = √(1 + δ/δ_c) ≥ 0, at any compression."""
-    if s <= STRETCH_OF_POLYNOMIAL:
-        return root_in_reach(s)
+    if s <= POLYNOMIAL_RANGE:
+        return polynomial_root(s)
     overlap = s * s - 1.0
     y = math.sqrt(math.sqrt(s * s / (2.0 * CUBE_ROOT_6)))
     for _ in range(4):

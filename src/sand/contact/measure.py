@@ -4,8 +4,8 @@ from ..compiler.jit import kernel, loop
 from ..numerics.vec import across, axpy, dot, load, norm
 from ..state.state import CONTACTS
 from . import jkr
-from . import law as contact_law
-from .update import bond_at, damping_at, pose_at
+from .law import contact_load, contact_radius, displacements_of, energies, normal_force, scaled_stiffness
+from .update import bond_at, pose_at, stored_damping_force
 
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
 
@@ -32,7 +32,7 @@ def measure_energies(grains, contacts, count, span, follow, out):
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         overlap, bond = r1 + r2 - pose.distance, bond_at(contacts, c)
         y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-        stored = contact_law.energies(pose, overlap, y, r1, r2, contact_law.stiffened(bond, y, follow))
+        stored = energies(pose, overlap, y, r1, r2, scaled_stiffness(bond, y, follow))
         for mode in range(4):
             out[2 + mode] += stored[mode]
 
@@ -74,26 +74,26 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         overlap, plain = r1 + r2 - pose.distance, bond_at(contacts, c)
         y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
-        bond = contact_law.stiffened(plain, y, follow)
-        strain = contact_law.strain_of(pose, overlap, r1, r2, bond)
-        xi = across(strain.roll, pose.n)
-        slide, roll = norm(strain.slide), norm(xi)
-        stored = contact_law.energies(pose, overlap, y, r1, r2, bond)
-        out[0, c], out[1, c] = overlap, contact_law.contact_radius(overlap, y, bond)
-        out[2, c], out[3, c], out[4, c] = slide, roll, strain.twist
+        bond = scaled_stiffness(plain, y, follow)
+        displacements = displacements_of(pose, overlap, r1, r2, bond)
+        xi = across(displacements.roll, pose.n)
+        slide, roll = norm(displacements.slide), norm(xi)
+        stored = energies(pose, overlap, y, r1, r2, bond)
+        out[0, c], out[1, c] = overlap, contact_radius(overlap, y, bond)
+        out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
         out[5, c] = -overlap / bond.pull_off_overlap
         out[6, c] = slide / bond.slide_limit if bond.slide_limit > 0.0 else 0.0
         out[7, c] = roll / bond.roll_limit
-        out[8, c] = abs(strain.twist) / bond.twist_limit
-        out[9, c] = contact_law.normal_force(overlap, y, bond) + damping_at(contacts, c)
+        out[8, c] = abs(displacements.twist) / bond.twist_limit
+        out[9, c] = normal_force(overlap, y, bond) + stored_damping_force(contacts, c)
         out[10, c] = bond.slide_stiffness * slide
         out[11, c] = bond.reduced_radius * bond.roll_stiffness * roll
-        out[12, c] = -bond.twist_stiffness * strain.twist
+        out[12, c] = -bond.twist_stiffness * displacements.twist
         for mode in range(4):
             out[13 + mode, c] = stored[mode]
-        push, torque1, torque2 = contact_law.contact_load(pose, overlap, y, r1, r2, bond)
-        push = axpy(damping_at(contacts, c), pose.n, push)
+        push, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond)
+        push = axpy(stored_damping_force(contacts, c), pose.n, push)
         for axis in range(3):
             out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = push[axis], torque1[axis], torque2[axis]
-            out[17 + axis, c] = strain.slide[axis]
+            out[17 + axis, c] = displacements.slide[axis]
             out[20 + axis, c] = xi[axis]

@@ -18,7 +18,7 @@ from .jkr import rest_radius
 from .law import Pairing
 from .mixing import MIXING, pairing_between
 
-BEYOND = ("clamp", "release")
+LIMIT_RULES = ("clamp", "release")
 STIFFNESS = ("frozen", "dt97")
 DAMPING = ("none", "constant", "viscoelastic")
 JKR_LIMIT = 0.3
@@ -78,7 +78,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        words = {"beyond": BEYOND, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
+        words = {"beyond": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
         for key, allowed in words.items():
             if getattr(self, key) not in allowed:
                 given = getattr(self, key)

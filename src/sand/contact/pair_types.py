@@ -10,7 +10,7 @@ from ..state.state import PAIRS
 from .law import Pairing, bond_between
 
 
-class Kind(NamedTuple):
+class PairType(NamedTuple):
     """What the constants of a pair's contact depend on, and what the list keeps of them."""
 
     grains: Any  # material, radius [m] and mass [kg] of each
@@ -19,11 +19,11 @@ class Kind(NamedTuple):
 
 
 NO_GRAIN_TYPE = (np.uint32(0), -1.0, -1.0)
-NO_PAIR_TYPE = Kind((NO_GRAIN_TYPE, NO_GRAIN_TYPE), 0.0, 0.0)
+NO_PAIR_TYPE = PairType((NO_GRAIN_TYPE, NO_GRAIN_TYPE), 0.0, 0.0)
 
 
 @loop
-def pairing_of(pairings, a, b):
+def load_pairing(pairings, a, b):
     """What materials a and b make together, from the (10, M, M) table."""
     return Pairing(
         pairings[0, a, b],
@@ -42,7 +42,7 @@ def pairing_of(pairings, a, b):
 @loop
 def bond_of(grains, pairings, i, j):
     """The constants of a contact between grains i and j."""
-    pairing = pairing_of(pairings, grains.material[i], grains.material[j])
+    pairing = load_pairing(pairings, grains.material[i], grains.material[j])
     return bond_between(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
 
 
@@ -59,7 +59,7 @@ def pair_type_of(grains, law, i, j, last):
     if (a, b) == last.grains:
         return last
     bond = bond_of(grains, law.pairings, i, j)
-    return Kind((a, b), 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period, bond.break_overlap)
+    return PairType((a, b), 2.0 * math.pi / math.sqrt(bond.max_squared_frequency) / law.per_period, bond.break_overlap)
 
 
 @loop
@@ -69,6 +69,6 @@ def pair_type_index(pair_list, p):
 
 
 @loop
-def kinds(pair_list, count):
+def pair_type_count(pair_list, count):
     """How many places are in use."""
     return min(count[PAIRS], pair_list.step.size)

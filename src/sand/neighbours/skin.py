@@ -10,7 +10,7 @@ import math
 
 from ..box import nearest_image
 from ..compiler.jit import loop
-from ..contact.pair_types import kinds
+from ..contact.pair_types import pair_type_count
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import dot, load, sub
 from ..state.state import INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED
@@ -37,7 +37,7 @@ def invalidate_skins(pair_list):
 def update_safe_speed(pair_list, count):
     """The speed [m/s] that is δ_c in the step of a contact, for the pair of the list for which it is least."""
     harmless = math.inf
-    for k in range(kinds(pair_list, count)):
+    for k in range(pair_type_count(pair_list, count)):
         harmless = min(harmless, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)
     pair_list.skin[SAFE_SPEED] = harmless
 
