@@ -98,7 +98,7 @@ FAULTS = (
           "accrue(force, j, (-f[0], -f[1], -f[2]))", "accrue(force, j, f)",
           "physics/test_magnetics.py::test_loads_against_brute_force_with_images"),
     Fault("a touch is given a whole kick", "factor 2", "loop", "contact/events.py",
-          "owed - 0.5 * dt * dot(load(contacts.push, c), n)", "owed - dt * dot(load(contacts.push, c), n)",
+          "impulse - 0.5 * dt * dot(load(contacts.push, c), n)", "impulse - dt * dot(load(contacts.push, c), n)",
           "physics/test_conservation.py::test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls"),
     Fault("half the speed at the start of a curve", "factor 2", "loop", "integrate/event_location.py",
           "v0 = scale(dt / 5.0, ", "v0 = scale(dt / 10.0, ",

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.events import add_initial_contacts
 from ..contact.gather import resort_contacts_by_grain
-from ..contact.initial import add_initial_contacts
 from ..forces.base import GrainForce, LongRangeForce
 from ..forces.external.loops import outside_shares_for
 from ..forces.pair.loops import shares_for
