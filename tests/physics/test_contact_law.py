@@ -194,7 +194,7 @@ def test_pointers_land_on_their_target(ratio, slide, roll):
     wish_roll = scale(size, sub(roll, scale(dot(roll, n), n)))
     n1, n2 = tangential.pointers_for(wish_slide, wish_roll, n, r1, r2)
     pose = law.Pose(n, r1 + r2, n1, n2, 0.0)
-    strain = law.strain_of(pose, 0.0, r1, r2, bond)
+    strain = law.displacements_of(pose, 0.0, r1, r2, bond)
     across_n = sub(strain.roll, scale(dot(strain.roll, n), n))
     # rounding: coordinates of size r1 are subtracted
     assert strain.slide == pytest.approx(wish_slide, abs=1e-12 * size + 4e-16 * r1)
@@ -208,29 +208,29 @@ def test_pointers_land_on_their_target(ratio, slide, roll):
 def test_limits_hold_on_both_sides(release, sign):
     """Clamp leaves a displacement at its limit, release at 0; both signs of the twist."""
     _, _, bond = contact_of(1.0)
-    over = law.Strain(
+    over = law.Displacements(
         0.0,
         (0.0, sign * 2 * bond.slide_limit, 0.0),
         (3 * bond.roll_limit, 0.0, 0.0),
         sign * 2 * bond.twist_limit,
     )
-    assert law.beyond_limits(over, UP, bond)
-    left = law.yielded(over, UP, bond, release)
+    assert law.exceeds_limits(over, UP, bond)
+    left = law.after_slip(over, UP, bond, release)
     part = 0.0 if release else 1.0
     assert left.slide[1] == pytest.approx(part * sign * bond.slide_limit, rel=1e-6, abs=0.0)
     assert left.roll[0] == pytest.approx(part * bond.roll_limit, rel=1e-6, abs=0.0)
     assert left.twist == pytest.approx(part * sign * bond.twist_limit, rel=1e-6, abs=0.0)
     zero = (0.0, 0.0, 0.0)
     alone = (
-        law.Strain(0.0, zero, zero, sign * 1.1 * bond.twist_limit),
-        law.Strain(0.0, (0.0, sign * 1.1 * bond.slide_limit, 0.0), zero, 0.0),
-        law.Strain(0.0, zero, (sign * 1.1 * bond.roll_limit, 0.0, 0.0), 0.0),
-        law.Strain(-1.01 * bond.pull_off_overlap, zero, zero, 0.0),
+        law.Displacements(0.0, zero, zero, sign * 1.1 * bond.twist_limit),
+        law.Displacements(0.0, (0.0, sign * 1.1 * bond.slide_limit, 0.0), zero, 0.0),
+        law.Displacements(0.0, zero, (sign * 1.1 * bond.roll_limit, 0.0, 0.0), 0.0),
+        law.Displacements(-1.01 * bond.pull_off_overlap, zero, zero, 0.0),
     )
-    assert all(law.beyond_limits(strain, UP, bond) for strain in alone)
-    within = law.Strain(0.0, (0.0, 0.9 * bond.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * bond.twist_limit)
-    assert not law.beyond_limits(within, UP, bond)
-    assert law.yielded(within, UP, bond, release) == within
+    assert all(law.exceeds_limits(strain, UP, bond) for strain in alone)
+    within = law.Displacements(0.0, (0.0, 0.9 * bond.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * bond.twist_limit)
+    assert not law.exceeds_limits(within, UP, bond)
+    assert law.after_slip(within, UP, bond, release) == within
 
 
 def test_what_yielding_dissipates():
@@ -238,11 +238,11 @@ def test_what_yielding_dissipates():
     _, _, b = contact_of(1.0)
     c = b.slide_limit
     zero = (0.0, 0.0, 0.0)
-    before = law.Strain(0.0, (c, 0.0, 0.0), zero, 0.0)
-    reached = law.Strain(0.0, (1.1 * c, 0.0, 0.0), zero, 0.0)
-    clamped = law.lost_by_yielding(before, reached, law.yielded(reached, UP, b, False), b)
+    before = law.Displacements(0.0, (c, 0.0, 0.0), zero, 0.0)
+    reached = law.Displacements(0.0, (1.1 * c, 0.0, 0.0), zero, 0.0)
+    clamped = law.slip_losses(before, reached, law.after_slip(reached, UP, b, False), b)
     assert clamped[0] == pytest.approx(b.slide_stiffness * c * 0.1 * c, rel=1e-12, abs=0.0)
-    released = law.lost_by_yielding(before, reached, law.yielded(reached, UP, b, True), b)
+    released = law.slip_losses(before, reached, law.after_slip(reached, UP, b, True), b)
     assert released[0] == pytest.approx(0.5 * b.slide_stiffness * c * 1.1 * c, rel=1e-12, abs=0.0)
 
 
@@ -267,8 +267,8 @@ def test_periods_of_20_nm_iron():
     r = 1e-8
     mass = IRON.density * 4 / 3 * math.pi * r**3
     b = law.bond_between(Contact().pairing(IRON, IRON), r, r, mass, mass)
-    assert 2 * math.pi / math.sqrt(b.fastest) == pytest.approx(1.9e-11, rel=0.02, abs=0.0)
-    assert b.fastest == pytest.approx(7 * b.slide_stiffness / mass, rel=1e-6, abs=0.0)
+    assert 2 * math.pi / math.sqrt(b.max_squared_frequency) == pytest.approx(1.9e-11, rel=0.02, abs=0.0)
+    assert b.max_squared_frequency == pytest.approx(7 * b.slide_stiffness / mass, rel=1e-6, abs=0.0)
     same = Contact().pairing(IRON, IRON)
     a0 = jkr.rest_radius(same.surface_energy, r / 2, same.modulus)
     k_n = jkr.normal_stiffness(a0, same.modulus)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact.events import inner_list_is_full
+from sand.contact.events import inner_list_overflowed
 from sand.integrate.step_parts import SOON_PART
-from sand.neighbours.spatial_sort import inverse, rearrange, spatial_order
+from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
 from sand.simulation import engine as engines
 from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 
@@ -21,7 +21,7 @@ EVERY = 700
 @pytest.fixture(autouse=True)
 def often(monkeypatch):
     """Orders are made anew more often, as runs are short."""
-    monkeypatch.setattr(engines, "RENEWED_EVERY", EVERY)
+    monkeypatch.setattr(engines, "SORT_INTERVAL", EVERY)
 
 
 def stirred(order="curve", **options):
@@ -93,7 +93,7 @@ def test_there_and_back():
     arrays = {name: array for name, array in arrays.items() if array.shape[-1] == 80}
     assert len(arrays) > 20
     old = {name: array.copy() for name, array in arrays.items()}
-    rearrange(world, order)
+    reorder_grains(world, order)
     for name, array in arrays.items():
         assert (array == old[name][..., order]).all(), name
     assert (world.grains.radius != old["radius"]).any() and (world.long_range.path != old["far path"]).any()
@@ -104,7 +104,7 @@ def test_there_and_back():
         order[world.pair_list.pair[:, :some]] == near
     ).all()
     assert {(order[i], order[j]) for i, j in listed(world)} == pairs
-    rearrange(world, inverse(order))
+    reorder_grains(world, inverse(order))
     assert state(sim) == before and listed(world) == pairs
 
 
@@ -228,7 +228,7 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
         w.pair_list.touching[: i.size] == 0
     )
     assert close.sum() > 5
-    assert not inner_list_is_full(w.pair_list, w.count)
+    assert not inner_list_overflowed(w.pair_list, w.count)
     assert set(np.flatnonzero(close)) <= set(w.pair_list.inner[: int(w.pair_list.skin[INNER_COUNT])].tolist())
 
 
@@ -313,8 +313,8 @@ def test_a_run_that_is_broken_off_leaves_grains_at_home():
 
 def test_who_gets_an_order_of_its_own():
     """ "auto" means ten thousand grains or more; the settled word stands in the choices; a wrong word is refused."""
-    assert sand.Neighbours().along_curve(4000) and not sand.Neighbours().along_curve(3999)
-    assert not sand.Neighbours(order="as given").along_curve(10**6)
+    assert sand.Neighbours().uses_spatial_sort(4000) and not sand.Neighbours().uses_spatial_sort(3999)
+    assert not sand.Neighbours(order="as given").uses_spatial_sort(10**6)
     assert stirred().neighbours.order == "curve" and "along a curve" in stirred().choices["neighbours"]
     assert stirred("auto").neighbours.order == "as given" and "curve" not in stirred("auto").choices["neighbours"]
     with pytest.raises(sand.BadInput, match=r"order = 'curves'.*curve"):

@@ -101,7 +101,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
     from sand.contact.law import Bond
-    from sand.state.arrays import FOR_ALL, empty_contact_arrays, empty_pair_list
+    from sand.state.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
 
     ends = []
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
@@ -112,7 +112,7 @@ def test_growing_arrays_changes_nothing():
         rules = sim._engine.rules
         sim._engine.rules = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
         sim.run(until=1e-9)
-        ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in FOR_ALL})
+        ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in UNIFORM_ARRAYS})
     assert sim.state.count[CONTACTS] > 16
     assert all(end == ends[0] for end in ends)
 

@@ -16,7 +16,7 @@ def _pair():
     mass = 4.0 / 3.0 * math.pi * R**3 * sand.SILICA.density
     bond = sand.contact.law.bond_between(contact, R, R, mass, mass)
     rest = bond.rest_radius**2 / (3.0 * bond.reduced_radius)
-    step = 2.0 * math.pi / math.sqrt(bond.fastest) / sand.Verlet().steps_per_period
+    step = 2.0 * math.pi / math.sqrt(bond.max_squared_frequency) / sand.Verlet().steps_per_period
     return bond, 2.0 * R - rest, step
 
 
@@ -41,7 +41,7 @@ def test_a_spinning_pair_does_not_ring_up():
     """
     bond, distance, step = _pair()
     ringing = 0.8 * bond.slide_limit
-    rate = 0.5 * ringing * math.sqrt(bond.fastest) / R  # spin of both grains that slides them that far
+    rate = 0.5 * ringing * math.sqrt(bond.max_squared_frequency) / R  # spin of both grains that slides them that far
     stake = 0.5 * bond.slide_stiffness * ringing**2
     for part in (0.8, 0.9, 1.2):
         turning = part * bond.pull_off_overlap / step / distance

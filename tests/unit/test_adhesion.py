@@ -42,9 +42,9 @@ def test_energies_of_breaking_and_of_a_cycle():
     assert broken - touch == pytest.approx(E_CYCLE, abs=6e-7)
 
 
-@pytest.mark.parametrize("function", [jkr.root, jkr.root_in_reach])
+@pytest.mark.parametrize("function", [jkr.root, jkr.polynomial_root])
 def test_the_inverse_is_good_to_1e_12(function):
-    """a(δ) against bisection in extended precision, −0.99 … 100 δc (root_in_reach: to its 11.25 δc)."""
+    """a(δ) against bisection in extended precision, −0.99 … 100 δc (polynomial_root: to its 11.25 δc)."""
     top = 100.0 if function is jkr.root else 11.24
     overlaps = np.concatenate([-1 + np.geomspace(0.01, 1, 200), np.linspace(0, top, 2000)])
     found = np.array([function(jkr.stretch(d, 1.0)) for d in overlaps])

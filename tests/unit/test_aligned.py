@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.numerics.aligned import LINE, SIMD_WIDTH, aligned, whole
+from sand.numerics.simd import LINE, SIMD_WIDTH, aligned, whole
 
 
 def begins(array):

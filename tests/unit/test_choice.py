@@ -7,11 +7,11 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
-from sand.contact.events import inner_list_is_full
+from sand.contact.events import inner_list_overflowed
 from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
 from sand.integrate.step_parts import SOON_PART
 from sand.neighbours.pair_list import build_inner_list
-from sand.numerics.float_order import float_from_bits, rank
+from sand.numerics.simd import float_bits, float_from_bits
 from sand.state.state import INNER_COUNT, INNER_SKIN, PAIRS
 
 
@@ -27,12 +27,12 @@ def crowd():
 
 
 def test_ranks_are_ordered_as_numbers():
-    """For x, y ≥ 0, infinity and subnormal numbers included: rank(x) < rank(y) as x < y; NaN is no minimum."""
+    """x < y ⇔ float_bits(x) < float_bits(y) for x, y ≥ 0, subnormal numbers and infinity; NaN is above all of them."""
     numbers = [0.0, 5e-324, 1e-310, 1e-30, 1.0, 1.0 + 2e-16, 1e300, math.inf]
-    ranks = [rank(x) for x in numbers]
+    ranks = [float_bits(x) for x in numbers]
     assert ranks == sorted(ranks) and len(set(ranks)) == len(ranks)
     assert [float_from_bits(bits) for bits in ranks] == numbers
-    assert rank(math.nan) > rank(math.inf)
+    assert float_bits(math.nan) > float_bits(math.inf)
 
 
 @pytest.mark.compiled("contacts")
@@ -46,7 +46,7 @@ def test_choices_are_the_least_of_all():
         step, cycle = steps_of_free_grains(grains, far, start, count, control)
         return step, cycle, closing_step(grains, near, count, span, control, math.inf)
 
-    step, cycle, closing = kernel(look, keep=False)(
+    step, cycle, closing = kernel(look, cached=False)(
         arrays, w.long_range, w.contacts.start, w.pair_list, w.count, span, control
     )
     each = [grain_step(arrays, w.long_range, w.contacts.start, control, i) for i in range(150)]
@@ -72,7 +72,7 @@ def test_what_may_touch_soon_is_what_is_close():
         near = w.pair_list._replace(inner=np.zeros(room, np.uint32), skin=w.pair_list.skin.copy())
         build_inner_list(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
-        if inner_list_is_full(near, w.count):
+        if inner_list_overflowed(near, w.count):
             return {tuple(sorted(pair)) for pair in near.pair[:, : w.count[PAIRS]].T.tolist()}
         soon = near.inner[: int(near.skin[INNER_COUNT])].tolist()
         assert len(set(soon)) == len(soon)

@@ -34,7 +34,7 @@ def test_every_column_row_by_row(stiffness):
         r1, r2 = sim.grains.radius[i], sim.grains.radius[j]
         overlap = r1 + r2 - np.linalg.norm(sim.grains.position[i] - sim.grains.position[j])
         y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
-        bond = law.stiffened(plain, y, stiffness == "dt97")
+        bond = law.scaled_stiffness(plain, y, stiffness == "dt97")
         n = np.array(pose.n)
         d = r1 * np.array(pose.n1) - r2 * np.array(pose.n2)
         slide = np.linalg.norm(d - (d @ n) * n)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sand.contact.events import compact_contacts
-from sand.contact.update import BROKE
+from sand.contact.update import BROKEN_FLAG
 from sand.state.arrays import ContactArrays, empty_contact_arrays
 from sand.state.state import CONTACTS, COUNT
 
@@ -25,8 +25,8 @@ def test_each_column_moves_with_its_contact(broken):
     for name in set(ContactArrays._fields) - BY_GRAIN:
         array = getattr(contacts, name)
         array[...] = rng.integers(1, 9, array.shape) if array.dtype.kind == "u" else rng.normal(size=array.shape)
-    contacts.flag[contacts.flag == BROKE] = 0
-    contacts.flag[broken] = BROKE
+    contacts.flag[contacts.flag == BROKEN_FLAG] = 0
+    contacts.flag[broken] = BROKEN_FLAG
     kept = [c for c in range(7) if c not in broken]
     expected = {name: getattr(contacts, name)[..., kept].copy() for name in set(ContactArrays._fields) - BY_GRAIN}
     compact_contacts(contacts, count)

@@ -77,7 +77,7 @@ def test_taylor_torque_is_the_whole_product_rule():
     before = sim.loads()
     w, rules = sim.state, sim._engine.rules
     far = empty_long_range_arrays(len(grains), 0)  # a run in single steps has no room for rates
-    kernel(fill, keep=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.long_range[0])
+    kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.long_range[0])
     force_rate, torque_rate = far.force_rate.T.copy(), far.torque_rate.T.copy()
     sim.run(steps=10)
     after = sim.loads()

@@ -162,7 +162,7 @@ def many_kicks(grains, seed, first, count, elapsed, gas):
     return given
 
 
-kicks = kernel(many_kicks, keep=False)
+kicks = kernel(many_kicks, cached=False)
 PRESSURE, TEMPERATURE = 50.0, 300.0
 compiled = pytest.mark.skipif(not hasattr(kicks, "_cache"), reason="too many grains with the compiler off")
 

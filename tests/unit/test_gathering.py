@@ -8,13 +8,13 @@ import pytest
 
 import sand
 from sand.compiler.jit import kernel
-from sand.contact.gather import BLOCK, DENSE, MOST, gather, resort_contacts_by_grain
+from sand.contact.gather import BLOCK, DENSE_FROM, LARGEST_CLASS, gather, resort_contacts_by_grain
 from sand.integrate.motion import gather_and_kick, kick, kick_and_drift_for
 from sand.integrate.task_queue import GRAINS_PER_BLOCK
-from sand.state.arrays import KINDS, TURNS_FROM, empty_contact_arrays
+from sand.state.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
 from sand.state.state import CONTACTS, COUNT, LARGEST_SPEED, LARGEST_SPIN
 
-GRAINS = TURNS_FROM + 37
+GRAINS = GATHER_ORDER_FROM + 37
 """Enough for an order of their own, and a last block that is not full."""
 
 
@@ -26,7 +26,7 @@ def _both_at_once(grains, contacts, dt):
     return gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
 
 
-gather_all, both_at_once, kick_all = (kernel(f, keep=False) for f in (_gather_all, _both_at_once, kick))
+gather_all, both_at_once, kick_all = (kernel(f, cached=False) for f in (_gather_all, _both_at_once, kick))
 
 
 def some(per_grain, count=GRAINS):
@@ -56,7 +56,7 @@ def some(per_grain, count=GRAINS):
 def test_sums_are_those_of_brute_force(per_grain, count):
     """F = Σ ±push, M = Σ torque of each end; terms of 1e-9, at most some 30, rounded to 1e-16 each: 1e-23."""
     grains, contacts, pair = some(per_grain, count)
-    assert contacts.gather_order.size == (count + KINDS if count >= TURNS_FROM else 0)
+    assert contacts.gather_order.size == (count + GATHER_CLASSES if count >= GATHER_ORDER_FROM else 0)
     used = pair.shape[1]
     force, torque = np.zeros((3, count)), np.zeros((3, count))
     for end, sign, own in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
@@ -84,15 +84,15 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     Where contacts are many all come by number.
     """
     _, contacts, pair = some(1.0)
-    many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], MOST)
-    kind = many[0] * (MOST + 1) + many[1]
+    many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], LARGEST_CLASS)
+    kind = many[0] * (LARGEST_CLASS + 1) + many[1]
     turn = contacts.gather_order[:GRAINS]
     assert len(set(kind.tolist())) > 10
     for first in range(0, GRAINS, BLOCK):
         block = np.arange(first, min(first + BLOCK, GRAINS))
         assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
-    _, crowded, _ = some(DENSE + 0.5)
-    assert crowded.gather_order[:GRAINS].tolist() == list(range(GRAINS))
+    _, crowded, _ = some(DENSE_FROM + 0.5)
+    assert crowded.turn[:GRAINS].tolist() == list(range(GRAINS))
 
 
 @pytest.mark.compiled("small")
@@ -118,7 +118,7 @@ def test_grains_without_moments_drift_as_those_with():
     with_moments, without = copy.deepcopy(grains), copy.deepcopy(grains)
     span = sand.Box.open().span
     ways = [
-        kernel(kick_and_drift_for(magnetic), keep=False)(one, span, 1e-9)
+        kernel(kick_and_drift_for(magnetic), cached=False)(one, span, 1e-9)
         for magnetic, one in ((True, with_moments), (False, without))
     ]
     assert ways[0] == pytest.approx(ways[1], rel=1e-15)

@@ -21,7 +21,7 @@ from sand.integrate.motion import kicked
 grains = sand.Grains(np.zeros((3, 3)) + np.arange(3)[:, None], 0.1, sand.SILICA).arrays
 def kick_one(grains, i):
     return kicked(grains, i, 1.0)[0][0]
-kick_one = kernel(kick_one, keep=False)
+kick_one = kernel(kick_one, cached=False)
 assert kick_one(grains, 2) == 0.0
 try:
     kick_one(grains, 99)
@@ -53,7 +53,7 @@ def test_an_error_in_an_inner_function_reaches_python():
             total += root_of(values[k])
         return total
 
-    roots = kernel(roots, keep=False)
+    roots = kernel(roots, cached=False)
     assert roots(np.array([4.0, 9.0])) == pytest.approx(5.0, rel=1e-15)
     with pytest.raises(ValueError, match="below 0"):
         roots(np.array([4.0, -9.0]))
@@ -78,8 +78,8 @@ def test_who_passes_arguments_otherwise_is_told():
         return kicked(grains, 0, 1.0)[0][0]
 
     grains = sand.Grains(np.zeros((1, 3)), 0.1, sand.SILICA, velocity=[[3.0, 0.0, 0.0]]).arrays
-    assert kernel(speed, keep=False)(grains) == 3.0
-    with pytest.raises(TypeError, match=r"sand\.compiler\.jit\.kernel"):
+    assert kernel(speed, cached=False)(grains) == 3.0
+    with pytest.raises(TypeError, match=r"sand\.core\.jit\.kernel"):
         numba.njit(speed)(grains)
 
 
@@ -90,7 +90,7 @@ def test_rubbish_is_collected_again_after_compiling():
     for wanted in (True, False):
         try:
             (gc.enable if wanted else gc.disable)()
-            kernel(lambda x: root_of(x), keep=False)(4.0)
+            kernel(lambda x: root_of(x), cached=False)(4.0)
             assert gc.isenabled() is wanted
         finally:
             gc.enable()

@@ -8,11 +8,11 @@ import pytest
 from sand.box import Box
 from sand.compiler.jit import kernel
 from sand.contact.events import update_flagged_contacts
-from sand.contact.law import Bond, bond_between, strain_of
+from sand.contact.law import Bond, bond_between, displacements_of
 from sand.contact.model import Contact
-from sand.contact.slip import contact_pass, log_slip_sums, strain_before
+from sand.contact.slip import contact_pass, log_slip_sums, displacements_before
 from sand.contact.tangential import pointers_for
-from sand.contact.update import BROKE, SLIPPED_FLAGS, WAITS, contact_loop, pose_at, twist_gain
+from sand.contact.update import BROKEN_FLAG, PENDING_FLAG, SLIPPED_FLAG, contact_loop, pose_at, twist_increment
 from sand.grains import GrainArrays, Grains
 from sand.integrate.kernel_spec import ContactParameters
 from sand.integrate.motion import kick_and_drift_for
@@ -35,7 +35,7 @@ def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
     return passed.waiting
 
 
-pass_and_settle = kernel(_pass_and_update, keep=False)
+pass_and_settle = kernel(_pass_and_update, cached=False)
 
 
 def one_by_one(grains, contacts, near, count, lost, span, law, dt):
@@ -120,16 +120,16 @@ def test_contacts_moved_in_the_pass_are_as_if_moved_one_by_one(option):
     assert (world[3] == other[3]).all()
     np.testing.assert_allclose(world[4], other[4], rtol=1e-12, atol=1e-12 * np.abs(other[4]).max())
     flag, waits = contacts.flag[:PAIRS], expected.flag[:PAIRS]
-    assert ((flag == BROKE) == (waits == BROKE)).all() and ((flag > 0) == (waits > 0)).all()
+    assert ((flag == BROKEN_FLAG) == (waits == BROKEN_FLAG)).all() and ((flag > 0) == (waits > 0)).all()
     # there are all sorts of contacts, and it is the pass that moves them, but for those it must leave alone
     assert 0 < world[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
     if option in ("clamped", "released", "periodic"):
-        assert np.sum(flag == SLIPPED_FLAGS) > PAIRS / 4 and np.sum(flag == WAITS) > 0
+        assert np.sum(flag == SLIPPED_FLAG) > PAIRS / 4 and np.sum(flag == PENDING_FLAG) > 0
         assert world[3][BROKEN] < waited < PAIRS / 3
-        assert world[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAGS)
+        assert world[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAG)
         assert (world[4][[SLIDING, ROLLING, TWISTING]] != 0.0).all()
     if option == "following":
-        assert not np.any(flag == SLIPPED_FLAGS)
+        assert not np.any(flag == SLIPPED_FLAG)
 
 
 def test_the_strain_before_a_step_is_that_of_grains_put_back():
@@ -143,10 +143,10 @@ def test_the_strain_before_a_step_is_that_of_grains_put_back():
     for c in range(PAIRS):
         bond, radii = Bond(*contacts.bond[:, c]), (grains.radius[c], grains.radius[c + PAIRS])
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        found.append(np.hstack(strain_before(grains, contacts, c, pose, bond, STEP)))
-        twist = contacts.twist[c] - twist_gain(grains, contacts, c, pose, STEP)
+        found.append(np.hstack(displacements_before(grains, contacts, c, pose, bond, STEP)))
+        twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, STEP)
         then = pose_at(back, contacts, span, c, twist)
-        expected.append(np.hstack(strain_of(then, sum(radii) - then.distance, *radii, bond)))
+        expected.append(np.hstack(displacements_of(then, sum(radii) - then.distance, *radii, bond)))
     found, expected = np.array(found), np.array(expected)
     assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
 
@@ -168,5 +168,5 @@ def test_a_quiet_block_waits_to_be_settled():
     world = some_contacts(SILICA, Box.open())
     world[1].flag[:] = 0.0
     waited = pass_and_settle(*world, Box.open().span, law_for(), STEP)
-    assert waited > PAIRS / 2 and not np.any(world[1].flag == SLIPPED_FLAGS)
+    assert waited > PAIRS / 2 and not np.any(world[1].flag == SLIPPED_FLAG)
     assert world[3][SLIPPED] > PAIRS / 2

@@ -28,7 +28,7 @@ def fill_normals(seed, number, grain, stream, out):
         out[0, i], out[1, i], out[2, i] = normal_vector(seed[i], number[i], grain[i], stream[i])
 
 
-compiled_words, compiled_normals = kernel(fill_words, keep=False), kernel(fill_normals, keep=False)
+compiled_words, compiled_normals = kernel(fill_words, cached=False), kernel(fill_normals, cached=False)
 compiled = pytest.mark.skipif(not COMPILED, reason="too many numbers with the compiler off")
 
 

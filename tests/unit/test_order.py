@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.neighbours.morton_order import morton_keys
+from sand.neighbours.spatial_sort import morton_keys
 
 
 def test_places_interleave_the_bits():

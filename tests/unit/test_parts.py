@@ -85,5 +85,5 @@ def test_a_formula_from_outside_may_print(capfd):
     def call(x):
         return talkative(x)
 
-    assert kernel(call, keep=False)(1.5) == 3.0
+    assert kernel(call, cached=False)(1.5) == 3.0
     assert "x is 1.5" in capfd.readouterr().out

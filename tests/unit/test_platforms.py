@@ -64,7 +64,7 @@ numba.version_info = numba.version_info._replace(short=({}, {}))
 numba.__version__ = "{}.{}.0"
 from sand.compiler import jit
 import sand.compiler.jit
-print(jit.CAN_SHARE, jit.LONG_VECTORS)
+print(jit.HAS_NOINLINE, jit.LONG_VECTORS)
 """
 
 

@@ -20,7 +20,7 @@ def filled_by(function):
             out[k] = function(x[k])
 
     fill.__qualname__ += function.__name__
-    return kernel(fill, keep=False, wide=True)
+    return kernel(fill, cached=False, long_vectors=True)
 
 
 @pytest.mark.compiled("small")
@@ -67,7 +67,7 @@ def test_sums_with_seeds_are_those_without(count):
     span, found = sand.Box.open().span, []
     for pair in (dipoles.bare_pair, dipoles.seeded_pair):
         loads, far, own = (
-            kernel(dipoles.all_pairs(pair).loads, keep=False, wide=True),
+            kernel(dipoles.all_pairs(pair).loads, cached=False, long_vectors=True),
             empty_long_range_arrays(count, 0, 8),
             grains.copy(),
         )

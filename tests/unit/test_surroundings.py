@@ -101,7 +101,7 @@ def test_compiled_formulas_compute_the_same(force):
     """Force, torque and energy of the compiled formula and of plain Python; rounding of sin and of a few sums."""
     grain = one((0.3, -2.0, 1.1), (0.5, 1.0, -0.4), mass=3.0, charge=-7.0)
     plain = force.formula(1.7e-6, grain, force.numbers())
-    compiled = kernel(force.formula, keep=False)(1.7e-6, grain, force.numbers())
+    compiled = kernel(force.formula, cached=False)(1.7e-6, grain, force.numbers())
     size = max(np.abs(np.concatenate([*plain[:2], [plain[2]]])))
     for found, expected in zip(compiled, plain, strict=True):
         assert found == pytest.approx(expected, abs=100 * EPS * size)

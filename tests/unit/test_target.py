@@ -36,7 +36,7 @@ for name, function, types, wide in [
     ("long loop", doubled, (float64[::1],), True),
     ("gathering", gathered, (float64[::1], int64[::1]), False),
 ]:
-    code = jit.kernel(function, wide=wide)
+    code = jit.kernel(function, long_vectors=wide)
     code.compile(types)  # never run: this machine need not have these instructions
     found["hits"] += sum(code.stats.cache_hits.values())
     llvm, assembly = *code.inspect_llvm().values(), *code.inspect_asm().values()
@@ -116,5 +116,5 @@ def test_long_vectors_give_the_same():
 
     for wide in (False, True):
         numbers = np.arange(100.0)
-        kernel(doubled, keep=False, wide=wide)(numbers)
+        kernel(doubled, cached=False, long_vectors=wide)(numbers)
         assert (numbers == 2.0 * np.arange(100)).all()

@@ -7,7 +7,7 @@ from numpy.polynomial import Polynomial
 import sand
 from sand.integrate.event_location import curve_at, first_entry, way_of_pair
 from sand.integrate.runge_kutta import STAGES, V, X
-from sand.state.stages import stage_arrays
+from sand.state.arrays import stage_arrays
 
 STEP = 0.3
 

@@ -3,7 +3,7 @@
 `formula`  scalar physics on floats and 3-tuples.  It stays an ordinary Python function.
 `rare`     like `formula`, but not pasted into the caller: for code that seldom runs.
 `loop`     a loop over arrays that is pasted into a larger loop.  No array may be passed twice.
-`shared`   a loop that stays a function of its own, so that all who call it get the same bits.  No array twice.
+`noinline` a loop that stays a function of its own, so that all who call it get the same bits.  No array twice.
 `kernel`   a compiled entry point, called from Python.  No array may be passed twice.
 """
 
@@ -24,7 +24,7 @@ from numba.extending import register_jitable
 from ..errors import warn
 from .cache import private_folder
 
-_NAMES = "CAN_SHARE COMPILED LONG_VECTORS cache_folder compiling formula kernel loop rare shared"
+_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compiling formula kernel loop noinline rare"
 __all__ = _NAMES.split()
 
 # As fast as fastmath=True, but NaN and infinity stay what they are, so that guards can see them.
@@ -47,13 +47,13 @@ def _promise_no_aliases() -> dict[str, Any]:
 _NO_ALIASES = _promise_no_aliases()
 
 
-TRIED = (0, 62), (0, 68)
+TESTED_NUMBA = (0, 62), (0, 68)
 """First and last version of numba whose inside `lowering` fits; others compile three times as long, without threads."""
 
 
 def _own_compilers() -> list[dict[str, Any]]:
     """Options for kernels, those with long loops, inner functions and those kept apart; none for another numba."""
-    if TRIED[0] <= numba.version_info.short <= TRIED[1]:
+    if TESTED_NUMBA[0] <= numba.version_info.short <= TESTED_NUMBA[1]:
         try:
             from .lowering import FAST_WHEN_WIDE, ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
         except (ImportError, AttributeError):
@@ -62,7 +62,7 @@ def _own_compilers() -> list[dict[str, Any]]:
             wide = WideCompiler if FAST_WHEN_WIDE else KernelCompiler
             return [{"pipeline_class": each} for each in (KernelCompiler, wide, InnerCompiler, ApartCompiler)]
     if not numba.config.DISABLE_JIT:
-        first, last = (".".join(map(str, version)) for version in TRIED)
+        first, last = (".".join(map(str, version)) for version in TESTED_NUMBA)
         warn(
             f"SAND does not know numba {numba.__version__} (tried: {first} to {last}): results are right, but "
             "compiling takes about three times as long and every simulation uses one thread only"
@@ -79,8 +79,8 @@ COMPILED = not numba.config.DISABLE_JIT
 """False where numba is told to leave everything to Python."""
 LONG_VECTORS = _WIDE != _KERNEL
 """Are there kernels with vectors of 512 bits, on processors that LLVM would use half of?"""
-CAN_SHARE = bool(_APART)
-"""Can `shared` loops be kept apart, so that all threads get the same bits from them?"""
+HAS_NOINLINE = bool(_APART)
+"""Can `noinline` loops be kept apart, so that all threads get the same bits from them?"""
 
 
 def _once_for_each_type(function: Callable) -> None:
@@ -125,7 +125,7 @@ _ALIASES = dict.fromkeys(_NO_ALIASES, False)
 formula = _registered(**_INNER, **_ALIASES, forceinline=True)
 rare = _registered(**_INNER, **_ALIASES, forceinline=False)
 loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
-shared = _registered(**_BARE, **_APART, **_NO_ALIASES, forceinline=False)
+noinline = _registered(**_BARE, **_APART, **_NO_ALIASES, forceinline=False)
 
 
 _COMPILED = (
@@ -176,32 +176,32 @@ def _load_alone(compiled: Any) -> None:
     cache.load_overload = load_overload
 
 
-def kernel(function: Callable, *, keep: bool = True, alone: bool = False, wide: bool = False) -> Callable:
+def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long_vectors: bool = False) -> Callable:
     """Compile `function` on its first call and keep the result in our own cache folder.
 
     numba's global cache folder is put back at once: a user's own kernels go where the user wants.
 
     Parameters
     ----------
-    keep : bool, optional
+    cached : bool, optional
         False for code that reaches formulas from outside SAND, whose edits our digest does not see.
-    alone : bool, optional
+    nogil : bool, optional
         True for code that other Python threads may run beside.
-    wide : bool, optional
+    long_vectors : bool, optional
         True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
     """
-    if wide and LONG_VECTORS:  # what is kept is found by its name; where both are the same, it is compiled once
+    if long_vectors and LONG_VECTORS:  # what is kept is found by its name; where both are the same, it is compiled once
         name = f"{function.__qualname__}_wide"
         function = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
         function.__qualname__ = name
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        options = (_WIDE if wide else _KERNEL) | _COMMON | _NO_ALIASES
-        compiled = numba.njit(cache=keep, nogil=alone, no_cfunc_wrapper=True, **options)(function)
+        options = (_WIDE if long_vectors else _KERNEL) | _COMMON | _NO_ALIASES
+        compiled = numba.njit(cache=cached, nogil=nogil, no_cfunc_wrapper=True, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
-    if keep:
+    if cached:
         _load_alone(compiled)
     return compiled
 

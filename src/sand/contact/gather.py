@@ -1,27 +1,28 @@
-"""Loads of contacts summed up at their grains, in a fixed order.
+"""Contact forces, second pass: a loop over grains that sums the loads of their contacts in a fixed order.
 
-Grains have few contacts, some more and some less, and the processor guesses how many.  Its branch predictor learns the
-numbers of a thousand grains, but not of ten thousand.  There, within blocks of neighbours in memory, those with equally
-many come in a row.
+The inner loop has one iteration per contact of a grain.  Its branch predictor entries learn the contact numbers of a
+thousand grains, but not of ten thousand.  Above `GATHER_ORDER_FROM` grains, each block of grains is therefore sorted
+by contact number, so that grains with equally many contacts follow each other.
 """
 
 import math
 
 from ..compiler.jit import kernel, loop, rare
 from ..numerics.vec import add, load, put, sub
-from ..state.arrays import KINDS
+from ..state.arrays import GATHER_CLASSES
 from ..state.state import CONTACTS
 
 BLOCK = 64
-"""Grains in a block; their contacts stay in the first cache."""
-MOST = math.isqrt(KINDS) - 1
-"""Grains that are the first, or the second, of so many contacts or more are not told apart."""
-DENSE = 3
-"""Contacts per grain from which most grains have equally many, as they are numbered."""
+"""Grains per block; the contacts of a block stay in the first-level cache."""
+LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
+"""Contact counts (as grain 1, as grain 2) above this share one class."""
+DENSE_FROM = 3
+"""Contacts per grain from which most grains have equally many contacts, so that sorting brings nothing."""
 
 
 @loop
 def _gather_at(grains, contacts, g):
+    """Set force and torque of grain g to the sums over its contacts."""
     force = torque = (0.0, 0.0, 0.0)
     for s in range(contacts.start[g], contacts.start[g + 1]):
         c = contacts.side[s] >> 1
@@ -36,28 +37,31 @@ def _gather_at(grains, contacts, g):
 
 
 @loop
-def gather_by_number(grains, contacts, first, last):
-    """`gather` where grains take no turns: in small worlds."""
+def gather_in_index_order(grains, contacts, first, last):
+    """`gather` without a gather order, for small systems."""
     for k in range(last - first):
         _gather_at(grains, contacts, first + k)
 
 
 @loop
 def gather(grains, contacts, first, last):
-    """Set force and torque of the grains first…last − 1 (uint64) to the sum over their contacts, in a fixed order.
+    """Set force and torque of the grains first … last − 1 (uint64) to the sums over their contacts, in a fixed order.
 
-    Both ends are multiples of BLOCK, but for the last grain of all.
+    `first` and `last` are multiples of BLOCK, except where `last` is the number of grains.
     """
     if contacts.gather_order.size > 0:
         for k in range(last - first):
             _gather_at(grains, contacts, contacts.gather_order[first + k])
     else:
-        gather_by_number(grains, contacts, first, last)
+        gather_in_index_order(grains, contacts, first, last)
 
 
 @rare
 def sort_contacts_by_grain(contacts, count, n):
-    """Rebuild the list of contacts per grain: first those that it is grain 1 of, each in the order of the contacts."""
+    """Rebuild the list of contacts per grain in compressed sparse row form (`start`, `side`).
+
+    The contacts of which a grain is grain 1 come first, each group in the order of the contacts.
+    """
     total = count[CONTACTS]
     start, side = contacts.start, contacts.side
     for g in range(n + 1):
@@ -67,7 +71,7 @@ def sort_contacts_by_grain(contacts, count, n):
         start[contacts.pair[1, c] + 1] += 1
     for g in range(n):
         start[g + 1] += start[g]
-    # fill from the back, so that `start` ends where it should
+    # fill from the back, which moves each `start` to the first entry of its grain
     for end in range(2):
         for k in range(total):
             c = total - 1 - k
@@ -78,43 +82,43 @@ def sort_contacts_by_grain(contacts, count, n):
         start[g] = start[g + 1]
     start[n] = 2 * total
     if contacts.gather_order.size > 0:
-        _take_turns(contacts, n, total)
+        _set_gather_order(contacts, n, total)
 
 
 @loop
-def _kind(contacts, g):
-    """A number for how many contacts grain g has, as the first and as the second of the two."""
+def _gather_class(contacts, g):
+    """Class of grain g: its contact counts as grain 1 and as grain 2, combined into one integer."""
     firsts = 0
     for s in range(contacts.start[g], contacts.start[g + 1]):
         firsts += 1 - int(contacts.side[s] & 1)
     seconds = int(contacts.start[g + 1]) - int(contacts.start[g]) - firsts
-    return min(firsts, MOST) * (MOST + 1) + min(seconds, MOST)
+    return min(firsts, LARGEST_CLASS) * (LARGEST_CLASS + 1) + min(seconds, LARGEST_CLASS)
 
 
 @loop
-def _take_turns(contacts, n, total):
-    """Fill `turn`: the grains of each block by their kind; by their numbers where contacts are many."""
-    turn = contacts.gather_order
+def _set_gather_order(contacts, n, total):
+    """Fill `gather_order`: the grains of each block sorted by class, or by index where contacts are many."""
+    order = contacts.gather_order
     for first in range(0, n, BLOCK):
         last = min(first + BLOCK, n)
         for g in range(first, last):
-            turn[g] = g
-        if total < DENSE * n:
-            # the places behind all grains count the kinds, and then say where the next of each goes
-            for k in range(KINDS):
-                turn[n + k] = 0
+            order[g] = g
+        if total < DENSE_FROM * n:
+            # counting sort: the last GATHER_CLASSES entries count the grains per class, then hold the next index of each
+            for k in range(GATHER_CLASSES):
+                order[n + k] = 0
             for g in range(first, last):
-                turn[n + _kind(contacts, g)] += 1
-            place = first
-            for k in range(KINDS):
-                place, turn[n + k] = place + int(turn[n + k]), place
+                order[n + _gather_class(contacts, g)] += 1
+            index = first
+            for k in range(GATHER_CLASSES):
+                index, order[n + k] = index + int(order[n + k]), index
             for g in range(first, last):
-                kind = _kind(contacts, g)
-                turn[turn[n + kind]] = g
-                turn[n + kind] += 1
+                gather_class = _gather_class(contacts, g)
+                order[order[n + gather_class]] = g
+                order[n + gather_class] += 1
 
 
 @kernel
 def resort_contacts_by_grain(contacts, count, n):
-    """The same, from Python."""
+    """`sort_contacts_by_grain`, callable from Python."""
     sort_contacts_by_grain(contacts, count, n)

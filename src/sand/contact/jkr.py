@@ -1,13 +1,13 @@
-"""JKR: two elastic spheres that stick (Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997).
+"""JKR theory: two adhesive elastic spheres (Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997).
 
-Everything is written in y = √(a/a₀), a the contact radius, a₀ its equilibrium value:
+All quantities are functions of y = √(a/a₀), where a is the contact radius and a₀ its equilibrium value:
 
-    F/F_c    = 4 (y⁶ − y³)                        push positive
-    δ/δ_c    = 6^(1/3) (2 y⁴ − (4/3) y)           overlap positive
+    F/F_c    = 4 (y⁶ − y³)                        positive in compression
+    δ/δ_c    = 6^(1/3) (2 y⁴ − (4/3) y)           positive in compression
     U/F_cδ_c = 4·6^(1/3) (4/5 y¹⁰ − 4/3 y⁷ + 1/3 y⁴)
 
-with γ the energy of one free surface (work of adhesion 2γ).  The overlap is smallest, −δ_c, at
-y_m = (1/6)^(1/3), where da/dδ is infinite; s = √(1 + δ/δ_c) removes the singularity: y = y_m + s p(s).
+γ is the energy of one free surface (work of adhesion 2γ).  The overlap has its minimum −δ_c at y_m = (1/6)^(1/3), where
+da/dδ is infinite.  The variable s = √(1 + δ/δ_c) removes this singularity: y = y_m + s p(s) with a smooth function p.
 """
 
 import math
@@ -37,16 +37,19 @@ POLYNOMIAL = (
     -5.7004524231251032e-06,
     2.6965646040310146e-07,
 )
-STRETCH_OF_POLYNOMIAL = 3.5
-"""Largest s the polynomial serves; δ = 11.25 δ_c."""
+POLYNOMIAL_RANGE = 3.5
+"""Largest s for which the polynomial is valid; δ = 11.25 δ_c."""
 
 ROOT_AT_TOUCH = (2.0 / 3.0) ** (1.0 / 3.0)
-"""y where the overlap is 0: the contact forms there."""
+"""y at zero overlap, where the contact forms."""
 
 
 @formula
-def root_in_reach(s):
-    """y = √(a/a₀) from s = √(1 + δ/δ_c), 0 ≤ s ≤ 3.5, without a branch; relative error 1e-14."""
+def polynomial_root(s):
+    """y = √(a/a₀) from s = √(1 + δ/δ_c), 0 ≤ s ≤ 3.5, without branches; relative error 1e-14.
+
+    The polynomial for p(s) is followed by one Newton step.
+    """
     c = POLYNOMIAL
     p = c[9] + s * c[10]
     p = c[8] + s * p
@@ -66,8 +69,8 @@ def root_in_reach(s):
 @formula
 def root(s):
     """y = √(a/a₀) from s = √(1 + δ/δ_c) ≥ 0, at any compression."""
-    if s <= STRETCH_OF_POLYNOMIAL:
-        return root_in_reach(s)
+    if s <= POLYNOMIAL_RANGE:
+        return polynomial_root(s)
     overlap = s * s - 1.0
     y = math.sqrt(math.sqrt(s * s / (2.0 * CUBE_ROOT_6)))
     for _ in range(4):
@@ -78,20 +81,20 @@ def root(s):
 
 @formula
 def stretch(overlap, pull_off_overlap):
-    """s = √(1 + δ/δ_c), 0 beyond the break."""
+    """s = √(1 + δ/δ_c); 0 beyond the breaking point."""
     return math.sqrt(max(1.0 + overlap / pull_off_overlap, 0.0))
 
 
 @formula
 def force_at(y, pull_off_force):
-    """Normal force [N] on grain 1 along n, push positive: F = 4 F_c (y⁶ − y³)."""
+    """Normal force [N] on grain 1 along n, positive in compression: F = 4 F_c (y⁶ − y³)."""
     cube = y * y * y
     return 4.0 * pull_off_force * (cube * cube - cube)
 
 
 @formula
 def stiffness_at(y, pull_off_force, pull_off_overlap):
-    """dF/dδ [N/m] at y = √(a/a₀): (9 F_c/δ_c 6^(−1/3)) (2y⁵ − y²)/(6y³ − 1), infinite at the break, y³ = 1/6."""
+    """dF/dδ [N/m] at y = √(a/a₀): (9 F_c/δ_c 6^(−1/3)) (2y⁵ − y²)/(6y³ − 1); infinite at breaking, y³ = 1/6."""
     square = y * y
     slope = pull_off_overlap * CUBE_ROOT_6 * (6.0 * square * y - 1.0)
     return 9.0 * pull_off_force * square * (2.0 * square * y - 1.0) / slope
@@ -105,7 +108,7 @@ def overlap_at(y, pull_off_overlap):
 
 @formula
 def energy_at(y, pull_off_force, pull_off_overlap):
-    """Energy [J] stored by the normal mode, 0 for surfaces apart; dU = F dδ."""
+    """Energy [J] stored in the normal mode, 0 for separated surfaces; dU = F dδ."""
     y2 = y * y
     y4 = y2 * y2
     shape = 0.8 * y4 * y4 * y2 - 4.0 / 3.0 * y4 * y2 * y + y4 / 3.0
@@ -120,23 +123,23 @@ def rest_radius(surface_energy, reduced_radius, modulus):
 
 @formula
 def pull_off_force(surface_energy, reduced_radius):
-    """Largest tension [N] the contact bears: F_c = 3πγR."""
+    """Pull-off force [N], the largest tension of a contact: F_c = 3πγR."""
     return 3.0 * math.pi * surface_energy * reduced_radius
 
 
 @formula
 def pull_off_overlap(a0, reduced_radius):
-    """δ_c [m], the stretch at which it breaks: δ_c = a₀²/(2·6^(1/3) R)."""
+    """Pull-off displacement δ_c = a₀²/(2·6^(1/3) R) [m]: the contact breaks at δ = −δ_c."""
     return a0 * a0 / (2.0 * CUBE_ROOT_6 * reduced_radius)
 
 
 @formula
 def rest_overlap(a0, reduced_radius):
-    """δ₀ [m], the overlap at equilibrium: a₀²/(3R)."""
+    """Overlap at equilibrium [m]: δ₀ = a₀²/(3R)."""
     return a0 * a0 / (3.0 * reduced_radius)
 
 
 @formula
 def normal_stiffness(a0, modulus):
-    """k_n = (6/5) E* a₀ [N/m] at equilibrium."""
+    """Normal stiffness at equilibrium [N/m]: k_n = (6/5) E* a₀."""
     return 1.2 * modulus * a0

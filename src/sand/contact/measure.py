@@ -1,28 +1,30 @@
-"""Energies for the books.  Looked at between steps, never inside them."""
+"""Energies, displacements and loads of contacts, measured between steps for the energy table and for output."""
 
 from ..compiler.jit import kernel, loop
 from ..numerics.vec import across, axpy, dot, load, norm
 from ..state.state import CONTACTS
 from . import jkr
-from . import law as contact_law
-from .update import bond_at, damping_at, pose_at
+from .law import contact_load, contact_radius, displacements_of, energies, normal_force, scaled_stiffness
+from .update import bond_at, pose_at, stored_damping_force
 
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
+"""Energies [J] that `measure_energies` computes."""
 
 
 @loop
 def _kinetic(grains):
-    moving = spinning = 0.0
+    """Kinetic energies [J] of translation and rotation."""
+    translation = rotation = 0.0
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        moving += 0.5 * grains.mass[i] * dot(v, v)
-        spinning += 0.5 * grains.inertia[i] * dot(w, w)
-    return moving, spinning
+        translation += 0.5 * grains.mass[i] * dot(v, v)
+        rotation += 0.5 * grains.inertia[i] * dot(w, w)
+    return translation, rotation
 
 
 @kernel
 def measure_energies(grains, contacts, count, span, follow, out):
-    """Fill `out` with the energies [J] named in ENERGIES."""
+    """Fill `out` with the energies [J] listed in ENERGIES."""
     out[0], out[1] = _kinetic(grains)
     for mode in range(4):
         out[2 + mode] = 0.0
@@ -32,7 +34,7 @@ def measure_energies(grains, contacts, count, span, follow, out):
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         overlap, bond = r1 + r2 - pose.distance, bond_at(contacts, c)
         y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-        stored = contact_law.energies(pose, overlap, y, r1, r2, contact_law.stiffened(bond, y, follow))
+        stored = energies(pose, overlap, y, r1, r2, scaled_stiffness(bond, y, follow))
         for mode in range(4):
             out[2 + mode] += stored[mode]
 
@@ -43,7 +45,7 @@ CONTACT_ROWS = (
     ("slide", "m", "size of the sliding displacement ζ"),
     ("roll", "m", "size of the rolling displacement ξ"),
     ("twist", "rad", "twisting angle φ"),
-    ("stretch_share", "1", "−δ over the stretch δ_c at which the contact breaks; negative in compression"),
+    ("stretch_share", "1", "−δ/δ_c, 1 where the contact breaks; negative in compression"),
     ("slide_share", "1", "|ζ|/ζ_c"),
     ("roll_share", "1", "|ξ|/ξ_c"),
     ("twist_share", "1", "|φ|/φ_c"),
@@ -56,44 +58,44 @@ CONTACT_ROWS = (
     ("energy_rolling", "J", "stored by the rolling spring"),
     ("energy_twisting", "J", "stored by the twisting spring"),
 )
-"""What `measure_contacts` tells of each contact: name, unit, meaning."""
+"""Scalars that `measure_contacts` computes for each contact: name, unit, meaning."""
 CONTACT_VECTORS = (
     ("slide_vector", "m", "sliding displacement ζ"),
     ("roll_vector", "m", "rolling displacement ξ"),
 )
 CONTACT_LOADS = ("force", "torque1", "torque2")
-"""The vectors it tells after them, three rows each, and then the loads of the contact law, damping included."""
+"""Rows of `measure_contacts` after the scalars: CONTACT_VECTORS, then the loads including damping, three rows each."""
 
 
 @kernel
 def measure_contacts(grains, contacts, count, span, follow, out):
-    """Fill `out` (rows, C) with the numbers of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
+    """Fill `out` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
     for c in range(count[CONTACTS]):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, plain = r1 + r2 - pose.distance, bond_at(contacts, c)
-        y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
-        bond = contact_law.stiffened(plain, y, follow)
-        strain = contact_law.strain_of(pose, overlap, r1, r2, bond)
-        xi = across(strain.roll, pose.n)
-        slide, roll = norm(strain.slide), norm(xi)
-        stored = contact_law.energies(pose, overlap, y, r1, r2, bond)
-        out[0, c], out[1, c] = overlap, contact_law.contact_radius(overlap, y, bond)
-        out[2, c], out[3, c], out[4, c] = slide, roll, strain.twist
+        overlap, frozen = r1 + r2 - pose.distance, bond_at(contacts, c)
+        y = jkr.root(jkr.stretch(overlap, frozen.pull_off_overlap))
+        bond = scaled_stiffness(frozen, y, follow)
+        displacements = displacements_of(pose, overlap, r1, r2, bond)
+        xi = across(displacements.roll, pose.n)
+        slide, roll = norm(displacements.slide), norm(xi)
+        stored = energies(pose, overlap, y, r1, r2, bond)
+        out[0, c], out[1, c] = overlap, contact_radius(overlap, y, bond)
+        out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
         out[5, c] = -overlap / bond.pull_off_overlap
         out[6, c] = slide / bond.slide_limit if bond.slide_limit > 0.0 else 0.0
         out[7, c] = roll / bond.roll_limit
-        out[8, c] = abs(strain.twist) / bond.twist_limit
-        out[9, c] = contact_law.normal_force(overlap, y, bond) + damping_at(contacts, c)
+        out[8, c] = abs(displacements.twist) / bond.twist_limit
+        out[9, c] = normal_force(overlap, y, bond) + stored_damping_force(contacts, c)
         out[10, c] = bond.slide_stiffness * slide
         out[11, c] = bond.reduced_radius * bond.roll_stiffness * roll
-        out[12, c] = -bond.twist_stiffness * strain.twist
+        out[12, c] = -bond.twist_stiffness * displacements.twist
         for mode in range(4):
             out[13 + mode, c] = stored[mode]
-        push, torque1, torque2 = contact_law.contact_load(pose, overlap, y, r1, r2, bond)
-        push = axpy(damping_at(contacts, c), pose.n, push)
+        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond)
+        force = axpy(stored_damping_force(contacts, c), pose.n, force)
         for axis in range(3):
-            out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = push[axis], torque1[axis], torque2[axis]
-            out[17 + axis, c] = strain.slide[axis]
+            out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]
+            out[17 + axis, c] = displacements.slide[axis]
             out[20 + axis, c] = xi[axis]

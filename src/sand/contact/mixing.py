@@ -1,4 +1,4 @@
-"""What two materials make together."""
+"""Contact parameters of pairs of materials."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MIXING: dict[str, Callable[[float, float], float]] = {
     "harmonic": lambda a, b: 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0,
     "smaller": min,
 }
-"""Rules for γ_eff of two materials; each gives γ for equal ones and 0 if one has none."""
+"""Mixing rules for γ_eff of two materials; each gives γ for equal materials, and 0 if one has no surface energy."""
 
 
 def pairing_between(
@@ -26,18 +26,29 @@ def pairing_between(
     damping: float = 0.0,
     viscous_time: float = 0.0,
 ) -> Pairing:
-    """1/E* = Σ(1−ν²)/E, 1/G* = Σ(2−ν)/G, 1/G′ = Σ 1/G, the smaller ξ_c, γ_eff by the mixing rule.
+    """Contact parameters of a pair of materials.
+
+    1/E* = Σ(1−ν²)/E, 1/G* = Σ(2−ν)/G, 1/G′ = Σ 1/G, the smaller ξ_c, and γ_eff by the mixing rule.
 
     Parameters
     ----------
+    a, b : Material
+        The materials, which may be the same.
+    mixing : str, optional
+        Mixing rule for γ_eff, a key of `MIXING`.
     rolling_limit : float or None, optional
-        ξ_c [m] instead of the materials' own.
+        Critical rolling displacement ξ_c [m], replacing those of the materials.
     factors : tuple[float, float, float], optional
-        multipliers on k_s, k_r, k_t.
+        Multipliers of k_s, k_r and k_t.
     damping : float, optional
-        c [kg/s] of a constant damping.
+        Constant damping coefficient c [kg/s].
     viscous_time : float, optional
-        T_vis [s] of viscoelastic damping, c/a = 2 T_vis E*/(ν1 ν2) (Krijt et al. 2013); 0: none.
+        T_vis [s] of viscoelastic damping, c/a = 2 T_vis E*/(ν1 ν2) (Krijt et al. 2013); 0 for none.
+
+    Returns
+    -------
+    Pairing
+        The parameters.
     """
     modulus = 1.0 / sum((1.0 - m.poisson_ratio**2) / m.young_modulus for m in (a, b))
     viscous = 2.0 * viscous_time * modulus / (a.poisson_ratio * b.poisson_ratio) if viscous_time > 0.0 else 0.0

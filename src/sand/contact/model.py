@@ -1,4 +1,4 @@
-"""Contacts: sticking, sliding, rolling, twisting."""
+"""Settings of the contact model: `sand.Contact`."""
 
 from __future__ import annotations
 
@@ -18,47 +18,46 @@ from .jkr import rest_radius
 from .law import Pairing
 from .mixing import MIXING, pairing_between
 
-BEYOND = ("clamp", "release")
+LIMIT_RULES = ("clamp", "release")
 STIFFNESS = ("frozen", "dt97")
 DAMPING = ("none", "constant", "viscoelastic")
 JKR_LIMIT = 0.3
-"""a0/R above which JKR is at the edge of its validity."""
+"""a0/R above which the assumptions of JKR theory are violated."""
 
 
 @checked
 @dataclass(frozen=True)
 class Contact:
-    """Grains that touch stick: JKR with sliding, rolling and twisting springs.
+    """Adhesive contacts: JKR normal force, and springs against sliding, rolling and twisting.
 
     Parameters
     ----------
     beyond : str, optional
-        what happens to a tangential displacement beyond its limit. "clamp" leaves it at the limit;
-        "release" sets it to 0, the literal SAND (A.6), which halves the friction of rolling.
+        Rule for a tangential displacement beyond its limit.  "clamp" sets it to the limit; "release" sets it to 0, as
+        in the SAND paper (A.6), which halves rolling friction.
     stiffness : str, optional
-        of the tangential springs. "frozen" at the equilibrium radius a0, forces exact gradients;
-        "dt97" lets them follow the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³, which does not conserve
-        energy: what it makes or destroys is booked as `lost_stiffness`.
-    slide_factor, roll_factor, twist_factor : optional
-        multipliers ≥ 0 on k_s, k_r, k_t (Seizinger et al. 2012 take 2.5, 8
-        and 1).
-    rolling_limit : optional
-        critical rolling displacement ξ_c [m] for all contacts; None: the smaller of the two
-        materials' own.
+        Tangential stiffnesses.  "frozen": evaluated at the equilibrium radius a0, so that forces are exact gradients of
+        the energy.  "dt97": functions of the contact radius, k_s ∝ a, k_r ∝ a^(3/2), k_t ∝ a³; energy is not conserved,
+        and the energy created or destroyed is logged as `lost_stiffness`.
+    slide_factor, roll_factor, twist_factor : float or str, optional
+        Multipliers ≥ 0 of k_s, k_r, k_t (Seizinger et al. 2012 use 2.5, 8 and 1).
+    rolling_limit : float or str, optional
+        Critical rolling displacement ξ_c [m] > 0 of all contacts.  Default: the smaller of the values of the two
+        materials.
     damping : str, optional
-        of the normal motion, "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013:
-        F = (2 T_vis E*/ν²) a dδ/dt; ν² is ν1 ν2 for unequal materials).
-    damping_constant : optional
+        Damping of normal motion: "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013: F = (2 T_vis
+        E*/ν²) a dδ/dt, with ν1 ν2 in place of ν² for unequal materials).
+    damping_constant : float or str, optional
         c [kg/s] ≥ 0, for "constant".
-    viscous_time : optional
-        T_vis [s] ≥ 0, for "viscoelastic"; 1.25e-11 s is for silica.
+    viscous_time : float or str, optional
+        T_vis [s] ≥ 0, for "viscoelastic"; the default, 1.25e-11 s, is that of silica.
     mixing : str, optional
-        γ_eff of unequal materials, "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
+        γ_eff of unequal materials: "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
 
     Raises
     ------
     BadInput
-        unknown words and numbers out of range, one line each.
+        If a setting is unknown or out of range; one line for each.
     """
 
     beyond: str = "clamp"
@@ -78,7 +77,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        words = {"beyond": BEYOND, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
+        words = {"beyond": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
         for key, allowed in words.items():
             if getattr(self, key) not in allowed:
                 given = getattr(self, key)
@@ -102,10 +101,11 @@ class Contact:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
+        """Settings in SI units; those that are None are omitted."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     def pairing(self, a: Material, b: Material) -> Pairing:
-        """What two materials make together under these settings."""
+        """Contact parameters of two materials under these settings."""
         return pairing_between(
             a,
             b,
@@ -117,12 +117,23 @@ class Contact:
         )
 
     def pairings(self, materials: Sequence[Material]) -> np.ndarray:
-        """The (10, M, M) table of `Pairing` for every two materials."""
+        """Table (10, M, M) of `Pairing` for every two materials."""
         table = [[self.pairing(a, b) for b in materials] for a in materials]
         return np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0))
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """A warning for each pair of materials whose contacts are too wide for JKR."""
+        """Check that the materials suit the contact model.
+
+        Returns
+        -------
+        list of str
+            A warning for each pair of materials whose contact radius is too large for JKR theory.
+
+        Raises
+        ------
+        BadInput
+            If a material has no surface energy, or no positive Poisson ratio for viscoelastic damping.
+        """
         problems = [
             f"material '{m.name}' has no surface energy; give one, 0 for none: "
             f'{m.name} with surface_energy = "… J/m^2"'
@@ -146,7 +157,7 @@ class Contact:
         ]
 
     def _too_wide(self, a: Material, r1: float, b: Material, r2: float) -> str:
-        """A warning if contacts of these grains are at the edge of JKR, else nothing."""
+        """A warning if contacts between these grains are too wide for JKR theory, else ""."""
         reduced = r1 * r2 / (r1 + r2)
         both = self.pairing(a, b)
         ratio = rest_radius(both.surface_energy, reduced, both.modulus) / reduced

@@ -1,4 +1,4 @@
-"""Where near pairs keep the numbers of their kind: one place for all where all grains are equal."""
+"""Contact parameters stored per candidate pair, or once where all grains are equal."""
 
 import math
 from typing import Any, NamedTuple
@@ -10,21 +10,21 @@ from ..state.state import PAIRS
 from .law import Pairing, bond_between
 
 
-class Kind(NamedTuple):
-    """What the constants of a pair's contact depend on, and what the list keeps of them."""
+class PairType(NamedTuple):
+    """Grain properties that determine the constants of a pair's contact, and the parameters stored in the pair list."""
 
-    grains: Any  # material, radius [m] and mass [kg] of each
-    step: Any  # the step that a contact needs [s]
-    length: Any  # δ at which it breaks [m]
+    grains: Any  # material, radius [m] and mass [kg] of both grains
+    step: Any  # time step that a contact needs [s]
+    length: Any  # −δ at which the contact breaks [m]
 
 
 NO_GRAIN_TYPE = (np.uint32(0), -1.0, -1.0)
-NO_PAIR_TYPE = Kind((NO_GRAIN_TYPE, NO_GRAIN_TYPE), 0.0, 0.0)
+NO_PAIR_TYPE = PairType((NO_GRAIN_TYPE, NO_GRAIN_TYPE), 0.0, 0.0)
 
 
 @loop
-def pairing_of(pairings, a, b):
-    """What materials a and b make together, from the (10, M, M) table."""
+def load_pairing(pairings, a, b):
+    """Parameters of materials a and b, from the (10, M, M) table."""
     return Pairing(
         pairings[0, a, b],
         pairings[1, a, b],
@@ -41,34 +41,34 @@ def pairing_of(pairings, a, b):
 
 @loop
 def bond_of(grains, pairings, i, j):
-    """The constants of a contact between grains i and j."""
-    pairing = pairing_of(pairings, grains.material[i], grains.material[j])
+    """Constants of a contact between grains i and j."""
+    pairing = load_pairing(pairings, grains.material[i], grains.material[j])
     return bond_between(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
 
 
 @loop
 def grain_type_of(grains, i):
-    """All that the bonds of grain i depend on."""
+    """Properties of grain i that contact constants depend on."""
     return grains.material[i], grains.radius[i], grains.mass[i]
 
 
 @loop
 def pair_type_of(grains, law, i, j, last):
-    """The kind of a pair: the `last` one if it is the same, as its powers cost more than all else."""
+    """Pair type of grains i and j; `last` is reused if equal, because the powers in `bond_between` are expensive."""
     a, b = grain_type_of(grains, i), grain_type_of(grains, j)
     if (a, b) == last.grains:
         return last
     bond = bond_of(grains, law.pairings, i, j)
-    return Kind((a, b), 2.0 * math.pi / math.sqrt(bond.fastest) / law.per_period, bond.break_overlap)
+    return PairType((a, b), 2.0 * math.pi / math.sqrt(bond.max_squared_frequency) / law.per_period, bond.break_overlap)
 
 
 @loop
 def pair_type_index(pair_list, p):
-    """The place of the numbers of pair p."""
+    """Index of the stored parameters of pair p."""
     return p if pair_list.step.size > 1 else 0
 
 
 @loop
-def kinds(pair_list, count):
-    """How many places are in use."""
+def pair_type_count(pair_list, count):
+    """Number of stored parameter sets in use."""
     return min(count[PAIRS], pair_list.step.size)

@@ -1,7 +1,9 @@
-"""The pass over all contacts, quiet ones and those that slide, roll or twist beyond a limit.
+"""First pass over contacts, with slip: blocks of contacts use the plain loop or a branch-free one.
 
-In shaken aggregates most contacts move in every step.  Blocks of which many moved in the step before get a pass that
-moves them at once, without a branch; elsewhere `events.update_flagged_contacts` moves the few that must.  Both do the same.
+The plain loop (`update.contact_loop`) only flags contacts beyond a limit, and `events.update_flagged_contacts` handles
+them one by one.  In strongly excited aggregates most contacts slip in every step.  Blocks in which more than 10 % of
+the contacts slipped in the last step therefore use a branch-free kernel that updates slipping contacts in place, with
+selections instead of branches, so that it vectorises.  Both give the same results.
 """
 
 import math
@@ -12,166 +14,184 @@ import numpy as np
 from ..compiler.jit import formula, loop
 from ..numerics.quaternion import turned_back, turned_by
 from ..numerics.vec import axpy, dot, load, load4, put, scale, sub
-from ..state.arrays import BLOCK as JUDGED_TOGETHER
+from ..state.arrays import BLOCK as CONTACTS_PER_BLOCK
 from ..state.state import BREAKING, ROLLING, SLIDING, SLIPPED, TWISTING
 from . import jkr, tangential
-from . import law as contact_law
-from .update import SLIPPED_FLAGS, WAITS, bond_in, contact_loop, pose_after, twist_gain, uniform_contacts, whole_vectors
+from .law import Pose, after_slip, contact_load, displacements_of, exceeds_limits, scaled_stiffness, slip_losses
+from .update import (
+    PENDING_FLAG,
+    SLIPPED_FLAG,
+    contact_loop,
+    load_bond,
+    padded_contact_count,
+    pose_at_step_end,
+    twist_increment,
+    uniform_contacts,
+)
 
-BLOCK = np.uint64(JUDGED_TOGETHER)
-"""Contacts that are judged together."""
+BLOCK = np.uint64(CONTACTS_PER_BLOCK)
+"""Contacts per block."""
 SLIP_FRACTION = 0.1
-"""Share of a block's contacts that passed a limit in the step before, from which it gets the longer pass."""
+"""Fraction of slipped contacts in the last step above which a block uses the branch-free kernel."""
 
 
 class SlipSums(NamedTuple):
-    """What a pass over contacts found and lost."""
+    """Counts and energy losses of a pass over contacts."""
 
-    waiting: float  # contacts that wait to be settled one by one
-    moved: float  # those that have moved
-    slid: float  # energies [J] that they lost
+    pending: float  # contacts to be handled one by one
+    slipped: float  # contacts that slipped
+    slid: float  # energies [J] dissipated by sliding, rolling and twisting
     rolled: float
     twisted: float
 
 
 @loop
-def _strain_at_start(grains, contacts, c, pose, twist, bond, dt):
-    """Displacements at the start of the step that led to this pose, when the twist was `twist`."""
+def _displacements_at_step_start(grains, contacts, c, pose, twist, bond, dt):
+    """Displacements at the start of the step that led to this pose; `twist` is the twist at that time."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    moving = sub(load(grains.velocity, i), load(grains.velocity, j))
-    apart = axpy(-dt, moving, scale(pose.distance, pose.n))
-    distance = math.sqrt(dot(apart, apart))
-    earlier = contact_law.Pose(
-        scale(1.0 / distance, apart),
+    relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
+    separation = axpy(-dt, relative_velocity, scale(pose.distance, pose.n))
+    distance = math.sqrt(dot(separation, separation))
+    start_pose = Pose(
+        scale(1.0 / distance, separation),
         distance,
         turned_by(scale(-dt, load(grains.spin, i)), pose.n1),
         turned_by(scale(-dt, load(grains.spin, j)), pose.n2),
         twist,
     )
     r1, r2 = grains.radius[i], grains.radius[j]
-    return contact_law.strain_of(earlier, r1 + r2 - distance, r1, r2, bond)
+    return displacements_of(start_pose, r1 + r2 - distance, r1, r2, bond)
 
 
 @loop
-def strain_before(grains, contacts, c, pose, bond, dt):
-    """The same for a contact whose twist is that of the pose."""
-    twist = pose.twist - twist_gain(grains, contacts, c, pose, dt)
-    return _strain_at_start(grains, contacts, c, pose, twist, bond, dt)
+def displacements_before(grains, contacts, c, pose, bond, dt):
+    """Displacements at the start of the step, for a contact whose stored twist is that at the end."""
+    twist = pose.twist - twist_increment(grains, contacts, c, pose, dt)
+    return _displacements_at_step_start(grains, contacts, c, pose, twist, bond, dt)
 
 
 @formula
-def _chosen(first, u, v):
-    """u if `first`, else v: vectors."""
-    return u[0] if first else v[0], u[1] if first else v[1], u[2] if first else v[2]
+def _select(condition, u, v):
+    """Vector u where the condition holds, else v."""
+    return u[0] if condition else v[0], u[1] if condition else v[1], u[2] if condition else v[2]
 
 
 @formula
-def record_of(channel):
-    """The row of a contact's own record for a channel of losses, but for breaking, which has none."""
+def loss_row(channel):
+    """Row of `ContactArrays.lost` for a loss channel other than breaking, which has no row."""
     return channel - 1 if channel > BREAKING else channel
 
 
 @loop
-def _keep_record(own, c, slid, rolled, twisted):
-    """Add what contact c lost [J] to its own record."""
-    own[record_of(SLIDING), c] += slid
-    own[record_of(ROLLING), c] += rolled
-    own[record_of(TWISTING), c] += twisted
+def _add_to_contact_losses(losses, c, slid, rolled, twisted):
+    """Add energies [J] dissipated by contact c to its losses."""
+    losses[loss_row(SLIDING), c] += slid
+    losses[loss_row(ROLLING), c] += rolled
+    losses[loss_row(TWISTING), c] += twisted
 
 
 @loop
-def _slip_loop(grains, contacts, first, last, column, span, law, dt):
-    """What `contact_loop` does, but contacts beyond a limit are moved at once unless they break or are pressed hard."""
-    waiting = moved = slid = rolled = twisted = 0.0
+def _branch_free_loop(grains, contacts, first, last, column, span, law, dt):
+    """Branch-free version of `contact_loop` in which contacts beyond a limit slip.
+
+    Contacts that break, or are compressed beyond the range of the JKR polynomial, are only flagged.
+    """
+    pending = slipped = slid = rolled = twisted = 0.0
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = bond_in(contacts.bond, column + k)
+        bond = load_bond(contacts.bond, column + k)
         r1, r2 = grains.radius[i], grains.radius[j]
         pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
-        pose = pose_after(grains, contacts, span, c, dt)
+        pose = pose_at_step_end(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
         s = jkr.stretch(overlap, bond.pull_off_overlap)
-        y = jkr.root_in_reach(s)
-        now = contact_law.stiffened(bond, y, law.follow)
-        strain = contact_law.strain_of(pose, overlap, r1, r2, bond)
-        odd = (overlap < -bond.break_overlap) | (s > jkr.STRETCH_OF_POLYNOMIAL)
-        moves = contact_law.beyond_limits(strain, pose.n, bond) & (not odd)
-        # all is worked out for all and chosen from at the end: a branch, or a store under a condition, stops SIMD
-        before = _strain_at_start(grains, contacts, c, pose, contacts.twist[c], bond, dt)
-        wish = contact_law.yielded(strain, pose.n, bond, law.release)
-        n1, n2 = tangential.pointers_for(wish.slide, wish.roll, pose.n, r1, r2)
-        back1 = turned_back(load4(grains.orientation, i), n1)
-        back2 = turned_back(load4(grains.orientation, j), n2)
-        n1, n2 = _chosen(moves, n1, pose.n1), _chosen(moves, n2, pose.n2)
-        there = contact_law.Pose(pose.n, pose.distance, n1, n2, wish.twist if moves else pose.twist)
-        left = contact_law.strain_of(there, overlap, r1, r2, bond)
-        lost = contact_law.lost_by_yielding(before, strain, left, now)
-        lost = _chosen(moves, lost, (0.0, 0.0, 0.0))
-        push, torque1, torque2 = contact_law.contact_load(there, overlap, y, r1, r2, now)
-        put(contacts.pointer1, c, _chosen(moves, back1, pointer1))
-        put(contacts.pointer2, c, _chosen(moves, back2, pointer2))
-        contacts.twist[c] = there.twist
-        put(contacts.push, c, push)
+        y = jkr.polynomial_root(s)
+        bond_now = scaled_stiffness(bond, y, law.follow)
+        displacements = displacements_of(pose, overlap, r1, r2, bond)
+        needs_event = (overlap < -bond.break_overlap) | (s > jkr.POLYNOMIAL_RANGE)
+        slips = exceeds_limits(displacements, pose.n, bond) & (not needs_event)
+        # both cases are computed and selected from at the end: branches and conditional stores prevent vectorisation
+        start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], bond, dt)
+        target = after_slip(displacements, pose.n, bond, law.release)
+        n1, n2 = tangential.pointers_for(target.slide, target.roll, pose.n, r1, r2)
+        body1 = turned_back(load4(grains.orientation, i), n1)
+        body2 = turned_back(load4(grains.orientation, j), n2)
+        n1, n2 = _select(slips, n1, pose.n1), _select(slips, n2, pose.n2)
+        new_pose = Pose(pose.n, pose.distance, n1, n2, target.twist if slips else pose.twist)
+        left = displacements_of(new_pose, overlap, r1, r2, bond)
+        lost = slip_losses(start, displacements, left, bond_now)
+        lost = _select(slips, lost, (0.0, 0.0, 0.0))
+        force, torque1, torque2 = contact_load(new_pose, overlap, y, r1, r2, bond_now)
+        put(contacts.pointer1, c, _select(slips, body1, pointer1))
+        put(contacts.pointer2, c, _select(slips, body2, pointer2))
+        contacts.twist[c] = new_pose.twist
+        put(contacts.push, c, force)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if odd else SLIPPED_FLAGS if moves else 0
-        _keep_record(contacts.lost, c, lost[0], lost[1], lost[2])
-        waiting += 1.0 if odd else 0.0
-        moved += 1.0 if moves else 0.0
+        contacts.flag[c] = PENDING_FLAG if needs_event else SLIPPED_FLAG if slips else 0
+        _add_to_contact_losses(contacts.lost, c, lost[0], lost[1], lost[2])
+        pending += 1.0 if needs_event else 0.0
+        slipped += 1.0 if slips else 0.0
         slid += lost[0]
         rolled += lost[1]
         twisted += lost[2]
-    return SlipSums(waiting, moved, slid, rolled, twisted)
+    return SlipSums(pending, slipped, slid, rolled, twisted)
 
 
 @loop
 def contact_pass(grains, contacts, first, last, span, law, dt):
-    """Twist, loads and flag of the contacts first…last − 1 (uint64); most of those beyond a limit move.
+    """Update twist, loads and flag of the contacts first … last − 1 (uint64), block by block.
 
-    Stiffnesses that follow a(δ) are booked between pass and moving: then all wait.
+    With stiffnesses that follow a(δ) all contacts beyond a limit stay flagged: the work of the stiffness change must be
+    logged before they slip.
+
+    Returns
+    -------
+    SlipSums
+        Contacts that remain flagged, and contacts that slipped with their losses.
     """
-    waiting = moved = slid = rolled = twisted = 0.0
+    pending = slipped = slid = rolled = twisted = 0.0
     for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
         begin = first + b * BLOCK
         end = begin + BLOCK if begin + BLOCK < last else last
         column = np.uint64(0) if uniform_contacts(contacts) else begin
-        busy = 0.0
+        slipped_before = 0.0
         for k in range(end - begin):
-            busy += 1.0 if contacts.flag[begin + k] > 0 else 0.0
-        if busy > SLIP_FRACTION * (end - begin) and not law.follow:
-            part = _slip_loop(grains, contacts, begin, end, column, span, law, dt)
-            waiting += part.waiting
-            moved += part.moved
+            slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
+        if slipped_before > SLIP_FRACTION * (end - begin) and not law.follow:
+            part = _branch_free_loop(grains, contacts, begin, end, column, span, law, dt)
+            pending += part.pending
+            slipped += part.slipped
             slid += part.slid
             rolled += part.rolled
             twisted += part.twisted
         else:
-            whole = whole_vectors(contacts, end)
-            waiting += contact_loop(grains, contacts, begin, whole, end, column, span, law, dt)
-    return SlipSums(waiting, moved, slid, rolled, twisted)
+            padded = padded_contact_count(contacts, end)
+            pending += contact_loop(grains, contacts, begin, padded, end, column, span, law, dt)
+    return SlipSums(pending, slipped, slid, rolled, twisted)
 
 
 @loop
-def log_slip_sums(count, lost, passed):
-    """Add what a pass moved and lost to the books."""
-    count[SLIPPED] += int(passed.moved)
-    lost[SLIDING] += passed.slid
-    lost[ROLLING] += passed.rolled
-    lost[TWISTING] += passed.twisted
+def log_slip_sums(count, lost, sums):
+    """Add slip events and losses of a pass to the counters and to the energy table."""
+    count[SLIPPED] += int(sums.slipped)
+    lost[SLIDING] += sums.slid
+    lost[ROLLING] += sums.rolled
+    lost[TWISTING] += sums.twisted
 
 
 @loop
-def store_slip_sums(rows, b, passed):
-    """Leave what a pass found in row b of a (B, 5 or more) array."""
-    rows[b, 0] = passed.waiting
-    rows[b, 1] = passed.moved
-    rows[b, 2] = passed.slid
-    rows[b, 3] = passed.rolled
-    rows[b, 4] = passed.twisted
+def store_slip_sums(rows, b, sums):
+    """Store the sums of a pass in row b of a (B, ≥ 5) array."""
+    rows[b, 0] = sums.pending
+    rows[b, 1] = sums.slipped
+    rows[b, 2] = sums.slid
+    rows[b, 3] = sums.rolled
+    rows[b, 4] = sums.twisted
 
 
 @loop
 def load_slip_sums(rows, b):
-    """What `store_slip_sums` left there."""
+    """Sums stored in row b by `store_slip_sums`."""
     return SlipSums(rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4])

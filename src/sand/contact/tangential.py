@@ -1,7 +1,7 @@
 """Sliding, rolling, twisting: displacements, springs, limits (Dominik & Tielens 1995, 1996, 1997).
 
-Contact pointers n1, n2 are unit vectors from each centre to the contact, fixed to the grains; unstrained
-n1 = −n, n2 = +n with n pointing from grain 2 to grain 1 (the paper's e_perp, Eq. 44).
+Contact pointers n1, n2 are unit vectors from each centre to the contact, fixed to the grains.  Without strain n1 = −n
+and n2 = +n, where n points from grain 2 to grain 1 (e_perp in the paper, Eq. 44).
 """
 
 import math
@@ -20,15 +20,16 @@ def sliding(n1, n2, n, r1, r2):
 
 @formula
 def rolling(n1, n2, reduced_radius):
-    """Rolling displacement ξ = R (n1 + n2) [m] (minus Eq. 47, which points from the contact to the axis)."""
+    """Rolling displacement ξ = R (n1 + n2) [m], of opposite sign to Eq. 47."""
     return scale(reduced_radius, add(n1, n2))
 
 
 @formula
 def twisting_rate(n, spin1, spin2, across_speed, distance, dt):
-    """dφ/dt = (ω1 − ω2)·n [rad/s] with n taken in the middle of the step.
+    """Twisting rate dφ/dt = (ω1 − ω2)·n [rad/s] with n in the middle of the step.
 
-    n is the axis at the end of the step; half a step earlier it was n − (dt/2) v_across/D to second order.
+    `n` is the axis at the end of the step.  Half a step earlier the axis is n − (dt/2) v_across/D, to second order in
+    dt.
     """
     turn = sub(spin1, spin2)
     return dot(turn, n) - 0.5 * dt / distance * dot(turn, across_speed)
@@ -36,7 +37,7 @@ def twisting_rate(n, spin1, spin2, across_speed, distance, dt):
 
 @formula
 def pointers_for(slide, roll, n, r1, r2):
-    """Unit pointers n1, n2 that have just these tangential displacements; exact for any radii.
+    """Unit contact pointers n1, n2 with the given tangential displacements; exact for any radii.
 
     t1 = ξ/r1 + ζ/(r1+r2), t2 = ξ/r2 − ζ/(r1+r2), n1 = −n√(1−t1²) + t1, n2 = n√(1−t2²) + t2
     """
@@ -50,27 +51,27 @@ def pointers_for(slide, roll, n, r1, r2):
 
 @formula
 def slide_stiffness(shear, a0):
-    """k_s = 8 G* a₀ [N/m], 1/G* = Σ (2−ν)/G."""
+    """Sliding stiffness k_s = 8 G* a₀ [N/m], 1/G* = Σ (2−ν)/G."""
     return 8.0 * shear * a0
 
 
 @formula
 def roll_stiffness(pull_off, reduced_radius):
-    """k_r = 4 F_c/R = 12πγ [N/m]."""
+    """Rolling stiffness k_r = 4 F_c/R = 12πγ [N/m]."""
     return 4.0 * pull_off / reduced_radius
 
 
 @formula
 def twist_stiffness(twist_shear, a0):
-    """k_t = (16/3) G′ a₀³ [N m], 1/G′ = Σ 1/G."""
+    """Twisting stiffness k_t = (16/3) G′ a₀³ [N m], 1/G′ = Σ 1/G."""
     return 16.0 / 3.0 * twist_shear * a0 * a0 * a0
 
 
 @formula
 def slide_limit(shear, twist_shear, a0):
-    """ζ_c = a₀ G′/(16π G*) [m]; (2−ν) a₀/(16π) for equal grains."""
+    """Critical sliding displacement ζ_c = a₀ G′/(16π G*) [m], (2−ν) a₀/(16π) for equal materials."""
     return a0 * twist_shear / (16.0 * math.pi * shear)
 
 
 TWIST_LIMIT = 1.0 / (16.0 * math.pi)
-"""φ_c [rad]"""
+"""Critical twisting angle φ_c [rad]."""

@@ -1,4 +1,10 @@
-"""Contacts: a pass per contact that vectorises."""
+"""Contact forces, first pass: a vectorised loop over contacts that writes forces and torques per contact.
+
+Contacts are updated in two passes.  The pass over contacts (here and in `slip`) computes pose, displacements, force and
+torques of each contact from its two grains and stores them per contact; no two iterations write to the same memory, so
+the loop vectorises.  The gather pass over grains (`gather`) then sums the stored forces and torques of the contacts of
+each grain in a fixed order.  Contacts beyond a limit are flagged and handled one by one in `events`.
+"""
 
 import math
 
@@ -11,37 +17,42 @@ from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import across, dot, load, load4, put, scale, sub
 from ..state.state import CONTACT_STEP, CONTACTS
 from . import jkr, tangential
-from . import law as contact_law
-from .pair_types import kinds
+from .law import Bond, Pose, contact_load, displacements_of, exceeds_limits, scaled_stiffness
+from .pair_types import pair_type_count
 
-FEW = 4
-"""Contacts that are faster done one by one than as a vector."""
-WAITS, BROKE, SLIPPED_FLAGS = 1, 2, 3
-"""Flags of a contact that passed a limit: to be settled; broken in this step; moved in the pass over all contacts."""
+MIN_REMAINDER = 4
+"""Remaining contacts from which a padded SIMD vector is faster than a scalar loop."""
+PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG = 1, 2, 3
+"""Flags of contacts beyond a limit: to be handled by `events.update_flagged_contacts`; broken in this step; slipped in
+this step in the pass over contacts.
+"""
 
 
 @loop
 def uniform_contacts(contacts):
-    """Do all contacts share their constants?  (If there is room for BLOCK of them, what is told does not matter.)"""
+    """Whether one set of constants serves all contacts.
+
+    Where exactly BLOCK contacts are allocated, columns and contacts cannot be told apart, and either answer is correct.
+    """
     return contacts.bond.shape[1] != contacts.flag.size
 
 
 @loop
 def bond_at(contacts, c):
-    """The stored constants of contact c."""
-    return bond_in(contacts.bond, 0 if uniform_contacts(contacts) else c)
+    """Constants of contact c."""
+    return load_bond(contacts.bond, 0 if uniform_contacts(contacts) else c)
 
 
 @loop
-def damping_at(contacts, c):
-    """The damping force [N] of contact c, along n on grain 1."""
+def stored_damping_force(contacts, c):
+    """Damping force [N] stored for contact c, on grain 1 along n; 0 without damping."""
     return contacts.damped[c] if contacts.damped.size > 0 else 0.0
 
 
 @loop
-def bond_in(b, c):
-    """Column c of a (K, …) array of constants."""
-    return contact_law.Bond(
+def load_bond(b, c):
+    """Constants in column c of a (K, …) array."""
+    return Bond(
         b[0, c],
         b[1, c],
         b[2, c],
@@ -62,12 +73,12 @@ def bond_in(b, c):
 
 @loop
 def pose_at(grains, contacts, span, c, twist):
-    """How the grains of contact c stand to each other now, with a given twist φ [rad]."""
+    """Relative pose of the grains of contact c now, with the given twist φ [rad]."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    distance = math.sqrt(dot(apart, apart))
-    return contact_law.Pose(
-        scale(1.0 / distance, apart),
+    separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
+    distance = math.sqrt(dot(separation, separation))
+    return Pose(
+        scale(1.0 / distance, separation),
         distance,
         turned(load4(grains.orientation, i), load(contacts.pointer1, c)),
         turned(load4(grains.orientation, j), load(contacts.pointer2, c)),
@@ -76,99 +87,116 @@ def pose_at(grains, contacts, span, c, twist):
 
 
 @loop
-def twist_gain(grains, contacts, c, pose, dt):
-    """Twist gained in the step that led to this pose, from mid-step velocities and spins."""
+def twist_increment(grains, contacts, c, pose, dt):
+    """Increase of the twist [rad] in the step that led to this pose, from mid-step velocities and spins."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    moving = across(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    rate = tangential.twisting_rate(pose.n, load(grains.spin, i), load(grains.spin, j), moving, pose.distance, dt)
+    transverse = across(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
+    rate = tangential.twisting_rate(pose.n, load(grains.spin, i), load(grains.spin, j), transverse, pose.distance, dt)
     return dt * rate
 
 
 @loop
-def pose_after(grains, contacts, span, c, dt):
-    """How the grains of contact c stand at the end of a step of dt, with the twist that they gained in it."""
+def pose_at_step_end(grains, contacts, span, c, dt):
+    """Relative pose at the end of a step of dt [s], with the twist accumulated in the step."""
     pose = pose_at(grains, contacts, span, c, 0.0)
-    twist = contacts.twist[c] + twist_gain(grains, contacts, c, pose, dt)
-    return contact_law.Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
+    twist = contacts.twist[c] + twist_increment(grains, contacts, c, pose, dt)
+    return Pose(pose.n, pose.distance, pose.n1, pose.n2, twist)
 
 
 @loop
 def contact_loop(grains, contacts, first, last, used, column, span, law, dt):
-    """Twist, loads and flag of the contacts first…last − 1 (uint64); how many passed a limit.  Vectorises.
+    """Update twist, loads and flag of the contacts first … last − 1.  Contacts beyond a limit are only flagged.
+
+    The loop has no branches, so that it vectorises.
 
     Parameters
     ----------
-    column
-        of the constants of the first; the others' follow.
-    used
-        number of contacts in use (uint64); columns beyond it may be passed over, to no effect.
+    grains, contacts : GrainArrays, ContactArrays
+        Arrays of grains and contacts.
+    first, last : uint64
+        Range of contacts.
+    used : uint64
+        Number of contacts in use.  Columns beyond it may be computed as padding; they are never read.
+    column : uint64
+        Column of the constants of the first contact; those of the others follow.
+    span : Span
+        The box.
+    law : ContactParameters
+        Settings of the contact law.
+    dt : float
+        Time step [s].
+
+    Returns
+    -------
+    float
+        Number of contacts in use that are beyond a limit.
     """
-    waiting = 0.0
+    pending = 0.0
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = bond_in(contacts.bond, column + k)
+        bond = load_bond(contacts.bond, column + k)
         r1, r2 = grains.radius[i], grains.radius[j]
-        pose = pose_after(grains, contacts, span, c, dt)
+        pose = pose_at_step_end(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
         s = jkr.stretch(overlap, bond.pull_off_overlap)
-        y = jkr.root_in_reach(s)
-        now = contact_law.stiffened(bond, y, law.follow)
-        push, torque1, torque2 = contact_law.contact_load(pose, overlap, y, r1, r2, now)
-        strain = contact_law.strain_of(pose, overlap, r1, r2, bond)
-        beyond = contact_law.beyond_limits(strain, pose.n, bond) | (s > jkr.STRETCH_OF_POLYNOMIAL)
+        y = jkr.polynomial_root(s)
+        bond_now = scaled_stiffness(bond, y, law.follow)
+        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond_now)
+        displacements = displacements_of(pose, overlap, r1, r2, bond)
+        exceeded = exceeds_limits(displacements, pose.n, bond) | (s > jkr.POLYNOMIAL_RANGE)
         contacts.twist[c] = pose.twist
-        put(contacts.push, c, push)
+        put(contacts.push, c, force)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
-        contacts.flag[c] = WAITS if beyond else 0
-        waiting += 1.0 if beyond & (c < used) else 0.0
-    return waiting
+        contacts.flag[c] = PENDING_FLAG if exceeded else 0
+        pending += 1.0 if exceeded & (c < used) else 0.0
+    return pending
 
 
 @loop
-def whole_vectors(contacts, number):
-    """The number of columns to pass over for so many contacts: if many are left over, they are a vector of their own.
+def padded_contact_count(contacts, number):
+    """Number of columns (uint64) to compute for `number` contacts: padded to whole SIMD vectors where faster.
 
-    What is beyond the contacts in use is worked out as well, and never read.  Both are uint64.
+    Padding columns are computed and never read.
     """
-    whole = round_up_to_simd_width(number, np.uint64(FEW))
-    return whole if COMPILED and whole <= np.uint64(contacts.pair.shape[1]) else number
+    padded = round_up_to_simd_width(number, np.uint64(MIN_REMAINDER))
+    return padded if COMPILED and padded <= np.uint64(contacts.pair.shape[1]) else number
 
 
 @rare
 def write_loads(grains, contacts, span, law, c):
-    """Loads of one contact from its stored pointers and twist, at any compression."""
+    """Compute the loads of one contact from its stored pointers and twist, at any compression."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     r1, r2 = grains.radius[i], grains.radius[j]
     bond = bond_at(contacts, c)
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
     y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    now = contact_law.stiffened(bond, y, law.follow)
-    push, torque1, torque2 = contact_law.contact_load(pose, overlap, y, r1, r2, now)
-    put(contacts.push, c, push)
+    bond_now = scaled_stiffness(bond, y, law.follow)
+    force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond_now)
+    put(contacts.push, c, force)
     put(contacts.torque1, c, torque1)
     put(contacts.torque2, c, torque2)
 
 
 @rare
 def contact_step(contacts, pair_list, count, n, clock, per_period):
-    """The longest step [s] while there are contacts: fastest period / per_period, less above 6 neighbours.
+    """Set the longest step [s] allowed by contacts: shortest period / per_period, less above 6 contacts per grain.
 
-    Pairs that may touch soon count as well, so that a contact of small grains never begins at the step of large
-    ones.  Infinite without contacts: then every closing pair is looked at in every step.
+    Candidate pairs count as well, so that a contact between small grains never begins at the step of large grains.  The
+    step is infinite without contacts: then the closing speeds of pairs are examined in every step.
     """
-    fastest, most = 0.0, 0
+    squared_frequency, most_contacts = 0.0, 0
     for c in range(count[CONTACTS]):
-        fastest = max(fastest, bond_at(contacts, c).fastest)
+        squared_frequency = max(squared_frequency, bond_at(contacts, c).max_squared_frequency)
     for g in range(n):
-        most = max(most, int(contacts.start[g + 1]) - int(contacts.start[g]))
-    crowd = max(1.0, most / 6.0)
+        most_contacts = max(most_contacts, int(contacts.start[g + 1]) - int(contacts.start[g]))
+    coordination = max(1.0, most_contacts / 6.0)
     clock[CONTACT_STEP] = math.inf
-    if fastest > 0.0:
-        clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(fastest * crowd) / per_period
-        for k in range(kinds(pair_list, count)):
+    if squared_frequency > 0.0:
+        clock[CONTACT_STEP] = 2.0 * math.pi / math.sqrt(squared_frequency * coordination) / per_period
+        for k in range(pair_type_count(pair_list, count)):
             clock[CONTACT_STEP] = min(clock[CONTACT_STEP], pair_list.step[k])
-        # few digits, so that sums of steps are exact: cycles of long-range forces then keep momenta to rounding
+        # 24 significant bits, so that sums of steps are exact and r-RESPA cycles conserve momenta to rounding
         clock[CONTACT_STEP] = np.float64(np.float32(clock[CONTACT_STEP]))

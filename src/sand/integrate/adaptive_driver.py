@@ -195,4 +195,4 @@ def flight_driver_for(plan: KernelSpec) -> Callable:
         leave(rules)
         return stop
 
-    return kernel(advance, keep=plan.keep, alone=plan.queue, wide=plan.wide)
+    return kernel(advance, cached=plan.keep, nogil=plan.queue, long_vectors=plan.wide)

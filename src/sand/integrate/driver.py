@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable
 
 from ..compiler.jit import kernel, loop
-from ..contact.events import new_touches
+from ..contact.events import count_new_contacts
 from ..forces.external.loops import outside_loads
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE
 from ..neighbours.skin import consume_skins, invalidate_speeds, reset_skins
@@ -228,7 +228,7 @@ def halves_for(plan: KernelSpec) -> tuple[Callable, Callable]:
         stop, stale = update_lists(grains, contacts, pair_list, long_range, count, rules)
         if stop != Stop.STEPS_DONE:
             return stop
-        fresh = new_touches(grains, pair_list, count, rules.span)
+        fresh = count_new_contacts(grains, pair_list, count, rules.span)
         if count[CONTACTS] + fresh > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
         flagged = pass_contacts(grains, contacts, long_range, clock, count, lost, rules)
@@ -288,4 +288,4 @@ def driver_for(plan: KernelSpec) -> Callable:
         leave(rules)
         return stop
 
-    return kernel(advance, keep=plan.keep, alone=plan.queue, wide=plan.wide)
+    return kernel(advance, cached=plan.keep, nogil=plan.queue, long_vectors=plan.wide)

@@ -9,8 +9,8 @@ import numpy as np
 from ..box import Span, nearest_image
 from ..compiler.jit import loop
 from ..contact.gather import BLOCK, gather
-from ..numerics.float_order import float_from_bits, magnitude_bits, rank
 from ..numerics.quaternion import turn, turned
+from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import axpy, dot, load, load4, put, put4, scale
 
 OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ def kicked(grains, i, dt):
 @loop
 def kick_some(grains, first, last, dt):
     """Velocities and spins of the grains first…last − 1 (uint64); ranks of the largest squares of speed and spin."""
-    fastest = fastest_spin = rank(0.0)
+    fastest = fastest_spin = float_bits(0.0)
     for k in range(last - first):
         v, w = kicked(grains, first + k, dt)
         fastest, fastest_spin = max(fastest, magnitude_bits(dot(v, v))), max(fastest_spin, magnitude_bits(dot(w, w)))
@@ -49,7 +49,7 @@ def kick(grains, dt):
 @loop
 def gather_and_kick(grains, contacts, first, last, dt):
     """Loads of contacts, the only ones, and the kick that they give, few grains at a time; as `kick_some`."""
-    fastest = fastest_spin = rank(0.0)
+    fastest = fastest_spin = float_bits(0.0)
     while first < last:
         end = min(first + BLOCK_OF_GRAINS, last)
         gather(grains, contacts, first, end)
@@ -77,9 +77,9 @@ def drift_for(magnetic: bool) -> Callable:
     def drift_some(grains, first, last, span, dt):
         """Grains first…last − 1 (uint64): kick for dt/2; x += v dt, wrapped into its box, ϱ turned by ω dt.
 
-        Returns the rank of the largest square of a speed.
+        Returns the bits of the largest square of a speed.
         """
-        fastest = rank(0.0)
+        fastest = float_bits(0.0)
         for k in range(last - first):
             i = first + k
             v, w = kicked(grains, i, 0.5 * dt)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.jit import loop
-from ..contact.gather import gather_by_number
+from ..contact.gather import gather_in_index_order
 from ..contact.slip import contact_pass, load_slip_sums, log_slip_sums
-from ..numerics.float_order import float_from_bits, magnitude_bits, rank
+from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..state.state import CONTACTS, STEP
 from .kernel_spec import KernelSpec
 from .motion import gather_and_kick, kick_and_drift_for
@@ -38,7 +38,7 @@ def _pass_alone(grains, contacts, long_range, clock, count, lost, rules):
 
 @loop
 def _gather_alone(grains, contacts, long_range, count, rules):
-    gather_by_number(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
+    gather_in_index_order(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
 
 
 @loop
@@ -103,7 +103,7 @@ def _by_a_crew(plan: KernelSpec) -> Large:
         rules.queue.step[0] = dt
         blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
         share(GATHER_AND_KICK, blocks, grains, contacts, long_range, count, rules)
-        fastest = fastest_spin = rank(0.0)
+        fastest = fastest_spin = float_bits(0.0)
         for b in range(blocks):
             fastest = max(fastest, magnitude_bits(rules.queue.speeds[b, 0]))
             fastest_spin = max(fastest_spin, magnitude_bits(rules.queue.speeds[b, 1]))
@@ -120,7 +120,7 @@ def _by_a_crew(plan: KernelSpec) -> Large:
         rules.queue.step[0] = dt
         blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
         share(DRIFT, blocks, grains, contacts, long_range, count, rules)
-        fastest = rank(0.0)
+        fastest = float_bits(0.0)
         for b in range(blocks):
             fastest = max(fastest, magnitude_bits(rules.queue.speeds[b, 0]))
         return dt * math.sqrt(float_from_bits(fastest))

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..box import nearest_image
 from ..compiler.jit import loop
-from ..contact.update import BROKE, whole_vectors
+from ..contact.update import BROKEN_FLAG, padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..state.state import CONTACTS
 
@@ -113,7 +113,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
 
     @loop
     def add_bonded(grains, contacts, count, span, numbers):
-        for c in range(whole_vectors(contacts, np.uint64(count[CONTACTS]))):
+        for c in range(padded_contact_count(contacts, np.uint64(count[CONTACTS]))):
             force, torque1, torque2 = pair(grains, span, numbers, contacts.pair[0, c], contacts.pair[1, c])
             part = 1.0 if contacts.bonded[c] == 1 else 0.0
             accrue(contacts.push, c, scale(part, force))
@@ -134,7 +134,7 @@ def bonded_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     @loop
     def swap_slow_parts(grains, contacts, count, long_range, span, numbers):
         for c in range(count[CONTACTS]):
-            dead = contacts.flag[c] == BROKE
+            dead = contacts.flag[c] == BROKEN_FLAG
             if dead or contacts.bonded[c] == 0:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, numbers, i, j)

@@ -7,7 +7,7 @@ from ..box import nearest_image
 from ..compiler.jit import formula, loop, rare
 from ..contact.pair_types import pair_type_index
 from ..forces.external.formulas import stiffness_of_field
-from ..numerics.float_order import float_from_bits, rank
+from ..numerics.simd import float_bits, float_from_bits
 from ..numerics.vec import dot, load, sub
 from ..state.state import (
     CALM,
@@ -109,13 +109,13 @@ def steps_of_free_grains(grains, long_range, start, count, control):
 
     GRAIN1 becomes a grain that is not finite. `start` (N + 1,) tells who has contacts (state.arrays.ContactArrays).
     """
-    step = cycle = rank(control.longest)
+    step = cycle = float_bits(control.longest)
     lost = 0.0
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         lost += 0.0 if (dot(v, v) < math.inf) & (dot(w, w) < math.inf) else 1.0
         own_step, own_cycle = grain_step(grains, long_range, start, control, i)
-        step, cycle = min(step, rank(own_step)), min(cycle, rank(own_cycle))
+        step, cycle = min(step, float_bits(own_step)), min(cycle, float_bits(own_cycle))
     if lost > 0.0:
         count[GRAIN1] = first_not_finite(grains)
         return 0.0, 0.0
@@ -164,9 +164,9 @@ def _safe_speed(pair_list, control):
 @loop
 def closing_step(grains, pair_list, count, span, control, wanted):
     """The longest step [s], at most `wanted`, that pairs about to touch or in contact allow."""
-    least = rank(wanted)
+    least = float_bits(wanted)
     for p in range(count[PAIRS]):
-        least = min(least, rank(pair_step(grains, pair_list, span, control, p)))
+        least = min(least, float_bits(pair_step(grains, pair_list, span, control, p)))
     return float_from_bits(least)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from ..box import nearest_image
 from ..compiler.jit import loop, rare
-from ..contact.events import compact_contacts, damp_contacts, log_stiffness_work, make_contacts, update_flagged_contacts
+from ..contact.events import compact_contacts, damp_contacts, form_contacts, log_stiffness_work, update_flagged_contacts
 from ..contact.gather import sort_contacts_by_grain
 from ..contact.update import contact_step
 from ..forces.external.loops import outside_energy, outside_wrap
@@ -132,7 +132,7 @@ def update_contacts(grains, contacts, pair_list, clock, count, lost, rules, stal
     if law.damped:
         damp_contacts(grains, contacts, count, lost, span, dt)
     if fresh > 0:
-        make_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt)
+        form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt)
     if fresh > 0:
         sort_contacts_by_grain(contacts, count, grains.mass.size)
     if fresh > 0 or stale:

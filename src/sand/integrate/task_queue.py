@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiler.atomics import fetch_add, read, write, yield_cpu
-from ..compiler.jit import CAN_SHARE, kernel, loop, rare, shared
+from ..compiler.jit import HAS_NOINLINE, kernel, loop, noinline, rare
 from ..contact.gather import gather
 from ..contact.slip import contact_pass, store_slip_sums
 from ..forces.pair.loops import PARALLEL_FROM
 from ..grains import GrainArrays
-from ..numerics.float_order import float_from_bits
+from ..numerics.simd import float_from_bits
 from ..state.state import CONTACTS
 from .kernel_spec import KernelSpec
 from .motion import BLOCK_OF_GRAINS, OPEN, drift_for, gather_and_kick
@@ -42,7 +42,7 @@ FRONT, BACK, BLOCKS, TASK = 0, _BITS, 2 * _BITS, 3 * _BITS
 
 def is_large(grains: int) -> bool:
     """True if a simulation of so many grains is for a crew, be it of one thread."""
-    return CAN_SHARE and grains >= PARALLEL_FROM
+    return HAS_NOINLINE and grains >= PARALLEL_FROM
 
 
 def benefits_from_workers(plan: KernelSpec, grains: GrainArrays, contacts: int) -> bool:
@@ -105,7 +105,7 @@ def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
     """The function that shares a task among all threads, and the kernel that a helper runs meanwhile."""
     far_block, drift_some = plan.long_range.parts.block, drift_for(plan.magnetic)
 
-    @shared
+    @noinline
     def do_block(task, b, grains, contacts, long_range, count, rules):
         if task == PASS:
             first = b * CONTACTS_PER_BLOCK
@@ -130,7 +130,7 @@ def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
             v = drift_some(grains, np.uint64(first), np.uint64(last), span_of_drift(rules), rules.queue.step[0])
             rules.queue.speeds[b, 0] = float_from_bits(v)
 
-    @shared
+    @noinline
     def share(task, blocks, grains, contacts, long_range, count, rules):
         words = rules.queue.words
         write(words, DONE, 0)
@@ -167,7 +167,7 @@ def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
             word = read(words, WORD)
         fetch_add(words, INSIDE, -1)
 
-    return share, kernel(worker_loop, keep=plan.keep, alone=True, wide=plan.wide)
+    return share, kernel(worker_loop, cached=plan.keep, nogil=True, long_vectors=plan.wide)
 
 
 @loop

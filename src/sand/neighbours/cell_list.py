@@ -7,7 +7,7 @@ import numpy as np
 
 from ..box import nearest_image
 from ..compiler.jit import kernel, loop, rare
-from ..numerics.aligned import SIMD_WIDTH
+from ..numerics.simd import SIMD_WIDTH
 from ..numerics.vec import dot, load, put, sub
 from ..state.arrays import CELLS_PER_GRAIN
 from ..state.state import LISTED

@@ -48,7 +48,7 @@ def share_within(position: np.ndarray, box: Box, reach: float) -> float:
     return float(((apart**2).sum(axis=-1) < reach**2)[another].mean())
 
 
-class Found(NamedTuple):
+class ChosenSearch(NamedTuple):
     """The search in force, and why."""
 
     search: Search
@@ -108,19 +108,19 @@ class Neighbours:
         """Its settings in SI."""
         return {"search": self.search, "margin": self.margin, "order": self.order}
 
-    def along_curve(self, count: int) -> bool:
+    def uses_spatial_sort(self, count: int) -> bool:
         """True if so many grains are kept in an order of their own."""
         return self.order == "curve" or (self.order == "auto" and count >= CURVE_FROM)
 
     def settled(self, search: Search, count: int) -> Neighbours:
         """What was chosen, so that a run that goes on from elsewhere chooses the same."""
-        order = "curve" if self.along_curve(count) else "as given"
+        order = "curve" if self.uses_spatial_sort(count) else "as given"
         how = "cells" if search.listed or search.celled else "all pairs"
         return Neighbours(how, search.margin or "auto", order)  # any margin would ask for a list
 
     def choose(
-        self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, flights: bool = False
-    ) -> Found:
+        self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, adaptive_steps: bool = False
+    ) -> ChosenSearch:
         """The search for these grains.
 
         Parameters
@@ -129,34 +129,34 @@ class Neighbours:
             gap [m] up to which pairs count as near a contact.
         cutoffs : Sequence[float]
             radii [m] of the long-range forces that have one.
-        flights : bool, optional
+        adaptive_steps : bool, optional
             whether steps may be as long as the list lasts.
         """
         touch = 2.0 * float(grains.radius.max()) + reach
         widest = max(cutoffs, default=0.0)
         # near pairs come straight from cells, or out of a list; their own margin is half their reach
-        celled = widest == 0.0 and self.margin == "auto" and not flights
+        celled = widest == 0.0 and self.margin == "auto" and not adaptive_steps
         margin = 0.0 if celled else self.margin
         if margin == "auto":
-            margin = (MARGIN_OF_FLIGHTS if flights else MARGIN) * widest if widest > 0.0 else 0.5 * reach
+            margin = (MARGIN_OF_FLIGHTS if adaptive_steps else MARGIN) * widest if widest > 0.0 else 0.5 * reach
         whole = max(widest, touch) + margin
         nothing = Search(False, whole, margin)
         if self.search == "all pairs":
-            return Found(nothing, "all pairs, asked for")
+            return ChosenSearch(nothing, "all pairs, asked for")
         if self.search == "auto":
             if len(grains) < LIST_FROM:
-                return Found(nothing, f"all pairs: fewer than {LIST_FROM} grains")
+                return ChosenSearch(nothing, f"all pairs: fewer than {LIST_FROM} grains")
             share = share_within(grains.position, box, whole)
             if share > LIST_UP_TO:
                 held = f"a grain has {share:.2g} of the others within {format_quantity(whole, 'm')}, more than {LIST_UP_TO}"
-                return Found(nothing, f"all pairs: {held}")
+                return ChosenSearch(nothing, f"all pairs: {held}")
         if celled:
             near = format_quantity(whole, "m")
-            return Found(Search(False, whole, margin, True), f"cells, for pairs closer than {near} (contacts)")
+            return ChosenSearch(Search(False, whole, margin, True), f"cells, for pairs closer than {near} (contacts)")
         purpose = (
             f"cut-off {format_quantity(widest, 'm')}" if widest > touch else f"contacts {format_quantity(touch, 'm')}"
         )
-        return Found(
+        return ChosenSearch(
             Search(True, whole, margin),
             f"cells and a list of pairs closer than {format_quantity(whole, 'm')} ({purpose}, margin {format_quantity(margin, 'm')})",
         )

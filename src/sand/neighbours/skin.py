@@ -10,8 +10,8 @@ import math
 
 from ..box import nearest_image
 from ..compiler.jit import loop
-from ..contact.pair_types import kinds
-from ..numerics.float_order import float_from_bits, magnitude_bits, rank
+from ..contact.pair_types import pair_type_count
+from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import dot, load, sub
 from ..state.state import INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED
 
@@ -37,7 +37,7 @@ def invalidate_skins(pair_list):
 def update_safe_speed(pair_list, count):
     """The speed [m/s] that is δ_c in the step of a contact, for the pair of the list for which it is least."""
     harmless = math.inf
-    for k in range(kinds(pair_list, count)):
+    for k in range(pair_type_count(pair_list, count)):
         harmless = min(harmless, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)
     pair_list.skin[SAFE_SPEED] = harmless
 
@@ -53,7 +53,7 @@ def reset_skins(pair_list, count):
 @loop
 def largest_speeds(grains):
     """Squares of the largest speed [m²/s²] and spin [1/s²]."""
-    fastest = fastest_spin = rank(0.0)
+    fastest = fastest_spin = float_bits(0.0)
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         fastest, fastest_spin = max(fastest, magnitude_bits(dot(v, v))), max(fastest_spin, magnitude_bits(dot(w, w)))
@@ -82,7 +82,7 @@ def largest_displacement(grains, anchor, span):
     What counts is the displacement, not the way: a grain that rings in its cluster moves as the cluster does, to
     within its amplitude, and does not make a list stale.
     """
-    most = rank(0.0)
+    most = float_bits(0.0)
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
         most = max(most, magnitude_bits(dot(moved, moved)))

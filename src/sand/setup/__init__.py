@@ -1,6 +1,6 @@
 """How simulations begin."""
 
-from ..neighbours.morton_order import in_space_order
+from ..neighbours.spatial_sort import in_space_order
 from .aggregates import KINDS, build, chain, grain, hexagonal, lattice
 from .ballistic import bcca, bpca
 from .deposit import rbd

@@ -22,21 +22,21 @@ from ..integrate.step_control import IMPACT_PART, Control
 from ..integrate.task_queue import is_large
 from ..integrate.verlet import Verlet
 from ..material import SILICA
-from ..neighbours.settings import Found, Neighbours
+from ..neighbours.settings import ChosenSearch, Neighbours
 from ..setup.from_frame import Bonds
 from ..state.arrays import (
-    ALWAYS,
-    FOR_CELLS,
-    FOR_FORCES,
-    FOR_IMPULSES,
-    FOR_LIST,
-    FOR_RATES,
-    SPARE,
+    ALWAYS_RECORDED,
+    CELL_ARRAYS,
+    FORCE_ARRAYS,
+    LIST_ARRAYS,
+    OVER_ALLOCATION,
+    RATE_ARRAYS,
+    RESPA_ARRAYS,
     empty_contact_arrays,
     empty_long_range_arrays,
     empty_pair_list,
+    stage_arrays,
 )
-from ..state.stages import stage_arrays
 from ..state.state import RECORDED, State
 from .checks import impossible, unusual
 from .engine import Engine
@@ -98,7 +98,7 @@ def build_engine(
     reach = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in given.distant]
     flights = isinstance(stepping, Adaptive)
-    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], flights=flights)
+    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], adaptive_steps=flights)
     long_range = _far(given, grains, box, [found.search.listed and r is not None for r in cutoffs])
     verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
     control = _control(grains, verlet, given, reach)
@@ -122,10 +122,10 @@ def build_engine(
     here = grains.copy()
     here.arrays.position[...] = box.wrap(grains.position).T
     start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
-    room = int(SPARE * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
+    room = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     state = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
-    search = found.reason + ("; in memory along a curve through space" if chosen.along_curve(len(grains)) else "")
+    search = found.reason + ("; in memory along a curve through space" if chosen.uses_spatial_sort(len(grains)) else "")
     engine = Engine(state, rules, warnings, given.external, long_range, search, stepping, chosen, plan)
     held = seed_contacts(engine, given.contact, contacts)
     if given.contact is not None:
@@ -176,13 +176,13 @@ def _plan(
 def _world(grains: Grains, box: Box, rules: StepParameters, plan: KernelSpec, room: int, *, all_pairs: bool) -> State:
     """The grains in their box, with `room` for contacts and pairs, and for whatever else plan and rules need."""
     count, listed, uniform_contacts = len(grains), rules.search.listed, rules.contact.uniform_contacts
-    channels = len(RECORDED) if rules.contact.damped or rules.contact.follow else ALWAYS
+    channels = len(RECORDED) if rules.contact.damped or rules.contact.follow else ALWAYS_RECORDED
     blocks = all_blocks(grains) if plan.long_range is not NO_LONG_RANGE_FORCE and all_pairs else 0
-    needed = set(FOR_LIST if listed else FOR_CELLS if rules.search.celled else ())
-    needed |= set(FOR_IMPULSES if plan.impulse else ())
-    needed |= set(FOR_RATES if plan.taylor else ())
+    needed = set(LIST_ARRAYS if listed else CELL_ARRAYS if rules.search.celled else ())
+    needed |= set(RESPA_ARRAYS if plan.impulse else ())
+    needed |= set(RATE_ARRAYS if plan.taylor else ())
     needed |= {"packed_position", "source"} if blocks else set()
-    needed |= set(FOR_FORCES if plan.long_range is not NO_LONG_RANGE_FORCE or plan.adaptive else ())
+    needed |= set(FORCE_ARRAYS if plan.long_range is not NO_LONG_RANGE_FORCE or plan.adaptive else ())
     return State(
         grains,
         box,
@@ -192,14 +192,14 @@ def _world(grains: Grains, box: Box, rules: StepParameters, plan: KernelSpec, ro
             count,
             MATES * count if listed else IN_REACH if rules.search.celled else 0,
             blocks,
-            needless={*FOR_FORCES, *FOR_LIST, *FOR_IMPULSES, *FOR_RATES} - needed,
+            needless={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
         stages=stage_arrays(count if plan.adaptive else 0),
         uniform_contacts=uniform_contacts,
     )
 
 
-def _stride(grains: Grains, box: Box, found: Found) -> float:
+def _stride(grains: Grains, box: Box, found: ChosenSearch) -> float:
     """The longest way [m] that a grain may go in one Runge–Kutta step, so that no pair is missed.
 
     With a list, Δr/4, as `integrate.event_location.first_touch` argues.  And an image of a grain other than the nearest must not

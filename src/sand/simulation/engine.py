@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.events import add_initial_contacts
 from ..contact.gather import resort_contacts_by_grain
-from ..contact.initial import seed_contacts
 from ..forces.base import GrainForce, LongRangeForce
 from ..forces.external.loops import outside_shares_for
 from ..forces.pair.loops import shares_for
@@ -24,8 +24,8 @@ from ..integrate.verlet import Verlet
 from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
-from ..neighbours.spatial_sort import RENEWED_EVERY, inverse, rearrange, sort_columns, spatial_order
-from ..state.arrays import SPARE
+from ..neighbours.spatial_sort import SORT_INTERVAL, inverse, reorder_grains, sort_contacts_and_pairs, spatial_order
+from ..state.arrays import OVER_ALLOCATION
 from ..state.state import (
     CHECKED,
     CONTACT_STEP,
@@ -99,7 +99,7 @@ class Engine:
     def restore_user_order(self) -> None:
         """Give every grain the number back that the user knows it by, until the next step is taken."""
         if self._away:
-            rearrange(self._world, inverse(self._world.order))
+            reorder_grains(self._world, inverse(self._world.order))
             self._away = False
 
     @property
@@ -114,25 +114,25 @@ class Engine:
 
     def _sort_in_space(self) -> None:
         """Grains where steps are fast, if that is not where they are."""
-        if not self._world.order.size or self.steps >= self._world.count[ORDERED] + RENEWED_EVERY:
+        if not self._world.order.size or self.steps >= self._world.count[ORDERED] + SORT_INTERVAL:
             w = self.state
             w.order, w.count[ORDERED] = spatial_order(w), w.steps
-            rearrange(w, w.order)
-            sort_columns(w)
+            reorder_grains(w, w.order)
+            sort_contacts_and_pairs(w)
             self._remake_list()
         elif not self._away:
-            rearrange(self._world, self._world.order)
+            reorder_grains(self._world, self._world.order)
         self._away = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
         """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
         last = min(self.steps + most_steps, 2**62)
-        if not self.neighbours.along_curve(len(self._world.grains)):
+        if not self.neighbours.uses_spatial_sort(len(self._world.grains)):
             return self._drive(until, last)
         while True:
             if self.time < until and self.steps < last:
                 self._sort_in_space()
-            renewed = self._world.count[ORDERED] + RENEWED_EVERY
+            renewed = self._world.count[ORDERED] + SORT_INTERVAL
             stop = self._drive(until, min(last, renewed))
             if not (stop is Stop.STEPS_DONE and renewed <= self.steps < last):
                 return stop
@@ -154,7 +154,7 @@ class Engine:
                 w.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
                 found, w.count[PAIRS] = int(w.count[PAIRS]), 0  # none of the list holds
-                w.grow_pairs(int(SPARE * found))
+                w.grow_pairs(int(OVER_ALLOCATION * found))
             elif stop is Stop.LIST_FULL:
                 w.grow_rows()
             else:
@@ -177,7 +177,9 @@ class Engine:
             w.grow_contacts(len(pair))
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
-        return int(seed_contacts(w.grains.arrays, w.contacts, w.count, w.box.span, self.rules.contact, pairs, *given))
+        return int(
+            add_initial_contacts(w.grains.arrays, w.contacts, w.count, w.box.span, self.rules.contact, pairs, *given)
+        )
 
     def begin(self) -> None:
         """Contacts of grains that touch at the start, nothing booked, and the first loads."""
@@ -195,7 +197,7 @@ class Engine:
         w = self.state
         w.from_arrays(saved)
         if w.order.size:  # lists depend on it
-            rearrange(w, w.order)
+            reorder_grains(w, w.order)
             self._away = True
         elif w.contacts.gather_order.size:
             resort_contacts_by_grain(w.contacts, w.count, len(w.grains))

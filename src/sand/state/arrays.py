@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..numerics.aligned import all_aligned, whole
+from ..numerics.simd import all_aligned, whole
 
-ALWAYS = 4
+ALWAYS_RECORDED = 4
 """The first records are kept in every contact law, the others only with damping or stiffnesses that change."""
 
 
@@ -36,7 +36,7 @@ class ContactArrays(NamedTuple):
     start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
     gather_order: (
         np.ndarray
-    )  # (N + KINDS,) uint32: the grains as contact.gather takes them; (0,) for as they are numbered
+    )  # (N + GATHER_CLASSES,) uint32: the grains as contact.gather takes them; (0,) for as they are numbered
 
 
 class PairList(NamedTuple):
@@ -80,25 +80,33 @@ class LongRangeArrays(NamedTuple):
     block_sums: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
+class StageArrays(NamedTuple):
+    """Room for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Never saved."""
+
+    start: np.ndarray  # (13, N) the state that a step begins with
+    rate: np.ndarray  # (7, 13, N) its rates of change at each stage
+    power: np.ndarray  # (7,) of the outside forces at each stage [W]
+
+
 SAVED_LONG_RANGE = ("anchor", "force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
-FOR_FORCES = ("force", "torque")
-FOR_CELLS = ("order", "cell_of", "cell", "source")
-FOR_LIST = ("anchor", "start", "packed_position", *FOR_CELLS)
-FOR_IMPULSES = ("slow_force", "slow_torque", "past_position", "path")
-FOR_RATES = ("force_rate", "torque_rate", "past_position", "past_moment")
+FORCE_ARRAYS = ("force", "torque")
+CELL_ARRAYS = ("order", "cell_of", "cell", "source")
+LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
+RESPA_ARRAYS = ("slow_force", "slow_torque", "past_position", "path")
+RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
 """The far arrays that only long-range forces, cells, a list, or cycles of either kind, read and write."""
-FOR_ALL = ("bond", "step", "length")
+UNIFORM_ARRAYS = ("bond", "step", "length")
 """Numbers of contacts and near pairs that are the same for all where grains are equal."""
 NOT_SAVED = ("inner", "skin", "gather_order")
 """Of contacts and near pairs, what it leaves out: it is picked or worked out anew."""
-KINDS = 64
+GATHER_CLASSES = 64
 """Places behind all grains that sorting them by their contacts needs."""
-TURNS_FROM = 4000
+GATHER_ORDER_FROM = 4000
 """Fewest grains for which the gathering has an order of its own; what fewer have, the branch predictor learns."""
 BLOCK = 128
 """Contacts that are passed over together, whole vectors of them."""
-SPARE, GROWTH = 1.1, 1.25
+OVER_ALLOCATION, GROWTH = 1.1, 1.25
 """Room for what is known to come, contacts at the start or pairs of a list; what is full grows by the second factor."""
 PAIRS_PER_SOON = 8
 """Near pairs for each of those that may touch soon and have room; where more are that close, all are looked at."""
@@ -136,7 +144,7 @@ def empty_contact_arrays(
     """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
     c = whole(max(int(room), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
-    numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS else 0)}
+    numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS_RECORDED else 0)}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         bond=np.zeros((constants, BLOCK if uniform_contacts else c)),
@@ -145,7 +153,7 @@ def empty_contact_arrays(
         lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
-        gather_order=np.zeros(grains + KINDS if grains >= TURNS_FROM else 0, np.uint32),
+        gather_order=np.zeros(grains + GATHER_CLASSES if grains >= GATHER_ORDER_FROM else 0, np.uint32),
         **(vectors | numbers),
     )
 
@@ -156,6 +164,11 @@ def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = Fals
     pair, touching, inner = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p // PAIRS_PER_SOON, np.uint32)
     kind = np.zeros((2, 1 if uniform_contacts else p))
     return PairList(pair, touching, kind[0], kind[1], nowhere, inner, np.full(7, -1.0))
+
+
+def stage_arrays(grains: int) -> StageArrays:
+    """Room for so many grains; 0 where no Runge–Kutta step is taken."""
+    return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
 def grown(arrays: Any, others: Collection[str], least: int) -> Any:

@@ -10,9 +10,19 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput
 from ..grains import GrainArrays, Grains
-from ..numerics.aligned import all_aligned
-from .arrays import FOR_ALL, GROWTH, NOT_SAVED, SAVED_LONG_RANGE, ContactArrays, LongRangeArrays, PairList, grown
-from .stages import StageArrays, stage_arrays
+from ..numerics.simd import all_aligned
+from .arrays import (
+    GROWTH,
+    NOT_SAVED,
+    SAVED_LONG_RANGE,
+    UNIFORM_ARRAYS,
+    ContactArrays,
+    LongRangeArrays,
+    PairList,
+    StageArrays,
+    grown,
+    stage_arrays,
+)
 
 # --- indices of State.clock (float64) ---------------------------------------------------------------
 TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, LONG_RANGE_LEVEL, CALM, KICKED, FLIGHT = range(10)
@@ -77,7 +87,7 @@ class State:
         return replace(copy.deepcopy(self))  # made anew, so that its arrays begin with a line
 
     def _for_all(self) -> tuple[str, ...]:
-        return FOR_ALL if self.uniform_contacts else ()
+        return UNIFORM_ARRAYS if self.uniform_contacts else ()
 
     def _columns(self, group: str, name: str) -> int | None:
         """How many columns of an array of contacts or near pairs a checkpoint holds; None: all."""

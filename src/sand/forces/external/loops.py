@@ -74,7 +74,7 @@ def outside_shares_for(formula_of_grain):
         for i in range(grains.mass.size):
             shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
 
-    return kernel(fill_shares, keep=is_ours(formula_of_grain))
+    return kernel(fill_shares, cached=is_ours(formula_of_grain))
 
 
 def is_ours(formula_of_grain):
