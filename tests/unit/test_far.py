@@ -62,11 +62,11 @@ def test_taylor_torque_is_the_whole_product_rule():
         moment=6e-18 * rng.normal(size=(3, 3)),
     )
     from sand.compiler.jit import kernel
-    from sand.forces.pair.dipole_loops import CUT
+    from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
     from sand.integrate.respa import clear_rates, set_mean_velocities
     from sand.state.arrays import empty_long_range_arrays
 
-    sum_rates = CUT.rates
+    sum_rates = ALL_PAIRS_CUT.rates
 
     def fill(g, far, start, span, rules):
         set_mean_velocities(g, far, start, span, 0.0, True)

@@ -14,10 +14,10 @@ import sand
 from sand.compiler.jit import kernel
 from sand.config.case import check_case
 from sand.errors import BadInput
-from sand.forces.base import GrainForce
+from sand.forces.base import ExternalForce
 from sand.forces.external import formulas as surroundings
 from sand.forces.external.formulas import GrainState, field_in_time, flux_density_at, uniform_field
-from sand.forces.external.loops import is_ours
+from sand.forces.external.loops import is_builtin
 
 EPS = np.finfo(float).eps
 component = st.integers(-100, 100).map(lambda n: n / 100)
@@ -105,7 +105,7 @@ def test_compiled_formulas_compute_the_same(force):
     size = max(np.abs(np.concatenate([*plain[:2], [plain[2]]])))
     for found, expected in zip(compiled, plain, strict=True):
         assert found == pytest.approx(expected, abs=100 * EPS * size)
-    assert is_ours(force.formula)
+    assert is_builtin(force.formula)
 
 
 # --- B(t) -------------------------------------------------------------------------------------------
@@ -200,14 +200,14 @@ def test_forces_that_have_a_place_say_so():
         assert not getattr(force, "time_dependent", False)
         assert force.flux_density_size() == 0.0
     assert not any(getattr(f, "position_dependent", False) for f in FIELDS)
-    assert all(isinstance(f, GrainForce) for f in FORCES)
+    assert all(isinstance(f, ExternalForce) for f in FORCES)
 
 
 def test_a_users_force_needs_none_of_the_new_members():
-    """A class written before `timed`, `moored` and `longest_step` is still a force that acts on one grain."""
+    """A class written before `time_dependent`, `position_dependent` and `longest_step` is still a force that acts on one grain."""
     asked = ("parameters", "check", "numbers", "flux_density_size")
     old = type("Old", (), {"name": "old", "references": "", "formula": None, **dict.fromkeys(asked, lambda self: 0)})
-    assert isinstance(old(), GrainForce)
+    assert isinstance(old(), ExternalForce)
 
 
 def test_warnings_about_grains_that_feel_nothing():

@@ -35,13 +35,13 @@ class Force(Protocol):
 
 
 @runtime_checkable
-class GrainForce(Force, Protocol):
+class ExternalForce(Force, Protocol):
     """A force that acts on one grain at a time (forces/external/formulas.py has the formulas).
 
     Four more members are looked for; without them a force has neither a clock nor a place, nor a step of its own:
 
-    `timed`  True if the energy depends on time explicitly: what its source does is then booked as work.
-    `moored`  True if the energy depends on the position: crossing a periodic boundary is then booked as work.
+    `time_dependent`  True if the energy depends on time explicitly: what its source does is then booked as work.
+    `position_dependent`  True if the energy depends on the position: crossing a periodic boundary is then booked as work.
     `flux_density_at(time)`  the flux density it brings [T], for `Simulation.at_grains`.
     `longest_step()`  longest step [s] that resolves how the force itself varies in time; `math.inf` if it does not.
 
@@ -90,7 +90,7 @@ class LongRangeForce(Force, Protocol):
         """What two grains in touch may have at stake [J]; limits the step."""
 
 
-def compose(forces: Sequence[GrainForce]) -> tuple[Callable, Any]:
+def compose(forces: Sequence[ExternalForce]) -> tuple[Callable, Any]:
     """One formula and one nested tuple of parameters for a list of per-grain forces, in order."""
     formula, numbers = nothing, ()
     for force in reversed(forces):

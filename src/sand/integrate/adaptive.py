@@ -12,14 +12,14 @@ from ..arguments import checked
 from ..errors import FORBID_EXTRA, BadInput, shown
 from ..grains import Grains
 from ..units import is_word, si
-from .step_control import Control
+from .step_control import StepCriteria
 from .verlet import Verlet
 
 ERRORS = {"position_error": "m", "velocity_error": "m/s", "turn_error": "rad", "spin_error": "rad/s"}
 """The prescribed errors and their units."""
 
 
-class Precision(NamedTuple):
+class ErrorLimits(NamedTuple):
     """What a Runge–Kutta step must keep to."""
 
     position: float  # allowed error of a step [m]
@@ -92,27 +92,27 @@ class Adaptive:
         own = {key: getattr(self, key) for key in ("tolerance", *ERRORS)}
         return {"method": self.name, **own, "touching": touching}
 
-    def settled(self, grains: Grains, control: Control) -> Adaptive:
+    def resolved(self, grains: Grains, criteria: StepCriteria) -> Adaptive:
         """The same with a number for every "auto", from the grains at the start."""
-        scales = dict(zip(ERRORS, natural_scales(grains, control), strict=True))
+        scales = dict(zip(ERRORS, natural_scales(grains, criteria), strict=True))
         auto = {key: self.tolerance * scale for key, scale in scales.items() if getattr(self, key) == "auto"}
         return replace(self, **auto)
 
-    def precision(self, stride: float) -> Precision:
+    def error_limits(self, stride: float) -> ErrorLimits:
         """What the driver takes, once settled."""
-        return Precision(self.position_error, self.velocity_error, self.turn_error, self.spin_error, stride)
+        return ErrorLimits(self.position_error, self.velocity_error, self.turn_error, self.spin_error, stride)
 
 
-def natural_scales(grains: Grains, control: Control) -> tuple[float, float, float, float]:
+def natural_scales(grains: Grains, criteria: StepCriteria) -> tuple[float, float, float, float]:
     """A length [m], a speed [m/s], an angle [rad] and a spin [rad/s] that are typical of the motion; never 0."""
     moment = float(np.linalg.norm(grains.body_moment, axis=1).max())
     length = float(grains.radius.min())
     speed = float(np.linalg.norm(grains.velocity, axis=1).max())
     spin = float(np.linalg.norm(grains.spin, axis=1).max())
-    swing = max(control.energy_scale, moment * control.outer_field)
+    swing = max(criteria.energy_scale, moment * criteria.outer_field)
     return (
         length,
-        max(speed, math.sqrt(control.energy_scale / float(grains.mass.max())), length / control.longest),
+        max(speed, math.sqrt(criteria.energy_scale / float(grains.mass.max())), length / criteria.longest),
         1.0,
-        max(spin, math.sqrt(swing / float(grains.inertia.max())), 1.0 / control.longest),
+        max(spin, math.sqrt(swing / float(grains.inertia.max())), 1.0 / criteria.longest),
     )

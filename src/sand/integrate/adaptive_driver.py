@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from ..box import nearest_image
 from ..compiler.jit import kernel, loop
-from ..forces.external.loops import outside_energy, outside_wrap
+from ..forces.external.loops import external_energy, external_wrap
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement, reset_skins
 from ..numerics.vec import dot, load, put
@@ -32,10 +32,19 @@ from ..state.state import (
     TIME,
 )
 from .driver import halves_for
-from .event_location import NEVER, first_touch
+from .event_location import NEVER, first_contact_time
 from .kernel_spec import KernelSpec, Stop
-from .runge_kutta import GROW, error_of, loads_at_stage, next_factor, normalise_all, place_stage, trial_for, work_of
-from .step_control import GROW_EVERY, steps_of_free_grains
+from .runge_kutta import (
+    GROW,
+    error_of,
+    loads_at_stage,
+    step_size_factor,
+    normalise_all,
+    place_stage,
+    trial_for,
+    work_of,
+)
+from .step_control import INCREASE_INTERVAL, steps_of_free_grains
 from .step_parts import apply_drag_and_noise, no_gas
 from .task_queue import join_workers, no_workers
 
@@ -63,12 +72,12 @@ def first_trial(grains, contacts, long_range, clock, count, rules):
     """The step to try [s]: what the last one left, or Verlet's own after a start or a parting; 0 if not finite."""
     dt = clock[FLIGHT]
     if not dt > 0.0:
-        dt, _ = steps_of_free_grains(grains, long_range, contacts.start, count, rules.control)
+        dt, _ = steps_of_free_grains(grains, long_range, contacts.start, count, rules.criteria)
     fastest = 0.0
     for i in range(grains.mass.size):
         v = load(grains.velocity, i)
         fastest = max(fastest, dot(v, v))
-    stride = STRIDE_PART * rules.precision.stride
+    stride = STRIDE_PART * rules.error_limits.stride
     if fastest * dt * dt > stride * stride:
         dt = stride / math.sqrt(fastest)
     return dt
@@ -101,18 +110,18 @@ def step_for(plan: KernelSpec) -> Callable:
                 return 0.0, False, Stop.NO_STEP
             error, stray = math.inf, -1
             if try_step(grains, long_range, stages, count, rules, clock[TIME], dt):
-                error, stray = error_of(stages, dt, rules.precision)
+                error, stray = error_of(stages, dt, rules.error_limits)
             if not error <= 1.0:
                 count[GRAIN1], count[GRAIN2] = stray, -1
                 count[REJECTED] += 1
-                dt *= next_factor(error, ORDER)
+                dt *= step_size_factor(error, ORDER)
                 growth, tries = 1.0, 0
                 continue
             if tries == 0:
-                wish = dt * min(growth, next_factor(error, ORDER))
-            touch = first_touch(grains, long_range, stages, rules, dt) if rules.contact.on else NEVER
+                wish = dt * min(growth, step_size_factor(error, ORDER))
+            touch = first_contact_time(grains, long_range, stages, rules, dt) if rules.contact.on else NEVER
             if touch >= 1.0 or tries == TRIES:
-                clock[FLIGHT] = min(wish, rules.control.longest)
+                clock[FLIGHT] = min(wish, rules.criteria.longest)
                 return dt, touch <= 1.0, Stop.STEPS_DONE
             dt *= touch
             tries += 1
@@ -124,14 +133,14 @@ def step_for(plan: KernelSpec) -> Callable:
 def flight_for(plan: KernelSpec) -> Callable:
     """The loop that takes one Runge–Kutta step and books it."""
     fitting_step, sum_stage = step_for(plan), loads_at_stage(plan.external, plan.long_range.loads)
-    energy, wrap_with_work = outside_energy(plan.external), outside_wrap(plan.external)
+    energy, wrap_with_work = external_energy(plan.external), external_wrap(plan.external)
     stir = apply_drag_and_noise if plan.gas else no_gas
 
     @loop
     def fly(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules):
         if refreshed(grains, long_range, count, rules) == FULL:
             return Stop.LIST_FULL
-        before = energy(grains, clock[TIME], rules.external) if rules.books.time_dependent else 0.0
+        before = energy(grains, clock[TIME], rules.external) if rules.external_work.time_dependent else 0.0
         dt, touched, stop = fitting_step(grains, contacts, long_range, stages, clock, count, rules)
         if stop != Stop.STEPS_DONE:
             return stop
@@ -139,9 +148,9 @@ def flight_for(plan: KernelSpec) -> Callable:
         invalidate_speeds(pair_list)
         invalidate_skins(pair_list)
         clock[TIME] += dt
-        if rules.books.time_dependent:
+        if rules.external_work.time_dependent:
             lost[OUTSIDE] -= energy(grains, clock[TIME], rules.external) - before + work_of(stages, dt)
-        if rules.books.position_dependent:
+        if rules.external_work.position_dependent:
             lost[OUTSIDE] -= wrap_with_work(grains, rules.span, clock[TIME], rules.external)
             sum_stage(grains, long_range, count, rules, clock[TIME])
         else:
@@ -151,7 +160,7 @@ def flight_for(plan: KernelSpec) -> Callable:
             # what is left is the second half of a step of 0 s, with new lists and then a new choice of the step
             pair_list.anchor[0, 0] = math.inf
             clock[FLIGHT] = 0.0
-            count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - GROW_EVERY
+            count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
             count[STAGE] = 1
             return Stop.STEPS_DONE
         clock[STEP] = dt
@@ -163,7 +172,7 @@ def flight_for(plan: KernelSpec) -> Callable:
 
 
 @functools.cache
-def flight_driver_for(plan: KernelSpec) -> Callable:
+def adaptive_driver_for(plan: KernelSpec) -> Callable:
     """The compiled `advance` of an adaptive run; as `advance.driver_for`, with the stages besides."""
     first_half, second_half = halves_for(plan)
     fly = flight_for(plan)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from ..compiler.jit import kernel, loop
 from ..contact.events import new_touches
-from ..forces.external.loops import outside_loads
+from ..forces.external.loops import external_loads
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE
 from ..neighbours.skin import consume_skins, invalidate_speeds, reset_skins
 from ..state.state import CONTACTS, CYCLE, LARGEST_SPEED, LARGEST_SPIN, LEFT, LONG_RANGE_SUMS, STAGE, STEP, STEPS, TIME
@@ -127,7 +127,7 @@ _NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
 @functools.cache
 def loads_loop(plan: KernelSpec) -> Callable:
     """The loop that sums forces and torques at the end of a step: the far ones if `due`, else what stands for them."""
-    add_outside = outside_loads(plan.external)
+    add_outside = external_loads(plan.external)
     gather_all, far_loads = large_loops(plan).gather, large_loops(plan).far_loads
     between = add_extrapolated_loads if plan.taylor else add_slow_loads if plan.impulse else _nothing_between
     take_out_bonded = bonded_loops(plan.long_range.pair)[1] if plan.split else _no_change
@@ -170,7 +170,7 @@ def loads_and_kick_loop(plan: KernelSpec) -> Callable:
         sum_loads(grains, contacts, long_range, clock, count, rules, due, elapsed)
         return kick(grains, 0.5 * clock[STEP])
 
-    return bare_loads_and_kick if plan.bare else loads_and_kick
+    return bare_loads_and_kick if plan.contacts_only else loads_and_kick
 
 
 @functools.cache
@@ -200,7 +200,7 @@ def halves_for(plan: KernelSpec) -> tuple[Callable, Callable]:
             swap_slow_parts(grains, contacts, count, long_range, rules.span, rules.long_range)
             clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
-    cut_short = _no_cycle if plan.bare else cut_cycle
+    cut_short = _no_cycle if plan.contacts_only else cut_cycle
 
     @loop
     def first_half(grains, contacts, pair_list, long_range, clock, count, lost, rules):
@@ -210,7 +210,7 @@ def halves_for(plan: KernelSpec) -> tuple[Callable, Callable]:
             cut_short(grains, contacts, long_range, clock, count, rules)
             return stop
         if clock[LEFT] == 0.0:
-            cycle = dt * cycle_steps(clock, count, rules.beat, dt)
+            cycle = dt * cycle_steps(clock, count, rules.respa, dt)
             set_rates(grains, contacts, long_range, clock, rules, cycle if cycle > dt else 0.0)
             clock[CYCLE] = clock[LEFT] = cycle
             begin(grains, long_range, clock, dt)

@@ -50,7 +50,7 @@ def curve_at(points, part):
 
 
 @loop
-def way_of_pair(grains, stages, span, i, j, dt):
+def separation_curve(grains, stages, span, i, j, dt):
     """The six points [m] of the separation x_i − x_j in the step."""
     start, rate, last = stages.start, stages.rate, STAGES - 1
     s0 = nearest_image(sub(rows3(start, X, i), rows3(start, X, j)), span)
@@ -77,7 +77,7 @@ def stays_away(points, limit):
 
 
 @rare
-def first_entry(points, limit):
+def first_crossing(points, limit):
     """The first part of the step at which the curve comes closer than `limit` [m], or NEVER."""
     before = 0.0
     _, slope = curve_at(points, 0.0)
@@ -115,7 +115,7 @@ def first_entry(points, limit):
 def contact_time_of_pair(grains, stages, span, i, j, dt):
     """The part of the step at which grains i and j touch first: 1 if they do at its end, to rounding, or NEVER."""
     reach = grains.radius[i] + grains.radius[j]
-    points = way_of_pair(grains, stages, span, i, j, dt)
+    points = separation_curve(grains, stages, span, i, j, dt)
     if stays_away(points, reach):
         return NEVER
     long_range = max(norm(load(grains.position, i)), norm(load(grains.position, j)))
@@ -123,11 +123,11 @@ def contact_time_of_pair(grains, stages, span, i, j, dt):
     overlap = reach - norm(points[5])
     if 0.0 <= overlap <= allowed and dot(points[5], sub(points[5], points[4])) < 0.0:
         return 1.0
-    return first_entry(points, reach - 0.5 * allowed)
+    return first_crossing(points, reach - 0.5 * allowed)
 
 
 @loop
-def first_touch(grains, long_range, stages, rules, dt):
+def first_contact_time(grains, long_range, stages, rules, dt):
     """The part of the step at which the first of all pairs comes to touch; NEVER if none does.
 
     With a list, its pairs are all that can: a pair was either listed or farther apart than the reach, r1 + r2 and more

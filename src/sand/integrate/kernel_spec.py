@@ -39,7 +39,7 @@ class KernelSpec(NamedTuple):
     wide: bool = False  # so many grains that loops are made of the longest vectors
 
     @property
-    def bare(self) -> bool:
+    def contacts_only(self) -> bool:
         """True where contacts are the only forces."""
         return self.external is nothing and self.long_range is NO_LONG_RANGE_FORCE
 
@@ -63,7 +63,7 @@ class RespaSettings(NamedTuple):
     literal: bool  # Taylor series with each grain's own v and ω, ringing or not
 
 
-class Books(NamedTuple):
+class ExternalWork(NamedTuple):
     """Energies that the outside forces leave to the driver."""
 
     time_dependent: bool  # their energy depends on time
@@ -86,9 +86,9 @@ class StepParameters(NamedTuple):
     long_range: Any
     external: Any
     search: Any
-    beat: RespaSettings
-    books: Books
+    respa: RespaSettings
+    external_work: ExternalWork
     gas: Any
-    control: Any
-    precision: Any = ()  # adaptive.Precision, where there are Runge–Kutta steps
+    criteria: Any
+    error_limits: Any = ()  # adaptive.ErrorLimits, where there are Runge–Kutta steps
     queue: Any = ()  # crew.Crew, where the plan has one

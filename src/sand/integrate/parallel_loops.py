@@ -79,7 +79,7 @@ def _alone(plan: KernelSpec) -> Large:
 
 def _by_a_crew(plan: KernelSpec) -> Large:
     share, _ = worker_loops(plan)
-    begin, _, end, far_blocks = plan.long_range.parts
+    begin, _, end, far_blocks = plan.long_range.blocked
 
     @loop
     def pass_together(grains, contacts, long_range, clock, count, lost, rules):

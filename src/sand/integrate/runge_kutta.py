@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..compiler.jit import formula, loop, rare
-from ..forces.external.loops import grain_at, outside_loads
+from ..forces.external.loops import grain_at, external_loads
 from ..numerics.quaternion import normalised, turned, turning_rate
 from ..numerics.vec import dot, load, load4, put, put4
 from ..state.state import LONG_RANGE_SUMS
@@ -41,7 +41,7 @@ X, V, Q, W = 0, 3, 6, 10
 
 
 @formula
-def next_factor(error, order):
+def step_size_factor(error, order):
     """What the next step should be, in parts of this one: 0.9 err^(−1/order), within 0.2 … 5; 5 without any error."""
     if error == 0.0:
         return GROW
@@ -122,7 +122,7 @@ def normalise_all(grains):
 
 
 @loop
-def error_of(stages, dt, precision):
+def error_of(stages, dt, error_limits):
     """The largest error of the step over what is allowed, and the grain that has it; infinite if not a number.
 
     The error of an angle is twice that of the rotation parameters.
@@ -137,8 +137,8 @@ def error_of(stages, dt, precision):
             w += blended(rate, ERROR, STAGES, W + row, i) ** 2
         for row in range(4):
             q += blended(rate, ERROR, STAGES, Q + row, i) ** 2
-        mine = max(math.sqrt(x) / precision.position, math.sqrt(v) / precision.velocity)
-        mine = max(mine, 2.0 * math.sqrt(q) / precision.turn, math.sqrt(w) / precision.spin)
+        mine = max(math.sqrt(x) / error_limits.position, math.sqrt(v) / error_limits.velocity)
+        mine = max(mine, 2.0 * math.sqrt(q) / error_limits.turn, math.sqrt(w) / error_limits.spin)
         if not (x + v + w + q < math.inf):
             return math.inf, i
         if dt * mine > worst:
@@ -149,7 +149,7 @@ def error_of(stages, dt, precision):
 @functools.cache
 def loads_at_stage(external: Callable, far_loads: Callable) -> Callable:
     """The loop that sums all loads of free grains where they are."""
-    add_outside = outside_loads(external)
+    add_outside = external_loads(external)
 
     @rare
     def sum_stage(grains, long_range, count, rules, time):
@@ -166,7 +166,7 @@ def loads_at_stage(external: Callable, far_loads: Callable) -> Callable:
 
 
 @functools.cache
-def outside_power(formula_of_grain: Callable) -> Callable:
+def external_power(formula_of_grain: Callable) -> Callable:
     """The loop that sums F·v + M·ω [W] of one composed formula over all grains."""
 
     @loop
@@ -183,25 +183,25 @@ def outside_power(formula_of_grain: Callable) -> Callable:
 @functools.cache
 def trial_for(external: Callable, far_loads: Callable) -> tuple[Callable, Callable]:
     """The loops that begin a step, and that go through its stages; False as soon as a grain strays too far."""
-    sum_stage, power = loads_at_stage(external, far_loads), outside_power(external)
+    sum_stage, power = loads_at_stage(external, far_loads), external_power(external)
 
     @loop
     def begin_step(grains, stages, rules, begin):
         keep_start(grains, stages)
         note_rates(grains, stages, 0)
-        if rules.books.time_dependent:
+        if rules.external_work.time_dependent:
             stages.power[0] = power(grains, begin, rules.external)
 
     @loop
     def try_step(grains, long_range, stages, count, rules, begin, dt):
-        stride = rules.precision.stride
+        stride = rules.error_limits.stride
         for s in range(1, STAGES):
             if not place_stage(grains, stages, s, dt) <= stride * stride:
                 return False
             time = begin + TIMES[s] * dt
             sum_stage(grains, long_range, count, rules, time)
             note_rates(grains, stages, s)
-            if rules.books.time_dependent:
+            if rules.external_work.time_dependent:
                 stages.power[s] = power(grains, time, rules.external)
         return True
 

@@ -9,7 +9,7 @@ from ..compiler.jit import loop, rare
 from ..contact.events import compact_contacts, damp_contacts, log_stiffness_work, make_contacts, update_flagged_contacts
 from ..contact.gather import sort_contacts_by_grain
 from ..contact.update import contact_step
-from ..forces.external.loops import outside_energy, outside_wrap
+from ..forces.external.loops import external_energy, external_wrap
 from ..forces.gas.loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, build_pair_list
@@ -39,7 +39,7 @@ from .step_control import CHECK_EVERY, choose_step, find_limiting_grains
 
 LONGEST_TURN = 0.5
 """Largest turn in one step [rad] for which `rotation.turn` is sound."""
-SOON_PART = 0.05
+INNER_SKIN_FRACTION = 0.05
 """Way, in the reach of the list of near pairs, after which those that may touch soon are picked out anew."""
 
 
@@ -77,17 +77,17 @@ def possible_step(grains, contacts, pair_list, long_range, clock, count, rules):
     """The step to take now [s], and STEPS_DONE or why there is none."""
     count[GRAIN1] = count[GRAIN2] = -1
     update_speeds(grains, pair_list)
-    dt = choose_step(grains, long_range, contacts.start, pair_list, clock, count, rules.span, rules.control)
+    dt = choose_step(grains, long_range, contacts.start, pair_list, clock, count, rules.span, rules.criteria)
     if not dt > 0.0:
         return 0.0, Stop.NOT_FINITE
     if clock[LEFT] > 0.0:  # inside a cycle: whole steps that fill it
         dt = clock[LEFT] / math.ceil(clock[LEFT] / dt - 1e-6)
     if clock[TIME] + dt == clock[TIME]:
-        find_limiting_grains(grains, long_range, contacts.start, pair_list, count, rules.span, rules.control)
+        find_limiting_grains(grains, long_range, contacts.start, pair_list, count, rules.span, rules.criteria)
         return 0.0, Stop.NO_STEP
-    stop = _moves_too_far(pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN], rules.control.reach, dt)
+    stop = _moves_too_far(pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN], rules.criteria.reach, dt)
     if stop != Stop.STEPS_DONE:
-        count[GRAIN1] = _first_too_fast(grains, rules.control.reach, dt, stop)
+        count[GRAIN1] = _first_too_fast(grains, rules.criteria.reach, dt, stop)
         return 0.0, stop
     if count[STEPS] % CHECK_EVERY == 0:
         c = _first_overcompressed(grains, contacts, count, rules.span)
@@ -100,7 +100,7 @@ def possible_step(grains, contacts, pair_list, long_range, clock, count, rules):
 @loop
 def update_lists(grains, contacts, pair_list, long_range, count, rules):
     """Make anew the lists that are too old for what this step needs; FULL stops ask for longer arrays."""
-    span, search, reach = rules.span, rules.search, rules.control.reach
+    span, search, reach = rules.span, rules.search, rules.criteria.reach
     stale = rules.contact.on and list_is_stale(
         grains, pair_list.anchor, span, 0.25 * reach, pair_list.skin, PAIR_LIST_SKIN
     )
@@ -118,7 +118,7 @@ def update_lists(grains, contacts, pair_list, long_range, count, rules):
         update_safe_speed(pair_list, count)
     # written so that what is no number is spent
     if rules.contact.on and (stale or not pair_list.skin[INNER_SKIN] > 0.0):
-        build_inner_list(grains, pair_list, count, span, 2.0 * SOON_PART * reach)
+        build_inner_list(grains, pair_list, count, span, 2.0 * INNER_SKIN_FRACTION * reach)
     return Stop.STEPS_DONE, stale
 
 
@@ -151,18 +151,18 @@ def remove_broken_contacts(grains, contacts, pair_list, clock, count, rules):
 @functools.cache
 def drift_with_work_for(external: Callable, drift: Callable) -> Callable:
     """Half a kick and a drift, with what time and boundaries do to the energy of the per-grain forces."""
-    energy, wrap = outside_energy(external), outside_wrap(external)
+    energy, wrap = external_energy(external), external_wrap(external)
 
     @loop
     def drift_with_work(grains, contacts, long_range, clock, count, lost, rules, dt):
         now, then = clock[TIME], clock[TIME] + dt
         gained = 0.0
-        if rules.books.time_dependent:
+        if rules.external_work.time_dependent:
             gained += 0.5 * (energy(grains, then, rules.external) - energy(grains, now, rules.external))
         way = drift(grains, contacts, long_range, count, rules, dt)
-        if rules.books.time_dependent:
+        if rules.external_work.time_dependent:
             gained += 0.5 * (energy(grains, then, rules.external) - energy(grains, now, rules.external))
-        if rules.books.position_dependent:
+        if rules.external_work.position_dependent:
             gained += wrap(grains, rules.span, then, rules.external)
         lost[OUTSIDE] -= gained
         return way
@@ -184,7 +184,7 @@ def rates_loop(sum_rates: Callable) -> Callable:
         if cycle > 0.0:
             # a mean over much less time than what is to be foretold is no drift
             past = clock[CYCLE] if clock[CYCLE] >= 0.5 * cycle else 0.0
-            set_mean_velocities(grains, long_range, contacts.start, rules.span, past, rules.beat.literal)
+            set_mean_velocities(grains, long_range, contacts.start, rules.span, past, rules.respa.literal)
             clear_rates(long_range)
             sum_rates(grains, long_range, rules.span, rules.long_range)
         store_positions(grains, long_range)

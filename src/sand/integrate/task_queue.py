@@ -23,7 +23,7 @@ from ..state.state import CONTACTS
 from .kernel_spec import KernelSpec
 from .motion import BLOCK_OF_GRAINS, OPEN, drift_for, gather_and_kick
 
-WORD, DONE, INSIDE = 0, 8, 16
+WORD, DONE, ACTIVE = 0, 8, 16
 """Places on the board, a line of the cache apart: the work at hand, its finished blocks, helpers at work."""
 PLACES = 24
 SPINS_BEFORE_YIELD = 4000
@@ -40,17 +40,17 @@ FRONT, BACK, BLOCKS, TASK = 0, _BITS, 2 * _BITS, 3 * _BITS
 """Where they begin."""
 
 
-def is_large(grains: int) -> bool:
+def uses_task_queue(grains: int) -> bool:
     """True if a simulation of so many grains is for a crew, be it of one thread."""
     return CAN_SHARE and grains >= PARALLEL_FROM
 
 
 def benefits_from_workers(plan: KernelSpec, grains: GrainArrays, contacts: int) -> bool:
     """True if helpers save time: without sums to share, a thousand contacts are done before a helper has begun."""
-    return plan.long_range.parts.blocks(grains) > 0 or contacts >= WORKERS_FROM
+    return plan.long_range.blocked.blocks(grains) > 0 or contacts >= WORKERS_FROM
 
 
-PASS, GATHER, GATHER_AND_KICK, FAR, DRIFT, LEAVE = range(1, 7)
+PASS, GATHER, GATHER_AND_KICK, FAR, DRIFT, QUIT = range(1, 7)
 """What a word asks for: contacts, their loads at grains, these and a kick, long-range loads, a drift, the end."""
 
 
@@ -71,8 +71,8 @@ def new_task_queue(grains: int, contacts: int) -> TaskQueue:
 
 def release_workers(queue: TaskQueue) -> None:
     """Let the helpers of a driver that did not come to its end leave, and wait until they have."""
-    queue.words[WORD] = LEAVE << TASK
-    while queue.words[INSIDE] > 0:
+    queue.words[WORD] = QUIT << TASK
+    while queue.words[ACTIVE] > 0:
         yield_cpu()
 
 
@@ -85,7 +85,7 @@ def blocks_of(number, at_once):
 @loop
 def span_of_drift(rules):
     """The box in which grains drift: without walls where what the walls cost is booked afterwards."""
-    return OPEN if rules.books.position_dependent else rules.span
+    return OPEN if rules.external_work.position_dependent else rules.span
 
 
 @loop
@@ -103,7 +103,7 @@ def is_left(word):
 @functools.cache
 def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
     """The function that shares a task among all threads, and the kernel that a helper runs meanwhile."""
-    far_block, drift_some = plan.long_range.parts.block, drift_for(plan.magnetic)
+    far_block, drift_some = plan.long_range.blocked.block, drift_for(plan.magnetic)
 
     @shared
     def do_block(task, b, grains, contacts, long_range, count, rules):
@@ -147,12 +147,12 @@ def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
                 yield_cpu()
 
     def worker_loop(grains, contacts, long_range, count, rules):
-        """Take blocks until the board says LEAVE."""
+        """Take blocks until the board says QUIT."""
         words = rules.queue.words
-        fetch_add(words, INSIDE, 1)
+        fetch_add(words, ACTIVE, 1)
         looks = 0
         word = read(words, WORD)
-        while word >> TASK != LEAVE:
+        while word >> TASK != QUIT:
             looks += 1
             if is_left(word):
                 # what is at hand may have changed since the look: what was taken is what this says
@@ -165,7 +165,7 @@ def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
             elif looks > SPINS_BEFORE_YIELD:
                 yield_cpu()
             word = read(words, WORD)
-        fetch_add(words, INSIDE, -1)
+        fetch_add(words, ACTIVE, -1)
 
     return share, kernel(worker_loop, keep=plan.keep, alone=True, wide=plan.wide)
 
@@ -179,6 +179,6 @@ def no_workers(rules):
 def join_workers(rules):
     """Send the helpers away, and wait until the last has left: then the arrays are the driver's alone."""
     words = rules.queue.words
-    write(words, WORD, LEAVE << TASK)
-    while read(words, INSIDE) > 0:
+    write(words, WORD, QUIT << TASK)
+    while read(words, ACTIVE) > 0:
         yield_cpu()

@@ -105,6 +105,6 @@ class Verlet:
             return int(self.far_steps)
         return max(1, int(BELOW_RESONANCE * self.steps_per_period)) if self.far == "impulse" else LITERAL_STEPS
 
-    def beat(self, distant: bool) -> RespaSettings:
+    def respa_settings(self, distant: bool) -> RespaSettings:
         """How often far loads are summed, for the driver; every step if there are none."""
         return RespaSettings(self.most_steps if distant else 1, self.far == "taylor-literal")

@@ -31,7 +31,7 @@ class WorkerThreads:
         """Others of the same kind."""
         return WorkerThreads(self._help)
 
-    def call(self, arrays: tuple[Any, ...]) -> None:
+    def start(self, arrays: tuple[Any, ...]) -> None:
         """Let all threads but the caller's own run the kernel on these arguments."""
         if not COMPILED:  # without the compiler nothing is atomic
             return

@@ -181,9 +181,7 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
             )
         if not told and wall.monotonic() > begun + PATIENCE:
             told = True
-            warn(
-                f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller"
-            )
+            warn(f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller")
     return placed
 
 

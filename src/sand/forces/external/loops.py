@@ -22,7 +22,7 @@ def grain_at(grains, i):
     )
 
 
-def outside_loads(formula_of_grain):
+def external_loads(formula_of_grain):
     """The loop that adds force and torque of one composed formula to every grain."""
 
     @loop
@@ -35,7 +35,7 @@ def outside_loads(formula_of_grain):
     return add_loads
 
 
-def outside_energy(formula_of_grain):
+def external_energy(formula_of_grain):
     """The loop that sums the energy [J] of one composed formula over all grains."""
 
     @loop
@@ -48,7 +48,7 @@ def outside_energy(formula_of_grain):
     return sum_energy
 
 
-def outside_wrap(formula_of_grain):
+def external_wrap(formula_of_grain):
     """The loop that brings grains back into a periodic box; returns the energy [J] they gain by that."""
 
     @loop
@@ -67,16 +67,16 @@ def outside_wrap(formula_of_grain):
 
 
 @functools.cache
-def outside_shares_for(formula_of_grain):
+def external_energies_for(formula_of_grain):
     """The compiled loop that fills `shares` (N,) with the energy [J] of one formula at each grain."""
 
     def fill_shares(grains, time, parameters, shares):
         for i in range(grains.mass.size):
             shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
 
-    return kernel(fill_shares, keep=is_ours(formula_of_grain))
+    return kernel(fill_shares, keep=is_builtin(formula_of_grain))
 
 
-def is_ours(formula_of_grain):
+def is_builtin(formula_of_grain):
     """True for formulas of SAND itself; compiled code with a user's own formula is not kept on disk."""
     return str(formula_of_grain.__module__).startswith("sand.")

@@ -56,7 +56,7 @@ def rotation_friction(radius, density, speed, accommodation):
 
 
 @formula
-def forgotten(rate, elapsed):
+def decayed_fraction(rate, elapsed):
     """1 − e^(−t/τ): the part of a motion through the gas that is lost after t [s] at the rate 1/τ [1/s]."""
     return -math.expm1(-rate * elapsed)
 
@@ -71,7 +71,7 @@ def thermal_spread(lost, temperature_energy, mass):
 
 
 @formula
-def relaxed(v, rest, lost, spread, noise):
+def ornstein_uhlenbeck(v, rest, lost, spread, noise):
     """v' = u + (v − u) e^(−t/τ) + spread ξ: the Ornstein–Uhlenbeck process after any time t, exact in law.
 
     Parameters
@@ -79,7 +79,7 @@ def relaxed(v, rest, lost, spread, noise):
     v, rest
         velocity, and that of the gas u [m/s]; or spin, and (0, 0, 0) [rad/s].
     lost
-        1 − e^(−t/τ), from `forgotten`.
+        1 − e^(−t/τ), from `decayed_fraction`.
     spread
         from `thermal_spread`.
     noise

@@ -7,7 +7,7 @@ import numpy as np
 from ...compiler.jit import formula, loop
 from ...numerics.random import normal_vector
 from ...numerics.vec import add, dot, load, put, sub
-from .drag import forgotten, relaxed, rotation_friction, thermal_spread, translation_friction
+from .drag import decayed_fraction, ornstein_uhlenbeck, rotation_friction, thermal_spread, translation_friction
 
 TRANSLATION, ROTATION = range(2)
 """Streams of random numbers: what a deviate is for.  Others that draw from `numerics.random` take other numbers."""
@@ -40,15 +40,19 @@ def kick_one(grains, i, seed, number, elapsed, gas):
         load(grains.velocity, i),
         load(grains.spin, i),
     )
-    slowed = forgotten(translation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / m, elapsed)
-    spun_down = forgotten(rotation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / inertia, elapsed)
+    slowed = decayed_fraction(translation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / m, elapsed)
+    spun_down = decayed_fraction(
+        rotation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / inertia, elapsed
+    )
     push = twirl = (0.0, 0.0, 0.0)
     if gas.temperature_energy > 0.0:
         push = normal_vector(seed, number, grains.id[i], TRANSLATION)
         twirl = normal_vector(seed, number, grains.id[i], ROTATION)
     wind = (gas.wind_x, gas.wind_y, gas.wind_z)
-    new_v = relaxed(v, wind, slowed, thermal_spread(slowed, gas.temperature_energy, m), push)
-    new_w = relaxed(w, (0.0, 0.0, 0.0), spun_down, thermal_spread(spun_down, gas.temperature_energy, inertia), twirl)
+    new_v = ornstein_uhlenbeck(v, wind, slowed, thermal_spread(slowed, gas.temperature_energy, m), push)
+    new_w = ornstein_uhlenbeck(
+        w, (0.0, 0.0, 0.0), spun_down, thermal_spread(spun_down, gas.temperature_energy, inertia), twirl
+    )
     put(grains.velocity, i, new_v)
     put(grains.spin, i, new_w)
     # v² − v'² as a product: no digits are lost where the two are nearly the same

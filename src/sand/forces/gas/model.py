@@ -110,7 +110,7 @@ class Gas:
         given = {key: value for key, value in asdict(self).items() if value is not None}
         return given | {"wind": list(self.wind)}
 
-    def rules(self) -> GasParameters:
+    def numbers(self) -> GasParameters:
         """The gas as the kernels take it."""
         energy = BOLTZMANN * self.temperature
         density = self.density or law.density_of(self.pressure, energy, self.molecule_mass)
@@ -119,11 +119,11 @@ class Gas:
 
     def shortest_time(self, grains: Grains) -> float:
         """The shortest time [s] in which a grain loses its motion through the gas, or its spin, to 1/e."""
-        return shortest_stopping_time(grains.arrays, self.rules())
+        return shortest_stopping_time(grains.arrays, self.numbers())
 
     def check(self, grains: Grains, box: Box) -> list[str]:
         """Warns of a gas too hot for solids, and of grains too fast for the linear law or too large for free flow."""
-        rules, warnings = self.rules(), []
+        rules, warnings = self.numbers(), []
         if self.temperature > MELTED:
             warnings.append(f"gas: temperature = {self.temperature:g} K: no material is solid above {MELTED:g} K")
         speed = np.linalg.norm(grains.velocity - np.array(self.wind), axis=1)

@@ -18,7 +18,7 @@ from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load, pair_load_at, pair_load_cut
 from .dipole_rates import pair_rates
-from .loops import LongRangeSums, Parts, all_blocks
+from .loops import LongRangeSums, BlockedSum, all_blocks
 
 ROWS_AT_ONCE = 256
 """Rows of the list in a block that one thread takes."""
@@ -175,13 +175,13 @@ def apart_if(real, apart):
 
 
 @loop
-def bare_pair(here, there, span, mine, other, rules, real):
+def uncut_pair(here, there, span, mine, other, rules, real):
     """Loads of a pair in an open box without a cut-off; none if it is not `real`."""
     return pair_load(apart_if(real, sub(here, there)), mine, other, rules.k if real else 0.0)
 
 
 @loop
-def seeded_pair(here, there, span, mine, other, rules, real):
+def uncut_pair_seeded(here, there, span, mine, other, rules, real):
     """The same, with 1/r from a seed."""
     apart = apart_if(real, sub(here, there))
     return pair_load_at(apart, seeded_inverse_root(dot(apart, apart)), mine, other, rules.k if real else 0.0)
@@ -275,16 +275,16 @@ def all_pairs(pair_loads: Callable) -> LongRangeSums:
             block(grains, long_range, span, rules, b)
         add_shares(grains, long_range, span, rules)
 
-    parts = Parts(copy_moments, block, add_shares, all_blocks)
+    parts = BlockedSum(copy_moments, block, add_shares, all_blocks)
     return LongRangeSums(loads, cut_rates, energy_shares, loads_of_pair, parts)
 
 
-BARE = all_pairs(bare_pair)._replace(many=all_pairs(seeded_pair) if LONG_VECTORS else None)
-CUT = all_pairs(cut_pair)
-LISTED = LongRangeSums(
+ALL_PAIRS = all_pairs(uncut_pair)._replace(wide=all_pairs(uncut_pair_seeded) if LONG_VECTORS else None)
+ALL_PAIRS_CUT = all_pairs(cut_pair)
+LISTED_PAIRS = LongRangeSums(
     listed_loads,
     listed_rates,
     energy_shares,
     loads_of_pair,
-    Parts(pack_moments, listed_block, add_torques, listed_blocks),
+    BlockedSum(pack_moments, listed_block, add_torques, listed_blocks),
 )

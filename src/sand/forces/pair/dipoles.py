@@ -15,7 +15,7 @@ from ...grains import Grains
 from ...units import format_quantity
 from .cutoff import ROOM, Choice, WithCutoff, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
-from .dipole_loops import BARE, CUT, LISTED, DipoleParameters
+from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParameters
 from .loops import LongRangeSums
 
 CAPTURE = 1.5
@@ -65,8 +65,8 @@ class Dipoles(WithCutoff):
     def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops that sum it: over listed pairs, or over all."""
         if listed:
-            return LISTED
-        return BARE if box.is_open and self.cutoff in (None, "auto") else CUT
+            return LISTED_PAIRS
+        return ALL_PAIRS if box.is_open and self.cutoff in (None, "auto") else ALL_PAIRS_CUT
 
     def numbers(self, grains: Grains, box: Box) -> DipoleParameters:
         """What the loops get."""

@@ -12,7 +12,7 @@ from ...box import Box
 from ...constants import COULOMB, GRAVITATION
 from ...grains import Grains
 from .cutoff import WithCutoff, cutoff_for
-from .inverse_square_loops import ALL, LISTED, InverseSquareParameters
+from .inverse_square_loops import ALL_PAIRS, LISTED_PAIRS, InverseSquareParameters
 from .loops import LongRangeSums
 
 
@@ -51,7 +51,7 @@ class Charges(WithCutoff):
 
     def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops that sum it: over listed pairs, or over all."""
-        return LISTED if listed else ALL
+        return LISTED_PAIRS if listed else ALL_PAIRS
 
     def numbers(self, grains: Grains, box: Box) -> InverseSquareParameters:
         """What the loops get."""

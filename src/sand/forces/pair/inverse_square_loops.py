@@ -129,5 +129,5 @@ def loads_of_pair(grains, span, rules, i, j):
     return force, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
-ALL = LongRangeSums(all_loads, all_rates, all_energies, loads_of_pair)
-LISTED = LongRangeSums(listed_loads, listed_rates, listed_energies, loads_of_pair)
+ALL_PAIRS = LongRangeSums(all_loads, all_rates, all_energies, loads_of_pair)
+LISTED_PAIRS = LongRangeSums(listed_loads, listed_rates, listed_energies, loads_of_pair)

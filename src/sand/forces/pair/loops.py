@@ -35,7 +35,7 @@ def all_blocks(grains):
     return ALL_BLOCKS if grains.mass.size >= PARALLEL_FROM else 1
 
 
-class Parts(NamedTuple):
+class BlockedSum(NamedTuple):
     """The sum of loads in blocks that threads may share; `loads` of LongRangeSums is their sum but for rounding."""
 
     begin: Callable  # (grains, far, span, numbers): before the blocks
@@ -51,13 +51,13 @@ class LongRangeSums(NamedTuple):
     rates: Callable  # adds to far.force_rate and far.torque_rate
     energies: Callable  # adds half the energy of each pair to each grain's entry of a fifth argument, (N,)
     pair: Callable  # (grains, span, numbers, i, j): force on i, torques on i and on j, of one pair
-    shared: Parts | None = None  # for threads; None: `loads` is done by one
-    many: Any = None  # the same sums by loops that are faster for many grains; None: by these
+    shared: BlockedSum | None = None  # for threads; None: `loads` is done by one
+    wide: Any = None  # the same sums by loops that are faster for many grains; None: by these
 
     @property
-    def parts(self) -> Parts:
+    def blocked(self) -> BlockedSum:
         """In blocks; or all of it after the blocks of others, which need what it would overwrite."""
-        return self.shared or Parts(_no_sum, _nothing_in, self.loads, _no_blocks)
+        return self.shared or BlockedSum(_no_sum, _nothing_in, self.loads, _no_blocks)
 
 
 @loop
@@ -70,7 +70,7 @@ NO_LONG_RANGE_FORCE = LongRangeSums(_no_sum, _no_sum, _nothing_in, _no_pair)
 
 @functools.cache
 def combined_sums(first: LongRangeSums, rest: LongRangeSums) -> LongRangeSums:
-    """The sums of two; `numbers` is the pair of theirs.  Energies are asked for one by one (`shares_for`)."""
+    """The sums of two; `numbers` is the pair of theirs.  Energies are asked for one by one (`long_range_energies_for`)."""
     first_loads, rest_loads, first_rates, rest_rates = first.loads, rest.loads, first.rates, rest.rates
     first_pair, rest_pair = first.pair, rest.pair
 
@@ -90,11 +90,11 @@ def combined_sums(first: LongRangeSums, rest: LongRangeSums) -> LongRangeSums:
         force2, here2, there2 = rest_pair(grains, span, numbers[1], i, j)
         return add(force1, force2), add(here1, here2), add(there1, there2)
 
-    return LongRangeSums(loads, rates, _nothing_in, pair, parts_together(first.parts, rest.parts))
+    return LongRangeSums(loads, rates, _nothing_in, pair, combined_blocks(first.blocked, rest.blocked))
 
 
 @functools.cache
-def parts_together(first: Parts, rest: Parts) -> Parts:
+def combined_blocks(first: BlockedSum, rest: BlockedSum) -> BlockedSum:
     """The parts of two; block b of both is one block."""
     first_begin, first_block, first_end, first_blocks = first
     rest_begin, rest_block, rest_end, rest_blocks = rest
@@ -120,11 +120,11 @@ def parts_together(first: Parts, rest: Parts) -> Parts:
     def blocks(grains):
         return max(first_blocks(grains), rest_blocks(grains))
 
-    return Parts(begin, block, end, blocks)
+    return BlockedSum(begin, block, end, blocks)
 
 
 @functools.cache
-def shares_for(energies: Callable) -> Callable:
+def long_range_energies_for(energies: Callable) -> Callable:
     """The compiled sum of each grain's part of the energy [J] of one long-range force."""
 
     def fill_shares(grains, long_range, span, numbers, shares):
