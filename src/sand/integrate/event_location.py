@@ -2,7 +2,7 @@
 
 Between the two ends of a step the separation of a pair is the polynomial of degree 5 that has its values, velocities
 and accelerations; it errs by the sixth power of the step, as the step itself.  It is kept as six points P_k in
-Bézier's form: the curve lies within their hull, which rules out most pairs without any search.
+Bézier's form: the curve lies within their hull, which parameters out most pairs without any search.
 """
 
 import math
@@ -127,13 +127,13 @@ def contact_time_of_pair(grains, stages, span, i, j, dt):
 
 
 @loop
-def first_contact_time(grains, long_range, stages, rules, dt):
+def first_contact_time(grains, long_range, stages, parameters, dt):
     """The part of the step at which the first of all pairs comes to touch; NEVER if none does.
 
     With a list, its pairs are all that can: a pair was either listed or farther apart than the reach, r1 + r2 and more
     plus Δr, and each grain has gone at most Δr/4 since the list was made when a step begins, and Δr/4 in it.
     """
-    listed = rules.search.listed
+    listed = parameters.search.listed
     first = NEVER
     for k in range(grains.mass.size):
         begin, end = (long_range.start[k], long_range.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
@@ -141,5 +141,5 @@ def first_contact_time(grains, long_range, stages, rules, dt):
         for m in range(begin, end):
             j = long_range.order[long_range.neighbour[m]] if listed else np.uint32(m)
             if j < i:
-                first = min(first, contact_time_of_pair(grains, stages, rules.span, i, j, dt))
+                first = min(first, contact_time_of_pair(grains, stages, parameters.span, i, j, dt))
     return first

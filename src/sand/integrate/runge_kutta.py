@@ -64,7 +64,7 @@ def blended(rate, weights, stages, row, i):
 
 
 @loop
-def keep_start(grains, stages):
+def store_start(grains, stages):
     """Remember the state of all grains."""
     for i in range(grains.mass.size):
         for row in range(3):
@@ -76,7 +76,7 @@ def keep_start(grains, stages):
 
 
 @rare
-def place_stage(grains, stages, s, dt):
+def set_stage(grains, stages, s, dt):
     """Bring all grains to stage s of a step of dt seconds; the square of the longest way any of them went [m²].
 
     Stage 0 is the start.
@@ -101,7 +101,7 @@ def place_stage(grains, stages, s, dt):
 
 
 @rare
-def note_rates(grains, stages, s):
+def store_rates(grains, stages, s):
     """The rates of change at stage s, from the loads there."""
     rate = stages.rate
     for i in range(grains.mass.size):
@@ -122,7 +122,7 @@ def normalise_all(grains):
 
 
 @loop
-def error_of(stages, dt, error_limits):
+def error_ratio(stages, dt, error_limits):
     """The largest error of the step over what is allowed, and the grain that has it; infinite if not a number.
 
     The error of an angle is twice that of the rotation parameters.
@@ -147,18 +147,18 @@ def error_of(stages, dt, error_limits):
 
 
 @functools.cache
-def loads_at_stage(external: Callable, far_loads: Callable) -> Callable:
+def stage_loads(external: Callable, long_range_loads: Callable) -> Callable:
     """The loop that sums all loads of free grains where they are."""
     add_outside = external_loads(external)
 
     @rare
-    def sum_stage(grains, long_range, count, rules, time):
+    def sum_stage(grains, long_range, count, parameters, time):
         for i in range(grains.mass.size):
             put(grains.force, i, (0.0, 0.0, 0.0))
             put(grains.torque, i, (0.0, 0.0, 0.0))
-        add_outside(grains, time, rules.external)
+        add_outside(grains, time, parameters.external)
         clear_long_range_loads(long_range)
-        far_loads(grains, long_range, rules.span, rules.long_range)
+        long_range_loads(grains, long_range, parameters.span, parameters.long_range)
         add_long_range_loads(grains, long_range)
         count[LONG_RANGE_SUMS] += 1
 
@@ -181,28 +181,28 @@ def external_power(formula_of_grain: Callable) -> Callable:
 
 
 @functools.cache
-def trial_for(external: Callable, far_loads: Callable) -> tuple[Callable, Callable]:
+def trial_step_loops(external: Callable, long_range_loads: Callable) -> tuple[Callable, Callable]:
     """The loops that begin a step, and that go through its stages; False as soon as a grain strays too far."""
-    sum_stage, power = loads_at_stage(external, far_loads), external_power(external)
+    sum_stage, power = stage_loads(external, long_range_loads), external_power(external)
 
     @loop
-    def begin_step(grains, stages, rules, begin):
-        keep_start(grains, stages)
-        note_rates(grains, stages, 0)
-        if rules.external_work.time_dependent:
-            stages.power[0] = power(grains, begin, rules.external)
+    def begin_step(grains, stages, parameters, begin):
+        store_start(grains, stages)
+        store_rates(grains, stages, 0)
+        if parameters.external_work.time_dependent:
+            stages.power[0] = power(grains, begin, parameters.external)
 
     @loop
-    def try_step(grains, long_range, stages, count, rules, begin, dt):
-        stride = rules.error_limits.stride
+    def try_step(grains, long_range, stages, count, parameters, begin, dt):
+        stride = parameters.error_limits.stride
         for s in range(1, STAGES):
-            if not place_stage(grains, stages, s, dt) <= stride * stride:
+            if not set_stage(grains, stages, s, dt) <= stride * stride:
                 return False
             time = begin + TIMES[s] * dt
-            sum_stage(grains, long_range, count, rules, time)
-            note_rates(grains, stages, s)
-            if rules.external_work.time_dependent:
-                stages.power[s] = power(grains, time, rules.external)
+            sum_stage(grains, long_range, count, parameters, time)
+            store_rates(grains, stages, s)
+            if parameters.external_work.time_dependent:
+                stages.power[s] = power(grains, time, parameters.external)
         return True
 
     return begin_step, try_step

@@ -107,4 +107,4 @@ class Verlet:
 
     def respa_settings(self, distant: bool) -> RespaSettings:
         """How often far loads are summed, for the driver; every step if there are none."""
-        return RespaSettings(self.most_steps if distant else 1, self.far == "taylor-literal")
+        return RespaSettings(self.max_steps if has_long_range else 1, self.far == "taylor-literal")

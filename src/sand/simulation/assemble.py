@@ -157,7 +157,7 @@ def _plan(
 ) -> KernelSpec:
     """What the driver is compiled from."""
     # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
-    way = verlet.far if given.distant and given.contact and verlet.most_steps > 1 else "every step"
+    way = verlet.far if given.distant and given.contact and verlet.max_cycle_steps > 1 else "every step"
     return KernelSpec(
         external,
         sums,
