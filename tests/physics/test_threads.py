@@ -153,7 +153,7 @@ def test_helpers_go_home_with_their_simulation():
     others = set(threading.enumerate())
 
     def crew():
-        return [t for t in threading.enumerate() if t.name == "sand-crew" and t not in others]
+        return [t for t in threading.enumerate() if t.name == "sand-worker" and t not in others]
 
     sand.set_threads(2)
     sim = shaken_lattice(None)
@@ -180,7 +180,7 @@ def test_helpers_come_where_they_save_time(number, forces, helpers):
     sim.run(steps=1)
     assert sim._engine._plan.queue
     assert sim.state.count[CONTACTS] == number - 1
-    assert len(sim._engine._hands._queues) == helpers
+    assert len(sim._engine._hands._inboxes) == helpers
 
 
 def test_small_simulations_have_no_crew():

@@ -191,9 +191,7 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
     add_contact_pairs, _, reassign_contact_pairs = (
         contact_pair_loops(spec.long_range.pair) if spec.split else (_no_contact_pairs, None, _no_reassignment)
     )
-    impulse_at_start, impulse_within, impulse_at_end, impulse_at_early_end = (
-        _IMPULSES if spec.impulse else _NO_IMPULSES
-    )
+    impulse_at_start, impulse_within, impulse_at_end, impulse_at_early_end = _IMPULSES if spec.impulse else _NO_IMPULSES
     apply_gas = apply_drag_and_noise if spec.gas else no_gas
     speeds_change_between_steps = spec.impulse or spec.gas
 
@@ -245,9 +243,7 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
         dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
         due = clock[LEFT] == 0.0 or broken or formed > 0
         add_contact_pairs(grains, contacts, count, parameters.span, parameters.long_range)
-        fastest, fastest_spin = loads_and_kick(
-            grains, contacts, long_range, clock, count, parameters, due, elapsed
-        )
+        fastest, fastest_spin = loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed)
         pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN] = fastest, fastest_spin
         if due:
             impulse_at_end(grains, long_range, parameters.span, clock, elapsed, dt)

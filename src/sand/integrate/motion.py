@@ -48,7 +48,7 @@ def kick(grains, dt):
 
 @loop
 def gather_and_kick(grains, contacts, first, last, dt):
-    """Sum the contact loads of few grains at a time and kick these; for contact forces alone.  Returns as `kick_some`."""
+    """Sum the contact loads of few grains at a time and kick these, without other forces; returns as `kick_some`."""
     fastest = fastest_spin = rank(0.0)
     while first < last:
         end = min(first + BLOCK_OF_GRAINS, last)

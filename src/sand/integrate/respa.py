@@ -49,7 +49,7 @@ def add_slow_loads(grains, long_range, since):
 
 @loop
 def update_slow_loads(grains, long_range):
-    """At the start of a cycle: update slow loads that differ too much from the present ones, reset the path integral."""
+    """At the start of a cycle: update slow loads that differ too much from present loads, reset the path integral."""
     for i in range(grains.mass.size):
         force, torque = load(long_range.force, i), load(long_range.torque, i)
         change = sub(force, load(long_range.slow_force, i))

@@ -45,7 +45,7 @@ INNER_SKIN_FRACTION = 0.05
 
 @loop
 def _moves_too_far(fastest, fastest_spin, reach, dt):
-    """TOO_FAST if a grain moves by more than reach/2 in dt, SPINS_TOO_FAST beyond MAX_TURN; speeds are given squared."""
+    """TOO_FAST for a displacement above reach/2, SPINS_TOO_FAST for a rotation above MAX_TURN; from squared speeds."""
     moved_too_far, turned_too_far = dt * dt * fastest > 0.25 * reach * reach, dt * dt * fastest_spin > MAX_TURN**2
     return Stop.TOO_FAST if moved_too_far else Stop.SPINS_TOO_FAST if turned_too_far else Stop.STEPS_DONE
 
@@ -200,7 +200,7 @@ def no_gas(grains, clock, count, lost, parameters):
 
 @loop
 def apply_drag_and_noise(grains, clock, count, lost, parameters):
-    """Drag and Brownian kicks for the time since the last ones, at the end of a step or cycle nearest to a gas period."""
+    """Drag and Brownian kicks for the time since the last; at ends of steps or cycles, about once per gas period."""
     elapsed = clock[TIME] - clock[KICKED]
     if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= parameters.gas.period:
         lost[GAS] += gas_kick(grains, parameters.gas.seed, count[STEPS], elapsed, parameters.gas.gas)
