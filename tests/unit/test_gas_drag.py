@@ -450,7 +450,7 @@ def test_the_shortest_time(accommodation):
         ({"pressure": 0}, r"gas: pressure = 0 must be above 0 Pa"),
         ({"pressure": None, "density": -2.0}, r"gas: density = -2.0 must be above 0 kg/m\^3"),
         ({"molecule_mass": "0 kg"}, r"gas: molecule_mass = '0 kg' must be above 0 kg"),
-        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a part of all molecules and must be at most 1"),
+        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a fraction of the molecules and must be at most 1"),
         ({"accommodation": -0.1}, r"gas: accommodation = -0.1 must be at least 0"),
         ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a quantity in 1"),
         ({"brownian": "no"}, r"gas: brownian = 'no' must be true or false"),
@@ -480,11 +480,11 @@ def test_warnings():
     assert still_gas(cross_section="2e-19 m^2").check(grains, box) == []
     grains.arrays.velocity[1, 3] = 0.51 * still_gas().numbers().mean_speed
     (warning,) = still_gas().check(grains, box)
-    assert "grain 3 moves at" in warning and "too weak" in warning
+    assert "grain 3 moves at" in warning and "underestimates the drag" in warning
     assert still_gas(wind=grains.velocity[3]).check(sand.Grains([[0, 0, 0]], 1e-8, "ice"), box) == [
         warning.replace("grain 3", "grain 0")
     ]
     dense = still_gas(pressure="1e5 Pa", cross_section="2e-19 m^2")
     (warning,) = dense.check(free_grains(5), box)
-    assert "mean free path is" in warning and "too strong" in warning
+    assert "mean free path is" in warning and "overestimates the drag" in warning
     assert still_gas(pressure="1e5 Pa").check(free_grains(5), box) == []
