@@ -52,11 +52,11 @@ def test_cycles_cost_little_energy(ringing):
 
 def test_the_usual_cycle_stays_below_half_a_period():
     """0.48 of the steps per period; the paper's 70 for the Taylor series; the user's own otherwise."""
-    found = [sand.Verlet(n).most_steps for n in (10, 25, 100)]
+    found = [sand.Verlet(n).max_cycle_steps for n in (10, 25, 100)]
     assert found == [4, 12, 48]
-    assert sand.Verlet(far="taylor").most_steps == 70
-    assert sand.Verlet(far_steps=70).most_steps == 70
-    assert sand.Verlet(far="every step", far_steps=9).most_steps == 1
+    assert sand.Verlet(far="taylor").max_cycle_steps == 70
+    assert sand.Verlet(far_steps=70).max_cycle_steps == 70
+    assert sand.Verlet(far="every step", far_steps=9).max_cycle_steps == 1
 
 
 @pytest.mark.validate

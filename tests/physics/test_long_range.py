@@ -140,7 +140,7 @@ def test_brownian_grains():
     count = 4000
     sim, gas, _ = brownian(count)
     grains = sim.grains
-    rules = gas.rules()
+    rules = gas.numbers()
     numbers = (rules.density, rules.mean_speed, rules.accommodation)
     tau = grains.mass[0] / translation_friction(1e-7, *numbers)
     tau_spin = grains.arrays.inertia[0] / rotation_friction(1e-7, *numbers)

@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.contact.events import inner_list_overflowed
-from sand.integrate.step_parts import SOON_PART
+from sand.integrate.step_parts import INNER_SKIN_FRACTION
 from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
 from sand.simulation import engine as engines
 from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
@@ -212,7 +212,7 @@ def test_only_rounding_tells_the_orders_apart(far):
 
 @pytest.mark.compiled("contacts", "small")
 def test_who_may_touch_soon_is_known_in_the_new_order():
-    """In the step after an order was made, every near pair that is closer than SOON_PART of the reach is picked.
+    """In the step after an order was made, every near pair that is closer than INNER_SKIN_FRACTION of the reach is picked.
 
     What is picked are columns of the near list, which were sorted.
     """
@@ -220,11 +220,11 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
     sim.run(steps=EVERY)
     listed = sim.state.count[REBUILT]
     sim._engine.advance(np.inf, 1)
-    w, reach = sim._engine._world, sim._engine.rules.control.reach
+    w, reach = sim._engine._world, sim._engine.rules.criteria.reach
     assert w.count[ORDERED] == EVERY and w.count[REBUILT] == listed
     i, j = w.pair_list.pair[:, : w.count[PAIRS]].astype(int)
     apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)
-    close = (apart < w.grains.radius[i] + w.grains.radius[j] + SOON_PART * reach) & (
+    close = (apart < w.grains.radius[i] + w.grains.radius[j] + INNER_SKIN_FRACTION * reach) & (
         w.pair_list.touching[: i.size] == 0
     )
     assert close.sum() > 5

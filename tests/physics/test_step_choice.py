@@ -77,20 +77,20 @@ def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
 
 @pytest.mark.compiled("contacts")
 def test_a_shorter_step_is_held_for_ten_periods():
-    """Two grains bounce beside a ringing pair: the step falls at once, and grows only HOLD steps after that."""
-    from sand.integrate.step_control import HOLD
+    """Two grains bounce beside a ringing pair: the step falls at once, and grows only HOLD_STEPS steps after that."""
+    from sand.integrate.step_control import HOLD_STEPS
 
     bond, distance, step = _pair()
     fast = 4.0 * bond.pull_off_overlap / step
     position = [[0, 0, 0], [distance, 0, 0], [0, 5e-6, 0], [2 * R + 20 * fast * step, 5e-6, 0]]
     grains = sand.Grains(position, R, sand.SILICA, velocity=[[0, 0, 0]] * 3 + [[-fast, 0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()])
-    lengths = _steps_of(sim, 3 * HOLD)
+    lengths = _steps_of(sim, 3 * HOLD_STEPS)
     changes = np.flatnonzero(np.abs(np.diff(lengths)) > 1e-3 * step)
     assert sim.ledger.rows[-1]["broken"] == 1
     growths = [k for k in changes if lengths[k + 1] > lengths[k]]
     assert len(growths) == 1
-    assert growths[0] - max(k for k in changes if k < growths[0]) >= HOLD
+    assert growths[0] - max(k for k in changes if k < growths[0]) >= HOLD_STEPS
     assert math.isclose(lengths[-1], step, rel_tol=1e-6)
 
 
@@ -98,7 +98,7 @@ def test_gravity_does_not_shorten_the_step():
     """A uniform load costs Verlet no energy, however weak the long-range force beside it: the same step without it."""
     grains = sand.Grains([[0, 0, 0], [1e-5, 0, 0]], R, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Attraction()])
-    world, control = sim.state, sim._engine.rules.control
+    world, control = sim.state, sim._engine.rules.criteria
     assert control.energy_scale > 0.0
     steps = []
     for pull in (0.0, 9.81):

@@ -9,7 +9,7 @@ import pytest
 import sand
 from sand import threads
 from sand.errors import BadInput
-from sand.integrate.task_queue import INSIDE, LEAVE, TASK, WORD, is_large, new_task_queue, worker_loops
+from sand.integrate.task_queue import ACTIVE, QUIT, TASK, WORD, uses_task_queue, new_task_queue, worker_loops
 from sand.simulation import assemble as translate
 from sand.simulation import engine
 from sand.state.state import CONTACTS, OUTSIDE, SLIPPED
@@ -58,7 +58,7 @@ def test_threads_change_no_bit(cutoff, size):
     for number in (1, 2, 3):
         sand.set_threads(number)
         sim = shaken_lattice(cutoff, size)
-        assert sim._engine._plan.queue and sim._engine._plan.bare is (cutoff == "bare")
+        assert sim._engine._plan.queue and sim._engine._plan.contacts_only is (cutoff == "bare")
         sim.run(steps=25)
         sim.run(steps=35)
         ends.append(state(sim))
@@ -75,7 +75,7 @@ def test_blocks_change_only_rounding(monkeypatch):
     """
     sim = {}
     for large in (True, False):
-        monkeypatch.setattr(translate, "is_large", lambda grains, large=large: large)
+        monkeypatch.setattr(translate, "uses_task_queue", lambda grains, large=large: large)
         sim[large] = shaken_lattice(None)
         assert sim[large]._engine._plan.queue is large
         sim[large].run(steps=1)
@@ -93,7 +93,7 @@ def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
     """
     found = []
     for large in (True, False):
-        monkeypatch.setattr(translate, "is_large", lambda grains, large=large: large)
+        monkeypatch.setattr(translate, "uses_task_queue", lambda grains, large=large: large)
         grains = sand.setup.gas(1100, "1 um", radius="10 nm", material=sand.SILICA, temperature="3e4 K", seed=2)
         forces, stepping = [sand.Contact(), sand.Gravity("1e12 m/s^2")], sand.Verlet(step="10 ps")
         sim = sand.Simulation(grains, forces, box="1 um", stepping=stepping)
@@ -106,15 +106,15 @@ def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
 
 @pytest.mark.compiled("threads")
 def test_a_helper_that_comes_too_late_touches_nothing():
-    """It finds LEAVE on its board and goes, with nobody counted inside."""
+    """It finds QUIT on its board and goes, with nobody counted inside."""
     sim = shaken_lattice(None)
     sim.run(steps=1)
     before, world = state(sim), sim.state
     crew = new_task_queue(len(world.grains), world.contacts.flag.size)
-    crew.words[WORD] = LEAVE << TASK
+    crew.words[WORD] = QUIT << TASK
     rules = sim._engine.rules._replace(queue=crew)
     worker_loops(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
-    assert crew.words[INSIDE] == 0
+    assert crew.words[ACTIVE] == 0
     assert state(sim) == before
 
 
@@ -138,8 +138,8 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     sim._engine._advance = fails
     with pytest.raises(RuntimeError, match="broken"):
         sim._engine.advance(1.0, 1)
-    assert boards[-1].words[WORD] == LEAVE << TASK
-    assert boards[-1].words[INSIDE] == 0
+    assert boards[-1].words[WORD] == QUIT << TASK
+    assert boards[-1].words[ACTIVE] == 0
     sim._engine._advance = works
     sim.run(steps=1)
     assert copy.deepcopy(sim._engine._hands) is not sim._engine._hands
@@ -153,7 +153,7 @@ def test_helpers_go_home_with_their_simulation():
     others = set(threading.enumerate())
 
     def crew():
-        return [t for t in threading.enumerate() if t.name == "sand-crew" and t not in others]
+        return [t for t in threading.enumerate() if t.name == "sand-worker" and t not in others]
 
     sand.set_threads(2)
     sim = shaken_lattice(None)
@@ -180,13 +180,13 @@ def test_helpers_come_where_they_save_time(number, forces, helpers):
     sim.run(steps=1)
     assert sim._engine._plan.queue
     assert sim.state.count[CONTACTS] == number - 1
-    assert len(sim._engine._hands._queues) == helpers
+    assert len(sim._engine._hands._inboxes) == helpers
 
 
 def test_small_simulations_have_no_crew():
     """Below a thousand grains."""
-    assert is_large(1000)
-    assert not is_large(999)
+    assert uses_task_queue(1000)
+    assert not uses_task_queue(999)
 
 
 def test_how_many(monkeypatch):

@@ -105,7 +105,7 @@ def problems_of(content):
         ({"box__periodic": "62 nm", "grains__number": 30}, ["no room for grain", "take a larger box or fewer grains"]),
         ({"box__periodic": None}, ["a gas needs a box"]),
         ({"box__periodic": ["1 um", "1 um", "open"]}, ["a gas needs a box"]),
-        ({"forces__dipoles__cutoff": "300 nm"}, ["cutoff = 300 nm", "beyond half the box (200 nm)"]),
+        ({"forces__dipoles__cutoff": "300 nm"}, ["cutoff = 300 nm", "exceeds half the box (200 nm)"]),
         ({"grains__material": "magnetite"}, ["'magnetite' has no surface energy", "surface_energy ="]),
         ({"grains__kind": "given"}, ["came from a script", "sand resume"]),
     ],

@@ -9,14 +9,14 @@ import sand
 from sand.box import Box, as_box
 from sand.compiler.jit import kernel
 from sand.contact.pair_types import bond_of
-from sand.forces.pair.dipole_loops import CUT
+from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
 from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours import cell_list as cells
 from sand.neighbours.settings import Neighbours, share_within
 from sand.state.arrays import empty_long_range_arrays
 from sand.state.state import LISTED, MADE, PAIRS, REBUILT
 
-cut_loads = CUT.loads
+cut_loads = ALL_PAIRS_CUT.loads
 
 
 def _all_pairs(grains, far, span, rules):

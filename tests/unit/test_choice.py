@@ -9,7 +9,7 @@ import sand
 from sand.compiler.jit import kernel
 from sand.contact.events import inner_list_overflowed
 from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
-from sand.integrate.step_parts import SOON_PART
+from sand.integrate.step_parts import INNER_SKIN_FRACTION
 from sand.neighbours.pair_list import build_inner_list
 from sand.numerics.simd import float_bits, float_from_bits
 from sand.state.state import INNER_COUNT, INNER_SKIN, PAIRS
@@ -40,7 +40,7 @@ def test_choices_are_the_least_of_all():
     """The loops that vectorise give the least of what grains and pairs allow one by one in Python, to rounding."""
     sim = crowd()
     w, rules = sim.state, sim._engine.rules
-    arrays, span, control = w.grains.arrays, rules.span, rules.control
+    arrays, span, control = w.grains.arrays, rules.span, rules.criteria
 
     def look(grains, far, start, near, count, span, control):
         step, cycle = steps_of_free_grains(grains, far, start, count, control)
@@ -65,8 +65,8 @@ def test_what_may_touch_soon_is_what_is_close():
     Where they have no room (an array has one place more than that), all near pairs are looked at.
     """
     sim = crowd()
-    w, reach = sim.state, sim._engine.rules.control.reach
-    gap = 2.0 * SOON_PART * reach
+    w, reach = sim.state, sim._engine.rules.criteria.reach
+    gap = 2.0 * INNER_SKIN_FRACTION * reach
 
     def picked(room):
         near = w.pair_list._replace(inner=np.zeros(room, np.uint32), skin=w.pair_list.skin.copy())

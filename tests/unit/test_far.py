@@ -9,7 +9,7 @@ import sand
 from sand.constants import COULOMB, GRAVITATION, MAGNETIC
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import Cutoff, cut_weight, pair_load_cut
-from sand.forces.pair.dipole_rates import bare_rates, cut_curvature, pair_rates
+from sand.forces.pair.dipole_rates import uncut_rates, cut_curvature, pair_rates
 from sand.forces.pair.inverse_square_formulas import central_field, central_potential, central_rate
 
 SMOOTH = cutoff_for(1.0, "smooth")
@@ -62,11 +62,11 @@ def test_taylor_torque_is_the_whole_product_rule():
         moment=6e-18 * rng.normal(size=(3, 3)),
     )
     from sand.compiler.jit import kernel
-    from sand.forces.pair.dipole_loops import CUT
+    from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
     from sand.integrate.respa import clear_rates, set_mean_velocities
     from sand.state.arrays import empty_long_range_arrays
 
-    sum_rates = CUT.rates
+    sum_rates = ALL_PAIRS_CUT.rates
 
     def fill(g, far, start, span, rules):
         set_mean_velocities(g, far, start, span, 0.0, True)
@@ -118,11 +118,11 @@ def test_the_weight_and_its_slopes():
     assert isinstance(SMOOTH, Cutoff)
 
 
-def test_bare_rates_repeat_the_loads():
+def test_uncut_rates_repeat_the_loads():
     """The loads that come along with the rates are those of `pair_load_cut` without a cut, to rounding."""
     rng = np.random.default_rng(1)
     x, m1, m2, v, t1, t2 = (tuple(a) for a in rng.normal(size=(6, 3)))
-    f, b1, b2, u, *_ = bare_rates(x, m1, m2, v, t1, t2, 1.0)
+    f, b1, b2, u, *_ = uncut_rates(x, m1, m2, v, t1, t2, 1.0)
     for mine, theirs in zip((f, b1, b2, u), pair_load_cut(x, m1, m2, 1.0, UNCUT), strict=True):
         assert mine == pytest.approx(theirs, rel=1e-13, abs=0.0)
 
@@ -187,7 +187,7 @@ def test_a_cutoff_beyond_half_the_box_is_refused():
     """For charges as for dipoles."""
     grains = sand.Grains([[0, 0, 0], [1e-7, 0, 0]], 1e-8, sand.SILICA, charge=1e-19, moment="1e-18 A m^2")
     for force in (sand.Charges(cutoff="0.6 um"), sand.Dipoles(cutoff="0.6 um"), sand.Attraction(cutoff="0.6 um")):
-        with pytest.raises(sand.BadInput, match="reaches beyond half the box"):
+        with pytest.raises(sand.BadInput, match="exceeds half the box"):
             sand.Simulation(grains, [force], box="1 um")
 
 

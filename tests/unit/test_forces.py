@@ -11,7 +11,7 @@ import sand
 from sand.compiler.jit import COMPILED, cache_folder, formula
 from sand.forces.base import compose
 from sand.forces.external.formulas import GrainState, nothing, uniform_field
-from sand.forces.external.loops import is_ours
+from sand.forces.external.loops import is_builtin
 from sand.integrate.driver import driver_for
 from sand.integrate.kernel_spec import KernelSpec
 
@@ -62,8 +62,8 @@ def test_a_force_of_the_user():
 
 def test_compiled_code_with_a_users_formula_is_not_kept():
     """Its edits are not seen by the digest of our sources: a stale copy would compute the old force."""
-    assert is_ours(uniform_field)
-    assert not is_ours(weight)
+    assert is_builtin(uniform_field)
+    assert not is_builtin(weight)
     if not COMPILED:
         pytest.skip("the compiler is off")
     theirs, ours = (compose([force])[0] for force in (Gravity(), sand.Field(0.5)))

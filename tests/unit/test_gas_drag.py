@@ -8,7 +8,7 @@ import pytest
 import sand
 from sand.compiler.jit import kernel
 from sand.constants import BOLTZMANN
-from sand.forces.base import Force, GrainForce
+from sand.forces.base import Force, ExternalForce
 from sand.forces.gas import drag as law
 from sand.forces.gas.loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
 from sand.forces.gas.model import Gas
@@ -130,10 +130,10 @@ def test_numbers_of_a_gas():
 def test_many_short_updates_equal_a_long_one(parts):
     """Σ over parts: the factors e^(−t/τ) multiply, the variances add up; exact, rounding 1e-14 × parts."""
     rate, time, energy, mass = 3.0, 0.4, 2.0, 5.0
-    part = law.forgotten(rate, time / parts)
+    part = law.decayed_fraction(rate, time / parts)
     mean, variance = 1.0, 0.0
     for _ in range(parts):
-        mean = law.relaxed((mean, 0.0, 0.0), (0.0, 0.0, 0.0), part, 0.0, (0.0, 0.0, 0.0))[0]
+        mean = law.ornstein_uhlenbeck((mean, 0.0, 0.0), (0.0, 0.0, 0.0), part, 0.0, (0.0, 0.0, 0.0))[0]
         variance = (1.0 - part) ** 2 * variance + law.thermal_spread(part, energy, mass) ** 2
     assert mean == pytest.approx(math.exp(-rate * time), rel=1e-13, abs=0)
     assert variance == pytest.approx((1.0 - math.exp(-2.0 * rate * time)) * energy / mass, rel=1e-13, abs=0)
@@ -142,14 +142,16 @@ def test_many_short_updates_equal_a_long_one(parts):
 @pytest.mark.interpreted
 def test_short_and_long_times_lose_no_digits():
     """t ≪ τ: 1 − e^(−x) → x − x²/2, variance → 2 f k_B T t/m²; t ≫ τ: all is forgotten, variance k_B T/m."""
-    tiny = law.forgotten(1e-3, 1e-12)
+    tiny = law.decayed_fraction(1e-3, 1e-12)
     assert tiny == pytest.approx(1e-15, rel=1e-14, abs=0)
     assert law.thermal_spread(tiny, 3.0, 2.0) ** 2 == pytest.approx(2.0 * 1e-15 * 3.0 / 2.0, rel=1e-14, abs=0)
-    assert law.forgotten(1.0, 1e4) == 1.0
+    assert law.decayed_fraction(1.0, 1e4) == 1.0
     assert law.thermal_spread(1.0, 3.0, 2.0) == pytest.approx(math.sqrt(1.5), rel=1e-15, abs=0)
     wind, noise = (1.0, -2.0, 3.0), (0.5, 0.0, -1.0)
-    assert law.relaxed((9.0, 9.0, 9.0), wind, 1.0, 2.0, noise) == pytest.approx((2.0, -2.0, 1.0), rel=1e-14, abs=0)
-    assert law.relaxed((9.0, 8.0, 7.0), wind, 0.0, 0.0, noise) == (9.0, 8.0, 7.0)
+    assert law.ornstein_uhlenbeck((9.0, 9.0, 9.0), wind, 1.0, 2.0, noise) == pytest.approx(
+        (2.0, -2.0, 1.0), rel=1e-14, abs=0
+    )
+    assert law.ornstein_uhlenbeck((9.0, 8.0, 7.0), wind, 0.0, 0.0, noise) == (9.0, 8.0, 7.0)
 
 
 # ---- the kicks ----------------------------------------------------------------------------------------
@@ -180,7 +182,7 @@ def free_grains(count, velocity=0.0, spin=0.0, seed=0):
 
 def times(grains, gas):
     """Stopping times [s] of translation and rotation, from the friction."""
-    rules = gas.rules()
+    rules = gas.numbers()
     numbers = (grains.radius, rules.density, rules.mean_speed, rules.accommodation)
     with np.errstate(divide="ignore"):  # mirrors never stop a spin
         spin_down = grains.arrays.inertia / law.rotation_friction(*numbers)
@@ -211,7 +213,7 @@ def test_drag_alone_is_an_exponential(accommodation):
     before = grains.copy()
     fall, spin_down = times(grains, gas)
     step = 0.1 * float(fall.min())
-    kicks(grains.arrays, 0, 0, 10, step, gas.rules())
+    kicks(grains.arrays, 0, 0, 10, step, gas.numbers())
     wind = np.array(gas.wind)
     expected = wind + (before.velocity - wind) * np.exp(-10 * step / fall)[:, None]
     assert grains.velocity == pytest.approx(expected, rel=1e-13, abs=1e-13 * np.abs(expected).max())
@@ -232,7 +234,7 @@ def test_equipartition(count, part, start, accommodation):
     gas, n = still_gas(accommodation=accommodation), 20_000
     grains = free_grains(n, start, start)
     longest = max(float(t.max()) for t in times(grains, gas))
-    kicks(grains.arrays, 1, 0, count, part * longest, gas.rules())
+    kicks(grains.arrays, 1, 0, count, part * longest, gas.numbers())
     for squares in reduced(grains):
         assert np.abs(squares.mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
 
@@ -243,7 +245,7 @@ def test_mirrors_heat_no_spin():
     """α = 0: translation comes to k_B T, spins stay at rest exactly; N = 20,000, within 3 σ = 3 √(2/N)."""
     gas, n = still_gas(accommodation=0.0), 20_000
     grains = free_grains(n)
-    kicks(grains.arrays, 2, 0, 1, 20.0 * float(times(grains, gas)[0].max()), gas.rules())
+    kicks(grains.arrays, 2, 0, 1, 20.0 * float(times(grains, gas)[0].max()), gas.numbers())
     assert np.abs(reduced(grains)[0].mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
     assert not grains.spin.any()
 
@@ -254,7 +256,7 @@ def test_velocities_and_spins_are_kicked_apart():
     """In equilibrium the correlation of any two of v_k, ω_l is 0 ± 1/√N, N = 20,000; 15 numbers, within 4 σ."""
     gas, n = still_gas(), 20_000
     grains = free_grains(n)
-    kicks(grains.arrays, 10, 0, 1, 20.0 * max(float(t.max()) for t in times(grains, gas)), gas.rules())
+    kicks(grains.arrays, 10, 0, 1, 20.0 * max(float(t.max()) for t in times(grains, gas)), gas.numbers())
     a = grains.arrays
     both = np.corrcoef(a.velocity * np.sqrt(a.mass), a.spin * np.sqrt(a.inertia))
     assert np.abs(both - np.eye(6)).max() < 4.0 / math.sqrt(n)
@@ -266,7 +268,7 @@ def test_grains_follow_the_wind():
     """Mean of √(m/k_B T)(v − u) is 0 ± 1/√N, and its square 1 ± √(2/N), N = 20,000; within 3 σ."""
     gas, n = still_gas(wind=(5.0, 0.0, -7.0)), 20_000
     grains = free_grains(n)
-    kicks(grains.arrays, 3, 0, 50, float(times(grains, gas)[0].max()), gas.rules())
+    kicks(grains.arrays, 3, 0, 50, float(times(grains, gas)[0].max()), gas.numbers())
     slow = (grains.velocity - np.array(gas.wind)) * np.sqrt(grains.mass / (BOLTZMANN * TEMPERATURE))[:, None]
     assert np.abs(slow.mean(axis=0)).max() < 3.0 / math.sqrt(n)
     assert np.abs((slow**2).mean(axis=0) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
@@ -283,7 +285,7 @@ def test_spread_from_rest_whatever_the_pieces(pieces):
     gas, n = still_gas(), 20_000
     grains = free_grains(n)
     time = 0.3 * float(times(grains, gas)[0].mean())
-    kicks(grains.arrays, 4, 0, pieces, time / pieces, gas.rules())
+    kicks(grains.arrays, 4, 0, pieces, time / pieces, gas.numbers())
     for squares, tau in zip(reduced(grains), times(grains, gas), strict=True):
         ratio = squares / (1.0 - np.exp(-2.0 * time / tau))
         assert np.abs(ratio.mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
@@ -301,7 +303,7 @@ def test_velocities_are_forgotten_at_the_rate_of_the_drag():
     before = grains.copy()
     step = 0.05 * float(times(grains, gas)[0].mean())
     for round_ in range(4):
-        kicks(grains.arrays, 5, 10 * round_, 10, step, gas.rules())
+        kicks(grains.arrays, 5, 10 * round_, 10, step, gas.numbers())
         time = 10 * (round_ + 1) * step
         for name, tau in zip(("velocity", "spin"), times(grains, gas), strict=True):
             x0, x1 = getattr(before.arrays, name), getattr(grains.arrays, name)
@@ -321,7 +323,7 @@ def test_what_is_given_to_the_gas_is_what_the_grains_lost(brownian):
         grains = free_grains(200, start, start)
         before = kinetic(grains)
         step = 0.01 * float(times(grains, gas)[0].min())
-        given = kicks(grains.arrays, 6, 0, 30, step, gas.rules())
+        given = kicks(grains.arrays, 6, 0, 30, step, gas.numbers())
         assert given == pytest.approx(before - kinetic(grains), rel=1e-12, abs=1e-12 * before)
         if start == 0.0:
             assert (given < 0.0) if brownian else (given == 0.0)
@@ -332,7 +334,7 @@ def test_what_is_given_to_the_gas_is_what_the_grains_lost(brownian):
 @pytest.mark.compiled("small")
 def test_same_address_same_bits():
     """Same seed and numbers: the same bits; another seed, number or id: every component is another."""
-    gas = still_gas().rules()
+    gas = still_gas().numbers()
 
     def after(seed=7, first=0, ids=None):
         grains = free_grains(100, 1.0, 1.0)
@@ -349,7 +351,7 @@ def test_same_address_same_bits():
 @pytest.mark.compiled("small")
 def test_order_and_pieces_change_no_bit():
     """Grains one by one, in sevens or backwards: each gets the same bits, for the deviates belong to its id."""
-    gas, n = still_gas().rules(), 101
+    gas, n = still_gas().numbers(), 101
 
     def part(index):
         grains = free_grains(n, 1.0, 1.0)
@@ -368,7 +370,7 @@ def test_order_and_pieces_change_no_bit():
 @pytest.mark.interpreted
 def test_no_time_and_no_gas_change_nothing():
     """A kick over 0 s, or in vacuum, leaves every bit and books nothing; position and orientation are never touched."""
-    gas = still_gas().rules()
+    gas = still_gas().numbers()
     for rules, elapsed in ((gas, 0.0), (VACUUM, 1.0), (gas._replace(on=False), 1e-9)):
         grains = free_grains(10, 1.0, 1.0)
         before = grains.copy()
@@ -383,7 +385,7 @@ def test_no_time_and_no_gas_change_nothing():
 @pytest.mark.interpreted
 def test_the_compiler_changes_nothing_but_rounding():
     """Three kicks of 20 grains in plain Python and compiled: 1e-13 of the largest component."""
-    gas = still_gas(wind=(1.0, 2.0, 3.0)).rules()
+    gas = still_gas(wind=(1.0, 2.0, 3.0)).numbers()
     fast, plain = free_grains(20, 1.0, 1.0), free_grains(20, 1.0, 1.0)
     given = kicks(fast.arrays, 2**62, 2**33, 3, 1e-8, gas)
     assert many_kicks(plain.arrays, 2**62, 2**33, 3, 1e-8, gas) == pytest.approx(given, rel=1e-11, abs=0)
@@ -400,14 +402,14 @@ def test_a_gas_in_numbers():
     assert gas.molecule_mass == pytest.approx(2.34 * 1.66053907e-27, rel=1e-8, abs=0)
     assert gas.molecule_mass == pytest.approx(Gas(280, 1e-6, molecule_mass="2.34 u").molecule_mass, rel=1e-8, abs=0)
     speed = math.sqrt(8 * BOLTZMANN * 280 / (math.pi * gas.molecule_mass))
-    assert gas.rules() == pytest.approx(
+    assert gas.numbers() == pytest.approx(
         GasParameters(True, 1e-6, speed, BOLTZMANN * 280, 1.0, 0.0, 0.0, 0.0), rel=1e-14, abs=0
     )
     pressed = Gas(280, pressure=1e-6 * BOLTZMANN * 280 / gas.molecule_mass, wind=["1 km/s", 0, -2], brownian=False)
-    assert pressed.rules() == pytest.approx(
+    assert pressed.numbers() == pytest.approx(
         GasParameters(True, 1e-6, speed, 0.0, 1.0, 1e3, 0.0, -2.0), rel=1e-14, abs=0
     )
-    assert isinstance(gas, Force) and not isinstance(gas, GrainForce)
+    assert isinstance(gas, Force) and not isinstance(gas, ExternalForce)
     assert gas.name == "gas" and "Epstein 1924" in gas.references
 
 
@@ -424,7 +426,7 @@ def test_parameters_build_the_same_gas(given):
 def test_the_shortest_time(accommodation):
     """min of m/f_t, and of I/f_r, which is 0.8 (1/α + π/8) times as long; infinite in vacuum."""
     gas, grains = still_gas(accommodation=accommodation), free_grains(30)
-    rules, small = gas.rules(), grains.radius.min()
+    rules, small = gas.numbers(), grains.radius.min()
     friction = 4 / 3 * math.pi * small**2 * rules.density * rules.mean_speed * (1 + math.pi / 8 * accommodation)
     expected = sand.SILICA.density * 4 / 3 * math.pi * small**3 / friction
     assert gas.shortest_time(grains) == pytest.approx(expected, rel=1e-13, abs=0)
@@ -448,7 +450,7 @@ def test_the_shortest_time(accommodation):
         ({"pressure": 0}, r"gas: pressure = 0 must be above 0 Pa"),
         ({"pressure": None, "density": -2.0}, r"gas: density = -2.0 must be above 0 kg/m\^3"),
         ({"molecule_mass": "0 kg"}, r"gas: molecule_mass = '0 kg' must be above 0 kg"),
-        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a part of all molecules and must be at most 1"),
+        ({"accommodation": 1.5}, r"gas: accommodation = 1.5 is a fraction of the molecules and must be at most 1"),
         ({"accommodation": -0.1}, r"gas: accommodation = -0.1 must be at least 0"),
         ({"accommodation": "much"}, r"gas: accommodation = 'much' is not a quantity in 1"),
         ({"brownian": "no"}, r"gas: brownian = 'no' must be true or false"),
@@ -476,13 +478,13 @@ def test_warnings():
     """Grains faster than half the molecules, and grains too large for the mean free path, if that is known."""
     grains, box = free_grains(5), sand.Box.open()
     assert still_gas(cross_section="2e-19 m^2").check(grains, box) == []
-    grains.arrays.velocity[1, 3] = 0.51 * still_gas().rules().mean_speed
+    grains.arrays.velocity[1, 3] = 0.51 * still_gas().numbers().mean_speed
     (warning,) = still_gas().check(grains, box)
-    assert "grain 3 moves at" in warning and "too weak" in warning
+    assert "grain 3 moves at" in warning and "underestimates the drag" in warning
     assert still_gas(wind=grains.velocity[3]).check(sand.Grains([[0, 0, 0]], 1e-8, "ice"), box) == [
         warning.replace("grain 3", "grain 0")
     ]
     dense = still_gas(pressure="1e5 Pa", cross_section="2e-19 m^2")
     (warning,) = dense.check(free_grains(5), box)
-    assert "mean free path is" in warning and "too strong" in warning
+    assert "mean free path is" in warning and "overestimates the drag" in warning
     assert still_gas(pressure="1e5 Pa").check(free_grains(5), box) == []

@@ -40,7 +40,11 @@ def test_blocks_of_forces_together_are_their_sum(order):
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
     of_dipoles, (of_charges, _) = sim._engine.rules.long_range
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
-    loops = {"listed dipoles": dipoles.LISTED, "listed charges": central.LISTED, "dipoles": dipoles.CUT}
+    loops = {
+        "listed dipoles": dipoles.LISTED_PAIRS,
+        "listed charges": central.LISTED_PAIRS,
+        "dipoles": dipoles.ALL_PAIRS_CUT,
+    }
     sums, own = compose_long_range([loops[name] for name in order], [numbers[name] for name in order])
     span, found = sim._engine.rules.span, []
     for way in ("at once", "in blocks"):
@@ -50,10 +54,10 @@ def test_blocks_of_forces_together_are_their_sum(order):
         if way == "at once":
             sums.loads(arrays, far, span, own)
         else:
-            sums.parts.begin(arrays, far, span, own)
-            for b in range(sums.parts.blocks(arrays)):
-                sums.parts.block(arrays, far, span, own, b)
-            sums.parts.end(arrays, far, span, own)
+            sums.blocked.begin(arrays, far, span, own)
+            for b in range(sums.blocked.blocks(arrays)):
+                sums.blocked.block(arrays, far, span, own, b)
+            sums.blocked.end(arrays, far, span, own)
         found.append((far.force, far.torque, arrays.field))
     for once, blocks in zip(*found, strict=True):
         assert np.abs(once).max() > 0.0

@@ -65,7 +65,7 @@ def test_sums_with_seeds_are_those_without(count):
     place = rng.permutation(11**3)[:count, None] // [1, 11, 121] % 11
     grains = sand.Grains(place * 1e-7, 1e-8, sand.IRON, moment=6e-18 * rng.normal(size=(count, 3)))
     span, found = sand.Box.open().span, []
-    for pair in (dipoles.bare_pair, dipoles.seeded_pair):
+    for pair in (dipoles.uncut_pair, dipoles.uncut_pair_seeded):
         loads, far, own = (
             kernel(dipoles.all_pairs(pair).loads, cached=False, long_vectors=True),
             empty_long_range_arrays(count, 0, 8),
@@ -85,6 +85,6 @@ def test_seeds_are_for_many_grains_on_processors_with_long_vectors():
             1e-6 * np.arange(3 * count).reshape(count, 3), 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * count
         )
         (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles()])._engine.long_range
-        assert (sums is dipoles.BARE) == (count < WIDE_FROM or not LONG_VECTORS)
+        assert (sums is dipoles.ALL_PAIRS) == (count < WIDE_FROM or not LONG_VECTORS)
         (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles(cutoff="1 um")])._engine.long_range
-        assert sums in (dipoles.CUT, dipoles.LISTED)
+        assert sums in (dipoles.ALL_PAIRS_CUT, dipoles.LISTED_PAIRS)

@@ -33,9 +33,9 @@ def pair(distance=3e-8, **options):
         (lambda: sand.Dipoles(cutoff=-1.0), r"cutoff = -1.0 must be above 0"),
         (
             lambda: sand.Simulation(pair(moment="1 A m^2/kg"), [sand.Dipoles(cutoff="1 um")], box="1 um"),
-            r"beyond half the box",
+            r"exceeds half the box",
         ),
-        (lambda: sand.Field([1, 2]), r"one size along z or three components, in T"),
+        (lambda: sand.Field([1, 2]), r"one value along z or three components, in T"),
         (lambda: sand.Field("1 m"), r"flux_density z = '1 m'"),
         (lambda: sand.Verlet(steps_per_period=2), r"at least 10"),
         (lambda: sand.Verlet(step="1 m"), r"step = '1 m'"),

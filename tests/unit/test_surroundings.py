@@ -14,10 +14,10 @@ import sand
 from sand.compiler.jit import kernel
 from sand.config.case import check_case
 from sand.errors import BadInput
-from sand.forces.base import GrainForce
+from sand.forces.base import ExternalForce
 from sand.forces.external import formulas as surroundings
 from sand.forces.external.formulas import GrainState, field_in_time, flux_density_at, uniform_field
-from sand.forces.external.loops import is_ours
+from sand.forces.external.loops import is_builtin
 
 EPS = np.finfo(float).eps
 component = st.integers(-100, 100).map(lambda n: n / 100)
@@ -105,7 +105,7 @@ def test_compiled_formulas_compute_the_same(force):
     size = max(np.abs(np.concatenate([*plain[:2], [plain[2]]])))
     for found, expected in zip(compiled, plain, strict=True):
         assert found == pytest.approx(expected, abs=100 * EPS * size)
-    assert is_ours(force.formula)
+    assert is_builtin(force.formula)
 
 
 # --- B(t) -------------------------------------------------------------------------------------------
@@ -200,14 +200,14 @@ def test_forces_that_have_a_place_say_so():
         assert not getattr(force, "time_dependent", False)
         assert force.flux_density_size() == 0.0
     assert not any(getattr(f, "position_dependent", False) for f in FIELDS)
-    assert all(isinstance(f, GrainForce) for f in FORCES)
+    assert all(isinstance(f, ExternalForce) for f in FORCES)
 
 
 def test_a_users_force_needs_none_of_the_new_members():
-    """A class written before `timed`, `moored` and `longest_step` is still a force that acts on one grain."""
+    """A class written before `time_dependent`, `position_dependent` and `longest_step` is still a force that acts on one grain."""
     asked = ("parameters", "check", "numbers", "flux_density_size")
     old = type("Old", (), {"name": "old", "references": "", "formula": None, **dict.fromkeys(asked, lambda self: 0)})
-    assert isinstance(old(), GrainForce)
+    assert isinstance(old(), ExternalForce)
 
 
 def test_warnings_about_grains_that_feel_nothing():
@@ -274,13 +274,13 @@ RAMPING = {"shape": "ramp", "final": "1 mT", "end": "5 us"}
         ({"flux_density": None}, ["flux_density is missing", "in T"]),
         # numbers
         ({"flux_density": [0, "nan T", 0]}, ["flux_density y = 'nan T' is not finite", "in T"]),
-        (OSCILLATING | {"amplitude": [1, 2]}, ["amplitude = [1, 2]", "one size along z or three components, in T"]),
+        (OSCILLATING | {"amplitude": [1, 2]}, ["amplitude = [1, 2]", "one value along z or three components, in T"]),
         (OSCILLATING | {"amplitude": "1 A"}, ["amplitude z = '1 A' is not a quantity in T", "'1 mT'"]),
         (OSCILLATING | {"frequency": "-1 Hz"}, ["frequency = '-1 Hz' must be above 0 Hz"]),
         (OSCILLATING | {"frequency": 0}, ["frequency = 0 must be above 0 Hz"]),
         (OSCILLATING | {"frequency": math.nan}, ["frequency = nan is not finite", "in Hz"]),
-        (OSCILLATING | {"frequency": "6.28 rad/s"}, ["'6.28 rad/s' counts angles", "turns per second"]),
-        (OSCILLATING | {"frequency": "60 rpm"}, ["'60 rpm' counts angles", "turns per second"]),
+        (OSCILLATING | {"frequency": "6.28 rad/s"}, ["'6.28 rad/s' has a unit of angle", "rotations per second"]),
+        (OSCILLATING | {"frequency": "60 rpm"}, ["'60 rpm' has a unit of angle", "rotations per second"]),
         (OSCILLATING | {"phase": math.inf}, ["phase = inf is not finite", "in rad"]),
         (OSCILLATING | {"phase": "1 m"}, ["phase = '1 m' is not a quantity in rad"]),
         (RAMPING | {"start": "1 m"}, ["start = '1 m' is not a quantity in s"]),
@@ -289,7 +289,10 @@ RAMPING = {"shape": "ramp", "final": "1 mT", "end": "5 us"}
         (ROTATING | {"axis": "z"}, ["axis = 'z' must be three numbers", "[0, 0, 1]"]),
         (ROTATING | {"axis": [0, 0, math.nan]}, ["axis z = nan is not finite"]),
         (ROTATING | {"amplitude": "1 mT"}, ["perpendicular to axis = [0.0, 0.0, 1.0]", "is [0, 0, 0] T"]),
-        (ROTATING | {"amplitude": [3, 0, 3], "axis": [1, 0, 0]}, ["perpendicular", "across the axis is [0, 0, 3] T"]),
+        (
+            ROTATING | {"amplitude": [3, 0, 3], "axis": [1, 0, 0]},
+            ["perpendicular", "perpendicular to the axis is [0, 0, 3] T"],
+        ),
         # the ends
         (RAMPING | {"start": "5 us"}, ["end = 5e-06 must be after start = 5e-06, in s"]),
         (RAMPING | {"end": -1}, ["end = -1.0 must be after start = 0.0, in s"]),
@@ -321,9 +324,12 @@ def test_the_amplitude_that_a_message_proposes_is_taken():
 @pytest.mark.parametrize(
     ("force", "line"),
     [
-        (lambda: sand.Gravity([0, 1]), "gravity: acceleration = [0, 1] must be one size along −z or three components"),
+        (lambda: sand.Gravity([0, 1]), "gravity: acceleration = [0, 1] must be one value along −z or three components"),
         (lambda: sand.Gravity("9.81 m"), "gravity: acceleration z = '9.81 m' is not a quantity in m/s^2"),
-        (lambda: sand.Gravity(-9.81), "a size along −z and must be at least 0 m/s^2; for another direction give three"),
+        (
+            lambda: sand.Gravity(-9.81),
+            "a magnitude along −z and must be at least 0 m/s^2; for another direction give three",
+        ),
         (lambda: sand.Gravity(math.nan), "gravity: acceleration z = nan is not finite"),
         (lambda: sand.ElectricField("1 V"), "electric: strength z = '1 V' is not a quantity in V/m"),
         (

@@ -5,7 +5,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import sand
-from sand.integrate.event_location import curve_at, first_entry, way_of_pair
+from sand.integrate.event_location import curve_at, first_crossing, separation_curve
 from sand.integrate.runge_kutta import STAGES, V, X
 from sand.state.arrays import stage_arrays
 
@@ -36,7 +36,7 @@ def test_the_curve_is_the_motion_of_degree_five(box, seed):
     image at the start is followed.  In plain Python.
     """
     grains, stages, apart = moving(np.random.default_rng(seed), box)
-    points = way_of_pair(grains, stages, box.span, 0, 1, STEP)
+    points = separation_curve(grains, stages, box.span, 0, 1, STEP)
     for part in np.linspace(0.0, 1.0, 11):
         place, slope = curve_at(points, part)
         h = 1e-3
@@ -53,8 +53,8 @@ def test_the_first_entry_is_where_the_distance_falls_to_the_limit(seed):
     parts = np.linspace(0.0, 1.0, 2001)
     distance = np.linalg.norm([apart(part * STEP) for part in parts], axis=1)
     limit = distance.min() + 0.3 * (distance[0] - distance.min())
-    points = way_of_pair(grains, stages, sand.Box.open().span, 0, 1, STEP)
+    points = separation_curve(grains, stages, sand.Box.open().span, 0, 1, STEP)
     if distance.argmin() == 0:  # they part: nothing is entered below the distance at the start
-        assert first_entry(points, 0.999 * distance[0]) > 1.0
+        assert first_crossing(points, 0.999 * distance[0]) > 1.0
     else:
-        assert first_entry(points, limit) == pytest.approx(parts[np.argmax(distance <= limit)], abs=1e-3)
+        assert first_crossing(points, limit) == pytest.approx(parts[np.argmax(distance <= limit)], abs=1e-3)

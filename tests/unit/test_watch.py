@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.integrate.kernel_spec import Stop
-from sand.integrate.step_parts import SOON_PART
+from sand.integrate.step_parts import INNER_SKIN_FRACTION
 from sand.neighbours.skin import largest_displacement, largest_speeds
 from sand.simulation import assemble as translate
 from sand.state.state import (
@@ -62,9 +62,9 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
 
     Also where loops are cut into blocks for threads.
     """
-    monkeypatch.setattr(translate, "is_large", lambda grains: blocks)
+    monkeypatch.setattr(translate, "uses_task_queue", lambda grains: blocks)
     sim = crowd(margin="5 nm")
-    control, search = sim._engine.rules.control, sim._engine.rules.search
+    control, search = sim._engine.rules.criteria, sim._engine.rules.search
     limits = {
         LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
         PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.reach),
@@ -86,13 +86,13 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
 
 @pytest.mark.validate
 def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
-    """Leeway + the largest displacement since the pick, in the first step of a call, ≤ SOON_PART of the reach.
+    """Leeway + the largest displacement since the pick, in the first step of a call, ≤ INNER_SKIN_FRACTION of the reach.
 
     A contact that forms ends the leeway, and so does one that breaks: 2000 steps are as many calls of one step, which
     pick in each.
     """
     sim, twin = crowd(), crowd()
-    limit, span = SOON_PART * sim._engine.rules.control.reach, sim._engine.rules.span
+    limit, span = INNER_SKIN_FRACTION * sim._engine.rules.criteria.reach, sim._engine.rules.span
     for each in (sim, twin):
         each.run(steps=1)
     looked_at = 0

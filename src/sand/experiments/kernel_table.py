@@ -16,14 +16,14 @@ from ..arguments import checked
 from ..errors import BadInput
 from ..io.run_folder import replace_file
 from ..io.table import write_table
-from ..theory.kinetics import Kernel, Rate
+from ..theory.kinetics import CollisionKernel, Rate
 
 GRAM, CUBIC_CM = 1e3, 1e6
 """g in a kg, cm³ in a m³."""
 
 
 @checked
-def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Kernel:
+def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> CollisionKernel:
     """K = σ v of any two masses, from some.
 
     Parameters
@@ -73,7 +73,7 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Ker
             )
         return np.exp(inside(edge) + (asked - edge) @ tilt)[where.reshape(-1)].reshape(np.shape(m1))
 
-    return Kernel(f"measured, {len(table)} rows", function)
+    return CollisionKernel(f"measured, {len(table)} rows", function)
 
 
 @checked

@@ -1,1 +1,1 @@
-"""What a user puts into the list of forces."""
+"""Forces of a simulation: pair forces, external forces, and a gas."""

@@ -1,4 +1,4 @@
-"""What every force can tell about itself, and what the driver asks of it."""
+"""Protocols of the forces, and the composition of several forces into one loop."""
 
 from __future__ import annotations
 
@@ -8,109 +8,113 @@ from typing import Any, Protocol, runtime_checkable
 from ..box import Box
 from ..grains import Grains
 from .external.formulas import nothing, together
-from .pair.cutoff import Choice
+from .pair.cutoff import CutoffChoice
 from .pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, combined_sums
 
 
 @runtime_checkable
 class Force(Protocol):
-    """Anything in `Simulation(forces=[…])`.
+    """An element of `Simulation(forces=[…])`.
 
     Attributes
     ----------
     name : str
-        its key in case files, ledger and summary.
+        Its key in case files, ledger and summary.
     references : str
-        where its equations come from.
+        Sources of its equations.
     """
 
     name: str
     references: str
 
     def parameters(self) -> dict[str, Any]:
-        """Its settings in SI, as a case file would give them."""
+        """Settings in SI units, as in a case file."""
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warnings for these grains; raises BadInput for what cannot work."""
+        """Warnings for these grains and this box; raises BadInput if the force cannot be computed for them."""
 
 
 @runtime_checkable
-class GrainForce(Force, Protocol):
-    """A force that acts on one grain at a time (forces/external/formulas.py has the formulas).
-
-    Four more members are looked for; without them a force has neither a clock nor a place, nor a step of its own:
-
-    `timed`  True if the energy depends on time explicitly: what its source does is then booked as work.
-    `moored`  True if the energy depends on the position: crossing a periodic boundary is then booked as work.
-    `flux_density_at(time)`  the flux density it brings [T], for `Simulation.at_grains`.
-    `longest_step()`  longest step [s] that resolves how the force itself varies in time; `math.inf` if it does not.
+class ExternalForce(Force, Protocol):
+    """A force on single grains; `forces/external/formulas.py` has the formulas.
 
     Attributes
     ----------
     formula : Callable
-        `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], made by
-        `sand.compiler.jit.formula`.  The energy is one of place, moment and time, not of velocity or spin.
+        `formula(time, grain, parameters)` → force [N], torque [N m], energy [J], decorated with
+        `sand.compiler.jit.formula`. The energy depends on position, moment and time, not on velocity or spin.
+
+    Notes
+    -----
+    Four more members are optional; without them the energy depends neither on time nor on position, there is no flux
+    density, and the force does not limit the step:
+
+    `time_dependent`  True if the energy depends explicitly on time: its change is logged as work of the source.
+    `position_dependent`  True if the energy depends on position: its jump at a periodic boundary is logged as work.
+    `flux_density_at(time)`  the flux density [T] of the force, for `Simulation.at_grains`.
+    `longest_step()`  largest step [s] that resolves the variation of the force in time; `math.inf` if constant.
     """
 
     formula: Callable
 
     def numbers(self) -> Any:
-        """What the formula gets as `parameters`: a NamedTuple of floats, none for a single grain."""
+        """The `parameters` of the formula: a NamedTuple of floats, without values of single grains."""
 
     def flux_density_size(self) -> float:
-        """Largest size over all times of the magnetic flux density it brings [T]; limits the step."""
+        """Largest magnitude over all times of the magnetic flux density [T]; limits the step."""
 
 
 @runtime_checkable
 class LongRangeForce(Force, Protocol):
-    """A force between all grains, near and far (forces/pair/dipole_loops.py and forces/pair/inverse_square_loops.py
-    have the loops).
+    """A force between all pairs of grains.
+
+    Its loops are in `forces/pair/dipole_loops.py` and `forces/pair/inverse_square_loops.py`.
 
     Attributes
     ----------
     column : str
-        the name of its energy in the ledger.
+        Name of its energy in the ledger.
     """
 
     column: str
 
-    def choose(self, grains: Grains, box: Box) -> Choice:
+    def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """Its cut-off, with the reason."""
 
     def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """The loops that sum it: over listed pairs, or over all."""
+        """Its loops: over the pairs of the Verlet list if `listed`, else over all pairs."""
 
     def numbers(self, grains: Grains, box: Box) -> Any:
-        """What the loops get: a NamedTuple, without anything for each grain: those have other numbers in the loops."""
+        """The `parameters` of its loops: a NamedTuple, without values of single grains, whose indices may change."""
 
     def acts_on(self, grains: Grains) -> bool:
-        """False if no grain feels it."""
+        """Whether any grain is subject to the force."""
 
     def energy_scale(self, grains: Grains) -> float:
-        """What two grains in touch may have at stake [J]; limits the step."""
+        """Largest energy of two grains in contact [J]; limits the step."""
 
 
-def compose(forces: Sequence[GrainForce]) -> tuple[Callable, Any]:
-    """One formula and one nested tuple of parameters for a list of per-grain forces, in order."""
+def compose(forces: Sequence[ExternalForce]) -> tuple[Callable, Any]:
+    """One formula and one nested tuple of parameters for a list of external forces, in order."""
     formula, numbers = nothing, ()
     for force in reversed(forces):
-        formula = _pair(force.formula, formula)
+        formula = _together(force.formula, formula)
         numbers = (force.numbers(), numbers)  # type: ignore[assignment]
     return formula, numbers
 
 
 def compose_long_range(sums: Sequence[LongRangeSums], numbers: Sequence[Any]) -> tuple[LongRangeSums, Any]:
-    """One set of loops and one nested tuple of numbers for a list of long-range forces, in order."""
-    whole, nested = NO_LONG_RANGE_FORCE, ()
+    """One set of loops and one nested tuple of parameters for a list of long-range forces, in order."""
+    composed, nested = NO_LONG_RANGE_FORCE, ()
     for each, own in zip(reversed(sums), reversed(numbers), strict=True):
-        whole = combined_sums(each, whole)
+        composed = combined_sums(each, composed)
         nested = (own, nested)  # type: ignore[assignment]
-    return whole, nested
+    return composed, nested
 
 
-_PAIRS: dict[tuple[Callable, Callable], Callable] = {}
+_COMPOSED: dict[tuple[Callable, Callable], Callable] = {}
 
 
-def _pair(first: Callable, rest: Callable) -> Callable:
-    """`together`, the same object for the same formulas, so that nothing is compiled twice."""
-    return _PAIRS.setdefault((first, rest), together(first, rest))
+def _together(first: Callable, rest: Callable) -> Callable:
+    """`together`, but the same object for the same formulas, so that nothing is compiled twice."""
+    return _COMPOSED.setdefault((first, rest), together(first, rest))

@@ -1,4 +1,4 @@
-"""Vectors as a user gives them: three components, or one size along an axis of the frame."""
+"""Vectors in user input: three components, or a magnitude along a coordinate axis."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..units import si
 
 
 def components(value: Any) -> list[Any] | None:
-    """The entries of what was given, or None for a single quantity (a number, text, a quantity with a unit)."""
+    """The entries of a sequence; None for a single quantity (a number, text, a quantity with a unit)."""
     if isinstance(value, str):
         return None
     try:
@@ -19,30 +19,35 @@ def components(value: Any) -> list[Any] | None:
 
 
 def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
-    """Three finite components in SI.
+    """Convert three components to SI.
 
     Parameters
     ----------
-    value
-        three numbers in SI, texts with a unit or quantities, one for each axis.
+    value : sequence
+        Three SI numbers, texts with a unit, or quantities.
     unit : str
-        the SI unit, "1" for pure numbers.
+        The SI unit, "1" for dimensionless numbers.
     name : str
-        how the user called it, for the message.
+        Name of the parameter in error messages.
+
+    Returns
+    -------
+    tuple[float, float, float]
+        Finite numbers.
 
     Raises
     ------
     BadInput
-        not three, or one line for each component that is wrong.
+        If there are not three components; one line for each invalid component.
     """
-    parts = components(value)
-    if parts is None or len(parts) != 3:
-        wanted = "numbers, such as [0, 0, 1]" if unit == "1" else f"components, in {unit}"
-        raise BadInput(f"{name} = {value!r} must be three {wanted}")
+    entries = components(value)
+    if entries is None or len(entries) != 3:
+        expected = "numbers, such as [0, 0, 1]" if unit == "1" else f"components, in {unit}"
+        raise BadInput(f"{name} = {value!r} must be three {expected}")
     numbers, problems = [], []
-    for part, axis in zip(parts, "xyz", strict=True):
+    for entry, axis in zip(entries, "xyz", strict=True):
         try:
-            numbers.append(si(part, unit, f"{name} {axis}"))
+            numbers.append(si(entry, unit, f"{name} {axis}"))
         except BadInput as error:
             problems += error.problems
     if problems:
@@ -50,18 +55,18 @@ def three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
     return numbers[0], numbers[1], numbers[2]
 
 
-def along_z(value: Any, unit: str, name: str, sense: float = 1.0) -> tuple[float, float, float]:
-    """Three finite components in SI, or one size along +z, or along −z if `sense` is −1.
+def along_z(value: Any, unit: str, name: str, direction: float = 1.0) -> tuple[float, float, float]:
+    """Convert three components, or one value along +z (−z if `direction` is −1), to SI.
 
     Raises
     ------
     BadInput
-        neither one nor three, or one line for each component that is wrong.
+        If there are neither one nor three components; one line for each invalid component.
     """
-    parts = components(value)
-    if parts is None:
-        return 0.0, 0.0, 0.0 + sense * si(value, unit, f"{name} z")
-    if len(parts) != 3:
-        axis = "z" if sense > 0.0 else "−z"
-        raise BadInput(f"{name} = {value!r} must be one size along {axis} or three components, in {unit}")
-    return three(parts, unit, name)
+    entries = components(value)
+    if entries is None:
+        return 0.0, 0.0, 0.0 + direction * si(value, unit, f"{name} z")
+    if len(entries) != 3:
+        axis = "z" if direction > 0.0 else "−z"
+        raise BadInput(f"{name} = {value!r} must be one value along {axis} or three components, in {unit}")
+    return three(entries, unit, name)

@@ -1,1 +1,1 @@
-"""Integrators, choice of the step, and the compiled driver."""
+"""Integrators, step-size control, and the compiled drivers."""

@@ -1,4 +1,4 @@
-"""Adaptive steps of an embedded Runge–Kutta pair, the integrator for free flight and scattering."""
+"""Adaptive integrator: an embedded Runge–Kutta pair for free flight, velocity Verlet during contacts."""
 
 from __future__ import annotations
 
@@ -12,53 +12,52 @@ from ..arguments import checked
 from ..errors import FORBID_EXTRA, BadInput, shown
 from ..grains import Grains
 from ..units import is_word, si
-from .step_control import Control
+from .step_control import StepCriteria
 from .verlet import Verlet
 
 ERRORS = {"position_error": "m", "velocity_error": "m/s", "turn_error": "rad", "spin_error": "rad/s"}
-"""The prescribed errors and their units."""
+"""Error limits and their units."""
 
 
-class Precision(NamedTuple):
-    """What a Runge–Kutta step must keep to."""
+class ErrorLimits(NamedTuple):
+    """Limits of a Runge–Kutta step."""
 
     position: float  # allowed error of a step [m]
     velocity: float  # [m/s]
     turn: float  # [rad]
     spin: float  # [rad/s]
-    stride: float  # longest way of a grain in one step [m]
+    stride: float  # largest displacement of a grain in one step [m]
 
 
 @checked
 @dataclass(frozen=True)
 class Adaptive:
-    """Dormand and Prince's Runge–Kutta pair 5(4) with prescribed errors while nothing touches, Verlet in between.
+    """Dormand–Prince Runge–Kutta pair 5(4) with error control while there are no contacts, velocity Verlet otherwise.
 
-    A step is taken again, shorter, if the error of any quantity of any grain exceeds what is prescribed, and ends
-    where two grains come to touch.  Momentum is kept to rounding, energy and angular momentum to the errors.
+    A step is repeated with a shorter length if the error of any quantity of any grain exceeds its limit, and ends at
+    the first contact of two grains. Momentum is conserved to rounding, energy and angular momentum to the errors.
 
     Parameters
     ----------
-    tolerance : optional
-        the errors that are "auto" are this part, below 1, of the problem's own scales.
-    position_error : optional
-        largest error of a position in one step [m], or "auto": of the smallest radius.
-    velocity_error : optional
-        of a velocity [m/s], or "auto": of the fastest start, or of √(U/m) if that is more, U the
-        far energy of two grains at touch, m the largest mass; at least a radius in the longest step.
-    turn_error : optional
-        of an orientation [rad], or "auto": of 1 rad.
-    spin_error : optional
-        of a spin [rad/s], or "auto": of the fastest spin at the start, or of √(U/I) if that is more, U
-        the larger of the far energy at touch and of μB, I the largest moment of inertia; at least 1 rad in the
-        longest step.
+    tolerance : float, optional
+        Relative error: limits that are "auto" are `tolerance` times the natural scales below; above 0, below 1.
+    position_error : float or str, optional
+        Largest error of a position in one step [m]. Scale of "auto": the smallest radius.
+    velocity_error : float or str, optional
+        Largest error of a velocity [m/s]. Scale: the largest initial speed or √(U/m), whichever is larger, U the
+        long-range energy of two grains in contact, m the largest mass; at least a radius per longest step.
+    turn_error : float or str, optional
+        Largest error of an orientation [rad]. Scale: 1 rad.
+    spin_error : float or str, optional
+        Largest error of a spin [rad/s]. Scale: the largest initial spin or √(U/I), whichever is larger, U the larger
+        of the long-range energy in contact and μB, I the largest moment of inertia; at least 1 rad per longest step.
     touching : Verlet, optional
-        the `sand.Verlet` that takes over while grains touch; a table of its keys in a case file.
+        Integrator while grains are in contact; in a case file a table of its keys.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
 
     tolerance: Any = 1e-9
@@ -87,32 +86,32 @@ class Adaptive:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
-        """Its settings in SI."""
+        """Settings in SI units, as in a case file."""
         touching = {k: v for k, v in self.touching.parameters().items() if k != "method"}
         own = {key: getattr(self, key) for key in ("tolerance", *ERRORS)}
         return {"method": self.name, **own, "touching": touching}
 
-    def settled(self, grains: Grains, control: Control) -> Adaptive:
-        """The same with a number for every "auto", from the grains at the start."""
-        scales = dict(zip(ERRORS, natural_scales(grains, control), strict=True))
+    def resolved(self, grains: Grains, criteria: StepCriteria) -> Adaptive:
+        """A copy in which every "auto" is replaced by a number, from the initial grains."""
+        scales = dict(zip(ERRORS, natural_scales(grains, criteria), strict=True))
         auto = {key: self.tolerance * scale for key, scale in scales.items() if getattr(self, key) == "auto"}
         return replace(self, **auto)
 
-    def precision(self, stride: float) -> Precision:
-        """What the driver takes, once settled."""
-        return Precision(self.position_error, self.velocity_error, self.turn_error, self.spin_error, stride)
+    def error_limits(self, stride: float) -> ErrorLimits:
+        """Limits for the driver, after `resolved`; `stride` is the largest displacement in one step [m]."""
+        return ErrorLimits(self.position_error, self.velocity_error, self.turn_error, self.spin_error, stride)
 
 
-def natural_scales(grains: Grains, control: Control) -> tuple[float, float, float, float]:
-    """A length [m], a speed [m/s], an angle [rad] and a spin [rad/s] that are typical of the motion; never 0."""
+def natural_scales(grains: Grains, criteria: StepCriteria) -> tuple[float, float, float, float]:
+    """Typical length [m], speed [m/s], angle [rad] and spin [rad/s] of the motion; never 0."""
     moment = float(np.linalg.norm(grains.body_moment, axis=1).max())
     length = float(grains.radius.min())
     speed = float(np.linalg.norm(grains.velocity, axis=1).max())
     spin = float(np.linalg.norm(grains.spin, axis=1).max())
-    swing = max(control.energy_scale, moment * control.outer_field)
+    rotational_energy = max(criteria.energy_scale, moment * criteria.outer_field)
     return (
         length,
-        max(speed, math.sqrt(control.energy_scale / float(grains.mass.max())), length / control.longest),
+        max(speed, math.sqrt(criteria.energy_scale / float(grains.mass.max())), length / criteria.longest),
         1.0,
-        max(spin, math.sqrt(swing / float(grains.inertia.max())), 1.0 / control.longest),
+        max(spin, math.sqrt(rotational_energy / float(grains.inertia.max())), 1.0 / criteria.longest),
     )

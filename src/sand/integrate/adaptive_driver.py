@@ -1,8 +1,8 @@
-"""The compiled driver of adaptive runs: Runge–Kutta steps while nothing touches, velocity Verlet otherwise.
+"""The compiled driver of adaptive runs: Runge–Kutta steps while there are no contacts, velocity Verlet otherwise.
 
-One step:  list of pairs made anew if need be → trial step → again and shorter if its error is too large → again up to
-the first touch if two grains come to touch in it → orientations normalised, positions wrapped, work booked.  A touch
-ends the step and is handed over as the second half of a Verlet step of 0 s, which forms the contact.
+One Runge–Kutta step:  rebuild the Verlet list if stale → trial step → repeat with a shorter step if the error is too
+large → shorten the step to the first contact, if there is one → normalise orientations, wrap positions, log the work of
+external forces.  A first contact ends the step; the second half of a Verlet step of 0 s then forms the contact.
 """
 
 import functools
@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from ..box import nearest_image
 from ..compiler.jit import kernel, loop
-from ..forces.external.loops import outside_energy, outside_wrap
+from ..forces.external.loops import external_energy, external_wrap
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement, reset_skins
 from ..numerics.vec import dot, load, put
@@ -31,44 +31,57 @@ from ..state.state import (
     STEPS,
     TIME,
 )
-from .driver import halves_for
-from .event_location import NEVER, first_touch
+from .driver import half_steps_for
+from .event_location import NEVER, first_contact_time
 from .kernel_spec import KernelSpec, Stop
-from .runge_kutta import GROW, error_of, loads_at_stage, next_factor, normalise_all, place_stage, trial_for, work_of
-from .step_control import GROW_EVERY, steps_of_free_grains
+from .runge_kutta import (
+    GROW,
+    error_ratio,
+    normalise_all,
+    set_stage,
+    stage_loads,
+    step_size_factor,
+    trial_step_loops,
+    work_of,
+)
+from .step_control import INCREASE_INTERVAL, steps_of_free_grains
 from .step_parts import apply_drag_and_noise, no_gas
 from .task_queue import join_workers, no_workers
 
 ORDER = 5.0
-"""The error of a step goes as this power of its length."""
-STALE_PART = 0.25
-"""Part of the list's margin that grains may have moved when a step begins."""
-STRIDE_PART = 0.9
-"""Of the longest way, for the way foretold."""
-TRIES = 30
-"""Most attempts to end a step at a touch; each squares the error of the last, so that five are many."""
+"""The error of a step is proportional to this power of its length."""
+STALE_FRACTION = 0.25
+"""Largest displacement of a grain since the list was built, at the start of a step, in units of the list's margin."""
+STRIDE_FRACTION = 0.9
+"""Displacement aimed at by a trial step, in units of the largest allowed one."""
+MAX_ATTEMPTS = 30
+"""Largest number of attempts to end a step at a contact; each squares the error of the previous one."""
 
 
 @loop
-def refreshed(grains, long_range, count, rules):
-    """Make the far list anew where a quarter of its margin is used up; FULL asks for longer arrays."""
-    search = rules.search
-    if search.listed and not largest_displacement(grains, long_range.anchor, rules.span) <= STALE_PART * search.margin:
-        return build_verlet_list(grains, long_range, count, rules.span, search)
+def refresh_verlet_list(grains, long_range, count, parameters):
+    """Rebuild the Verlet list once a quarter of its margin is used up; FULL if the array is too small."""
+    search = parameters.search
+    if not search.listed:
+        return 0
+    moved = largest_displacement(grains, long_range.anchor, parameters.span)
+    # written so that an anchor at infinity (no list yet) counts as stale
+    if not moved <= STALE_FRACTION * search.margin:
+        return build_verlet_list(grains, long_range, count, parameters.span, search)
     return 0
 
 
 @loop
-def first_trial(grains, contacts, long_range, clock, count, rules):
-    """The step to try [s]: what the last one left, or Verlet's own after a start or a parting; 0 if not finite."""
+def first_trial(grains, contacts, long_range, clock, count, parameters):
+    """First trial step [s]: proposed by the last step, or Verlet's after a start or a break; 0 if not finite."""
     dt = clock[FLIGHT]
     if not dt > 0.0:
-        dt, _ = steps_of_free_grains(grains, long_range, contacts.start, count, rules.control)
+        dt, _ = steps_of_free_grains(grains, long_range, contacts.start, count, parameters.criteria)
     fastest = 0.0
     for i in range(grains.mass.size):
         v = load(grains.velocity, i)
         fastest = max(fastest, dot(v, v))
-    stride = STRIDE_PART * rules.precision.stride
+    stride = STRIDE_FRACTION * parameters.error_limits.stride
     if fastest * dt * dt > stride * stride:
         dt = stride / math.sqrt(fastest)
     return dt
@@ -76,102 +89,105 @@ def first_trial(grains, contacts, long_range, clock, count, rules):
 
 @loop
 def wrap_all(grains, span):
-    """Bring all grains back into a periodic box."""
+    """Wrap all positions into the periodic box."""
     for i in range(grains.mass.size):
         put(grains.position, i, nearest_image(load(grains.position, i), span))
 
 
 @functools.cache
-def step_for(plan: KernelSpec) -> Callable:
-    """The loop that finds the length of a Runge–Kutta step and takes it: (length [s], touched?, stop)."""
-    sum_stage = loads_at_stage(plan.external, plan.long_range.loads)
-    begin_step, try_step = trial_for(plan.external, plan.long_range.loads)
+def adaptive_step_for(spec: KernelSpec) -> Callable:
+    """The loop that takes one Runge–Kutta step; returns its length [s], whether it ends at a contact, and a Stop."""
+    sum_stage = stage_loads(spec.external, spec.long_range.loads)
+    begin_step, try_step = trial_step_loops(spec.external, spec.long_range.loads)
 
     @loop
-    def fitting_step(grains, contacts, long_range, stages, clock, count, rules):
-        dt = wish = first_trial(grains, contacts, long_range, clock, count, rules)
+    def adaptive_step(grains, contacts, long_range, stages, clock, count, parameters):
+        dt = proposed = first_trial(grains, contacts, long_range, clock, count, parameters)
         if not dt > 0.0:
             return 0.0, False, Stop.NOT_FINITE
-        begin_step(grains, stages, rules, clock[TIME])
-        growth, tries = GROW, 0
+        begin_step(grains, stages, parameters, clock[TIME])
+        growth, attempts = GROW, 0
         while True:
-            if tries == 0 and clock[TIME] + dt == clock[TIME]:
-                place_stage(grains, stages, 0, 0.0)
-                sum_stage(grains, long_range, count, rules, clock[TIME])
+            if attempts == 0 and clock[TIME] + dt == clock[TIME]:
+                set_stage(grains, stages, 0, 0.0)
+                sum_stage(grains, long_range, count, parameters, clock[TIME])
                 return 0.0, False, Stop.NO_STEP
-            error, stray = math.inf, -1
-            if try_step(grains, long_range, stages, count, rules, clock[TIME], dt):
-                error, stray = error_of(stages, dt, rules.precision)
+            error, limiting_grain = math.inf, -1
+            if try_step(grains, long_range, stages, count, parameters, clock[TIME], dt):
+                error, limiting_grain = error_ratio(stages, dt, parameters.error_limits)
             if not error <= 1.0:
-                count[GRAIN1], count[GRAIN2] = stray, -1
+                count[GRAIN1], count[GRAIN2] = limiting_grain, -1
                 count[REJECTED] += 1
-                dt *= next_factor(error, ORDER)
-                growth, tries = 1.0, 0
+                dt *= step_size_factor(error, ORDER)
+                growth, attempts = 1.0, 0
                 continue
-            if tries == 0:
-                wish = dt * min(growth, next_factor(error, ORDER))
-            touch = first_touch(grains, long_range, stages, rules, dt) if rules.contact.on else NEVER
-            if touch >= 1.0 or tries == TRIES:
-                clock[FLIGHT] = min(wish, rules.control.longest)
-                return dt, touch <= 1.0, Stop.STEPS_DONE
-            dt *= touch
-            tries += 1
+            if attempts == 0:
+                proposed = dt * min(growth, step_size_factor(error, ORDER))
+            if parameters.contact.on:
+                contact_time = first_contact_time(grains, long_range, stages, parameters, dt)
+            else:
+                contact_time = NEVER
+            if contact_time >= 1.0 or attempts == MAX_ATTEMPTS:
+                clock[FLIGHT] = min(proposed, parameters.criteria.longest)
+                return dt, contact_time <= 1.0, Stop.STEPS_DONE
+            dt *= contact_time
+            attempts += 1
 
-    return fitting_step
+    return adaptive_step
 
 
 @functools.cache
-def flight_for(plan: KernelSpec) -> Callable:
-    """The loop that takes one Runge–Kutta step and books it."""
-    fitting_step, sum_stage = step_for(plan), loads_at_stage(plan.external, plan.long_range.loads)
-    energy, wrap_with_work = outside_energy(plan.external), outside_wrap(plan.external)
-    stir = apply_drag_and_noise if plan.gas else no_gas
+def free_flight_for(spec: KernelSpec) -> Callable:
+    """The loop that takes one Runge–Kutta step and logs the work of external forces."""
+    adaptive_step, sum_stage = adaptive_step_for(spec), stage_loads(spec.external, spec.long_range.loads)
+    energy, wrap_with_work = external_energy(spec.external), external_wrap(spec.external)
+    apply_gas = apply_drag_and_noise if spec.gas else no_gas
 
     @loop
-    def fly(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules):
-        if refreshed(grains, long_range, count, rules) == FULL:
+    def free_flight(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters):
+        if refresh_verlet_list(grains, long_range, count, parameters) == FULL:
             return Stop.LIST_FULL
-        before = energy(grains, clock[TIME], rules.external) if rules.books.time_dependent else 0.0
-        dt, touched, stop = fitting_step(grains, contacts, long_range, stages, clock, count, rules)
+        before = energy(grains, clock[TIME], parameters.external) if parameters.external_work.time_dependent else 0.0
+        dt, in_contact, stop = adaptive_step(grains, contacts, long_range, stages, clock, count, parameters)
         if stop != Stop.STEPS_DONE:
             return stop
         normalise_all(grains)
         invalidate_speeds(pair_list)
         invalidate_skins(pair_list)
         clock[TIME] += dt
-        if rules.books.time_dependent:
-            lost[OUTSIDE] -= energy(grains, clock[TIME], rules.external) - before + work_of(stages, dt)
-        if rules.books.position_dependent:
-            lost[OUTSIDE] -= wrap_with_work(grains, rules.span, clock[TIME], rules.external)
-            sum_stage(grains, long_range, count, rules, clock[TIME])
+        if parameters.external_work.time_dependent:
+            lost[OUTSIDE] -= energy(grains, clock[TIME], parameters.external) - before + work_of(stages, dt)
+        if parameters.external_work.position_dependent:
+            lost[OUTSIDE] -= wrap_with_work(grains, parameters.span, clock[TIME], parameters.external)
+            sum_stage(grains, long_range, count, parameters, clock[TIME])
         else:
-            wrap_all(grains, rules.span)
+            wrap_all(grains, parameters.span)
         clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
-        if touched:
-            # what is left is the second half of a step of 0 s, with new lists and then a new choice of the step
+        if in_contact:
+            # the second half of a step of 0 s follows, with new lists and a new choice of the step
             pair_list.anchor[0, 0] = math.inf
             clock[FLIGHT] = 0.0
-            count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - GROW_EVERY
+            count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
             count[STAGE] = 1
             return Stop.STEPS_DONE
         clock[STEP] = dt
         count[STEPS] += 1
-        stir(grains, clock, count, lost, rules)
+        apply_gas(grains, clock, count, lost, parameters)
         return Stop.STEPS_DONE
 
-    return fly
+    return free_flight
 
 
 @functools.cache
-def flight_driver_for(plan: KernelSpec) -> Callable:
-    """The compiled `advance` of an adaptive run; as `advance.driver_for`, with the stages besides."""
-    first_half, second_half = halves_for(plan)
-    fly = flight_for(plan)
-    leave = join_workers if plan.queue else no_workers
+def adaptive_driver_for(spec: KernelSpec) -> Callable:
+    """Compile the driver `advance` of an adaptive run; like `driver.driver_for`, with the array of stages."""
+    first_half, second_half = half_steps_for(spec)
+    free_flight = free_flight_for(spec)
+    join = join_workers if spec.queue else no_workers
 
     @loop
-    def steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules, until, last):
-        """Steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
+    def steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
+        """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
         reset_skins(pair_list, count)
         while True:
             stop = Stop.STEPS_DONE
@@ -182,17 +198,17 @@ def flight_driver_for(plan: KernelSpec) -> Callable:
                     if count[STEPS] >= last:
                         return Stop.STEPS_DONE
                 if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
-                    stop = fly(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules)
+                    stop = free_flight(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters)
                 else:
-                    stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, rules)
+                    stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
             if stop == Stop.STEPS_DONE and count[STAGE] == 1:
-                stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, rules)
+                stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
             if stop != Stop.STEPS_DONE:
                 return stop
 
-    def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules, until, last):
-        stop = steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, rules, until, last)
-        leave(rules)
+    def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
+        stop = steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last)
+        join(parameters)
         return stop
 
-    return kernel(advance, cached=plan.keep, nogil=plan.queue, long_vectors=plan.wide)
+    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide)

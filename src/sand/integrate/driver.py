@@ -1,10 +1,10 @@
 """The compiled driver: thousands of velocity Verlet steps per call from Python.
 
-One step:  choose dt → kick dt/2, drift and turn dt → lists of pairs checked → contacts: pass, break or move, form
-→ forces (contacts, far, per grain) → kick dt/2.  Far forces are summed once in a cycle of one or more steps; a
-contact that forms or breaks ends the cycle.  The driver comes back between two cycles, for the end of the time
-asked for or because no step can be taken, and in the middle of a step (STAGE) for longer arrays; it goes on from
-there, so that growing arrays changes no number.
+One step:  choose dt → kick dt/2, drift, rotate dt → check the pair lists → update contacts: slip, break, form → forces
+(contacts, long-range, external) → kick dt/2.  Long-range forces are summed once per cycle of one or more steps; a
+contact that forms or breaks ends the cycle.  The driver returns between two cycles, at the requested end or because no
+step is possible, and in the middle of a step (STAGE = 1) if an array is too small; the call after it resumes there, so
+enlarging arrays does not change the result.
 """
 
 import functools
@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from ..compiler.jit import kernel, loop
 from ..contact.events import count_new_contacts
-from ..forces.external.loops import outside_loads
+from ..forces.external.loops import external_loads
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE
 from ..neighbours.skin import consume_skins, invalidate_speeds, reset_skins
 from ..state.state import CONTACTS, CYCLE, LARGEST_SPEED, LARGEST_SPIN, LEFT, LONG_RANGE_SUMS, STAGE, STEP, STEPS, TIME
@@ -24,10 +24,10 @@ from .respa import (
     add_long_range_loads,
     add_slow_loads,
     apply_impulse,
-    bonded_loops,
     clear_long_range_loads,
-    follow_path,
-    keep_angular_momentum,
+    contact_pair_loops,
+    correct_angular_momentum,
+    integrate_displacement,
     update_slow_loads,
 )
 from .step_control import cycle_steps
@@ -46,210 +46,217 @@ from .task_queue import join_workers, no_workers
 
 
 @loop
-def _nothing_between(grains, long_range, elapsed):
-    """In a cycle of one step nothing lies between two sums."""
+def _no_loads_within_cycle(grains, long_range, elapsed):
+    """For cycles of one step."""
 
 
 @loop
-def _no_begin(grains, long_range, clock, dt):
-    """Far loads act with all others."""
+def _no_impulse_at_start(grains, long_range, clock, dt):
+    """Without r-RESPA."""
 
 
 @loop
-def _no_inner(grains, long_range, span, clock, dt):
-    """As above."""
+def _no_impulse_within(grains, long_range, span, clock, dt):
+    """Without r-RESPA."""
 
 
 @loop
-def _no_end(grains, long_range, span, clock, elapsed, dt):
-    """As above."""
+def _no_impulse_at_end(grains, long_range, span, clock, elapsed, dt):
+    """Without r-RESPA."""
 
 
 @loop
-def _no_cut(grains, long_range, span, clock, elapsed):
-    """As above."""
+def _no_impulse_at_early_end(grains, long_range, span, clock, elapsed):
+    """Without r-RESPA."""
 
 
 @loop
-def _begin_impulse(grains, long_range, clock, dt):
-    """The first of a cycle's two impulses; half a step of the far loads is given with all others."""
+def _impulse_at_start(grains, long_range, clock, dt):
+    """First impulse of a cycle; the kick dt/2 of its first step already contains dt/2 of the long-range loads."""
     update_slow_loads(grains, long_range)
     if clock[CYCLE] > dt:
         apply_impulse(grains, long_range, 0.5 * (clock[CYCLE] - dt))
 
 
 @loop
-def _inside_impulses(grains, long_range, span, clock, dt):
-    """Between two steps of a cycle, the last of clock[STEP] and the next of dt seconds."""
-    follow_path(grains, long_range, span, 0.5 * (clock[STEP] + dt))
+def _impulse_within(grains, long_range, span, clock, dt):
+    """Between two steps of a cycle, of clock[STEP] and dt seconds: accumulate the path of the slow force."""
+    integrate_displacement(grains, long_range, span, 0.5 * (clock[STEP] + dt))
 
 
 @loop
-def _end_impulse(grains, long_range, span, clock, elapsed, dt):
-    """The second impulse: half the cycle was given at its begin, half a step just now."""
+def _impulse_at_end(grains, long_range, span, clock, elapsed, dt):
+    """Second impulse: half of the cycle was applied at its start, dt/2 with the last kick."""
     if clock[CYCLE] > dt:
         apply_impulse(grains, long_range, elapsed - 0.5 * clock[CYCLE] - 0.5 * dt)
-        follow_path(grains, long_range, span, 0.5 * dt)
-        keep_angular_momentum(grains, long_range, span, elapsed - 0.5 * clock[CYCLE])
+        integrate_displacement(grains, long_range, span, 0.5 * dt)
+        correct_angular_momentum(grains, long_range, span, elapsed - 0.5 * clock[CYCLE])
 
 
 @loop
-def _cut_impulse(grains, long_range, span, clock, elapsed):
-    """The second impulse between two steps: the last half step had the held loads alone."""
+def _impulse_at_early_end(grains, long_range, span, clock, elapsed):
+    """Second impulse between two steps: the last half kick contained the slow loads only."""
     apply_impulse(grains, long_range, 0.5 * clock[STEP])
-    _end_impulse(grains, long_range, span, clock, elapsed, clock[STEP])
+    _impulse_at_end(grains, long_range, span, clock, elapsed, clock[STEP])
 
 
 @loop
-def _no_far(grains, contacts, long_range, count, rules):
-    """No grain feels another from afar."""
+def _no_long_range(grains, contacts, long_range, count, parameters):
+    """Without long-range forces."""
 
 
 @loop
-def _no_bonded(grains, contacts, count, span, numbers):
-    """Pairs in contact are not apart from the others."""
+def _no_contact_pairs(grains, contacts, count, span, parameters):
+    """For long-range loads that are not split."""
 
 
 @loop
-def _no_change(grains, contacts, count, long_range, span, numbers):
-    """As above."""
+def _no_reassignment(grains, contacts, count, long_range, span, parameters):
+    """For long-range loads that are not split."""
 
 
 @loop
-def _no_cycle(grains, contacts, long_range, clock, count, rules):
-    """A cycle of one step needs no cutting."""
+def _no_open_cycle(grains, contacts, long_range, clock, count, parameters):
+    """For cycles of one step."""
 
 
-_IMPULSES = (_begin_impulse, _inside_impulses, _end_impulse, _cut_impulse)
-_NO_IMPULSES = (_no_begin, _no_inner, _no_end, _no_cut)
+_IMPULSES = (_impulse_at_start, _impulse_within, _impulse_at_end, _impulse_at_early_end)
+_NO_IMPULSES = (_no_impulse_at_start, _no_impulse_within, _no_impulse_at_end, _no_impulse_at_early_end)
 
 
 @functools.cache
-def loads_loop(plan: KernelSpec) -> Callable:
-    """The loop that sums forces and torques at the end of a step: the far ones if `due`, else what stands for them."""
-    add_outside = outside_loads(plan.external)
-    gather_all, far_loads = large_loops(plan).gather, large_loops(plan).far_loads
-    between = add_extrapolated_loads if plan.taylor else add_slow_loads if plan.impulse else _nothing_between
-    take_out_bonded = bonded_loops(plan.long_range.pair)[1] if plan.split else _no_change
+def loads_loop(spec: KernelSpec) -> Callable:
+    """The loop that sums forces and torques at the end of a step.
+
+    Long-range loads are summed if `due`; within a cycle the slow or extrapolated loads replace them.
+    """
+    add_external = external_loads(spec.external)
+    gather_all, long_range_loads = large_loops(spec).gather, large_loops(spec).long_range_loads
+    add_within_cycle = (
+        add_extrapolated_loads if spec.taylor else add_slow_loads if spec.impulse else _no_loads_within_cycle
+    )
+    subtract_contact_pairs = contact_pair_loops(spec.long_range.pair)[1] if spec.split else _no_reassignment
 
     @loop
-    def sum_far(grains, contacts, long_range, count, rules):
+    def sum_long_range(grains, contacts, long_range, count, parameters):
         clear_long_range_loads(long_range)
-        far_loads(grains, contacts, long_range, count, rules)
-        take_out_bonded(grains, contacts, count, long_range, rules.span, rules.long_range)
+        long_range_loads(grains, contacts, long_range, count, parameters)
+        subtract_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
         add_long_range_loads(grains, long_range)
 
-    add_far = _no_far if plan.long_range is NO_LONG_RANGE_FORCE else sum_far
+    add_long_range = _no_long_range if spec.long_range is NO_LONG_RANGE_FORCE else sum_long_range
 
     @loop
-    def sum_loads(grains, contacts, long_range, clock, count, rules, due, elapsed):
-        gather_all(grains, contacts, long_range, count, rules)
-        add_outside(grains, clock[TIME] + clock[STEP], rules.external)
+    def sum_loads(grains, contacts, long_range, clock, count, parameters, due, elapsed):
+        gather_all(grains, contacts, long_range, count, parameters)
+        add_external(grains, clock[TIME] + clock[STEP], parameters.external)
         if due:
-            add_far(grains, contacts, long_range, count, rules)
+            add_long_range(grains, contacts, long_range, count, parameters)
             count[LONG_RANGE_SUMS] += 1
         else:
-            between(grains, long_range, elapsed)
+            add_within_cycle(grains, long_range, elapsed)
 
     return sum_loads
 
 
 @functools.cache
-def loads_and_kick_loop(plan: KernelSpec) -> Callable:
-    """The loop for the end of a step: `loads_loop`, and the kick for its second half; returns what `kick` does."""
-    sum_loads = loads_loop(plan)
-    gather_and_kick_all = large_loops(plan).gather_and_kick
+def loads_and_kick_loop(spec: KernelSpec) -> Callable:
+    """The loop that sums the loads (`loads_loop`) and applies the second half kick; returns as `motion.kick` does."""
+    sum_loads = loads_loop(spec)
+    gather_and_kick_all = large_loops(spec).gather_and_kick
 
     @loop
-    def bare_loads_and_kick(grains, contacts, long_range, clock, count, rules, due, elapsed):
+    def contact_loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed):
         count[LONG_RANGE_SUMS] += 1
-        return gather_and_kick_all(grains, contacts, long_range, count, rules, 0.5 * clock[STEP])
+        return gather_and_kick_all(grains, contacts, long_range, count, parameters, 0.5 * clock[STEP])
 
     @loop
-    def loads_and_kick(grains, contacts, long_range, clock, count, rules, due, elapsed):
-        sum_loads(grains, contacts, long_range, clock, count, rules, due, elapsed)
+    def loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed):
+        sum_loads(grains, contacts, long_range, clock, count, parameters, due, elapsed)
         return kick(grains, 0.5 * clock[STEP])
 
-    return bare_loads_and_kick if plan.bare else loads_and_kick
+    return contact_loads_and_kick if spec.contacts_only else loads_and_kick
 
 
 @functools.cache
-def halves_for(plan: KernelSpec) -> tuple[Callable, Callable]:
-    """The two halves of a velocity Verlet step for one plan.
+def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
+    """The two halves of a velocity Verlet step.
 
-    The second half of a step of 0 s finds the pairs and the contacts that are there and works out the loads.
+    The second half of a step of 0 s finds pairs and existing contacts and computes the loads.
     """
-    drift_with_work = drift_with_work_for(plan.external, large_loops(plan).drift)
-    sum_loads, loads_and_kick = loads_loop(plan), loads_and_kick_loop(plan)
-    pass_contacts = large_loops(plan).pass_contacts
-    set_rates = rates_loop(plan.long_range.rates) if plan.taylor else no_rates
-    add_bonded, _, swap_slow_parts = (
-        bonded_loops(plan.long_range.pair) if plan.split else (_no_bonded, None, _no_change)
+    drift_with_work = drift_with_work_for(spec.external, large_loops(spec).drift)
+    sum_loads, loads_and_kick = loads_loop(spec), loads_and_kick_loop(spec)
+    pass_contacts = large_loops(spec).pass_contacts
+    set_rates = rates_loop(spec.long_range.rates) if spec.taylor else no_rates
+    add_contact_pairs, _, reassign_contact_pairs = (
+        contact_pair_loops(spec.long_range.pair) if spec.split else (_no_contact_pairs, None, _no_reassignment)
     )
-    begin, inside, end, cut = _IMPULSES if plan.impulse else _NO_IMPULSES
-    stir = apply_drag_and_noise if plan.gas else no_gas
-    kicked_besides = plan.impulse or plan.gas
+    impulse_at_start, impulse_within, impulse_at_end, impulse_at_early_end = _IMPULSES if spec.impulse else _NO_IMPULSES
+    apply_gas = apply_drag_and_noise if spec.gas else no_gas
+    speeds_change_between_steps = spec.impulse or spec.gas
 
     @loop
-    def cut_cycle(grains, contacts, long_range, clock, count, rules):
-        """End a cycle where it stands, so that what a run leaves behind when it stops is whole."""
+    def close_cycle(grains, contacts, long_range, clock, count, parameters):
+        """End an unfinished cycle at the present step, so that a stopped run leaves a consistent state."""
         if clock[LEFT] > 0.0:
             elapsed = clock[CYCLE] - clock[LEFT]
-            sum_loads(grains, contacts, long_range, clock, count, rules, True, elapsed)
-            cut(grains, long_range, rules.span, clock, elapsed)
-            swap_slow_parts(grains, contacts, count, long_range, rules.span, rules.long_range)
+            sum_loads(grains, contacts, long_range, clock, count, parameters, True, elapsed)
+            impulse_at_early_end(grains, long_range, parameters.span, clock, elapsed)
+            reassign_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
             clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
-    cut_short = _no_cycle if plan.bare else cut_cycle
+    close_open_cycle = _no_open_cycle if spec.contacts_only else close_cycle
 
     @loop
-    def first_half(grains, contacts, pair_list, long_range, clock, count, lost, rules):
-        """Choose the step, kick half of it, drift; anything but STEPS_DONE: no step was taken."""
-        dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, rules)
+    def first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters):
+        """Choose the step, kick dt/2 and drift; no step was taken unless STEPS_DONE is returned."""
+        dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, parameters)
         if stop != Stop.STEPS_DONE:
-            cut_short(grains, contacts, long_range, clock, count, rules)
+            close_open_cycle(grains, contacts, long_range, clock, count, parameters)
             return stop
         if clock[LEFT] == 0.0:
-            cycle = dt * cycle_steps(clock, count, rules.beat, dt)
-            set_rates(grains, contacts, long_range, clock, rules, cycle if cycle > dt else 0.0)
+            cycle = dt * cycle_steps(clock, count, parameters.respa, dt)
+            set_rates(grains, contacts, long_range, clock, parameters, cycle if cycle > dt else 0.0)
             clock[CYCLE] = clock[LEFT] = cycle
-            begin(grains, long_range, clock, dt)
+            impulse_at_start(grains, long_range, clock, dt)
         else:
-            inside(grains, long_range, rules.span, clock, dt)
-        consume_skins(pair_list, drift_with_work(grains, contacts, long_range, clock, count, lost, rules, dt))
+            impulse_within(grains, long_range, parameters.span, clock, dt)
+        consume_skins(pair_list, drift_with_work(grains, contacts, long_range, clock, count, lost, parameters, dt))
         clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
         clock[STEP] = dt
         count[STAGE] = 1
         return Stop.STEPS_DONE
 
     @loop
-    def second_half(grains, contacts, pair_list, long_range, clock, count, lost, rules):
-        """Contacts, loads, the other half kick; may be entered again after arrays have grown."""
-        stop, stale = update_lists(grains, contacts, pair_list, long_range, count, rules)
+    def second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters):
+        """Update lists and contacts, sum the loads, kick dt/2; called again after an array was enlarged."""
+        stop, list_rebuilt = update_lists(grains, contacts, pair_list, long_range, count, parameters)
         if stop != Stop.STEPS_DONE:
             return stop
-        fresh = count_new_contacts(grains, pair_list, count, rules.span)
-        if count[CONTACTS] + fresh > contacts.pair.shape[1]:
+        formed = count_new_contacts(grains, pair_list, count, parameters.span)
+        if count[CONTACTS] + formed > contacts.pair.shape[1]:
             return Stop.CONTACTS_FULL
-        flagged = pass_contacts(grains, contacts, long_range, clock, count, lost, rules)
-        parted = update_contacts(grains, contacts, pair_list, clock, count, lost, rules, stale, fresh, flagged)
+        flagged = pass_contacts(grains, contacts, long_range, clock, count, lost, parameters)
+        broken = update_contacts(
+            grains, contacts, pair_list, clock, count, lost, parameters, list_rebuilt, formed, flagged
+        )
         dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
-        due = clock[LEFT] == 0.0 or parted or fresh > 0
-        add_bonded(grains, contacts, count, rules.span, rules.long_range)
-        fastest, fastest_spin = loads_and_kick(grains, contacts, long_range, clock, count, rules, due, elapsed)
+        due = clock[LEFT] == 0.0 or broken or formed > 0
+        add_contact_pairs(grains, contacts, count, parameters.span, parameters.long_range)
+        fastest, fastest_spin = loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed)
         pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN] = fastest, fastest_spin
         if due:
-            end(grains, long_range, rules.span, clock, elapsed, dt)
-            swap_slow_parts(grains, contacts, count, long_range, rules.span, rules.long_range)
+            impulse_at_end(grains, long_range, parameters.span, clock, elapsed, dt)
+            reassign_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
             clock[LEFT], clock[CYCLE] = 0.0, elapsed
-        if parted:
-            remove_broken_contacts(grains, contacts, pair_list, clock, count, rules)
+        if broken:
+            remove_broken_contacts(grains, contacts, pair_list, clock, count, parameters)
         clock[TIME] += dt
         count[STEPS] += 1
         count[STAGE] = 0
         if due:
-            stir(grains, clock, count, lost, rules)
-            if kicked_besides:
+            apply_gas(grains, clock, count, lost, parameters)
+            if speeds_change_between_steps:
                 invalidate_speeds(pair_list)
         return Stop.STEPS_DONE
 
@@ -257,17 +264,17 @@ def halves_for(plan: KernelSpec) -> tuple[Callable, Callable]:
 
 
 @functools.cache
-def driver_for(plan: KernelSpec) -> Callable:
-    """The compiled `advance` for one plan.
+def driver_for(spec: KernelSpec) -> Callable:
+    """Compile the driver `advance` for one specification.
 
-    A world starts at STAGE 1 with a step of 0 s (what that counts and books is not part of a run).
+    A run starts at STAGE 1 with a step of 0 s, whose counters and energies are discarded.
     """
-    first_half, second_half = halves_for(plan)
-    leave = join_workers if plan.queue else no_workers
+    first_half, second_half = half_steps_for(spec)
+    join = join_workers if spec.queue else no_workers
 
     @loop
-    def steps_until(grains, contacts, pair_list, long_range, clock, count, lost, rules, until, last):
-        """Steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""
+    def steps_until(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last):
+        """Take steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""
         reset_skins(pair_list, count)
         while True:
             if count[STAGE] == 0:
@@ -276,16 +283,16 @@ def driver_for(plan: KernelSpec) -> Callable:
                         return Stop.TIME_REACHED
                     if count[STEPS] >= last:
                         return Stop.STEPS_DONE
-                stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, rules)
+                stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
                 if stop != Stop.STEPS_DONE:
                     return stop
-            stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, rules)
+            stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
             if stop != Stop.STEPS_DONE:
                 return stop
 
-    def advance(grains, contacts, pair_list, long_range, clock, count, lost, rules, until, last):
-        stop = steps_until(grains, contacts, pair_list, long_range, clock, count, lost, rules, until, last)
-        leave(rules)
+    def advance(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last):
+        stop = steps_until(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last)
+        join(parameters)
         return stop
 
-    return kernel(advance, cached=plan.keep, nogil=plan.queue, long_vectors=plan.wide)
+    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide)

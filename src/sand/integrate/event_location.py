@@ -1,8 +1,9 @@
-"""When two grains come to touch within a Runge–Kutta step.
+"""Location of the first contact of two grains within a Runge–Kutta step.
 
-Between the two ends of a step the separation of a pair is the polynomial of degree 5 that has its values, velocities
-and accelerations; it errs by the sixth power of the step, as the step itself.  It is kept as six points P_k in
-Bézier's form: the curve lies within their hull, which rules out most pairs without any search.
+Within a step the separation of a pair is interpolated by the polynomial of degree 5 (quintic Hermite) that matches
+positions, velocities and accelerations at both ends; its error is of sixth order in the step, like that of the step
+itself.  It is stored as the six control points P_k of a Bézier curve: the curve lies within their convex hull, which
+excludes most pairs without a search.
 """
 
 import math
@@ -14,27 +15,27 @@ from ..compiler.jit import formula, loop, rare
 from ..numerics.vec import add, axpy, dot, load, norm, scale, sub
 from .runge_kutta import STAGES, V, X, rows3
 
-TOUCH_ERROR = 1e-12
-"""Largest overlap at a touch, in r1 + r2; a step that ends with it is not shortened any more."""
+OVERLAP_TOLERANCE = 1e-12
+"""Largest overlap at first contact, in units of r1 + r2; a step that ends with less is accepted."""
 ROUNDING = 1e-15
-"""The same in parts of the coordinates, where these are so large that rounding is more."""
-LOOKS = 16
-"""Places within a step at which the distance of a pair is looked at; between two there is one minimum at most."""
-HALVINGS = 60
-"""Of an interval of a step, to find a root to rounding."""
+"""The same in units of the largest coordinate, where rounding errors dominate."""
+SAMPLES = 16
+"""Intervals of a step, each assumed to contain at most one minimum of the distance of a pair."""
+BISECTIONS = 60
+"""Bisections of an interval; they locate a root to rounding."""
 NEVER = 2.0
-"""A touch after the end of the step, or none at all."""
+"""Contact time returned if there is no contact within the step."""
 
 
 @formula
 def between(a, b, part):
-    """The point at `part` of the way from a to b."""
+    """Linear interpolation a + part (b − a)."""
     return axpy(part, sub(b, a), a)
 
 
 @formula
 def curve_at(points, part):
-    """Place and slope of the curve with six points at 0 ≤ part ≤ 1 (de Casteljau's scheme)."""
+    """Point and derivative of the Bézier curve of six control points at 0 ≤ part ≤ 1 (de Casteljau's algorithm)."""
     a, b, c, d, e, f = points
     a, b, c, d, e = (
         between(a, b, part),
@@ -50,8 +51,8 @@ def curve_at(points, part):
 
 
 @loop
-def way_of_pair(grains, stages, span, i, j, dt):
-    """The six points [m] of the separation x_i − x_j in the step."""
+def separation_curve(grains, stages, span, i, j, dt):
+    """Control points [m] of the separation x_i − x_j over the step."""
     start, rate, last = stages.start, stages.rate, STAGES - 1
     s0 = nearest_image(sub(rows3(start, X, i), rows3(start, X, j)), span)
     moved1, moved2 = (
@@ -68,72 +69,73 @@ def way_of_pair(grains, stages, span, i, j, dt):
 
 @formula
 def stays_away(points, limit):
-    """True if the curve cannot come closer to the origin than `limit`: no point is that far from the first."""
-    largest_displacement = 0.0
+    """Whether the curve stays farther than `limit` from the origin, by a bound from its control points."""
+    largest = 0.0
     for k in range(1, 6):
-        way = sub(points[k], points[0])
-        largest_displacement = max(largest_displacement, dot(way, way))
-    return norm(points[0]) - math.sqrt(largest_displacement) > limit
+        offset = sub(points[k], points[0])
+        largest = max(largest, dot(offset, offset))
+    return norm(points[0]) - math.sqrt(largest) > limit
 
 
 @rare
-def first_entry(points, limit):
-    """The first part of the step at which the curve comes closer than `limit` [m], or NEVER."""
+def first_crossing(points, limit):
+    """First parameter 0 … 1 at which the curve comes closer to the origin than `limit` [m], or NEVER."""
     before = 0.0
     _, slope = curve_at(points, 0.0)
-    falling = dot(points[0], slope) < 0.0
-    for k in range(1, LOOKS + 1):
-        after = k / LOOKS
-        place, slope = curve_at(points, after)
-        falls = dot(place, slope) < 0.0
+    was_approaching = dot(points[0], slope) < 0.0
+    for k in range(1, SAMPLES + 1):
+        after = k / SAMPLES
+        point, slope = curve_at(points, after)
+        approaching = dot(point, slope) < 0.0
         high = after
-        if falling and not falls:  # a minimum in between
+        if was_approaching and not approaching:  # a minimum in between
             low = before
-            for _ in range(HALVINGS):
+            for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
-                place, slope = curve_at(points, middle)
-                if dot(place, slope) < 0.0:
+                point, slope = curve_at(points, middle)
+                if dot(point, slope) < 0.0:
                     low = middle
                 else:
                     high = middle
-            place, _ = curve_at(points, high)
-        if dot(place, place) <= limit * limit:
+            point, _ = curve_at(points, high)
+        if dot(point, point) <= limit * limit:
             low = before
-            for _ in range(HALVINGS):
+            for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
-                place, _ = curve_at(points, middle)
-                if dot(place, place) <= limit * limit:
+                point, _ = curve_at(points, middle)
+                if dot(point, point) <= limit * limit:
                     high = middle
                 else:
                     low = middle
             return high
-        before, falling = after, falls
+        before, was_approaching = after, approaching
     return NEVER
 
 
 @loop
 def contact_time_of_pair(grains, stages, span, i, j, dt):
-    """The part of the step at which grains i and j touch first: 1 if they do at its end, to rounding, or NEVER."""
+    """Time of first contact of grains i and j in units of the step; 1 for contact at its end, NEVER for none."""
     reach = grains.radius[i] + grains.radius[j]
-    points = way_of_pair(grains, stages, span, i, j, dt)
+    points = separation_curve(grains, stages, span, i, j, dt)
     if stays_away(points, reach):
         return NEVER
-    long_range = max(norm(load(grains.position, i)), norm(load(grains.position, j)))
-    allowed = TOUCH_ERROR * reach + ROUNDING * long_range
+    largest = max(norm(load(grains.position, i)), norm(load(grains.position, j)))
+    allowed = OVERLAP_TOLERANCE * reach + ROUNDING * largest
     overlap = reach - norm(points[5])
     if 0.0 <= overlap <= allowed and dot(points[5], sub(points[5], points[4])) < 0.0:
         return 1.0
-    return first_entry(points, reach - 0.5 * allowed)
+    return first_crossing(points, reach - 0.5 * allowed)
 
 
 @loop
-def first_touch(grains, long_range, stages, rules, dt):
-    """The part of the step at which the first of all pairs comes to touch; NEVER if none does.
+def first_contact_time(grains, long_range, stages, parameters, dt):
+    """Time of the first contact of any pair in units of the step; NEVER if there is none.
 
-    With a list, its pairs are all that can: a pair was either listed or farther apart than the reach, r1 + r2 and more
-    plus Δr, and each grain has gone at most Δr/4 since the list was made when a step begins, and Δr/4 in it.
+    With a Verlet list only listed pairs can touch: pairs that are not listed were farther apart than the reach, at
+    least r1 + r2 plus the margin Δr, and a grain moves by at most Δr/4 between the construction of the list and the
+    start of a step, and by at most Δr/4 in the step.
     """
-    listed = rules.search.listed
+    listed = parameters.search.listed
     first = NEVER
     for k in range(grains.mass.size):
         begin, end = (long_range.start[k], long_range.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
@@ -141,5 +143,5 @@ def first_touch(grains, long_range, stages, rules, dt):
         for m in range(begin, end):
             j = long_range.order[long_range.neighbour[m]] if listed else np.uint32(m)
             if j < i:
-                first = min(first, contact_time_of_pair(grains, stages, rules.span, i, j, dt))
+                first = min(first, contact_time_of_pair(grains, stages, parameters.span, i, j, dt))
     return first

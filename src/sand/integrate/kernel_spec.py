@@ -1,4 +1,4 @@
-"""What the compiled driver is made of and what it is told: all that does not change during a run."""
+"""What a compiled driver is built from (`KernelSpec`), and its run-time parameters (`StepParameters`)."""
 
 from collections.abc import Callable
 from enum import IntEnum
@@ -9,7 +9,7 @@ from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums
 
 
 class Stop(IntEnum):
-    """Why the driver came back."""
+    """Why the driver returned to Python."""
 
     STEPS_DONE = 0
     TIME_REACHED = 1
@@ -24,71 +24,71 @@ class Stop(IntEnum):
 
 
 class KernelSpec(NamedTuple):
-    """What a driver is compiled from; each combination is compiled once."""
+    """The code that a driver is composed of; each combination is compiled once."""
 
-    external: Callable = nothing  # per-grain forces, composed
-    long_range: LongRangeSums = NO_LONG_RANGE_FORCE  # long-range forces, composed
-    split: bool = False  # pairs in contact feel their far force in every step
-    impulse: bool = False  # far loads as impulses at both ends of a cycle, but for a held part
-    taylor: bool = False  # far loads by Taylor series inside a cycle
+    external: Callable = nothing  # formula of the external forces, composed
+    long_range: LongRangeSums = NO_LONG_RANGE_FORCE  # loops of the long-range forces, composed
+    split: bool = False  # long-range forces between grains in contact are evaluated in every step
+    impulse: bool = False  # r-RESPA: fast part of the long-range forces as impulses at both ends of a cycle
+    taylor: bool = False  # long-range forces extrapolated within a cycle by their first-order Taylor series
     gas: bool = False  # drag and Brownian kicks
-    adaptive: bool = False  # Runge–Kutta steps while nothing touches
-    queue: bool = False  # large loops in blocks, for threads to share
-    keep: bool = True  # the compiled code on disk, if all of it is ours
+    adaptive: bool = False  # Runge–Kutta steps while there are no contacts
+    queue: bool = False  # large loops in blocks that worker threads share
+    keep: bool = True  # cache the compiled code on disk; False with formulas from outside SAND
     magnetic: bool = True  # some grain has a moment
-    wide: bool = False  # so many grains that loops are made of the longest vectors
+    wide: bool = False  # enough grains for the longest SIMD vectors
 
     @property
-    def bare(self) -> bool:
-        """True where contacts are the only forces."""
+    def contacts_only(self) -> bool:
+        """Whether contact forces are the only forces."""
         return self.external is nothing and self.long_range is NO_LONG_RANGE_FORCE
 
 
 class ContactParameters(NamedTuple):
-    """The contact law's run-time numbers."""
+    """Run-time parameters of the contact model."""
 
-    on: bool  # False: grains pass through each other
-    pairings: Any  # (10, M, M) table: what two materials make together
-    release: bool  # displacement beyond its limit: False clamp, True release
-    follow: bool  # stiffnesses: False frozen at a₀, True following the contact radius
-    damped: bool  # is there any damping
-    per_period: float  # steps per fastest period
-    uniform_contacts: bool = False  # as in World: one set of constants for all contacts
+    on: bool  # False: grains overlap without interaction
+    pairings: Any  # (10, M, M) constants of each pair of materials
+    release: bool  # slip: False clamps the displacement at its limit, True resets it
+    follow: bool  # stiffnesses: False for the equilibrium radius a₀, True for the instantaneous contact radius
+    damped: bool  # whether normal motion is damped
+    per_period: float  # steps per fastest contact period
+    uniform_contacts: bool = False  # one set of constants for all contacts, as in State
 
 
 class RespaSettings(NamedTuple):
-    """How often far loads are summed while grains are in contact."""
+    """Multiple time stepping: how often the long-range forces are summed while grains are in contact."""
 
-    most: int  # k_max, steps from one summation to the next; 1: every step
-    literal: bool  # Taylor series with each grain's own v and ω, ringing or not
+    max_steps: int  # k_max, largest number of steps in a cycle; 1: summed in every step
+    instantaneous_rates: bool  # Taylor series from the instantaneous v and ω of all grains, not from mean rates
 
 
-class Books(NamedTuple):
-    """Energies that the outside forces leave to the driver."""
+class ExternalWork(NamedTuple):
+    """Energy changes of the external forces that the driver has to log as work of their sources."""
 
-    time_dependent: bool  # their energy depends on time
-    position_dependent: bool  # their energy depends on position, which periodic boundaries make jump
+    time_dependent: bool  # the energy depends explicitly on time
+    position_dependent: bool  # the energy depends on position and jumps when a grain crosses a periodic boundary
 
 
 class GasSettings(NamedTuple):
-    """When and how the gas acts."""
+    """When and how drag and Brownian kicks are applied."""
 
-    period: float  # shortest time between two kicks [s]
+    period: float  # target interval between two kicks [s]
     seed: int
     gas: Any  # forces.gas.loops.GasParameters
 
 
 class StepParameters(NamedTuple):
-    """All numbers that do not change during a run."""
+    """All run-time parameters of a driver; constant during a run."""
 
-    span: Any
+    span: Any  # box.Span, side lengths of the box
     contact: ContactParameters
-    long_range: Any
-    external: Any
-    search: Any
-    beat: RespaSettings
-    books: Books
-    gas: Any
-    control: Any
-    precision: Any = ()  # adaptive.Precision, where there are Runge–Kutta steps
-    queue: Any = ()  # crew.Crew, where the plan has one
+    long_range: Any  # nested parameters of the long-range forces
+    external: Any  # nested parameters of the external forces
+    search: Any  # neighbours.cell_list.Search
+    respa: RespaSettings
+    external_work: ExternalWork
+    gas: GasSettings
+    criteria: Any  # step_control.StepCriteria
+    error_limits: Any = ()  # adaptive.ErrorLimits of Runge–Kutta steps
+    queue: Any = ()  # task_queue.TaskQueue, if `KernelSpec.queue`

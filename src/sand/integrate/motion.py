@@ -1,4 +1,4 @@
-"""Kick, drift, turn: velocity Verlet for translation and rotation (Eqs. 28, 29, 31–33 with 1/m and 1/I)."""
+"""Kicks and drifts of velocity Verlet for translation and rotation (Eqs. 28, 29, 31–33, with 1/m and 1/I)."""
 
 import functools
 import math
@@ -13,15 +13,15 @@ from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import axpy, dot, load, load4, put, put4, scale
 
-OPEN = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""A box without walls, for moves that are wrapped later."""
+UNBOUNDED = Span(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A box without periodic boundaries, for drifts whose positions are wrapped afterwards."""
 BLOCK_OF_GRAINS = np.uint64(4 * BLOCK)
-"""Grains whose loads are gathered before they are kicked, whole blocks; their forces stay in the first cache."""
+"""Grains gathered before they are kicked: whole blocks of `contact.gather`, whose forces stay in the L1 cache."""
 
 
 @loop
 def kicked(grains, i, dt):
-    """Velocity and spin of grain i after v += F dt/m, ω += M dt/I; kept there."""
+    """Apply v += F dt/m, ω += M dt/I to grain i; returns the new velocity and spin."""
     v = axpy(dt / grains.mass[i], load(grains.force, i), load(grains.velocity, i))
     w = axpy(dt / grains.inertia[i], load(grains.torque, i), load(grains.spin, i))
     put(grains.velocity, i, v)
@@ -31,7 +31,7 @@ def kicked(grains, i, dt):
 
 @loop
 def kick_some(grains, first, last, dt):
-    """Velocities and spins of the grains first…last − 1 (uint64); ranks of the largest squares of speed and spin."""
+    """Kick the grains first…last − 1 (uint64); returns the bits of the largest squares of speed and spin."""
     fastest = fastest_spin = float_bits(0.0)
     for k in range(last - first):
         v, w = kicked(grains, first + k, dt)
@@ -41,14 +41,14 @@ def kick_some(grains, first, last, dt):
 
 @loop
 def kick(grains, dt):
-    """All velocities and spins; returns squares of the largest speed [m²/s²] and spin [1/s²]."""
+    """Kick all grains; returns the squares of the largest speed [m²/s²] and spin [1/s²]."""
     fastest, fastest_spin = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
     return float_from_bits(fastest), float_from_bits(fastest_spin)
 
 
 @loop
 def gather_and_kick(grains, contacts, first, last, dt):
-    """Loads of contacts, the only ones, and the kick that they give, few grains at a time; as `kick_some`."""
+    """Sum the contact loads of few grains at a time and kick these, without other forces; returns as `kick_some`."""
     fastest = fastest_spin = float_bits(0.0)
     while first < last:
         end = min(first + BLOCK_OF_GRAINS, last)
@@ -59,23 +59,23 @@ def gather_and_kick(grains, contacts, first, last, dt):
 
 
 @loop
-def _moment_follows(grains, i, q):
+def _rotate_moment(grains, i, q):
     put(grains.moment, i, turned(q, load(grains.body_moment, i)))
 
 
 @loop
 def _no_moment(grains, i, q):
-    """There is none."""
+    """For grains without moments."""
 
 
 @functools.cache
 def drift_for(magnetic: bool) -> Callable:
-    """The loop of the first half of a step, with moments that turn with their grains or without any."""
-    follow = _moment_follows if magnetic else _no_moment
+    """The loop of the first half of a step; if `magnetic`, moments rotate with their grains."""
+    rotate_moment = _rotate_moment if magnetic else _no_moment
 
     @loop
     def drift_some(grains, first, last, span, dt):
-        """Grains first…last − 1 (uint64): kick for dt/2; x += v dt, wrapped into its box, ϱ turned by ω dt.
+        """Kick the grains first…last − 1 (uint64) by dt/2; x += v dt, wrapped into the box; ϱ rotated by ω dt.
 
         Returns the bits of the largest square of a speed.
         """
@@ -87,7 +87,7 @@ def drift_for(magnetic: bool) -> Callable:
             put(grains.position, i, nearest_image(axpy(dt, v, load(grains.position, i)), span))
             q = turn(load4(grains.orientation, i), scale(dt, w))
             put4(grains.orientation, i, q)
-            follow(grains, i, q)
+            rotate_moment(grains, i, q)
         return fastest
 
     return drift_some
@@ -95,7 +95,7 @@ def drift_for(magnetic: bool) -> Callable:
 
 @functools.cache
 def kick_and_drift_for(magnetic: bool) -> Callable:
-    """The same for all grains; returns the longest way [m]."""
+    """As `drift_for`, for all grains; the loop returns the largest displacement [m]."""
     drift_some = drift_for(magnetic)
 
     @loop

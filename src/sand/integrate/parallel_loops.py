@@ -1,4 +1,4 @@
-"""The large loops of a step, by one thread or by a crew."""
+"""The large loops of a step: on one thread, or in blocks shared by threads."""
 
 import functools
 import math
@@ -15,114 +15,114 @@ from ..state.state import CONTACTS, STEP
 from .kernel_spec import KernelSpec
 from .motion import gather_and_kick, kick_and_drift_for
 from .task_queue import (
+    CONTACT_PASS,
     CONTACTS_PER_BLOCK,
     DRIFT,
-    FAR,
     GATHER,
     GATHER_AND_KICK,
     GRAINS_PER_BLOCK,
-    PASS,
+    LONG_RANGE,
     blocks_of,
-    span_of_drift,
+    drift_span,
     worker_loops,
 )
 
 
+class LargeLoops(NamedTuple):
+    """The large loops of a step."""
+
+    pass_contacts: Callable  # update of all contacts; True if any has to be settled one by one
+    gather: Callable  # sums of the contact loads per grain
+    gather_and_kick: Callable  # these sums and a kick
+    long_range_loads: Callable
+    drift: Callable  # kick dt/2 and drift; returns the largest displacement [m]
+
+
+@functools.cache
+def large_loops(spec: KernelSpec) -> LargeLoops:
+    """The large loops for one specification."""
+    return _shared_loops(spec) if spec.queue else _serial_loops(spec)
+
+
 @loop
-def _pass_alone(grains, contacts, long_range, clock, count, lost, rules):
+def _serial_pass(grains, contacts, long_range, clock, count, lost, parameters):
     last = np.uint64(count[CONTACTS])
-    passed = contact_pass(grains, contacts, np.uint64(0), last, rules.span, rules.contact, clock[STEP])
+    passed = contact_pass(grains, contacts, np.uint64(0), last, parameters.span, parameters.contact, clock[STEP])
     log_slip_sums(count, lost, passed)
     return passed.waiting > 0.0
 
 
 @loop
-def _gather_alone(grains, contacts, long_range, count, rules):
+def _serial_gather(grains, contacts, long_range, count, parameters):
     gather_in_index_order(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
 
 
 @loop
-def _gather_and_kick_alone(grains, contacts, long_range, count, rules, dt):
+def _serial_gather_and_kick(grains, contacts, long_range, count, parameters, dt):
     fastest, fastest_spin = gather_and_kick(grains, contacts, np.uint64(0), np.uint64(grains.mass.size), dt)
     return float_from_bits(fastest), float_from_bits(fastest_spin)
 
 
-class Large(NamedTuple):
-    """The large loops of a step."""
-
-    pass_contacts: Callable  # over all contacts; True if any wait
-    gather: Callable  # their loads at grains
-    gather_and_kick: Callable  # these, and a kick
-    far_loads: Callable
-    drift: Callable  # half a kick and a drift; the longest way [m]
-
-
-@functools.cache
-def large_loops(plan: KernelSpec) -> Large:
-    """The large loops for one plan."""
-    return _by_a_crew(plan) if plan.queue else _alone(plan)
-
-
-def _alone(plan: KernelSpec) -> Large:
-    sum_far, kick_and_drift = plan.long_range.loads, kick_and_drift_for(plan.magnetic)
+def _serial_loops(spec: KernelSpec) -> LargeLoops:
+    sum_long_range, kick_and_drift = spec.long_range.loads, kick_and_drift_for(spec.magnetic)
 
     @loop
-    def far_alone(grains, contacts, long_range, count, rules):
-        sum_far(grains, long_range, rules.span, rules.long_range)
+    def long_range_loads(grains, contacts, long_range, count, parameters):
+        sum_long_range(grains, long_range, parameters.span, parameters.long_range)
 
     @loop
-    def drift_alone(grains, contacts, long_range, count, rules, dt):
-        return kick_and_drift(grains, span_of_drift(rules), dt)
+    def drift(grains, contacts, long_range, count, parameters, dt):
+        return kick_and_drift(grains, drift_span(parameters), dt)
 
-    return Large(_pass_alone, _gather_alone, _gather_and_kick_alone, far_alone, drift_alone)
+    return LargeLoops(_serial_pass, _serial_gather, _serial_gather_and_kick, long_range_loads, drift)
 
 
-def _by_a_crew(plan: KernelSpec) -> Large:
-    share, _ = worker_loops(plan)
-    begin, _, end, far_blocks = plan.long_range.parts
+def _shared_loops(spec: KernelSpec) -> LargeLoops:
+    share, _ = worker_loops(spec)
+    begin, _, end, long_range_blocks = spec.long_range.blocked
 
     @loop
-    def pass_together(grains, contacts, long_range, clock, count, lost, rules):
-        rules.queue.step[0] = clock[STEP]
+    def pass_contacts(grains, contacts, long_range, clock, count, lost, parameters):
+        parameters.queue.step[0] = clock[STEP]
         blocks = blocks_of(count[CONTACTS], CONTACTS_PER_BLOCK)
-        share(PASS, blocks, grains, contacts, long_range, count, rules)
+        share(CONTACT_PASS, blocks, grains, contacts, long_range, count, parameters)
         waiting = False
         for b in range(blocks):
-            passed = load_slip_sums(rules.queue.passed, b)
+            passed = load_slip_sums(parameters.queue.passed, b)
             waiting |= passed.waiting > 0.0
             log_slip_sums(count, lost, passed)
         return waiting
 
     @loop
-    def gather_together(grains, contacts, long_range, count, rules):
+    def gather(grains, contacts, long_range, count, parameters):
         blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
-        share(GATHER, blocks, grains, contacts, long_range, count, rules)
+        share(GATHER, blocks, grains, contacts, long_range, count, parameters)
 
     @loop
-    def gather_and_kick_together(grains, contacts, long_range, count, rules, dt):
-        rules.queue.step[0] = dt
+    def gather_and_kick(grains, contacts, long_range, count, parameters, dt):
+        parameters.queue.step[0] = dt
         blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
-        share(GATHER_AND_KICK, blocks, grains, contacts, long_range, count, rules)
+        share(GATHER_AND_KICK, blocks, grains, contacts, long_range, count, parameters)
         fastest = fastest_spin = float_bits(0.0)
         for b in range(blocks):
-            fastest = max(fastest, magnitude_bits(rules.queue.speeds[b, 0]))
-            fastest_spin = max(fastest_spin, magnitude_bits(rules.queue.speeds[b, 1]))
+            fastest = max(fastest, magnitude_bits(parameters.queue.speeds[b, 0]))
+            fastest_spin = max(fastest_spin, magnitude_bits(parameters.queue.speeds[b, 1]))
         return float_from_bits(fastest), float_from_bits(fastest_spin)
 
     @loop
-    def combined_sums(grains, contacts, long_range, count, rules):
-        begin(grains, long_range, rules.span, rules.long_range)
-        share(FAR, far_blocks(grains), grains, contacts, long_range, count, rules)
-        end(grains, long_range, rules.span, rules.long_range)
+    def long_range_loads(grains, contacts, long_range, count, parameters):
+        begin(grains, long_range, parameters.span, parameters.long_range)
+        share(LONG_RANGE, long_range_blocks(grains), grains, contacts, long_range, count, parameters)
+        end(grains, long_range, parameters.span, parameters.long_range)
 
     @loop
-    def drift_together(grains, contacts, long_range, count, rules, dt):
-        rules.queue.step[0] = dt
+    def drift(grains, contacts, long_range, count, parameters, dt):
+        parameters.queue.step[0] = dt
         blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
-        share(DRIFT, blocks, grains, contacts, long_range, count, rules)
+        share(DRIFT, blocks, grains, contacts, long_range, count, parameters)
         fastest = float_bits(0.0)
         for b in range(blocks):
-            fastest = max(fastest, magnitude_bits(rules.queue.speeds[b, 0]))
+            fastest = max(fastest, magnitude_bits(parameters.queue.speeds[b, 0]))
         return dt * math.sqrt(float_from_bits(fastest))
 
-    return Large(pass_together, gather_together, gather_and_kick_together, combined_sums, drift_together)
+    return LargeLoops(pass_contacts, gather, gather_and_kick, long_range_loads, drift)

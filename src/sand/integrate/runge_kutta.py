@@ -4,8 +4,10 @@ Dormand, J. R. & Prince, P. J. 1980, J. Comput. Appl. Math. 6, 19.  The state of
 
     ẋ = v,  v̇ = F/m,  ϱ̇ = ½ ω∘ϱ,  ω̇ = M/I
 
-The right-hand side takes ϱ/|ϱ|, so that it does not matter to the method when ϱ is normalised.  The last of the seven
-stages is the new state, and its loads serve as the first of the next step.
+The right-hand side depends on ϱ/|ϱ| only, so normalising ϱ between steps does not affect the order.  The last of the
+seven stages is the new state, and its rates are the first of the next step (FSAL).
+
+The trajectories of `experiments.scattering` have a Runge–Kutta driver of their own, of order 8 and for two bodies.
 """
 
 import functools
@@ -15,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..compiler.jit import formula, loop, rare
-from ..forces.external.loops import grain_at, outside_loads
+from ..forces.external.loops import external_loads, grain_at
 from ..numerics.quaternion import normalised, turned, turning_rate
 from ..numerics.vec import dot, load, load4, put, put4
 from ..state.state import LONG_RANGE_SUMS
@@ -23,9 +25,9 @@ from .respa import add_long_range_loads, clear_long_range_loads
 
 STAGES = 7
 TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
-"""When each stage is, in steps."""
+"""Times c_s of the stages, in units of the step."""
 WEIGHTS = np.zeros((STAGES, STAGES))
-"""What the rates of the earlier stages count for in each stage; the last row gives the step, of order 5."""
+"""Coefficients a_sr of the stages; the last row is the solution of order 5."""
 WEIGHTS[1, :1] = [1 / 5]
 WEIGHTS[2, :2] = [3 / 40, 9 / 40]
 WEIGHTS[3, :3] = [44 / 45, -56 / 15, 32 / 9]
@@ -33,16 +35,16 @@ WEIGHTS[4, :4] = [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729]
 WEIGHTS[5, :5] = [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656]
 WEIGHTS[6, :6] = [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]
 ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
-"""Weights of order 5 less those of order 4: the error of the latter."""
+"""Weights of order 5 minus those of order 4: the error estimate of the step."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-"""Of the next step: part of what would just do, least and largest factor."""
+"""Step-size control: safety factor, smallest and largest ratio of successive steps."""
 X, V, Q, W = 0, 3, 6, 10
-"""Rows where position, velocity, orientation and spin begin."""
+"""First rows of position, velocity, orientation and spin in the arrays of a stage."""
 
 
 @formula
-def next_factor(error, order):
-    """What the next step should be, in parts of this one: 0.9 err^(−1/order), within 0.2 … 5; 5 without any error."""
+def step_size_factor(error, order):
+    """Ratio of the next step to this one: 0.9 err^(−1/order), limited to 0.2 … 5; 5 for err = 0."""
     if error == 0.0:
         return GROW
     return min(GROW, max(SHRINK, SAFETY * error ** (-1.0 / order)))
@@ -55,8 +57,8 @@ def rows3(array, first, i):
 
 
 @loop
-def blended(rate, weights, stages, row, i):
-    """Σ w_s k_s of one row over the first stages."""
+def weighted_rate(rate, weights, stages, row, i):
+    """Σ w_s k_s of one row over the first `stages` stages."""
     total = 0.0
     for s in range(stages):
         total += weights[s] * rate[s, row, i]
@@ -64,8 +66,8 @@ def blended(rate, weights, stages, row, i):
 
 
 @loop
-def keep_start(grains, stages):
-    """Remember the state of all grains."""
+def store_start(grains, stages):
+    """Store the state of all grains at the start of the step."""
     for i in range(grains.mass.size):
         for row in range(3):
             stages.start[X + row, i] = grains.position[row, i]
@@ -76,33 +78,33 @@ def keep_start(grains, stages):
 
 
 @rare
-def place_stage(grains, stages, s, dt):
-    """Bring all grains to stage s of a step of dt seconds; the square of the longest way any of them went [m²].
+def set_stage(grains, stages, s, dt):
+    """Set all grains to stage s of a step of dt seconds; returns the square of the largest displacement [m²].
 
-    Stage 0 is the start.
+    Stage 0 is the start of the step.
     """
-    largest_displacement = 0.0
+    largest = 0.0
     start, rate, weights = stages.start, stages.rate, WEIGHTS[s]
     for i in range(grains.mass.size):
-        way = 0.0
+        squared = 0.0
         for row in range(3):
-            moved = dt * blended(rate, weights, s, X + row, i)
-            way += moved * moved
+            moved = dt * weighted_rate(rate, weights, s, X + row, i)
+            squared += moved * moved
             grains.position[row, i] = start[X + row, i] + moved
-            grains.velocity[row, i] = start[V + row, i] + dt * blended(rate, weights, s, V + row, i)
-            grains.spin[row, i] = start[W + row, i] + dt * blended(rate, weights, s, W + row, i)
+            grains.velocity[row, i] = start[V + row, i] + dt * weighted_rate(rate, weights, s, V + row, i)
+            grains.spin[row, i] = start[W + row, i] + dt * weighted_rate(rate, weights, s, W + row, i)
         for row in range(4):
-            grains.orientation[row, i] = start[Q + row, i] + dt * blended(rate, weights, s, Q + row, i)
+            grains.orientation[row, i] = start[Q + row, i] + dt * weighted_rate(rate, weights, s, Q + row, i)
         put(grains.moment, i, turned(normalised(load4(grains.orientation, i)), load(grains.body_moment, i)))
-        # written so that what is not a number counts as far
-        largest_displacement = largest_displacement if way <= largest_displacement else way
-        largest_displacement = largest_displacement if way < math.inf else math.inf
-    return largest_displacement
+        # written so that a displacement that is not a number counts as infinite
+        largest = largest if squared <= largest else squared
+        largest = largest if squared < math.inf else math.inf
+    return largest
 
 
 @rare
-def note_rates(grains, stages, s):
-    """The rates of change at stage s, from the loads there."""
+def store_rates(grains, stages, s):
+    """Store the rates of change at stage s, from its loads."""
     rate = stages.rate
     for i in range(grains.mass.size):
         for row in range(3):
@@ -116,49 +118,49 @@ def note_rates(grains, stages, s):
 
 @loop
 def normalise_all(grains):
-    """|ϱ| = 1, to rounding; the moments are those already."""
+    """Normalise the orientations, |ϱ| = 1; the moments are already those of ϱ/|ϱ|."""
     for i in range(grains.mass.size):
         put4(grains.orientation, i, normalised(load4(grains.orientation, i)))
 
 
 @loop
-def error_of(stages, dt, precision):
-    """The largest error of the step over what is allowed, and the grain that has it; infinite if not a number.
+def error_ratio(stages, dt, error_limits):
+    """Largest ratio of estimated to allowed error of the step, and its grain; infinite if not a number.
 
     The error of an angle is twice that of the rotation parameters.
     """
     rate = stages.rate
-    worst, worst_grain = 0.0, 0
+    largest, limiting_grain = 0.0, 0
     for i in range(stages.start.shape[1]):
         x = v = w = q = 0.0
         for row in range(3):
-            x += blended(rate, ERROR, STAGES, X + row, i) ** 2
-            v += blended(rate, ERROR, STAGES, V + row, i) ** 2
-            w += blended(rate, ERROR, STAGES, W + row, i) ** 2
+            x += weighted_rate(rate, ERROR, STAGES, X + row, i) ** 2
+            v += weighted_rate(rate, ERROR, STAGES, V + row, i) ** 2
+            w += weighted_rate(rate, ERROR, STAGES, W + row, i) ** 2
         for row in range(4):
-            q += blended(rate, ERROR, STAGES, Q + row, i) ** 2
-        mine = max(math.sqrt(x) / precision.position, math.sqrt(v) / precision.velocity)
-        mine = max(mine, 2.0 * math.sqrt(q) / precision.turn, math.sqrt(w) / precision.spin)
+            q += weighted_rate(rate, ERROR, STAGES, Q + row, i) ** 2
+        ratio = max(math.sqrt(x) / error_limits.position, math.sqrt(v) / error_limits.velocity)
+        ratio = max(ratio, 2.0 * math.sqrt(q) / error_limits.turn, math.sqrt(w) / error_limits.spin)
         if not (x + v + w + q < math.inf):
             return math.inf, i
-        if dt * mine > worst:
-            worst, worst_grain = dt * mine, i
-    return worst, worst_grain
+        if dt * ratio > largest:
+            largest, limiting_grain = dt * ratio, i
+    return largest, limiting_grain
 
 
 @functools.cache
-def loads_at_stage(external: Callable, far_loads: Callable) -> Callable:
-    """The loop that sums all loads of free grains where they are."""
-    add_outside = outside_loads(external)
+def stage_loads(external: Callable, long_range_loads: Callable) -> Callable:
+    """The loop that sums all loads of free grains at their present positions."""
+    add_external = external_loads(external)
 
     @rare
-    def sum_stage(grains, long_range, count, rules, time):
+    def sum_stage(grains, long_range, count, parameters, time):
         for i in range(grains.mass.size):
             put(grains.force, i, (0.0, 0.0, 0.0))
             put(grains.torque, i, (0.0, 0.0, 0.0))
-        add_outside(grains, time, rules.external)
+        add_external(grains, time, parameters.external)
         clear_long_range_loads(long_range)
-        far_loads(grains, long_range, rules.span, rules.long_range)
+        long_range_loads(grains, long_range, parameters.span, parameters.long_range)
         add_long_range_loads(grains, long_range)
         count[LONG_RANGE_SUMS] += 1
 
@@ -166,8 +168,8 @@ def loads_at_stage(external: Callable, far_loads: Callable) -> Callable:
 
 
 @functools.cache
-def outside_power(formula_of_grain: Callable) -> Callable:
-    """The loop that sums F·v + M·ω [W] of one composed formula over all grains."""
+def external_power(formula_of_grain: Callable) -> Callable:
+    """The loop that sums the power F·v + M·ω [W] of the composed external forces over all grains."""
 
     @loop
     def sum_power(grains, time, parameters):
@@ -181,28 +183,28 @@ def outside_power(formula_of_grain: Callable) -> Callable:
 
 
 @functools.cache
-def trial_for(external: Callable, far_loads: Callable) -> tuple[Callable, Callable]:
-    """The loops that begin a step, and that go through its stages; False as soon as a grain strays too far."""
-    sum_stage, power = loads_at_stage(external, far_loads), outside_power(external)
+def trial_step_loops(external: Callable, long_range_loads: Callable) -> tuple[Callable, Callable]:
+    """The loops `begin_step` and `try_step`; the latter computes all stages, or False if a grain moves too far."""
+    sum_stage, power = stage_loads(external, long_range_loads), external_power(external)
 
     @loop
-    def begin_step(grains, stages, rules, begin):
-        keep_start(grains, stages)
-        note_rates(grains, stages, 0)
-        if rules.books.time_dependent:
-            stages.power[0] = power(grains, begin, rules.external)
+    def begin_step(grains, stages, parameters, begin):
+        store_start(grains, stages)
+        store_rates(grains, stages, 0)
+        if parameters.external_work.time_dependent:
+            stages.power[0] = power(grains, begin, parameters.external)
 
     @loop
-    def try_step(grains, long_range, stages, count, rules, begin, dt):
-        stride = rules.precision.stride
+    def try_step(grains, long_range, stages, count, parameters, begin, dt):
+        stride = parameters.error_limits.stride
         for s in range(1, STAGES):
-            if not place_stage(grains, stages, s, dt) <= stride * stride:
+            if not set_stage(grains, stages, s, dt) <= stride * stride:
                 return False
             time = begin + TIMES[s] * dt
-            sum_stage(grains, long_range, count, rules, time)
-            note_rates(grains, stages, s)
-            if rules.books.time_dependent:
-                stages.power[s] = power(grains, time, rules.external)
+            sum_stage(grains, long_range, count, parameters, time)
+            store_rates(grains, stages, s)
+            if parameters.external_work.time_dependent:
+                stages.power[s] = power(grains, time, parameters.external)
         return True
 
     return begin_step, try_step
@@ -210,7 +212,7 @@ def trial_for(external: Callable, far_loads: Callable) -> tuple[Callable, Callab
 
 @loop
 def work_of(stages, dt):
-    """∫ P dt [J] of the outside forces over the step, of the same order as the step."""
+    """Work ∫ P dt [J] of the external forces over the step, of the same order as the step."""
     total = 0.0
     for s in range(STAGES - 1):
         total += WEIGHTS[STAGES - 1, s] * stages.power[s]

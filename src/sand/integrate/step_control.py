@@ -1,4 +1,4 @@
-"""The choice of the step: contact periods while anything touches, magnetic and closing times otherwise."""
+"""Step-size control: the contact period while there are contacts; magnetic, collision and flight times otherwise."""
 
 import math
 from typing import NamedTuple
@@ -29,94 +29,95 @@ from ..state.state import (
     STEPS,
 )
 
-CHECK_EVERY = 16
-"""Steps between two looks at the physics while contacts set the step."""
-GROW_EVERY = 64
-"""The step is halved at once but doubled only after this many steps, so that it does not flap."""
-HOLD = 256
-"""While grains touch it is doubled only after this many steps, ten fastest periods, in none of which it was needed.
+CHECK_INTERVAL = 16
+"""Steps between two evaluations of the criteria while contacts determine the step."""
+INCREASE_INTERVAL = 64
+"""Least number of steps before the step is doubled; halving is immediate.  The hysteresis prevents alternation."""
+HOLD_STEPS = 256
+"""The same while there are contacts: steps (ten fastest periods) in none of which the shorter step was needed.
 
-A step that follows the phase of the ringing pumps it: Verlet keeps p²/2m + ½kx² (1 − (ω dt)²/4), so that every
-change of dt changes its energy, by up to one per cent, with a sign that depends on the phase.
+A step that follows the phase of contact oscillations heats them: Verlet conserves p²/2m + ½kx² (1 − (ω dt)²/4), so each
+change of dt changes the energy by up to one per cent, with a sign that depends on the phase.
 """
-ALMOST = 1.0 - 1e-6
-"""The step of the contacts is kept to few digits (`contact_step`): equal steps may differ by this."""
-SPIN_ANGLE = 0.05
-"""Largest turn of a grain in one step [rad]."""
-FIELD_ANGLE = 0.03
-"""Largest phase √(μB/I) dt of a moment swinging in its field; Verlet then errs by 4e-5 in its frequency."""
-CLOSING_PART = 0.2
-"""Largest part of the gap that two grains about to touch may close in one step."""
-IMPACT_PART = 25.0
-"""Largest way two grains about to touch, or along n in contact, may move in one step, in δ_c / per_period."""
-REACH_PART = 1.0 / 16.0
-"""Largest part of the list's reach that a grain may fly in one step; keeps the check of the list safe."""
+EQUAL_STEPS = 1.0 - 1e-6
+"""The contact step is rounded to single precision (`contact_step`): steps equal to within this factor are the same."""
+MAX_SPIN_ANGLE = 0.05
+"""Largest rotation of a grain in one step [rad]."""
+MAX_FIELD_PHASE = 0.03
+"""Largest phase √(μB/I) dt of a moment oscillating in its field; the frequency error of Verlet is then 4e-5."""
+CLOSING_FRACTION = 0.2
+"""Largest fraction of its gap that an approaching pair may close in one step."""
+IMPACT_DISPLACEMENT = 25.0
+"""Largest relative displacement of an approaching pair, or along n in contact, per step, in δ_c / steps_per_period."""
+FLIGHT_FRACTION = 1.0 / 16.0
+"""Largest flight of a grain in one step in units of the reach of the pair list, so that the list cannot be too old."""
 
 
-class Control(NamedTuple):
-    """What the choice of the step needs to know."""
+class StepCriteria(NamedTuple):
+    """Parameters of the step-size criteria."""
 
-    fixed: float  # the user's own step [s]; 0: choose
-    reach: float  # of the list of near pairs [m]
-    energy_scale: float  # what the magnetics may put at stake, |U_min| [J]; 0: no such force
-    accuracy: float  # part of it that a step may misplace
-    outer_field: float  # size of the external flux density [T]
-    longest: float  # for worlds in which nothing happens [s]
-    impact: float  # largest way of an impact in one step, in δ_c
+    fixed: float  # step set by the user [s]; 0: automatic
+    reach: float  # of the list of contact candidates: the smallest radius [m]
+    energy_scale: float  # largest energy of a long-range pair, |U_min| for dipoles [J]; 0: no such force
+    accuracy: float  # allowed energy error of a step, in units of energy_scale
+    outer_field: float  # magnitude of the external flux density [T]
+    longest: float  # largest step, if no other criterion applies [s]
+    impact: float  # largest relative displacement of an impact in one step, in δ_c
 
 
 @formula
 def field_step(moment, b, outer, inertia):
-    """Longest step [s] for a moment in the field b of the others plus an external one of size `outer`."""
+    """Largest step [s] for a moment in the flux density b of the other grains plus an external one of size `outer`."""
     square = stiffness_of_field(moment, b, inertia) + math.sqrt(dot(moment, moment)) * outer / inertia
-    return FIELD_ANGLE / math.sqrt(square) if square > 0.0 else math.inf
+    return MAX_FIELD_PHASE / math.sqrt(square) if square > 0.0 else math.inf
 
 
 @formula
-def load_step(force, torque, mass, inertia, control):
-    """Longest step [s] for which Verlet's energy error dt²/24 (F²/m + M²/I) stays below its share."""
+def load_step(force, torque, mass, inertia, criteria):
+    """Largest step [s] for which Verlet's energy error dt²/24 (F²/m + M²/I) is at most accuracy × energy_scale."""
     rate = dot(force, force) / mass + dot(torque, torque) / inertia
-    stake = 24.0 * control.accuracy * control.energy_scale
-    return math.sqrt(stake / rate) if rate > 0.0 and stake > 0.0 else math.inf
+    allowed = 24.0 * criteria.accuracy * criteria.energy_scale
+    return math.sqrt(allowed / rate) if rate > 0.0 and allowed > 0.0 else math.inf
 
 
 @loop
-def grain_step(grains, long_range, start, control, i):
-    """Longest step [s] that grain i by itself allows, and longest cycle of the far loads.
+def grain_step(grains, long_range, start, criteria, i):
+    """Largest step [s] allowed by the motion of grain i, and largest cycle of the long-range loads.
 
-    Bound grains ring: their step is that of contacts, and only how they fly and spin is looked at.  Free grains
-    limit the cycle as they limit the step, but for the part of the list's reach they fly.  Their loads are those of
-    the long-range forces, whose energy is at stake: a uniform load, as gravity's, costs Verlet nothing.
+    Grains in contact oscillate at contact frequencies, which limit the step elsewhere: only their flight and spin count
+    here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The load criterion
+    uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no energy error.
     """
     v, w = load(grains.velocity, i), load(grains.spin, i)
-    speed, turning = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
-    spin = SPIN_ANGLE / turning if turning > 0.0 else math.inf
+    speed, rotation = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
+    spin = MAX_SPIN_ANGLE / rotation if rotation > 0.0 else math.inf
     inertia = grains.inertia[i]
-    swing = field_step(load(grains.moment, i), load(grains.field, i), control.outer_field, inertia)
-    own = math.inf
-    if long_range.force.shape[1] > 0:  # else there is no such force
-        own = load_step(load(long_range.force, i), load(long_range.torque, i), grains.mass[i], inertia, control)
+    swing = field_step(load(grains.moment, i), load(grains.field, i), criteria.outer_field, inertia)
+    smooth = math.inf
+    if long_range.force.shape[1] > 0:  # empty without long-range forces
+        smooth = load_step(load(long_range.force, i), load(long_range.torque, i), grains.mass[i], inertia, criteria)
     bound = start[i + 1] != start[i]
-    own = math.inf if bound else own
-    cycle = min(min(spin, swing), own)
-    flight = REACH_PART * control.reach / speed if speed > 0.0 else math.inf
+    smooth = math.inf if bound else smooth
+    cycle = min(min(spin, swing), smooth)
+    flight = FLIGHT_FRACTION * criteria.reach / speed if speed > 0.0 else math.inf
     return min(cycle, flight), math.inf if bound else cycle
 
 
 @loop
-def steps_of_free_grains(grains, long_range, start, count, control):
-    """Longest step [s] that each grain by itself allows, and longest cycle of the far loads; 0, 0 if not finite.
+def steps_of_free_grains(grains, long_range, start, count, criteria):
+    """Largest step [s] and cycle [s] allowed by the motion of all single grains (`grain_step`); 0, 0 if not finite.
 
-    GRAIN1 becomes a grain that is not finite. `start` (N + 1,) tells who has contacts (state.arrays.ContactArrays).
+    GRAIN1 is set to a grain that is not finite.  `start` (N + 1,) are the row offsets of the contacts of each grain
+    (state.arrays.ContactArrays).
     """
-    step = cycle = float_bits(control.longest)
-    lost = 0.0
+    step = cycle = float_bits(criteria.longest)
+    not_finite = 0.0
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        lost += 0.0 if (dot(v, v) < math.inf) & (dot(w, w) < math.inf) else 1.0
-        own_step, own_cycle = grain_step(grains, long_range, start, control, i)
+        not_finite += 0.0 if (dot(v, v) < math.inf) & (dot(w, w) < math.inf) else 1.0
+        own_step, own_cycle = grain_step(grains, long_range, start, criteria, i)
         step, cycle = min(step, float_bits(own_step)), min(cycle, float_bits(own_cycle))
-    if lost > 0.0:
+    if not_finite > 0.0:
         count[GRAIN1] = first_not_finite(grains)
         return 0.0, 0.0
     return float_from_bits(step), float_from_bits(cycle)
@@ -124,7 +125,7 @@ def steps_of_free_grains(grains, long_range, start, count, control):
 
 @rare
 def first_not_finite(grains):
-    """The first grain whose velocity or spin is not finite."""
+    """Index of the first grain whose velocity or spin is not finite, or −1."""
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
         if not (dot(v, v) < math.inf and dot(w, w) < math.inf):
@@ -133,62 +134,62 @@ def first_not_finite(grains):
 
 
 @loop
-def pair_step(grains, pair_list, span, control, p):
-    """The longest step [s] that pair p allows, about to touch or in contact."""
+def pair_step(grains, pair_list, span, criteria, p):
+    """Largest step [s] allowed by pair p of the list, approaching or in contact."""
     i, j = pair_list.pair[0, p], pair_list.pair[1, p]
-    moving = sub(load(grains.velocity, i), load(grains.velocity, j))
+    relative = sub(load(grains.velocity, i), load(grains.velocity, j))
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(apart, apart))
-    closing = -dot(moving, apart) / distance
+    closing = -dot(relative, apart) / distance
     touching = pair_list.touching[p] == 1
-    # in contact only what loads the neck counts: a pair may spin as fast as it likes
-    speed = abs(closing) if touching else math.sqrt(dot(moving, moving))
-    kind = pair_type_index(pair_list, p)
-    need, length = pair_list.step[kind], pair_list.length[kind]
-    fast = (length > 0.0) & (speed * need > control.impact * length)
-    need = control.impact * length / speed if fast else need
+    # in contact only the normal velocity strains the contact; rotation of the pair does not
+    speed = abs(closing) if touching else math.sqrt(dot(relative, relative))
+    pair_type = pair_type_index(pair_list, p)
+    need, length = pair_list.step[pair_type], pair_list.length[pair_type]
+    fast = (length > 0.0) & (speed * need > criteria.impact * length)
+    need = criteria.impact * length / speed if fast else need
     gap = distance - grains.radius[i] - grains.radius[j]
-    free = max(need, CLOSING_PART * gap / closing) if closing > 0.0 else math.inf
-    # slow pairs in contact are served by the step of the contacts
+    free = max(need, CLOSING_FRACTION * gap / closing) if closing > 0.0 else math.inf
+    # slow pairs in contact are resolved by the contact step
     bound = need if fast else math.inf
     return bound if touching else free
 
 
 @loop
-def _safe_speed(pair_list, control):
-    """True if no two grains can meet so fast that they need a shorter step than contacts do."""
-    impact = control.impact * pair_list.skin[SAFE_SPEED]
+def _safe_speed(pair_list, criteria):
+    """Whether the relative speed of any two grains is too low to need a step below that of the contacts."""
+    impact = criteria.impact * pair_list.skin[SAFE_SPEED]
     return 4.0 * pair_list.skin[LARGEST_SPEED] < impact * impact
 
 
 @loop
-def closing_step(grains, pair_list, count, span, control, wanted):
-    """The longest step [s], at most `wanted`, that pairs about to touch or in contact allow."""
-    least = float_bits(wanted)
+def closing_step(grains, pair_list, count, span, criteria, wanted):
+    """Largest step [s], at most `wanted`, allowed by all approaching or touching pairs."""
+    shortest = float_bits(wanted)
     for p in range(count[PAIRS]):
-        least = min(least, float_bits(pair_step(grains, pair_list, span, control, p)))
-    return float_from_bits(least)
+        shortest = min(shortest, float_bits(pair_step(grains, pair_list, span, criteria, p)))
+    return float_from_bits(shortest)
 
 
 @rare
-def find_limiting_grains(grains, long_range, start, pair_list, count, span, control):
-    """Let GRAIN1 and GRAIN2 be the pair, or GRAIN1 the grain, that wants the shortest step."""
+def find_limiting_grains(grains, long_range, start, pair_list, count, span, criteria):
+    """Set GRAIN1 and GRAIN2 to the pair, or GRAIN1 to the grain, that requires the smallest step."""
     shortest = math.inf
     for i in range(grains.mass.size):
-        own, _ = grain_step(grains, long_range, start, control, i)
-        if own < shortest:
-            shortest = own
+        step, _ = grain_step(grains, long_range, start, criteria, i)
+        if step < shortest:
+            shortest = step
             count[GRAIN1], count[GRAIN2] = i, -1
     for p in range(count[PAIRS]):
-        own = pair_step(grains, pair_list, span, control, p)
-        if own < shortest:
-            shortest = own
+        step = pair_step(grains, pair_list, span, criteria, p)
+        if step < shortest:
+            shortest = step
             count[GRAIN1], count[GRAIN2] = pair_list.pair[0, p], pair_list.pair[1, p]
 
 
 @loop
 def quantise_step(level, wanted, may_grow):
-    """The power of two of a second at or below `wanted`, or the old level where that is below and may not grow."""
+    """The largest power of two of a second not above `wanted`; not above the old level unless it `may_grow`."""
     level = level if level > 0.0 else 1.0
     while level > wanted:
         level *= 0.5
@@ -198,50 +199,49 @@ def quantise_step(level, wanted, may_grow):
 
 
 @loop
-def choose_step(grains, long_range, start, pair_list, clock, count, span, control):
-    """The next step [s], or 0 if there is none: that of the contacts, or less if something else needs less.
+def choose_step(grains, long_range, start, pair_list, clock, count, span, criteria):
+    """The next step [s]: the contact step, or less if another criterion requires it; 0 if the state is not finite.
 
-    Steps that are not the contacts' are powers of two of a second and change seldom, because every change
-    costs velocity Verlet a little energy.  Inside a cycle the far loads are not at hand, and only pairs are looked
-    at.
+    Steps below the contact step are powers of two of a second and change seldom, because each change costs velocity
+    Verlet a little energy.  Within a cycle the long-range loads are not available, and only pairs are checked.
     """
-    between = clock[LEFT] == 0.0
-    alone = count[CONTACTS] == 0
-    # a step of the user's own is looked at only for numbers that are not finite
-    each = (alone and control.fixed == 0.0) or (between and clock[CYCLE] > clock[STEP])
-    if each or count[STEPS] - count[CHECKED] >= CHECK_EVERY:
-        may_grow = count[STEPS] - count[STEP_INCREASES] >= GROW_EVERY
-        if between:
-            clock[CALM], cycle = steps_of_free_grains(grains, long_range, start, count, control)
+    between_cycles = clock[LEFT] == 0.0
+    no_contacts = count[CONTACTS] == 0
+    # with a fixed step the criteria only detect numbers that are not finite
+    every_step = (no_contacts and criteria.fixed == 0.0) or (between_cycles and clock[CYCLE] > clock[STEP])
+    if every_step or count[STEPS] - count[CHECKED] >= CHECK_INTERVAL:
+        may_grow = count[STEPS] - count[STEP_INCREASES] >= INCREASE_INTERVAL
+        if between_cycles:
+            clock[CALM], cycle = steps_of_free_grains(grains, long_range, start, count, criteria)
             if not clock[CALM] > 0.0:
                 return 0.0
             clock[LONG_RANGE_LEVEL] = quantise_step(clock[LONG_RANGE_LEVEL], cycle, may_grow)
-        quiet = not alone and _safe_speed(pair_list, control)
-        wanted = clock[CALM] if quiet else closing_step(grains, pair_list, count, span, control, clock[CALM])
+        slow = not no_contacts and _safe_speed(pair_list, criteria)
+        wanted = clock[CALM] if slow else closing_step(grains, pair_list, count, span, criteria, clock[CALM])
         if not wanted > 0.0:
             return 0.0
         count[CHECKED] = count[STEPS]
         if may_grow:
             count[STEP_INCREASES] = count[STEPS]
-        if not alone:
-            if wanted >= ALMOST * clock[CONTACT_STEP]:  # just that will do, not the power of two below
+        if not no_contacts:
+            if wanted >= EQUAL_STEPS * clock[CONTACT_STEP]:  # the contact step itself, not the power of two below it
                 wanted = max(wanted, 2.0 * clock[CONTACT_STEP])
             elif wanted < 2.0 * clock[LEVEL]:
                 count[NEEDED] = count[STEPS]
-            may_grow = count[STEPS] - count[NEEDED] >= HOLD
+            may_grow = count[STEPS] - count[NEEDED] >= HOLD_STEPS
         clock[LEVEL] = quantise_step(clock[LEVEL], wanted, may_grow)
-    if control.fixed > 0.0:
-        return control.fixed
+    if criteria.fixed > 0.0:
+        return criteria.fixed
     return min(clock[LEVEL], clock[CONTACT_STEP])
 
 
 @loop
-def cycle_steps(clock, count, beat, dt):
-    """How many steps of dt [s] may lie between two sums of the far loads: 1 where nothing touches.
+def cycle_steps(clock, count, respa, dt):
+    """Number of steps of dt [s] in the next cycle of the long-range loads; 1 without contacts.
 
-    Impulses must come more often than contacts ring, whatever the step: k_max counts the contacts' own steps.
+    Impulses must be more frequent than contact oscillations for any dt, so k_max counts steps of the contact step.
     """
     if count[CONTACTS] == 0:
         return 1
-    longest = min(clock[LONG_RANGE_LEVEL], beat.most * clock[CONTACT_STEP])
-    return max(1, min(beat.most, int(longest / dt + 1e-6)))
+    longest = min(clock[LONG_RANGE_LEVEL], respa.max_steps * clock[CONTACT_STEP])
+    return max(1, min(respa.max_steps, int(longest / dt + 1e-6)))

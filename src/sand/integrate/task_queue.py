@@ -1,9 +1,9 @@
-"""A crew: threads that take parts of a step's large loops; who takes which changes no bit of the result.
+"""A task queue in memory: threads share the large loops of a step, with results independent of the number of threads.
 
-A loop is cut into blocks, by the size of the problem alone, and each block is done by the same compiled function.  The
-driver's own thread takes them from the front, helpers from the back, until they meet: so most blocks are done by the
-same thread in each step, which has them in its cache.  A helper that comes late, or that the system puts aside, only
-does less.
+A loop is divided into blocks, by the size of the problem alone, and the same compiled function processes each block.
+The driver's own thread takes blocks from the front, workers take them from the back, until they meet: most blocks are
+then processed by the same thread in every step and stay in its cache.  A worker that starts late or is descheduled
+only processes fewer blocks.
 """
 
 import functools
@@ -21,98 +21,96 @@ from ..grains import GrainArrays
 from ..numerics.simd import float_from_bits
 from ..state.state import CONTACTS
 from .kernel_spec import KernelSpec
-from .motion import BLOCK_OF_GRAINS, OPEN, drift_for, gather_and_kick
+from .motion import BLOCK_OF_GRAINS, UNBOUNDED, drift_for, gather_and_kick
 
-WORD, DONE, INSIDE = 0, 8, 16
-"""Places on the board, a line of the cache apart: the work at hand, its finished blocks, helpers at work."""
-PLACES = 24
+WORD, FINISHED, ACTIVE = 0, 8, 16
+"""Indices into `TaskQueue.words`, one cache line apart: the current task, its finished blocks, the active workers."""
+QUEUE_LENGTH = 24
 SPINS_BEFORE_YIELD = 4000
-"""Looks at the board before a waiting thread lets others run on its core."""
+"""Reads of the queue before a waiting thread yields its core."""
 CONTACTS_PER_BLOCK = 512
 GRAINS_PER_BLOCK = 2 * int(BLOCK_OF_GRAINS)
-"""Contacts and grains in a block: 3 to 10 µs of work, whole vectors, and whole blocks of the gathering."""
+"""Contacts and grains per block: 3 to 10 µs of work, whole SIMD vectors, and whole blocks of `contact.gather`."""
 WORKERS_FROM = 8 * CONTACTS_PER_BLOCK
-"""Contacts from which a helper saves more time than handing it work takes, where nothing else can be shared."""
+"""Least number of contacts for which workers save time if there are no long-range sums to share."""
 _BITS = 20
 _MASK = (1 << _BITS) - 1
-"""A word is the task, the number of blocks, and how many were taken from the back and from the front, so long each."""
 FRONT, BACK, BLOCKS, TASK = 0, _BITS, 2 * _BITS, 3 * _BITS
-"""Where they begin."""
+"""Bit offsets in a task word: blocks taken from the front, blocks taken from the back, number of blocks, task."""
+CONTACT_PASS, GATHER, GATHER_AND_KICK, LONG_RANGE, DRIFT, QUIT = range(1, 7)
+"""Tasks: contact update, sums of contact loads per grain, these with a kick, long-range loads, drift, end of work."""
 
 
-def is_large(grains: int) -> bool:
-    """True if a simulation of so many grains is for a crew, be it of one thread."""
+def uses_task_queue(grains: int) -> bool:
+    """Whether a simulation of so many grains divides its loops into blocks, for any number of threads."""
     return HAS_NOINLINE and grains >= PARALLEL_FROM
 
 
-def benefits_from_workers(plan: KernelSpec, grains: GrainArrays, contacts: int) -> bool:
-    """True if helpers save time: without sums to share, a thousand contacts are done before a helper has begun."""
-    return plan.long_range.parts.blocks(grains) > 0 or contacts >= WORKERS_FROM
-
-
-PASS, GATHER, GATHER_AND_KICK, FAR, DRIFT, LEAVE = range(1, 7)
-"""What a word asks for: contacts, their loads at grains, these and a kick, long-range loads, a drift, the end."""
+def benefits_from_workers(spec: KernelSpec, grains: GrainArrays, contacts: int) -> bool:
+    """Whether workers save time: without long-range sums, few contacts are finished before a worker has started."""
+    return spec.long_range.blocked.blocks(grains) > 0 or contacts >= WORKERS_FROM
 
 
 class TaskQueue(NamedTuple):
-    """What the threads share besides the world."""
+    """Data shared by the threads of one call of the driver, besides the state."""
 
-    words: Any  # (24,) int64; made anew for every call of the driver
-    step: Any  # (1,) float64: length of the step at hand, or of the kick [s]
-    passed: Any  # (B, 8) float64: what the pass over each block of contacts found, by `Passed`
+    words: Any  # (24,) int64: task word and counters
+    step: Any  # (1,) float64: length of the present step or kick [s]
+    passed: Any  # (B, 8) float64: slip sums of each block of contacts, contact.slip
     speeds: Any  # (G, 2) float64: largest squares of speed [m²/s²] and spin [1/s²] in each block of grains
 
 
 def new_task_queue(grains: int, contacts: int) -> TaskQueue:
-    """A board without work, for so many grains and up to so many contacts."""
+    """An empty queue for a number of grains and a capacity of contacts."""
     passed = np.zeros((contacts // CONTACTS_PER_BLOCK + 1, 8))
-    return TaskQueue(np.zeros(PLACES, np.int64), np.zeros(1), passed, np.zeros((grains // GRAINS_PER_BLOCK + 1, 2)))
+    speeds = np.zeros((grains // GRAINS_PER_BLOCK + 1, 2))
+    return TaskQueue(np.zeros(QUEUE_LENGTH, np.int64), np.zeros(1), passed, speeds)
 
 
 def release_workers(queue: TaskQueue) -> None:
-    """Let the helpers of a driver that did not come to its end leave, and wait until they have."""
-    queue.words[WORD] = LEAVE << TASK
-    while queue.words[INSIDE] > 0:
+    """End the workers of a driver that raised an exception, and wait until they have returned."""
+    queue.words[WORD] = QUIT << TASK
+    while queue.words[ACTIVE] > 0:
         yield_cpu()
 
 
 @loop
-def blocks_of(number, at_once):
-    """How many blocks of `at_once` there are in `number`."""
-    return (number + at_once - 1) // at_once
+def blocks_of(number, block):
+    """Number of blocks of `block` elements that cover `number` elements."""
+    return (number + block - 1) // block
 
 
 @loop
-def span_of_drift(rules):
-    """The box in which grains drift: without walls where what the walls cost is booked afterwards."""
-    return OPEN if rules.books.position_dependent else rules.span
+def drift_span(parameters):
+    """The box used by drifts: unbounded if the work of crossing a periodic boundary is logged afterwards."""
+    return UNBOUNDED if parameters.external_work.position_dependent else parameters.span
 
 
 @loop
-def part_of(word, place):
-    """What a word says at this place."""
-    return (word >> place) & _MASK
+def field_of(word, offset):
+    """The field of a task word at a bit offset."""
+    return (word >> offset) & _MASK
 
 
 @loop
-def is_left(word):
-    """Is there a block that nobody has taken?"""
-    return part_of(word, FRONT) + part_of(word, BACK) < part_of(word, BLOCKS)
+def has_block_left(word):
+    """Whether the task has a block that no thread has taken."""
+    return field_of(word, FRONT) + field_of(word, BACK) < field_of(word, BLOCKS)
 
 
 @functools.cache
-def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
-    """The function that shares a task among all threads, and the kernel that a helper runs meanwhile."""
-    far_block, drift_some = plan.long_range.parts.block, drift_for(plan.magnetic)
+def worker_loops(spec: KernelSpec) -> tuple[Callable, Callable]:
+    """The function by which the driver shares a task among all threads, and the kernel that each worker runs."""
+    long_range_block, drift_some = spec.long_range.blocked.block, drift_for(spec.magnetic)
 
     @noinline
-    def do_block(task, b, grains, contacts, long_range, count, rules):
-        if task == PASS:
+    def do_block(task, b, grains, contacts, long_range, count, parameters):
+        if task == CONTACT_PASS:
             first = b * CONTACTS_PER_BLOCK
             last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
-            span, law, step = rules.span, rules.contact, rules.queue.step[0]
+            span, law, step = parameters.span, parameters.contact, parameters.queue.step[0]
             found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, law, step)
-            store_slip_sums(rules.queue.passed, b, found)
+            store_slip_sums(parameters.queue.passed, b, found)
         elif task == GATHER:
             first = b * GRAINS_PER_BLOCK
             last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
@@ -120,65 +118,66 @@ def worker_loops(plan: KernelSpec) -> tuple[Callable, Callable]:
         elif task == GATHER_AND_KICK:
             first = b * GRAINS_PER_BLOCK
             last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
-            v, w = gather_and_kick(grains, contacts, np.uint64(first), np.uint64(last), rules.queue.step[0])
-            rules.queue.speeds[b, 0], rules.queue.speeds[b, 1] = float_from_bits(v), float_from_bits(w)
-        elif task == FAR:
-            far_block(grains, long_range, rules.span, rules.long_range, b)
+            v, w = gather_and_kick(grains, contacts, np.uint64(first), np.uint64(last), parameters.queue.step[0])
+            parameters.queue.speeds[b, 0], parameters.queue.speeds[b, 1] = float_from_bits(v), float_from_bits(w)
+        elif task == LONG_RANGE:
+            long_range_block(grains, long_range, parameters.span, parameters.long_range, b)
         elif task == DRIFT:
             first = b * GRAINS_PER_BLOCK
             last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
-            v = drift_some(grains, np.uint64(first), np.uint64(last), span_of_drift(rules), rules.queue.step[0])
-            rules.queue.speeds[b, 0] = float_from_bits(v)
+            span, step = drift_span(parameters), parameters.queue.step[0]
+            v = drift_some(grains, np.uint64(first), np.uint64(last), span, step)
+            parameters.queue.speeds[b, 0] = float_from_bits(v)
 
     @noinline
-    def share(task, blocks, grains, contacts, long_range, count, rules):
-        words = rules.queue.words
-        write(words, DONE, 0)
+    def share(task, blocks, grains, contacts, long_range, count, parameters):
+        words = parameters.queue.words
+        write(words, FINISHED, 0)
         write(words, WORD, (task << TASK) | (blocks << BLOCKS))
         word = fetch_add(words, WORD, 1 << FRONT)
-        while is_left(word):
-            do_block(task, part_of(word, FRONT), grains, contacts, long_range, count, rules)
-            fetch_add(words, DONE, 1)
+        while has_block_left(word):
+            do_block(task, field_of(word, FRONT), grains, contacts, long_range, count, parameters)
+            fetch_add(words, FINISHED, 1)
             word = fetch_add(words, WORD, 1 << FRONT)
-        looks = 0
-        while read(words, DONE) < blocks:
-            looks += 1
-            if looks > SPINS_BEFORE_YIELD:
+        spins = 0
+        while read(words, FINISHED) < blocks:
+            spins += 1
+            if spins > SPINS_BEFORE_YIELD:
                 yield_cpu()
 
-    def worker_loop(grains, contacts, long_range, count, rules):
-        """Take blocks until the board says LEAVE."""
-        words = rules.queue.words
-        fetch_add(words, INSIDE, 1)
-        looks = 0
+    def worker_loop(grains, contacts, long_range, count, parameters):
+        """Take blocks from the back of the queue until the task is QUIT."""
+        words = parameters.queue.words
+        fetch_add(words, ACTIVE, 1)
+        spins = 0
         word = read(words, WORD)
-        while word >> TASK != LEAVE:
-            looks += 1
-            if is_left(word):
-                # what is at hand may have changed since the look: what was taken is what this says
+        while word >> TASK != QUIT:
+            spins += 1
+            if has_block_left(word):
+                # the task may have changed since the read: the word returned here identifies the block taken
                 word = fetch_add(words, WORD, 1 << BACK)
-                if is_left(word):
-                    b = part_of(word, BLOCKS) - 1 - part_of(word, BACK)
-                    do_block(word >> TASK, b, grains, contacts, long_range, count, rules)
-                    fetch_add(words, DONE, 1)
-                looks = 0
-            elif looks > SPINS_BEFORE_YIELD:
+                if has_block_left(word):
+                    b = field_of(word, BLOCKS) - 1 - field_of(word, BACK)
+                    do_block(word >> TASK, b, grains, contacts, long_range, count, parameters)
+                    fetch_add(words, FINISHED, 1)
+                spins = 0
+            elif spins > SPINS_BEFORE_YIELD:
                 yield_cpu()
             word = read(words, WORD)
-        fetch_add(words, INSIDE, -1)
+        fetch_add(words, ACTIVE, -1)
 
-    return share, kernel(worker_loop, cached=plan.keep, nogil=True, long_vectors=plan.wide)
+    return share, kernel(worker_loop, cached=spec.keep, nogil=True, long_vectors=spec.wide)
 
 
 @loop
-def no_workers(rules):
-    """Where there is no crew."""
+def no_workers(parameters):
+    """Without a task queue."""
 
 
 @rare
-def join_workers(rules):
-    """Send the helpers away, and wait until the last has left: then the arrays are the driver's alone."""
-    words = rules.queue.words
-    write(words, WORD, LEAVE << TASK)
-    while read(words, INSIDE) > 0:
+def join_workers(parameters):
+    """End the workers and wait until the last has returned, so that no other thread accesses the arrays."""
+    words = parameters.queue.words
+    write(words, WORD, QUIT << TASK)
+    while read(words, ACTIVE) > 0:
         yield_cpu()

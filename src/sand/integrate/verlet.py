@@ -1,4 +1,4 @@
-"""Velocity Verlet, the integrator."""
+"""Velocity Verlet, the default integrator."""
 
 from __future__ import annotations
 
@@ -10,47 +10,48 @@ from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..units import is_word, si, whole_number
 from .kernel_spec import RespaSettings
 
-BELOW_RESONANCE = 0.48
-"""Longest cycle of impulses in fastest periods: at half a period the first of them would push in step."""
-LITERAL_STEPS = 70
+IMPULSE_PERIODS = 0.48
+"""Longest r-RESPA cycle in fastest contact periods; the first resonance of the impulses is at half a period."""
+TAYLOR_STEPS = 70
 """k_max of the paper."""
-MOST_FAR_STEPS = 1_000_000
-"""Longest cycle that can be asked for."""
+MAX_FAR_STEPS = 1_000_000
+"""Largest `far_steps` accepted."""
 FAR = ("every step", "impulse", "taylor", "taylor-literal")
 
 
 @checked
 @dataclass(frozen=True)
 class Verlet:
-    """Velocity Verlet for translation, spin and rotation parameters; second order, keeps momenta exactly.
+    """Velocity Verlet for translation, spin and rotation parameters; second order, conserves momenta to rounding.
 
     Parameters
     ----------
-    steps_per_period : optional
-        steps per fastest period of any contact, ≥ 10 (25: frequencies come out 0.26 % high).
-    step : optional
-        a fixed step [s], or "auto": contact periods while anything touches, magnetic and closing times
-        otherwise.
-    accuracy : optional
-        part, below 1, of the largest energy that a long-range force puts at stake, |U_min| for dipoles,
-        that a step away from contacts may misplace.
+    steps_per_period : float, optional
+        Steps per fastest period of any contact, ≥ 10. With 25, frequencies are 0.26 % too high.
+    step : float or str, optional
+        A fixed step [s], or "auto": a fraction of the contact period while there are contacts; of magnetic and
+        collision times otherwise.
+    accuracy : float, optional
+        Allowed energy error of a step without contacts, in units of the largest energy of a long-range pair
+        (|U_min| for dipoles); above 0, below 1.
     far : str, optional
-        how long-range forces act while grains touch. "impulse" sums them once in a cycle of steps; what of them
-        changes acts at the two ends of the cycle (r-RESPA), what lasts in every step, as does the force between
-        two grains in contact. "taylor" foretells them inside the cycle by their Taylor series of first order,
-        bound grains with their mean motion; "taylor-literal" is SAND's own, bound grains with the velocity and
-        spin of the moment, ringing included; "every step" sums them in every step.
-    far_steps : optional
-        most steps in a cycle, k_max ≥ 1, counted in steps of the contacts' own where a fixed `step` is
-        longer; or "auto": as many as stay below half the fastest period of a contact, 12 of 25, for "impulse";
-        70, the paper's, for the Taylor series. Impulses at the ends of longer cycles meet the ringing in step
-        and slowly heat it. A cycle is shorter where grains that touch nothing need it, by their long-range
-        loads, spins and moments, and has one step where nothing touches.
+        Integration of long-range forces while there are contacts. "impulse": r-RESPA; the forces are summed once per
+        cycle of steps, their slow part acts in every step and the difference as impulses at both ends of the cycle;
+        forces between grains in contact act in every step. "taylor": extrapolated within the cycle by their
+        first-order Taylor series, with the mean motion of grains in contact. "taylor-literal": as in the paper, with
+        the instantaneous velocity and spin of all grains, contact oscillations included. "every step": summed in
+        every step.
+    far_steps : int or str, optional
+        Largest number of steps in a cycle, k_max ≥ 1, counted in contact steps if a fixed `step` is longer; or
+        "auto": for "impulse" the largest cycle below half the fastest contact period, 12 steps of 25; for Taylor
+        series 70, as in the paper. Impulses of longer cycles are resonant with contact oscillations and slowly heat
+        them. Cycles are shorter where the long-range loads, spins or moments of free grains require it, and have one
+        step without contacts.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
 
     steps_per_period: Any = 25.0
@@ -79,14 +80,14 @@ class Verlet:
             problems.append(f"stepping: far = {self.far!r}; {did_you_mean(str(self.far), FAR)}")
         if not is_word(self.far_steps, "auto"):
             try:
-                whole_number(self.far_steps, "stepping: far_steps", 1, MOST_FAR_STEPS)
+                whole_number(self.far_steps, "stepping: far_steps", 1, MAX_FAR_STEPS)
             except BadInput as error:
                 problems += [f'{line}, or "auto"' for line in error.problems]
         if problems:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
-        """Its settings in SI."""
+        """Settings in SI units, as in a case file."""
         return {
             "method": self.name,
             "steps_per_period": self.steps_per_period,
@@ -97,14 +98,14 @@ class Verlet:
         }
 
     @property
-    def most_steps(self) -> int:
-        """k_max: the most steps between two sums of the long-range forces."""
+    def max_cycle_steps(self) -> int:
+        """k_max, the largest number of steps between two sums of the long-range forces."""
         if self.far == "every step":
             return 1
         if self.far_steps != "auto":
             return int(self.far_steps)
-        return max(1, int(BELOW_RESONANCE * self.steps_per_period)) if self.far == "impulse" else LITERAL_STEPS
+        return max(1, int(IMPULSE_PERIODS * self.steps_per_period)) if self.far == "impulse" else TAYLOR_STEPS
 
-    def beat(self, distant: bool) -> RespaSettings:
-        """How often far loads are summed, for the driver; every step if there are none."""
-        return RespaSettings(self.most_steps if distant else 1, self.far == "taylor-literal")
+    def respa_settings(self, has_long_range: bool) -> RespaSettings:
+        """Settings of multiple time stepping for the driver; cycles of one step without long-range forces."""
+        return RespaSettings(self.max_cycle_steps if has_long_range else 1, self.far == "taylor-literal")

@@ -1,4 +1,4 @@
-"""The helping threads of a simulation's crew."""
+"""Python threads that run a compiled worker kernel next to the driver."""
 
 from __future__ import annotations
 
@@ -14,44 +14,47 @@ from ..threads import threads
 
 
 class WorkerThreads:
-    """Threads that run a kernel beside the driver whenever it is called; started when first needed.
+    """A pool of threads that run one compiled kernel, without the GIL, at the same time.
+
+    Threads start on first use and end with the pool.  After a fork the child process starts its own.
 
     Parameters
     ----------
-    worker_loop : Callable
-        the kernel, which ends when the driver says so.
+    kernel : Callable
+        It processes blocks of a `TaskQueue` until the driver ends the work.
     """
 
-    def __init__(self, worker_loop: Callable):
-        self._help, self._process = worker_loop, os.getpid()
-        self._queues: list[queue.SimpleQueue] = []
-        self._end = weakref.finalize(self, _send_home, self._queues)
+    def __init__(self, kernel: Callable[..., None]):
+        self._kernel, self._process = kernel, os.getpid()
+        self._inboxes: list[queue.SimpleQueue] = []
+        self._finalizer = weakref.finalize(self, _stop_all, self._inboxes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> WorkerThreads:
-        """Others of the same kind."""
-        return WorkerThreads(self._help)
+        """A new pool for the same kernel."""
+        return WorkerThreads(self._kernel)
 
-    def call(self, arrays: tuple[Any, ...]) -> None:
-        """Let all threads but the caller's own run the kernel on these arguments."""
+    def start(self, arguments: tuple[Any, ...]) -> None:
+        """Run the kernel with `arguments` on all threads but the caller's; returns at once."""
         if not COMPILED:  # without the compiler nothing is atomic
             return
-        if self._process != os.getpid():  # threads do not come along into a fork
-            self._queues.clear()
+        if self._process != os.getpid():  # threads do not survive a fork
+            self._inboxes.clear()
             self._process = os.getpid()
-        while len(self._queues) < threads() - 1:
-            line: queue.SimpleQueue = queue.SimpleQueue()
-            threading.Thread(target=_work, args=(line, self._help), name="sand-crew", daemon=True).start()
-            self._queues.append(line)
-        for line in self._queues[: threads() - 1]:
-            line.put(arrays)
+        workers = threads() - 1
+        while len(self._inboxes) < workers:
+            inbox: queue.SimpleQueue = queue.SimpleQueue()
+            threading.Thread(target=_run, args=(inbox, self._kernel), name="sand-worker", daemon=True).start()
+            self._inboxes.append(inbox)
+        for inbox in self._inboxes[:workers]:
+            inbox.put(arguments)
 
 
-def _work(line: queue.SimpleQueue, worker_loop: Callable) -> None:
-    while (arrays := line.get()) is not None:
-        worker_loop(*arrays)
-        del arrays
+def _run(inbox: queue.SimpleQueue, kernel: Callable[..., None]) -> None:
+    while (arguments := inbox.get()) is not None:
+        kernel(*arguments)
+        del arguments  # do not keep the arrays of a finished run alive
 
 
-def _send_home(queues: list[queue.SimpleQueue]) -> None:
-    for line in queues:
-        line.put(None)
+def _stop_all(inboxes: list[queue.SimpleQueue]) -> None:
+    for inbox in inboxes:
+        inbox.put(None)

@@ -10,16 +10,16 @@ from ..box import Box
 from ..contact.law import Bond
 from ..contact.model import Contact
 from ..errors import BadInput
-from ..forces.base import Force, GrainForce, LongRangeForce, compose, compose_long_range
-from ..forces.external.loops import is_ours
+from ..forces.base import Force, ExternalForce, LongRangeForce, compose, compose_long_range
+from ..forces.external.loops import is_builtin
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
 from ..grains import Grains
 from ..integrate.adaptive import Adaptive
-from ..integrate.kernel_spec import Books, ContactParameters, GasSettings, KernelSpec, StepParameters
-from ..integrate.step_control import IMPACT_PART, Control
-from ..integrate.task_queue import is_large
+from ..integrate.kernel_spec import ExternalWork, ContactParameters, GasSettings, KernelSpec, StepParameters
+from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
+from ..integrate.task_queue import uses_task_queue
 from ..integrate.verlet import Verlet
 from ..material import SILICA
 from ..neighbours.settings import ChosenSearch, Neighbours
@@ -62,7 +62,7 @@ class Given(NamedTuple):
 
     contact: Contact | None
     distant: list[LongRangeForce]  # those that some grain feels
-    external: list[GrainForce]
+    external: list[ExternalForce]
     gas: list[Gas]  # one or none
 
 
@@ -103,7 +103,7 @@ def build_engine(
     verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
     control = _control(grains, verlet, given, reach)
     if isinstance(stepping, Adaptive):
-        stepping = stepping.settled(grains, control)
+        stepping = stepping.resolved(grains, control)
     composed, numbers = compose(given.external)
     sums, far_numbers = compose_long_range([sums for _, sums, _ in long_range], [own for _, _, own in long_range])
     rules = StepParameters(
@@ -112,11 +112,11 @@ def build_engine(
         far_numbers,
         numbers,
         found.search,
-        verlet.beat(bool(long_range)),
+        verlet.respa_settings(bool(long_range)),
         _ledger_columns(given.external, box),
         _stirring(given.gas, grains, seed),
         control,
-        stepping.precision(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
+        stepping.error_limits(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
     )
     plan = _plan(grains, given, composed, sums, verlet, isinstance(stepping, Adaptive))
     here = grains.copy()
@@ -139,7 +139,7 @@ def _far(
     """Each long-range force with its loops and numbers."""
     sums = [force.sums(box, own) for force, own in zip(given.distant, listed, strict=True)]
     if len(grains) >= WIDE_FROM:
-        sums = [own.many or own for own in sums]
+        sums = [own.wide or own for own in sums]
     return [(f, own, f.numbers(grains, box)) for f, own in zip(given.distant, sums, strict=True)]
 
 
@@ -147,7 +147,7 @@ def _given(forces: Sequence[Force], grains: Grains) -> Given:
     return Given(
         next((f for f in forces if isinstance(f, Contact)), None),
         [f for f in forces if isinstance(f, LongRangeForce) and f.acts_on(grains)],
-        [f for f in forces if isinstance(f, GrainForce)],
+        [f for f in forces if isinstance(f, ExternalForce)],
         [f for f in forces if isinstance(f, Gas)],
     )
 
@@ -157,7 +157,7 @@ def _plan(
 ) -> KernelSpec:
     """What the driver is compiled from."""
     # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
-    way = verlet.far if given.distant and given.contact and verlet.most_steps > 1 else "every step"
+    way = verlet.far if given.distant and given.contact and verlet.max_cycle_steps > 1 else "every step"
     return KernelSpec(
         external,
         sums,
@@ -166,8 +166,8 @@ def _plan(
         taylor=way.startswith("taylor"),
         gas=bool(given.gas),
         adaptive=adaptive,
-        queue=is_large(len(grains)),
-        keep=all(is_ours(f.formula) for f in given.external),
+        queue=uses_task_queue(len(grains)),
+        keep=all(is_builtin(f.formula) for f in given.external),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
     )
@@ -210,15 +210,17 @@ def _stride(grains: Grains, box: Box, found: ChosenSearch) -> float:
     return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images
 
 
-def _ledger_columns(external: Sequence[GrainForce], box: Box) -> Books:
+def _ledger_columns(external: Sequence[ExternalForce], box: Box) -> ExternalWork:
     position_dependent = any(getattr(f, "position_dependent", False) for f in external)
-    return Books(any(getattr(f, "time_dependent", False) for f in external), position_dependent and not box.is_open)
+    return ExternalWork(
+        any(getattr(f, "time_dependent", False) for f in external), position_dependent and not box.is_open
+    )
 
 
 def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
     if not gas:
         return GasSettings(math.inf, seed, VACUUM)
-    return GasSettings(GAS_PERIOD_FRACTION * gas[0].shortest_time(grains), seed, gas[0].rules())
+    return GasSettings(GAS_PERIOD_FRACTION * gas[0].shortest_time(grains), seed, gas[0].numbers())
 
 
 def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
@@ -241,17 +243,17 @@ def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) 
     return warnings + (unusual(grains, forces, box) if fresh else [])
 
 
-def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> Control:
+def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> StepCriteria:
     """What the choice of the step needs."""
     steps = [own() for f in given.external if (own := getattr(f, "longest_step", None)) is not None]
     idle = IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials)))
-    return Control(
+    return StepCriteria(
         fixed=0.0 if stepping.step == "auto" else stepping.step,
         reach=reach,
         energy_scale=max((f.energy_scale(grains) for f in given.distant), default=0.0),
         accuracy=stepping.accuracy,
         outer_field=math.fsum(f.flux_density_size() for f in given.external),
-        impact=IMPACT_PART / stepping.steps_per_period,
+        impact=IMPACT_DISPLACEMENT / stepping.steps_per_period,
         longest=min([idle, *steps, *(GAS_PERIOD_FRACTION * gas.shortest_time(grains) for gas in given.gas)]),
     )
 

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..contact.events import add_initial_contacts
 from ..contact.gather import resort_contacts_by_grain
-from ..forces.base import GrainForce, LongRangeForce
-from ..forces.external.loops import outside_shares_for
-from ..forces.pair.loops import shares_for
+from ..forces.base import ExternalForce, LongRangeForce
+from ..forces.external.loops import external_energies_for
+from ..forces.pair.loops import long_range_energies_for
 from ..integrate.adaptive import Adaptive
-from ..integrate.adaptive_driver import flight_driver_for
+from ..integrate.adaptive_driver import adaptive_driver_for
 from ..integrate.driver import driver_for
 from ..integrate.kernel_spec import KernelSpec, StepParameters, Stop
-from ..integrate.step_control import GROW_EVERY
+from ..integrate.step_control import INCREASE_INTERVAL
 from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, worker_loops
 from ..integrate.verlet import Verlet
 from ..integrate.worker_threads import WorkerThreads
@@ -58,7 +58,7 @@ class Engine:
         what the forces had to say about these grains.
     far : Sequence[tuple[LongRangeForce, Any, Any]]
         the long-range forces that some grain feels, with their loops and numbers.
-    outside : Sequence[GrainForce]
+    outside : Sequence[ExternalForce]
         the per-grain forces.
     search : str
         how neighbours are found, in words.
@@ -71,7 +71,7 @@ class Engine:
     _world: State
     rules: StepParameters
     warnings: list[str]
-    external: Sequence[GrainForce]
+    external: Sequence[ExternalForce]
     long_range: Sequence[tuple[LongRangeForce, Any, Any]]
     search: str
     stepping: Verlet | Adaptive
@@ -82,7 +82,7 @@ class Engine:
     _hands: WorkerThreads | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self._advance = flight_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
+        self._advance = adaptive_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
         if self._plan.queue:
             self._hands = WorkerThreads(worker_loops(self._plan)[1])
 
@@ -167,7 +167,7 @@ class Engine:
         w = self._world
         rules = self.rules._replace(queue=new_task_queue(len(w.grains), w.contacts.flag.size))
         if benefits_from_workers(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
-            self._hands.call((w.grains.arrays, w.contacts, w.long_range, w.count, rules))
+            self._hands.start((w.grains.arrays, w.contacts, w.long_range, w.count, rules))
         return rules
 
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
@@ -185,7 +185,7 @@ class Engine:
         """Contacts of grains that touch at the start, nothing booked, and the first loads."""
         w = self.state
         w.count[STAGE] = 1
-        w.count[CHECKED] = w.count[STEP_INCREASES] = -GROW_EVERY
+        w.count[CHECKED] = w.count[STEP_INCREASES] = -INCREASE_INTERVAL
         w.clock[CONTACT_STEP] = math.inf
         self._drive(-math.inf, 1)
         w.count[STEPS] = w.count[MADE] = w.count[SLIPPED] = w.count[LONG_RANGE_SUMS] = 0
@@ -224,10 +224,12 @@ class Engine:
         w = self.state
         shares = {force.column: np.zeros(len(w.grains)) for force, _, _ in self.long_range}
         for force, sums, numbers in self.long_range:
-            shares_for(sums.energies)(w.grains.arrays, w.long_range, self.rules.span, numbers, shares[force.column])
+            long_range_energies_for(sums.energies)(
+                w.grains.arrays, w.long_range, self.rules.span, numbers, shares[force.column]
+            )
         for outer in self.external:
             shares[outer.name] = np.zeros(len(w.grains))
-            fill = outside_shares_for(outer.formula)
+            fill = external_energies_for(outer.formula)
             fill(w.grains.arrays, w.time, outer.numbers(), shares[outer.name])
         return shares
 

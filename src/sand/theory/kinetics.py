@@ -26,7 +26,7 @@ Rate = Callable[[np.ndarray, np.ndarray], Any]
 
 
 @dataclass(frozen=True)
-class Kernel:
+class CollisionKernel:
     """A function K(m1, m2) [m³/s] with a name.
 
     Attributes
@@ -56,21 +56,21 @@ class Kernel:
 
 
 @checked
-def constant(rate: Any) -> Kernel:
+def constant(rate: Any) -> CollisionKernel:
     """K = `rate` [m³/s] > 0, λ = 0.  Raises BadInput."""
     value = si(rate, "m^3/s", "rate", above=0.0)
-    return Kernel("constant", lambda m1, m2: np.full(np.shape(m1), value), 0.0)
+    return CollisionKernel("constant", lambda m1, m2: np.full(np.shape(m1), value), 0.0)
 
 
 @checked
-def additive(rate: Any, mass: Any) -> Kernel:
+def additive(rate: Any, mass: Any) -> CollisionKernel:
     """K = rate (N1 + N2), λ = 1: the size grows exponentially (Golovin 1963).  Arguments as for `product`."""
     value, grain = _scale(rate, mass)
-    return Kernel("additive", lambda m1, m2: value * (m1 / grain + m2 / grain), 1.0)
+    return CollisionKernel("additive", lambda m1, m2: value * (m1 / grain + m2 / grain), 1.0)
 
 
 @checked
-def product(rate: Any, mass: Any) -> Kernel:
+def product(rate: Any, mass: Any) -> CollisionKernel:
     """K = rate N1 N2, λ = 2: a gel, one cluster of all, after 1/(n rate).
 
     Parameters
@@ -86,11 +86,11 @@ def product(rate: Any, mass: Any) -> Kernel:
         out of range.
     """
     value, grain = _scale(rate, mass)
-    return Kernel("product", lambda m1, m2: value * (m1 / grain) * (m2 / grain), 2.0)
+    return CollisionKernel("product", lambda m1, m2: value * (m1 / grain) * (m2 / grain), 2.0)
 
 
 @checked
-def power(rate: Any, mass: Any, eta: Any, nu: Any) -> Kernel:
+def power(rate: Any, mass: Any, eta: Any, nu: Any) -> CollisionKernel:
     """K = rate [(N1^(η/2) + N2^(η/2))/2]² [2N1N2/(N1 + N2)]^ν: σ ∝ m^η and v ∝ m^ν of Eq. 20; λ = η + ν.
 
     Radii that go as m^(η/2) add up in σ, and v follows the reduced mass.
@@ -116,7 +116,7 @@ def power(rate: Any, mass: Any, eta: Any, nu: Any) -> Kernel:
         n1, n2 = m1 / grain, m2 / grain
         return value * (0.5 * (n1**half + n2**half)) ** 2 * _twice_reduced(n1, n2) ** speed
 
-    return Kernel(f"power, eta = {2 * half:g}, nu = {speed:g}", function, 2.0 * half + speed)
+    return CollisionKernel(f"power, eta = {2 * half:g}, nu = {speed:g}", function, 2.0 * half + speed)
 
 
 @checked
@@ -129,7 +129,7 @@ def mean_speed(mass: Any, temperature: Any) -> float:
 
 
 @checked
-def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 2.0) -> Kernel:
+def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 2.0) -> CollisionKernel:
     """K = π r² (N1^(1/D) + N2^(1/D))² √(8k_B T/(π m̄)): clusters of radius r N^(1/D) in free molecular flow.
 
     η = 2/D and ν = −1/2 of Eq. 20: z = 2 for D = 2, 6/5 for compact ones.  Below D = 2 it is an upper bound: the
@@ -158,7 +158,7 @@ def brownian(radius: Any, mass: Any, temperature: Any, fractal_dimension: Any = 
     area = magnetic.geometric_cross_section(si(radius, "m", "radius", above=0.0))
     rate = area * mean_speed(magnetic.reduced_mass(mass), heat)
     made = power(rate, mass, 2.0 / dimension, -0.5)
-    return Kernel(f"Brownian, D = {dimension:g}", made.function, made.degree)
+    return CollisionKernel(f"Brownian, D = {dimension:g}", made.function, made.degree)
 
 
 @checked
@@ -172,7 +172,7 @@ def capture(
     reading: str = "paper",
     speed: str = "impact",
     c: Any = 1.0,
-) -> Kernel:
+) -> CollisionKernel:
     """σ v of magnetic clusters, σ of Eq. 14 and μ = μ1 N^γ (Eq. 16).
 
     σ = c 3π (α/(k_B T))^(2/3): the relative motion has the energy m̄v∞² = k_B T, whatever the masses (Eq. 22).
@@ -226,7 +226,7 @@ def capture(
         n1, n2 = m1 / grain, m2 / grain
         return rate * (n1**products * n2**products) / np.sqrt(_twice_reduced(n1, n2))
 
-    return Kernel(f"magnetic, {reading}, {speed} speed", function, 2.0 * products - 0.5)
+    return CollisionKernel(f"magnetic, {reading}, {speed} speed", function, 2.0 * products - 0.5)
 
 
 def _twice_reduced(n1: np.ndarray, n2: np.ndarray) -> np.ndarray:

@@ -18,11 +18,11 @@ FULL, LARGE, LEFT = (
     "the mean size that was asked for is reached",
     "mass leaves through the top of the grid: give larger sizes, or the kernel makes a gel",
 )
-"""What can become of `coagulate`, `Growth.outcome`."""
+"""What can become of `coagulate`, `SizeDistribution.outcome`."""
 
 
 @dataclass(frozen=True)
-class Growth:
+class SizeDistribution:
     """A size distribution over time, as far as the grid holds it.
 
     Attributes
@@ -45,7 +45,7 @@ class Growth:
         (T,) [kg/(m³ s)], d lost/dt.
     outcome : str
         one of `FULL`, `LARGE`, `LEFT`; but for `FULL` there are fewer times than asked for.
-    solve_tighter : Callable[[ndarray], Growth] or None
+    solve_tighter : Callable[[ndarray], SizeDistribution] or None
         solves the equation once more up to the given times [s], with a tenth of the tolerance.
     """
 
@@ -58,14 +58,14 @@ class Growth:
     lost: np.ndarray
     loss_rate: np.ndarray
     outcome: str
-    solve_tighter: Callable[[np.ndarray], Growth] | None = field(default=None, repr=False, compare=False)
+    solve_tighter: Callable[[np.ndarray], SizeDistribution] | None = field(default=None, repr=False, compare=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """For copies in other processes, where the functions that kernels are made of cannot go."""
         return self.__dict__ | {"solve_tighter": None}
 
     @cached_property
-    def _tighter(self) -> Growth:
+    def _tighter(self) -> SizeDistribution:
         """The same outputs of a solution with a tenth of the tolerance."""
         if self.solve_tighter is None:
             raise BadInput("a copy has no kernel to solve with once more; ask the original for its exponent first")

@@ -1,4 +1,4 @@
-"""Growth of many clusters that stick whenever they meet: Smoluchowski's (1916) coagulation equation.
+"""SizeDistribution of many clusters that stick whenever they meet: Smoluchowski's (1916) coagulation equation.
 
     dn_k/dt = ½ Σ_{i+j=k} K_ij n_i n_j − n_k Σ_j K_kj n_j
 
@@ -20,7 +20,7 @@ from ..arguments import checked
 from ..errors import BadInput, SandError, did_you_mean
 from ..units import si
 from .kinetics import Rate
-from .size_distribution import FULL, LARGE, LEFT, Growth
+from .size_distribution import FULL, LARGE, LEFT, SizeDistribution
 
 MOST_SIZES = 3000
 """All pairs are held in memory: 4.5 million, some 300 MB."""
@@ -71,7 +71,7 @@ def coagulate(
     may_lose: Any = 1e-6,
     accuracy: Any = 1e-8,
     method: str = "BDF",
-) -> Growth:
+) -> SizeDistribution:
     """Solve Smoluchowski's equation from t = 0 with one of SciPy's integrators.
 
     Parameters
@@ -128,7 +128,7 @@ class _Question(NamedTuple):
     method: str
 
 
-def _solved(asked: _Question, t: np.ndarray) -> Growth:
+def _solved(asked: _Question, t: np.ndarray) -> SizeDistribution:
     """The answer at times t [s], as far as it goes."""
     from scipy.integrate import solve_ivp
 
@@ -166,7 +166,7 @@ def _solved(asked: _Question, t: np.ndarray) -> Growth:
 
 def _told(
     system: _System, y: np.ndarray, times: np.ndarray, units: tuple[float, float, float], outcome: str, again: Any
-) -> Growth:
+) -> SizeDistribution:
     grains, clock, grain = units
     x, parts = system.sizes, y[:-1].T
     all_changes = np.reshape([system.change(0.0, column) for column in y.T], (len(parts), len(x) + 1))
@@ -175,7 +175,7 @@ def _told(
     mean = parts @ x / held
     rate = (changes @ x - mean * changes.sum(axis=1)) / held / clock
     density = grain * grains
-    return Growth(
+    return SizeDistribution(
         times,
         x,
         grains * parts / x,

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import DOP853 as SCHEME
 
 from ...compiler.jit import kernel, loop, rare
-from ...integrate.runge_kutta import next_factor
+from ...integrate.runge_kutta import step_size_factor
 from ...numerics.vec import dot, norm
 from .initial_conditions import R, U, at, draw_path
 from .two_spheres import Model
@@ -153,7 +153,7 @@ def flight_of(model: Model) -> Callable:
             dt = min(dt, longest)
             off = tried(room, rules, dt) / limits.tolerance
             if not off <= 1.0:
-                dt *= next_factor(off, ORDER)
+                dt *= step_size_factor(off, ORDER)
                 if not dt > SMALLEST * first:
                     return FAILED, time, steps, closest, 0.0
                 continue
@@ -166,7 +166,7 @@ def flight_of(model: Model) -> Callable:
                 y[row] = new[row]
                 rate[0, row] = rate[STAGES, row]
             gap, time, steps = new_gap, time + dt, steps + 1
-            dt *= next_factor(off, ORDER)
+            dt *= step_size_factor(off, ORDER)
             closest = min(closest, gap)
             note(room.trail, steps, time, y)
             r, u = at(y, R), at(y, U)

@@ -1,1 +1,1 @@
-"""External forces on single grains: fields and gravity."""
+"""External forces on single grains: magnetic and electric fields, gravity."""

@@ -16,17 +16,17 @@ from .formulas import UniformElectric, uniform_electric
 @checked
 @dataclass(frozen=True)
 class ElectricField:
-    """An electric field that is the same everywhere and always: force q E, energy −q E·x.
+    """A uniform, constant electric field: force q E, energy −q E·x.
 
     Parameters
     ----------
-    strength
-        E, three components [V/m], or one size along +z: "1 kV/m".
+    strength : float, str or sequence
+        E, three components [V/m], or one value along +z: "1 kV/m".
 
     Raises
     ------
     BadInput
-        not one or three finite numbers in V/m; one line each.
+        If `strength` is not one or three finite numbers in V/m; one line each.
     """
 
     strength: Any
@@ -41,14 +41,17 @@ class ElectricField:
         object.__setattr__(self, "strength", along_z(self.strength, "V/m", "electric: strength"))
 
     def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
         return {"strength": list(self.strength)}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns when no grain has a charge."""
+        """Warnings: no grain has a charge."""
         return [] if grains.charge.any() else ["an electric field is switched on but no grain has a charge"]
 
     def numbers(self) -> UniformElectric:
+        """Parameters of the formula."""
         return UniformElectric(*self.strength)
 
     def flux_density_size(self) -> float:
+        """0: there is no magnetic field."""
         return 0.0

@@ -1,6 +1,6 @@
-"""Forces that act on one grain at a time: each formula gives force, torque and energy.
+"""Formulas of external forces on single grains: force, torque and energy.
 
-All have the same form, `formula(time, grain, parameters)`, so that a list of them is one formula.
+All have the signature `formula(time, grain, parameters)`, so that a list of forces composes to one formula.
 """
 
 import math
@@ -11,7 +11,7 @@ from ...numerics.vec import add, axpy, cross, dot, scale
 
 
 class GrainState(NamedTuple):
-    """One grain, as a per-grain force sees it."""
+    """The quantities of one grain that a formula may use."""
 
     position: tuple  # [m]
     velocity: tuple  # [m/s]
@@ -23,7 +23,7 @@ class GrainState(NamedTuple):
 
 
 class UniformField(NamedTuple):
-    """A magnetic flux density [T] that is the same everywhere and always."""
+    """A uniform, constant magnetic flux density [T]."""
 
     x: float
     y: float
@@ -38,7 +38,7 @@ def uniform_field(time, grain, parameters):
 
 
 class FieldInTime(NamedTuple):
-    """A flux density B(t) [T] that is the same everywhere; what a shape does not use is 0."""
+    """A uniform flux density B(t) [T]; terms that a shape does not use are 0."""
 
     constant: tuple  # B0 [T]
     cosine: tuple  # C [T]
@@ -46,36 +46,36 @@ class FieldInTime(NamedTuple):
     ramp: tuple  # R [T]
     frequency: float  # ω = 2πf [rad/s]
     phase: float  # φ [rad]
-    start: float  # t0 [s], when the ramp begins
+    start: float  # t0 [s], start of the ramp
     inverse_duration: float  # 1/(t1 − t0) [1/s]
 
 
 @formula
 def flux_density_at(time, field):
-    """B(t) [T] of a `FieldInTime`; outside t0 … t1 the ramp rests at its ends.
+    """B(t) [T] of a `FieldInTime`.
 
         B = B0 + C cos(ωt + φ) + S sin(ωt + φ) + R p,  p = (t − t0)/(t1 − t0) clipped to 0 … 1
 
-    The sum does not know the grain, so the compiler works it out once and not for each of them.
+    The sum is independent of the grain, so the compiler evaluates it once per step.
     """
     angle = field.frequency * time + field.phase
-    part = min(max((time - field.start) * field.inverse_duration, 0.0), 1.0)
-    swinging = axpy(math.cos(angle), field.cosine, scale(math.sin(angle), field.sine))
-    return add(swinging, axpy(part, field.ramp, field.constant))
+    ramp = min(max((time - field.start) * field.inverse_duration, 0.0), 1.0)
+    periodic = axpy(math.cos(angle), field.cosine, scale(math.sin(angle), field.sine))
+    return add(periodic, axpy(ramp, field.ramp, field.constant))
 
 
 @formula
 def field_in_time(time, grain, parameters):
     """No force, torque μ×B(t) [N m], energy −μ·B(t) [J] (Eqs. 40, 41 at the time t).
 
-    The energy changes at the rate −μ·dB/dt of its own: work of what makes the field.
+    The energy changes explicitly at the rate −μ·dB/dt, which is work of the source of the field.
     """
     b = flux_density_at(time, parameters)
     return (0.0, 0.0, 0.0), cross(grain.moment, b), -dot(grain.moment, b)
 
 
 class UniformGravity(NamedTuple):
-    """An acceleration g [m/s²] that is the same everywhere and always."""
+    """A uniform, constant acceleration g [m/s²]."""
 
     x: float
     y: float
@@ -90,7 +90,7 @@ def uniform_gravity(time, grain, parameters):
 
 
 class UniformElectric(NamedTuple):
-    """An electric field E [V/m] that is the same everywhere and always."""
+    """A uniform, constant electric field E [V/m]."""
 
     x: float
     y: float
@@ -106,12 +106,12 @@ def uniform_electric(time, grain, parameters):
 
 @formula
 def nothing(time, grain, parameters):
-    """No force at all: the end of every list."""
+    """No force: the last formula of every composition."""
     return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
 
 
 def together(first, rest):
-    """One formula for two; `parameters` is the pair of theirs."""
+    """The sum of two formulas; its `parameters` are the pair of theirs."""
 
     @formula
     def both(time, grain, parameters):
@@ -124,5 +124,5 @@ def together(first, rest):
 
 @formula
 def stiffness_of_field(moment, b, inertia):
-    """ω² = μB/I [1/s²], the square of the frequency at which a moment turns about a field."""
+    """ω² = μB/I [1/s²], squared frequency of the oscillation of a moment about a field."""
     return (dot(moment, moment) * dot(b, b)) ** 0.5 / inertia

@@ -16,17 +16,17 @@ from .formulas import UniformGravity, uniform_gravity
 @checked
 @dataclass(frozen=True)
 class Gravity:
-    """An acceleration that is the same everywhere and always: force m g, energy −m g·x.
+    """A uniform, constant acceleration: force m g, energy −m g·x.
 
     Parameters
     ----------
-    acceleration
-        g, three components [m/s^2], or one size ≥ 0, then along −z: "9.81 m/s^2".
+    acceleration : float, str or sequence
+        g, three components [m/s^2], or one magnitude ≥ 0 along −z: "9.81 m/s^2".
 
     Raises
     ------
     BadInput
-        not one or three finite numbers in m/s^2, or one below 0; one line each.
+        If `acceleration` is not one or three finite numbers in m/s^2, or one number below 0; one line each.
     """
 
     acceleration: Any
@@ -39,23 +39,26 @@ class Gravity:
 
     def __post_init__(self) -> None:
         given = self.acceleration
-        g = along_z(given, "m/s^2", "gravity: acceleration", sense=-1.0)
+        g = along_z(given, "m/s^2", "gravity: acceleration", direction=-1.0)
         if components(given) is None and g[2] > 0.0:
             raise BadInput(
-                f"gravity: acceleration = {given!r} is a size along −z and must be at least 0 m/s^2; "
+                f"gravity: acceleration = {given!r} is a magnitude along −z and must be at least 0 m/s^2; "
                 "for another direction give three components"
             )
         object.__setattr__(self, "acceleration", g)
 
     def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
         return {"acceleration": list(self.acceleration)}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Nothing to warn of: every grain has a mass."""
+        """No warnings: every grain has a mass."""
         return []
 
     def numbers(self) -> UniformGravity:
+        """Parameters of the formula."""
         return UniformGravity(*self.acceleration)
 
     def flux_density_size(self) -> float:
+        """0: there is no magnetic field."""
         return 0.0

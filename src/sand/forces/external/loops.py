@@ -1,4 +1,4 @@
-"""Per-grain forces: one composed formula over all grains."""
+"""Loops of external forces: one composed formula over all grains."""
 
 import functools
 
@@ -10,7 +10,7 @@ from .formulas import GrainState
 
 @loop
 def grain_at(grains, i):
-    """Grain i as a per-grain formula sees it."""
+    """The state of grain i for a formula."""
     return GrainState(
         load(grains.position, i),
         load(grains.velocity, i),
@@ -22,8 +22,8 @@ def grain_at(grains, i):
     )
 
 
-def outside_loads(formula_of_grain):
-    """The loop that adds force and torque of one composed formula to every grain."""
+def external_loads(formula_of_grain):
+    """The loop that adds force and torque of a composed formula to the loads of every grain."""
 
     @loop
     def add_loads(grains, time, parameters):
@@ -35,8 +35,8 @@ def outside_loads(formula_of_grain):
     return add_loads
 
 
-def outside_energy(formula_of_grain):
-    """The loop that sums the energy [J] of one composed formula over all grains."""
+def external_energy(formula_of_grain):
+    """The loop that sums the energy [J] of a composed formula over all grains."""
 
     @loop
     def sum_energy(grains, time, parameters):
@@ -48,18 +48,18 @@ def outside_energy(formula_of_grain):
     return sum_energy
 
 
-def outside_wrap(formula_of_grain):
-    """The loop that brings grains back into a periodic box; returns the energy [J] they gain by that."""
+def external_wrap(formula_of_grain):
+    """The loop that wraps positions into a periodic box; returns the change of external energy [J] by wrapping."""
 
     @loop
     def wrap(grains, span, time, parameters):
         gained = 0.0
         for i in range(grains.mass.size):
-            away = load(grains.position, i)
-            home = nearest_image(away, span)
-            if home != away:
+            position = load(grains.position, i)
+            wrapped = nearest_image(position, span)
+            if wrapped != position:
                 before = formula_of_grain(time, grain_at(grains, i), parameters)[2]
-                put(grains.position, i, home)
+                put(grains.position, i, wrapped)
                 gained += formula_of_grain(time, grain_at(grains, i), parameters)[2] - before
         return gained
 
@@ -67,16 +67,16 @@ def outside_wrap(formula_of_grain):
 
 
 @functools.cache
-def outside_shares_for(formula_of_grain):
-    """The compiled loop that fills `shares` (N,) with the energy [J] of one formula at each grain."""
+def external_energies_for(formula_of_grain):
+    """Compile the loop that sets `shares` (N,) to the energy [J] of each grain by one formula."""
 
     def fill_shares(grains, time, parameters, shares):
         for i in range(grains.mass.size):
             shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
 
-    return kernel(fill_shares, cached=is_ours(formula_of_grain))
+    return kernel(fill_shares, cached=is_builtin(formula_of_grain))
 
 
-def is_ours(formula_of_grain):
-    """True for formulas of SAND itself; compiled code with a user's own formula is not kept on disk."""
+def is_builtin(formula_of_grain):
+    """Whether a formula is part of SAND; compiled code with a user's own formula is not cached on disk."""
     return str(formula_of_grain.__module__).startswith("sand.")

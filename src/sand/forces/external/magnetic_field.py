@@ -1,4 +1,4 @@
-"""A uniform magnetic field, constant or changing in time."""
+"""A uniform magnetic field, constant or variable in time."""
 
 from __future__ import annotations
 
@@ -23,38 +23,40 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "rotating": ("amplitude", "frequency", "phase", "axis"),
     "ramp": ("final", "start", "end"),
 }
-"""How B changes in time, and the keys that say so, besides `flux_density`."""
-USUAL = {"phase": 0.0, "start": 0.0}
-"""Keys that may be left out."""
-WANTED = {
-    "flux_density": "one size along z or three components, in T, such as '1 mT', or 0",
-    "amplitude": "one size along z or three components, in T, such as '1 mT'",
-    "frequency": "swings or turns per second, in Hz, such as '1 MHz'",
+"""Time dependence of B, and the keys that each shape requires besides `flux_density`."""
+DEFAULTS = {"phase": 0.0, "start": 0.0}
+"""Defaults of optional keys."""
+EXPECTED = {
+    "flux_density": "one value along z or three components, in T, such as '1 mT', or 0",
+    "amplitude": "one value along z or three components, in T, such as '1 mT'",
+    "frequency": "oscillations or rotations per second, in Hz, such as '1 MHz'",
     "axis": "three numbers, such as [0, 0, 1]",
-    "final": "one size along z or three components, in T, such as '1 mT'",
+    "final": "one value along z or three components, in T, such as '1 mT'",
     "end": "a time in s, such as '5 us'",
 }
-"""What a missing key would hold."""
-PERIOD_PARTS = 200
+"""Description of each required value, for error messages."""
+STEPS_PER_PERIOD = 200
 """Least number of steps in a period of the field."""
-RAMP_PARTS = 100
+STEPS_PER_RAMP = 100
 """Least number of steps in a ramp."""
-TILT = 1e-6
-"""Largest cosine of the angle between amplitude and axis of a rotating field; more than rounding is a mistake."""
+MAX_COSINE = 1e-6
+"""Largest cosine of the angle between amplitude and axis of a rotating field: allows for rounding only."""
 _ANGLE = re.compile(r"°|rad|deg|turn|rev|rpm|cycle|rps", re.IGNORECASE)
 _ZERO = (0.0, 0.0, 0.0)
 
 
 def _frequency(value: Any, name: str) -> float:
-    """[Hz]; units with an angle are refused, because pint takes 1 rad/s for 1 Hz and 60 rpm for 6.28 Hz."""
+    """Frequency [Hz]; units with an angle are refused, because pint converts 1 rad/s to 1 Hz and 60 rpm to 6.28 Hz."""
     unit = value if isinstance(value, str) else str(getattr(value, "units", ""))
     if _ANGLE.search(unit):
-        raise BadInput(f"{name} = {value!r} counts angles; give swings or turns per second, such as '1 MHz'")
+        raise BadInput(
+            f"{name} = {value!r} has a unit of angle; give oscillations or rotations per second, such as '1 MHz'"
+        )
     return si(value, "Hz", name, above=0.0)
 
 
 def _axis(value: Any, name: str) -> tuple[float, float, float]:
-    """Three numbers, not all 0; stored as they were given."""
+    """Three numbers, not all 0; not normalised."""
     axis = three(value, "1", name)
     if axis == _ZERO:
         raise BadInput(f"{name} = {value!r} has no direction; give three numbers, not all 0, such as [0, 0, 1]")
@@ -71,47 +73,47 @@ READERS: dict[str, Callable[[Any, str], Any]] = {
     "start": lambda value, name: si(value, "s", name),
     "end": lambda value, name: si(value, "s", name),
 }
-"""How each key is read."""
+"""Conversion of each key to SI."""
 
 
 @checked
 @dataclass(frozen=True)
 class Field:
-    """A magnetic flux density that is the same everywhere: torque μ×B(t), energy −μ·B(t) (Eqs. 40, 41).
+    """A uniform magnetic flux density: torque μ×B(t), energy −μ·B(t) (Eqs. 40, 41).
 
     With B0 = `flux_density` and B1 = `amplitude`:
 
         constant      B0
         oscillating   B0 + B1 cos(2πft + φ)
         rotating      B0 + B1 cos(2πft + φ) + n×B1 sin(2πft + φ),  n along `axis`, B1 across it
-        ramp          B0 until `start`, then linear in time, `final` from `end` on
+        ramp          B0 until `start`, then linear in time to `final` at `end`, constant afterwards
 
     Parameters
     ----------
-    flux_density
-        B0, three components [T], or one size along +z as in the paper: "1 mT". 0 for none.
+    flux_density : float, str or sequence
+        B0, three components [T], or one value along +z as in the paper: "1 mT". 0 for none.
     shape : str, optional
         "constant", "oscillating", "rotating" (right-handed about `axis`) or "ramp".
-    amplitude : optional
-        B1 of "oscillating" and "rotating", three components [T], or one size along +z. When rotating it
-        is where the turning part points at the phase 0, and must be perpendicular to the axis.
-    frequency : optional
-        f of "oscillating" and "rotating", swings or turns per second [Hz] > 0.
-    phase : optional
-        φ of "oscillating" and "rotating" [rad]; 0 unless given. Text may say "90 deg".
-    axis : optional
-        direction of the axis of "rotating", three numbers of any size.
-    final : optional
-        flux density after a "ramp", three components [T], or one size along +z.
-    start : optional
-        when a "ramp" begins [s]; 0 unless given.
-    end : optional
-        when a "ramp" ends [s], after its start.
+    amplitude : float, str or sequence, optional
+        B1 of "oscillating" and "rotating", three components [T], or one value along +z. For "rotating" it is the
+        rotating component at phase 0, and must be perpendicular to the axis.
+    frequency : float or str, optional
+        f of "oscillating" and "rotating", oscillations or rotations per second [Hz] > 0.
+    phase : float or str, optional
+        φ of "oscillating" and "rotating" [rad], 0 by default; or text with a unit: "90 deg".
+    axis : sequence, optional
+        Direction of the axis of "rotating": three numbers, not all 0, of any magnitude.
+    final : float, str or sequence, optional
+        Flux density after a "ramp", three components [T], or one value along +z.
+    start : float or str, optional
+        Start of a "ramp" [s], 0 by default.
+    end : float or str, optional
+        End of a "ramp" [s], after its start.
 
     Raises
     ------
     BadInput
-        numbers that are wrong or out of range, keys that the shape lacks or does not use; one line each.
+        If a value is invalid or out of range, or the shape requires or does not use a key; one line each.
     """
 
     flux_density: Any
@@ -131,7 +133,7 @@ class Field:
     def __post_init__(self) -> None:
         shapes = list(SHAPES)
         problems = []
-        used = tuple(READERS)  # the shape is unknown: all may be meant
+        used = tuple(READERS)  # for an unknown shape no key is reported as unused
         if self.shape in shapes:
             used = ("flux_density", *SHAPES[self.shape])
         else:
@@ -139,9 +141,9 @@ class Field:
         for key, read in READERS.items():
             given = getattr(self, key)
             if given is None and self.shape in shapes and key in used:
-                given = USUAL.get(key)
+                given = DEFAULTS.get(key)
                 if given is None:
-                    problems.append(f"field: {key} is missing: shape = '{self.shape}' needs {WANTED[key]}")
+                    problems.append(f"field: {key} is missing: shape = '{self.shape}' needs {EXPECTED[key]}")
             elif given is not None and key not in used:
                 problems.append(self._unused(key))
                 continue
@@ -149,66 +151,66 @@ class Field:
                 object.__setattr__(self, key, None if given is None else read(given, f"field: {key}"))
             except BadInput as error:
                 problems += error.problems
-        if problems := problems or self._wrong_together():
+        if problems := problems or self._inconsistencies():
             raise BadInput(problems)
 
     def _unused(self, key: str) -> str:
-        """The complaint about a key that is for other shapes."""
+        """The error message for a key that belongs to other shapes."""
         others = " or ".join(f"'{shape}'" for shape, keys in SHAPES.items() if key in keys)
         return (
             f"field: {key} = {getattr(self, key)!r} is not used by shape = '{self.shape}'; leave it out, "
             f"or give shape = {others}"
         )
 
-    def _wrong_together(self) -> list[str]:
-        """Complaints about keys that are right one by one."""
+    def _inconsistencies(self) -> list[str]:
+        """Error messages for keys that are valid by themselves but contradict each other."""
         if self.shape == "ramp" and not self.end > self.start:
             return [f"field: end = {self.end!r} must be after start = {self.start!r}, in s"]
         if self.shape == "rotating":
             n, amplitude = self._normal(), self.amplitude
-            if abs(dot(amplitude, n)) > TILT * norm(amplitude):
-                part = ", ".join(f"{b:.9g}" for b in across(amplitude, n))
+            if abs(dot(amplitude, n)) > MAX_COSINE * norm(amplitude):
+                across_axis = ", ".join(f"{b:.9g}" for b in across(amplitude, n))
                 return [
                     f"field: amplitude = {list(amplitude)} must be perpendicular to axis = {list(self.axis)}; "
-                    f"its part across the axis is [{part}] T"
+                    f"its component perpendicular to the axis is [{across_axis}] T"
                 ]
         return []
 
     def _normal(self) -> tuple[float, float, float]:
-        """The unit vector along the axis."""
+        """Unit vector along the axis."""
         return scale(1.0 / math.hypot(*self.axis), self.axis)
 
     @property
     def formula(self) -> Callable:
-        """That of forces/external/formulas.py; the one of a constant field has no sine to work out."""
+        """The formula in `forces/external/formulas.py`; constant fields have one without trigonometric functions."""
         return uniform_field if self.shape == "constant" else field_in_time
 
     @property
     def time_dependent(self) -> bool:
-        """True if B changes in time: then −μ·B does so too, which is work of what makes the field."""
+        """Whether B, and with it the energy −μ·B, depends explicitly on time: its change is work of the source."""
         return self.shape != "constant"
 
     def parameters(self) -> dict[str, Any]:
-        """What the shape uses, in SI; a constant field is its flux density alone."""
+        """Settings of the shape in SI units, as in a case file; for a constant field its flux density alone."""
         given = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items() if v is not None}
         return given if self.time_dependent else {"flux_density": given["flux_density"]}
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns when no grain has a moment."""
+        """Warnings: no grain has a moment."""
         return [] if grains.moment.any() else ["a field is switched on but no grain has a magnetic moment"]
 
     def numbers(self) -> UniformField | FieldInTime:
-        """What `formula` takes."""
+        """Parameters of `formula`."""
         b = self.flux_density
         if self.shape == "constant":
             return UniformField(*b)
         if self.shape == "ramp":
             return FieldInTime(b, _ZERO, _ZERO, sub(self.final, b), 0.0, 0.0, self.start, 1.0 / (self.end - self.start))
-        cosine, sine = self._swinging()
+        cosine, sine = self._quadratures()
         return FieldInTime(b, cosine, sine, _ZERO, 2.0 * math.pi * self.frequency, self.phase, 0.0, 0.0)
 
-    def _swinging(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-        """The vectors [T] that go with cos and sin."""
+    def _quadratures(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Amplitudes [T] of the cosine and the sine."""
         if self.shape == "oscillating":
             return self.amplitude, _ZERO
         n = self._normal()
@@ -216,14 +218,14 @@ class Field:
         return first, cross(n, first)
 
     def flux_density_at(self, time: float) -> tuple[float, float, float]:
-        """B [T] at a time [s]."""
+        """Flux density B [T] at a time [s]."""
         if self.shape == "constant":
             return self.flux_density
         x, y, z = flux_density_at(time, self.numbers())
         return x, y, z
 
     def flux_density_size(self) -> float:
-        """The largest |B(t)| [T] of all times, reached or not."""
+        """Largest |B(t)| [T] over all times, whether the run reaches them or not."""
         b = self.flux_density
         if self.shape == "ramp":
             return max(norm(b), norm(self.final))
@@ -235,9 +237,9 @@ class Field:
         return norm(b)
 
     def longest_step(self) -> float:
-        """A two-hundredth of the period or a hundredth of the ramp [s]; infinite for a constant field."""
+        """Largest step [s]: 1/200 of the period or 1/100 of the ramp; infinite for a constant field."""
         if self.shape == "constant":
             return math.inf
         if self.shape == "ramp":
-            return (self.end - self.start) / RAMP_PARTS
-        return 1.0 / (PERIOD_PARTS * self.frequency)
+            return (self.end - self.start) / STEPS_PER_RAMP
+        return 1.0 / (STEPS_PER_PERIOD * self.frequency)

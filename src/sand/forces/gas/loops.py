@@ -1,4 +1,4 @@
-"""The gas brakes and jostles every grain: exact over any time, given that nothing else acts meanwhile."""
+"""Drag and Brownian kicks of all grains: the exact solution over any time in the absence of other forces."""
 
 from typing import NamedTuple
 
@@ -7,32 +7,32 @@ import numpy as np
 from ...compiler.jit import formula, loop
 from ...numerics.random import normal_vector
 from ...numerics.vec import add, dot, load, put, sub
-from .drag import forgotten, relaxed, rotation_friction, thermal_spread, translation_friction
+from .drag import decayed_fraction, ornstein_uhlenbeck, rotation_friction, thermal_spread, translation_friction
 
 TRANSLATION, ROTATION = range(2)
-"""Streams of random numbers: what a deviate is for.  Others that draw from `numerics.random` take other numbers."""
+"""Random-number streams of `numerics.random`, distinct from those of all other uses."""
 
 
 class GasParameters(NamedTuple):
-    """The gas's run-time numbers."""
+    """Run-time parameters of the gas."""
 
     on: bool  # False: vacuum
     density: float  # ρ_g [kg/m³]
     mean_speed: float  # v̄ of the molecules [m/s]
     temperature_energy: float  # k_B T [J]; 0: no Brownian kicks
-    accommodation: float  # α, part of the molecules that leaves diffusely
+    accommodation: float  # α, fraction of molecules reflected diffusely
     wind_x: float  # velocity of the gas [m/s]
     wind_y: float
     wind_z: float
 
 
 VACUUM = GasParameters(False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""No gas: `gas_kick` does nothing."""
+"""No gas: `gas_kick` has no effect."""
 
 
 @formula
-def kick_one(grains, i, seed, number, elapsed, gas):
-    """`gas_kick` for grain i alone; returns the energy it gave to the gas [J]."""
+def kick_grain(grains, i, seed, number, elapsed, gas):
+    """Apply `gas_kick` to grain i; returns the energy [J] transferred to the gas."""
     r, m, inertia, v, w = (
         grains.radius[i],
         grains.mass[i],
@@ -40,61 +40,65 @@ def kick_one(grains, i, seed, number, elapsed, gas):
         load(grains.velocity, i),
         load(grains.spin, i),
     )
-    slowed = forgotten(translation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / m, elapsed)
-    spun_down = forgotten(rotation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / inertia, elapsed)
-    push = twirl = (0.0, 0.0, 0.0)
+    decayed_v = decayed_fraction(translation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / m, elapsed)
+    decayed_w = decayed_fraction(
+        rotation_friction(r, gas.density, gas.mean_speed, gas.accommodation) / inertia, elapsed
+    )
+    noise_v = noise_w = (0.0, 0.0, 0.0)
     if gas.temperature_energy > 0.0:
-        push = normal_vector(seed, number, grains.id[i], TRANSLATION)
-        twirl = normal_vector(seed, number, grains.id[i], ROTATION)
+        noise_v = normal_vector(seed, number, grains.id[i], TRANSLATION)
+        noise_w = normal_vector(seed, number, grains.id[i], ROTATION)
     wind = (gas.wind_x, gas.wind_y, gas.wind_z)
-    new_v = relaxed(v, wind, slowed, thermal_spread(slowed, gas.temperature_energy, m), push)
-    new_w = relaxed(w, (0.0, 0.0, 0.0), spun_down, thermal_spread(spun_down, gas.temperature_energy, inertia), twirl)
+    new_v = ornstein_uhlenbeck(v, wind, decayed_v, thermal_spread(decayed_v, gas.temperature_energy, m), noise_v)
+    new_w = ornstein_uhlenbeck(
+        w, (0.0, 0.0, 0.0), decayed_w, thermal_spread(decayed_w, gas.temperature_energy, inertia), noise_w
+    )
     put(grains.velocity, i, new_v)
     put(grains.spin, i, new_w)
-    # v² − v'² as a product: no digits are lost where the two are nearly the same
-    moving = 0.5 * m * dot(sub(v, new_v), add(v, new_v))
-    return moving + 0.5 * inertia * dot(sub(w, new_w), add(w, new_w))
+    # v² − v'² as a product: accurate where the two are nearly equal
+    translational = 0.5 * m * dot(sub(v, new_v), add(v, new_v))
+    return translational + 0.5 * inertia * dot(sub(w, new_w), add(w, new_w))
 
 
 @loop
 def gas_kick(grains, seed, number, elapsed, gas):
-    """Let the gas act on velocity and spin of every grain for `elapsed` seconds.
+    """Apply drag and Brownian kicks of `elapsed` seconds to velocity and spin of every grain.
+
+    Random deviates depend on the id of a grain, not on its index, and grains do not interact here: the results have
+    the same bits in any order of the grains.
 
     Parameters
     ----------
-    seed
-        of the run, 0 ≤ seed < 2⁶³.
-    number
-        of this kick; a number used twice gives the same deviates twice.
-    elapsed
-        [s] ≥ 0.
-    gas
-        GasParameters.
+    seed : int
+        Seed of the run, 0 ≤ seed < 2⁶³.
+    number : int
+        Number of this kick; equal numbers give equal deviates.
+    elapsed : float
+        Time [s] ≥ 0.
+    gas : GasParameters
+        Properties of the gas.
 
     Returns
     -------
-    result
-        Kinetic energy [J] that the grains gave to the gas, laboratory frame; negative if they gained.
-
-    Deviates belong to the id of a grain, not to its place, and grains do not see each other: the same bits come
-    out whatever the order, or the pieces, in which grains are visited.
+    float
+        Kinetic energy [J] transferred from the grains to the gas, laboratory frame; negative if the grains gained.
     """
-    given = 0.0
+    transferred = 0.0
     if gas.on:
         for i in range(grains.mass.size):
-            given += kick_one(grains, i, seed, number, elapsed, gas)
-    return given
+            transferred += kick_grain(grains, i, seed, number, elapsed, gas)
+    return transferred
 
 
 def shortest_stopping_time(grains, gas):
-    """The shortest of all m/f_t and I/f_r [s]; infinite without gas.  Not compiled.
+    """Shortest stopping time [s], m/f_t or I/f_r, of all grains; infinite without gas.  Not compiled.
 
     Parameters
     ----------
-    grains
-        grains.GrainArrays.
-    gas
-        GasParameters.
+    grains : GrainArrays
+        All grains.
+    gas : GasParameters
+        Properties of the gas.
     """
     numbers = (gas.density, gas.mean_speed, gas.accommodation)
     fastest = max(

@@ -1,4 +1,4 @@
-"""A thin gas: drag and Brownian motion."""
+"""A rarefied gas: drag and Brownian motion."""
 
 from __future__ import annotations
 
@@ -17,54 +17,54 @@ from ..vectors import three
 from . import drag as law
 from .loops import GasParameters, shortest_stopping_time
 
-RAREFIED = 10.0
-"""Least mean free path, in radii, for molecules that hit a grain unaware of each other."""
+MIN_KNUDSEN = 10.0
+"""Least mean free path in radii for free molecular flow."""
 LARGEST_SPEED = 0.5
-"""Speed relative to the wind, in mean molecular speeds, above which Epstein's linear law is at the edge: it then
-lacks 6 % of the drag of mirrors and 4 % of that of diffuse walls."""
+"""Speed relative to the gas, in mean molecular speeds, up to which Epstein's linear law is accurate: at this speed it
+underestimates drag by 6 % (specular reflection) or 4 % (diffuse reflection)."""
 
 
 @checked
 @dataclass(frozen=True)
 class Gas:
-    """A thin gas around the grains: it brakes them (Epstein) and keeps them in Brownian motion.
+    """A rarefied gas: drag (Epstein) and Brownian motion of every grain.
 
-    Each grain feels the gas as if it were alone. It must be much smaller than the mean free path of the molecules and
-    much slower than they are; then F = −f_t (v − u) and M = −f_r ω with f_t = (4π/3) r² ρ_g v̄ (1 + (π/8) α) and
-    f_r = (2π/3) α ρ_g v̄ r⁴. What the grains give to the gas is booked as `lost_gas`, negative where it heats them.
-    The random kicks follow from the simulation's seed.
+    Grains do not influence the gas around other grains. Valid for radii much smaller than the mean free path of the
+    molecules and speeds much smaller than theirs. Then F = −f_t (v − u) and M = −f_r ω with
+    f_t = (4π/3) r² ρ_g v̄ (1 + (π/8) α) and f_r = (2π/3) α ρ_g v̄ r⁴. The energy transferred to the gas is logged as
+    `lost_gas`, negative if the gas heats the grains. Random kicks are determined by the seed of the simulation.
 
     Parameters
     ----------
-    temperature
-        T [K] > 0 of the gas and of the grains' surfaces.
-    density : optional
-        ρ_g [kg/m^3] > 0; this or the pressure.
-    pressure : optional
-        p [Pa] > 0; this or the density.
-    molecule_mass : optional
-        mean mass m_g of a molecule [kg] > 0, or "28.97 u"; 2.34 u, H2 with He, by default.
-    accommodation : optional
-        α, 0 … 1, the part of the molecules that leaves diffusely, at the temperature T; the others
-        are reflected as by a mirror.
+    temperature : float or str
+        T [K] > 0 of the gas and of the surfaces of the grains.
+    density : float or str, optional
+        ρ_g [kg/m^3] > 0; either this or the pressure.
+    pressure : float or str, optional
+        p [Pa] > 0; either this or the density.
+    molecule_mass : float or str, optional
+        Mean mass m_g of a molecule [kg] > 0, or "28.97 u"; 2.34 u (H2 with He) by default.
+    accommodation : float, optional
+        α, 0 … 1, the fraction of molecules reflected diffusely, at the temperature T; the others are reflected
+        specularly.
     brownian : bool, optional
         True: random kicks that bring the grains to the temperature T; False: drag alone.
-    wind : optional
-        u, three components of the gas's own velocity [m/s]; at rest by default.
-    cross_section : optional
-        of two molecules [m^2] > 0, about "2e-19 m^2" for H2; if given, the mean free path is compared
-        with the radii.
+    wind : sequence, optional
+        u, three components of the velocity of the gas [m/s]; at rest by default.
+    cross_section : float or str, optional
+        Collision cross-section of two molecules [m^2] > 0, about "2e-19 m^2" for H2. If given, a mean free path below
+        ten radii is reported.
 
     Raises
     ------
     BadInput
-        numbers out of range, and density and pressure both or neither, one line each.
+        If a parameter is out of range, or both or neither of density and pressure are given; one line each.
     """
 
     temperature: Any
     density: Any = None
     pressure: Any = None
-    molecule_mass: Any = law.NEBULA * law.ATOMIC_MASS
+    molecule_mass: Any = law.NEBULA_MOLECULE * law.ATOMIC_MASS
     accommodation: Any = 1.0
     brownian: bool = True
     wind: Any = (0.0, 0.0, 0.0)
@@ -85,13 +85,13 @@ class Gas:
             except BadInput as error:
                 problems += error.problems
         if (self.density is None) == (self.pressure is None):
-            told = "neither" if self.density is None else "both"
-            problems.append(f"gas: give either the density in kg/m^3 or the pressure in Pa; {told} is given")
+            which = "neither" if self.density is None else "both"
+            problems.append(f"gas: give either the density in kg/m^3 or the pressure in Pa; {which} is given")
         given = self.accommodation
         try:
             object.__setattr__(self, "accommodation", si(given, "1", "gas: accommodation", least=0.0))
             if self.accommodation > 1.0:
-                problems.append(f"gas: accommodation = {given!r} is a part of all molecules and must be at most 1")
+                problems.append(f"gas: accommodation = {given!r} is a fraction of the molecules and must be at most 1")
         except BadInput as error:
             problems += error.problems
         if not isinstance(self.brownian, bool):
@@ -101,45 +101,47 @@ class Gas:
         except BadInput as error:
             problems += error.problems
         if not problems and law.mean_speed(BOLTZMANN * self.temperature, self.molecule_mass) >= LIGHT:
-            problems.append(f"gas: temperature = {self.temperature:g} K: its molecules would be faster than light")
+            problems.append(
+                f"gas: temperature = {self.temperature:g} K: the mean speed of its molecules would exceed that of light"
+            )
         if problems:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
-        """Its settings in SI; of density and pressure the one that was given."""
+        """Settings in SI units, as in a case file; of density and pressure the one given."""
         given = {key: value for key, value in asdict(self).items() if value is not None}
         return given | {"wind": list(self.wind)}
 
-    def rules(self) -> GasParameters:
-        """The gas as the kernels take it."""
+    def numbers(self) -> GasParameters:
+        """Run-time parameters of the kernels."""
         energy = BOLTZMANN * self.temperature
         density = self.density or law.density_of(self.pressure, energy, self.molecule_mass)
         speed = law.mean_speed(energy, self.molecule_mass)
         return GasParameters(True, density, speed, energy if self.brownian else 0.0, self.accommodation, *self.wind)
 
     def shortest_time(self, grains: Grains) -> float:
-        """The shortest time [s] in which a grain loses its motion through the gas, or its spin, to 1/e."""
-        return shortest_stopping_time(grains.arrays, self.rules())
+        """Shortest stopping time [s]: velocity relative to the gas, or spin, of a grain decays to 1/e."""
+        return shortest_stopping_time(grains.arrays, self.numbers())
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns of a gas too hot for solids, and of grains too fast for the linear law or too large for free flow."""
-        rules, warnings = self.rules(), []
+        """Warnings: gas too hot for solids; grains too fast for the linear law or too large for free molecular flow."""
+        numbers, warnings = self.numbers(), []
         if self.temperature > MELTED:
             warnings.append(f"gas: temperature = {self.temperature:g} K: no material is solid above {MELTED:g} K")
         speed = np.linalg.norm(grains.velocity - np.array(self.wind), axis=1)
         fastest = int(np.argmax(speed))
-        if speed[fastest] > LARGEST_SPEED * rules.mean_speed:
+        if speed[fastest] > LARGEST_SPEED * numbers.mean_speed:
             warnings.append(
                 f"gas: grain {fastest} moves at {format_quantity(speed[fastest], 'm/s')} through a gas of mean molecular speed "
-                f"{format_quantity(rules.mean_speed, 'm/s')}; Epstein's law assumes far less than that: "
-                "its drag is then too weak"
+                f"{format_quantity(numbers.mean_speed, 'm/s')}; Epstein's law holds for much smaller speeds "
+                "and underestimates the drag"
             )
         if self.cross_section is not None:
-            path = law.mean_free_path(rules.density, self.molecule_mass, self.cross_section)
+            path = law.mean_free_path(numbers.density, self.molecule_mass, self.cross_section)
             largest = float(grains.radius.max())
-            if path < RAREFIED * largest:
+            if path < MIN_KNUDSEN * largest:
                 warnings.append(
                     f"gas: the mean free path is {format_quantity(path, 'm')}, the largest radius {format_quantity(largest, 'm')}; "
-                    f"Epstein's law assumes a path above {RAREFIED:g} radii: its drag is then too strong"
+                    f"Epstein's law holds above {MIN_KNUDSEN:g} radii and overestimates the drag"
                 )
         return warnings

@@ -1,1 +1,1 @@
-"""Long-range forces between pairs of grains."""
+"""Long-range forces between pairs of grains: dipoles, charges, gravitation."""

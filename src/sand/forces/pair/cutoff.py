@@ -1,4 +1,4 @@
-"""Where a long-range force ends: what the user may give, and what the kernels get."""
+"""Cut-offs of long-range forces: user input, automatic choice, parameters of the kernels."""
 
 from __future__ import annotations
 
@@ -13,45 +13,24 @@ from .dipole_formulas import Cutoff
 
 CUTS = ("smooth", "sharp")
 SHELL = 0.2
-"""Part of the cut-off radius over which a smooth cut switches the interaction off."""
+"""Width of the outer shell in which a smooth cut-off switches the interaction off, in units of the cut-off radius."""
 SHARP = 1e15
-"""r_c² over the shell of a sharp cut: thinner than numbers can tell."""
-
+"""r_c²/(r_c² − r_s²) of a sharp cut-off: the shell is thinner than the rounding of distances."""
 UNCUT = Cutoff(1e300, 1e-200)
-"""No cut: the weight is 1 and its slope 0 at any distance; infinities would make 0 × ∞."""
-ROOM = 1.35
-"""Half the box over the automatic cut-off: so much farther the paper's list reached."""
+"""No cut-off: weight 1 and slope 0 at any distance; infinite parameters would give 0 × ∞."""
+HALF_BOX_RATIO = 1.35
+"""Ratio of half the box to the automatic cut-off, and of the radius of the paper's neighbour list to its cut-off."""
 
 
-class Choice(NamedTuple):
-    """A cut-off [m] (None: none) and why."""
+class CutoffChoice(NamedTuple):
+    """A cut-off radius [m], None for no cut-off, and the reason for it."""
 
     radius: float | None
     reason: str
 
 
-def cutoff_given(cutoff: Any, name: str) -> float | None:
-    """A length [m], or None for None and "none" (how a case file says it).  Raises BadInput."""
-    if cutoff is None or is_word(cutoff, "none"):
-        return None
-    return si(cutoff, "m", f"{name}: cutoff", above=0.0)
-
-
-def describe_cutoff(cutoff: float | None, cut: str, box: Box, name: str) -> Choice:
-    """The user's own cut-off as a choice.  Raises BadInput if it reaches beyond half the box."""
-    if cutoff is None:
-        where = "all pairs, open box" if box.is_open else "nearest images, energy jumps at half the box"
-        return Choice(None, f"no cut-off asked for: {where}")
-    if cutoff > 0.5 * box.shortest:
-        raise BadInput(
-            f"{name}: cutoff = {format_quantity(cutoff, 'm')} reaches beyond half the box "
-            f"({format_quantity(0.5 * box.shortest, 'm')}); take a larger box or a cutoff up to that"
-        )
-    return Choice(cutoff, f"{cut}, given by the user")
-
-
 def cutoff_for(radius: float | None, cut: str) -> Cutoff:
-    """The numbers of the weight S(r²)."""
+    """Parameters of the weight S(r²) for a cut-off radius [m]."""
     if radius is None:
         return UNCUT
     if cut == "sharp":
@@ -61,51 +40,71 @@ def cutoff_for(radius: float | None, cut: str) -> Cutoff:
 
 
 @dataclass(frozen=True)
-class WithCutoff:
-    """What all long-range forces have: an end, and something to warn of. `cutoff` and `cut` as the force says."""
+class CutoffForce:
+    """Base class of the long-range forces: their cut-off and its warnings; subclasses document `cutoff` and `cut`."""
 
     cutoff: Any = "auto"
     cut: str = "smooth"
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str]
-    idle: ClassVar[str]  # what is said where no grain feels it
+    no_effect: ClassVar[str]  # warning if no grain is subject to the force
 
     def __post_init__(self) -> None:
         problems = []
         if self.cut not in CUTS:
             problems.append(f"{self.name}: cut = {self.cut!r}; {did_you_mean(str(self.cut), CUTS)}")
-        if not is_word(self.cutoff, "auto"):
+        if self.cutoff is None or is_word(self.cutoff, "none"):  # "none" is the spelling of case files
+            object.__setattr__(self, "cutoff", None)
+        elif not is_word(self.cutoff, "auto"):
             try:
-                object.__setattr__(self, "cutoff", cutoff_given(self.cutoff, self.name))
+                object.__setattr__(self, "cutoff", si(self.cutoff, "m", f"{self.name}: cutoff", above=0.0))
             except BadInput as error:
                 problems += error.problems
         if problems:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
         return {"cutoff": "none" if self.cutoff is None else self.cutoff, "cut": self.cut}
 
-    def choose(self, grains: Grains, box: Box) -> Choice:
-        """The cut-off in force, with its reason.  Raises BadInput if it does not fit into the box."""
-        if self.cutoff != "auto":
-            return describe_cutoff(self.cutoff, self.cut, box, self.name)
-        if box.is_open:
-            return Choice(None, "open box: all pairs")
-        return self.automatic(grains, 0.5 * box.shortest / ROOM)
+    def choose(self, grains: Grains, box: Box) -> CutoffChoice:
+        """The cut-off radius, with the reason.
 
-    def automatic(self, grains: Grains, half: float) -> Choice:
-        """The cut-off in a periodic box where the user gave none; at most `half` [m]."""
-        return Choice(half, f"{self.cut}, half the box / {ROOM}")
+        Raises
+        ------
+        BadInput
+            If a cut-off given by the user exceeds half the box.
+        """
+        if self.cutoff is None:
+            where = "all pairs, open box" if box.is_open else "nearest images, energy jumps at half the box"
+            return CutoffChoice(None, f"no cut-off, given by the user: {where}")
+        if self.cutoff != "auto":
+            half = 0.5 * box.shortest
+            if self.cutoff > half:
+                raise BadInput(
+                    f"{self.name}: cutoff = {format_quantity(self.cutoff, 'm')} exceeds half the box "
+                    f"({format_quantity(half, 'm')}); use a larger box or a cutoff up to that"
+                )
+            return CutoffChoice(self.cutoff, f"{self.cut}, given by the user")
+        if box.is_open:
+            return CutoffChoice(None, "open box: all pairs")
+        return self.automatic(grains, 0.5 * box.shortest / HALF_BOX_RATIO)
+
+    def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
+        """The automatic cut-off in a periodic box; `largest` is its upper limit [m]."""
+        return CutoffChoice(largest, f"{self.cut}, half the box / {HALF_BOX_RATIO}")
 
     def acts_on(self, grains: Grains) -> bool:
-        """False if no grain feels it."""
+        """Whether any grain is subject to the force."""
         raise NotImplementedError
 
     def check(self, grains: Grains, box: Box) -> list[str]:
-        """Warns when no grain feels it, or when nearest images are summed without a cut."""
+        """Warnings: no grain is subject to the force, or nearest images are summed without a cut-off."""
         choice = self.choose(grains, box)
-        warnings = [] if self.acts_on(grains) else [self.idle]
+        warnings = [] if self.acts_on(grains) else [self.no_effect]
         if choice.radius is None and not box.is_open:
-            warnings.append(f"{self.name}: cutoff = none in a periodic box: energy jumps when images change")
+            warnings.append(
+                f"{self.name}: cutoff = none in a periodic box: the energy jumps when nearest images change"
+            )
         return warnings

@@ -1,8 +1,8 @@
-"""Rates of change of dipole loads: the first-order Taylor terms of Eqs. 51–56 of the paper, corrected.
+"""Rates of change of dipole loads: the first-order terms of the Taylor series, Eqs. 51–56 of the paper, corrected.
 
-Eq. 53 as printed has the moment of the wrong grain, Eq. 54 the Jacobians of F (docs: misprints).  With
-`apart` r = x1 − x2 and the rates ṙ, μ̇1, μ̇2 the chain rule through Eqs. 35 and 39 gives the same as the
-Jacobians, dF = (∂F/∂r) ṙ + (∂F/∂μ1) μ̇1 + (∂F/∂μ2) μ̇2, without building them.
+Eq. 53 is printed with the moment of the wrong grain, Eq. 54 with the Jacobians of F (docs: misprints).  The chain rule
+applied to Eqs. 35 and 39 with r = x1 − x2 (`apart`) and the rates ṙ, μ̇1, μ̇2 equals the product with the Jacobians,
+dF = (∂F/∂r) ṙ + (∂F/∂μ1) μ̇1 + (∂F/∂μ2) μ̇2, without computing these.
 """
 
 import math
@@ -14,21 +14,27 @@ from .dipole_formulas import cut_weight
 
 @formula
 def cut_curvature(square, cutoff):
-    """d(slope)/d(r²) [1/m⁴] of `cut_weight`'s slope: −120 c² t(1−t)(1−2t), c the inverse shell."""
+    """d(slope)/d(r²) [1/m⁴] of the slope of `cut_weight`: −120 c² t(1−t)(1−2t), c = 1/(r_c² − r_s²)."""
     t = min(max((cutoff.square - square) * cutoff.inverse_shell, 0.0), 1.0)
     return -120.0 * cutoff.inverse_shell * cutoff.inverse_shell * t * (1.0 - t) * (1.0 - 2.0 * t)
 
 
 @formula
-def bare_rates(apart, moment1, moment2, moving, turning1, turning2, k):
-    """Force, fields and energy of `pair_load`, and the rates of the first three.
+def uncut_rates(apart, moment1, moment2, moving, turning1, turning2, k):
+    """Force, flux densities and energy of `pair_load`, and the rates of force and flux densities.
 
     Parameters
     ----------
-    moving
+    apart : tuple
+        r = x1 − x2 [m].
+    moment1, moment2 : tuple
+        μ1, μ2 [A m²].
+    moving : tuple
         ṙ = v1 − v2 [m/s].
-    turning1, turning2
-        μ̇ of the moments [A m²/s].
+    turning1, turning2 : tuple
+        μ̇1, μ̇2 [A m²/s].
+    k : float
+        μ₀/4π [T m/A].
     """
     inverse2 = 1.0 / dot(apart, apart)
     inverse3 = k * inverse2 * math.sqrt(inverse2)
@@ -57,12 +63,14 @@ def bare_rates(apart, moment1, moment2, moving, turning1, turning2, k):
 
 @formula
 def pair_rates(apart, moment1, moment2, moving, turning1, turning2, k, cutoff):
-    """Ḟ on 1 [N/s] and Ḃ at 1 and 2 [T/s] of `pair_load_cut`.
+    """Rates Ḟ on 1 [N/s] and Ḃ at 1 and 2 [T/s] of `pair_load_cut`; arguments as for `uncut_rates`.
 
-    With the weight S(r²): Ḃ → S Ḃ + Ṡ B, and of F = S F_d + U s r, s = −2 dS/dr², the rate is
-    S Ḟ_d + Ṡ F_d + (U̇ s + U ṡ) r + U s ṙ;  U̇ = −F_d·ṙ − μ̇1·B1 − μ̇2·B2, Ṡ = −s r·ṙ.
+    With the weight S(r²) and s = −2 dS/d(r²), F = S F_d + U s r and B = S B_d:
+
+        Ḟ = S Ḟ_d + Ṡ F_d + (U̇ s + U ṡ) r + U s ṙ,  Ḃ = S Ḃ_d + Ṡ B_d
+        U̇ = −F_d·ṙ − μ̇1·B1 − μ̇2·B2,  Ṡ = −s r·ṙ
     """
-    force, field1, field2, energy, force_rate, rate1, rate2 = bare_rates(
+    force, field1, field2, energy, force_rate, rate1, rate2 = uncut_rates(
         apart, moment1, moment2, moving, turning1, turning2, k
     )
     square, radial = dot(apart, apart), dot(apart, moving)

@@ -1,6 +1,6 @@
-"""Forces along the line of centres that fall with the square of the distance: charges, Newtonian attraction.
+"""Central forces of inverse-square type: Coulomb forces and Newtonian attraction.
 
-U = k q1 q2/r with k = 1/(4πε₀) for charges and −G for masses.  Like dipoles they may be cut: U → S(r) U.
+U = k q1 q2/r with k = 1/(4πε₀) for charges and −G for masses; with a cut-off U → S(r) U, as for dipoles.
 """
 
 import math
@@ -13,7 +13,7 @@ from .dipole_rates import cut_curvature
 
 @formula
 def central_field(apart, k, cutoff):
-    """Field at 1 per unit of charge 2, F1 = q1 q2 × this: k (S/r³ + s/r) r with r = x1 − x2, s = −2 dS/dr²."""
+    """Force on 1 per unit of both charges, F1/(q1 q2) = k (S/r³ + s/r) r, r = x1 − x2, s = −2 dS/d(r²)."""
     square = dot(apart, apart)
     weight, slope = cut_weight(square, cutoff)
     inverse = 1.0 / math.sqrt(square)
@@ -22,14 +22,14 @@ def central_field(apart, k, cutoff):
 
 @formula
 def central_potential(apart, k, cutoff):
-    """Energy per unit of both charges, k S/r."""
+    """Energy per unit of both charges, U/(q1 q2) = k S/r."""
     square = dot(apart, apart)
     return k * cut_weight(square, cutoff)[0] / math.sqrt(square)
 
 
 @formula
 def central_rate(apart, moving, k, cutoff):
-    """Rate of change of `central_field` for ṙ = v1 − v2 [m/s]."""
+    """Rate of change of `central_field` for ṙ = v1 − v2 (`moving`) [m/s]."""
     square, radial = dot(apart, apart), dot(apart, moving)
     weight, slope = cut_weight(square, cutoff)
     slope_rate = 2.0 * cut_curvature(square, cutoff) * radial
