@@ -12,12 +12,11 @@ from .analysis.clusters import cluster_labels
 from .analysis.ledger_columns import Books
 from .arguments import checked
 from .config.case import read_case
-from .errors import BadInput, NoSuchKey, did_you_mean, shown
+from .errors import BadInput, NoSuchKey, did_you_mean, import_optional, shown
 from .io import run_folder as files
 from .io.export import export_frames
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
-from .optional import optional
 from .setup.from_frame import from_frame
 from .simulation.simulation import Simulation
 from .units import si
@@ -175,7 +174,7 @@ class Run:
 
     def to_xarray(self) -> Any:
         """All frames as an xarray Dataset with dimensions frame, grain and axis, SI; xarray has to be installed."""
-        xarray = optional("xarray", "to_xarray")
+        xarray = import_optional("xarray", "to_xarray")
         whole: list[Frame] = list(self.frames)
         vectors = ("position", "velocity", "moment", "spin")
         data = {
@@ -194,7 +193,7 @@ class Run:
 
     def to_pandas(self) -> Any:
         """The ledger as a pandas DataFrame; pandas has to be installed."""
-        return optional("pandas", "to_pandas").DataFrame(self.ledger)
+        return import_optional("pandas", "to_pandas").DataFrame(self.ledger)
 
     def __repr__(self) -> str:
         return f"<run in {self.folder}: {len(self.frames)} frames>"

@@ -44,7 +44,7 @@ IMPOSSIBLE = [
         "dipoles: cutoff = 15 nm ends within a grain, whose diameter is 20 nm",
     ),
     (lambda: sand.Simulation(grains(gap=1e-6), [sand.Contact()], box="1 um"), "grain 1 lies outside the box"),
-    (lambda: case(materials={"iron": {"like": "ice"}}), "'iron' is a material of its own, like = 'ice' makes it"),
+    (lambda: case(materials={"iron": {"like": "ice"}}), "'iron' is the name of a preset, but like = 'ice'"),
     (lambda: case(stepping={"method": "adaptive", "tolerance": 2}), "tolerance = 2 must be below 1"),
 ]
 

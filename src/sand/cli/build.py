@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ..errors import BadInput
-from ..limits import MOST_GRAINS
+from ..arguments import MOST_GRAINS
 from . import options, report
 from .exits import DONE
 

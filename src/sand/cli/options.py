@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ..io.run_folder import checked_name
-from ..limits import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 
 
 class PathName(click.ParamType):

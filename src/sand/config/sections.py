@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from ..io.run_folder import checked_name
-from ..limits import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
 from ..simulation.stop import duration
 from ..units import si
 

@@ -30,7 +30,7 @@ from ..errors import BadInput, did_you_mean
 from ..grains import Grains, moment_size
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
-from ..limits import MOST_GRAINS
+from ..arguments import MOST_GRAINS
 from ..material import PRESETS, Material
 from ..setup.aggregates import build
 from ..setup.encounters import offset_of

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..errors import BadInput, did_you_mean, shown
 from ..grains import Grains
 from ..material import PRESETS, Material, as_material
-from ..units import MOST_GRAINS, si
+from ..units import si
 from .ballistic import bcca, bpca
 from .deposit import rbd
 from .diffusion import dla, dlca

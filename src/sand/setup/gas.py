@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..box import Box, Span, as_box
 from ..constants import BOLTZMANN, LIGHT
 from ..errors import BadInput, did_you_mean, warn
 from ..grains import Grains, moment_size, vector_for_all
 from ..material import Material
-from ..units import MELTED, MOST_GRAINS, format_quantity, in_unit, seed_given, si, whole_number
+from ..units import MELTED, format_quantity, in_unit, seed_given, si, whole_number
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
 """Variance of each spin component in units of kT/I: mean rotational energy kT/2 in all, (3/2)kT, or none."""
@@ -181,9 +181,7 @@ def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarra
             )
         if not told and wall.monotonic() > begun + PATIENCE:
             told = True
-            warn(
-                f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller"
-            )
+            warn(f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller")
     return placed
 
 

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..contact.jkr import rest_overlap, rest_radius
 from ..contact.mixing import pairing_between
 from ..errors import BadInput, shown
 from ..grains import Grains, materials_of
 from ..material import Material, as_material
-from ..units import MOST_GRAINS, format_quantity, in_unit, seed_given, si, whole_number
+from ..units import format_quantity, in_unit, seed_given, si, whole_number
 from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0
