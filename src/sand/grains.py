@@ -103,8 +103,8 @@ class Grains:
         Angular velocity (N, 3) or (3,) [rad/s] in the laboratory frame, with surface speeds below that of light.
         Default: zero.
     moment : array_like or str, optional
-        Magnetic moments (N, 3) or (3,) [A m²] in the laboratory frame at the start; or one magnitude, along +z, as text:
-        absolute "6.6e-18 A m^2", per mass "200 A m^2/kg", or "material" for the specific moment of each material.
+        Magnetic moments (N, 3) or (3,) [A m²] in the laboratory frame at the start; or one magnitude, along +z, as
+        text: absolute "6.6e-18 A m^2", per mass "200 A m^2/kg", or "material" for the specific moment of each material.
         Default: zero.
     charge : float or str or array_like, optional
         Scalar or (N,) [C]. Default: zero.

@@ -1,4 +1,4 @@
-"""Table of the per-grain quantities, from which storage, validation, file layout, labels and reference are generated."""
+"""Table of the per-grain quantities, the source of storage, validation, file layout, labels and reference."""
 
 from __future__ import annotations
 

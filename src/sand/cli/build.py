@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
 from ..arguments import MOST_GRAINS
+from ..errors import BadInput
 from . import options, report
 from .exits import DONE
 

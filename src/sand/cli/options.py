@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
-from ..io.run_folder import checked_name
 from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..io.run_folder import checked_name
 
 
 class PathName(click.ParamType):

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput, shown
 from ..arguments import MOST_STEPS
+from ..errors import BadInput, shown
 from ..units import si
 
 SHORTEST = 1e-21
