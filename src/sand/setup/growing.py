@@ -56,6 +56,6 @@ def require_all_placed(done: int, count: int, subject: str) -> None:
     """Raise BadInput if a kernel placed only `done` of `count` grains or clusters; `subject` names the failed one."""
     if done < count:
         raise BadInput(
-            f"no position where {subject} has exactly one contact was found in {TRIES} attempts: the equilibrium "
-            "overlaps or the differences of the radii are too large; use larger or stiffer grains, or a narrower distribution"
+            f"no position where {subject} has exactly one contact was found in {TRIES} attempts: equilibrium overlaps "
+            "or differences of the radii are too large; use larger or stiffer grains, or a narrower distribution"
         )
