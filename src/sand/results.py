@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .analysis.clusters import cluster_labels
-from .analysis.ledger_columns import Books
+from .analysis.ledger_columns import LedgerColumns
 from .arguments import checked
 from .config.case import read_case
 from .errors import BadInput, NoSuchKey, did_you_mean, import_optional, shown
@@ -68,7 +68,7 @@ class Run:
     @cached_property
     def ledger(self) -> dict[str, np.ndarray]:
         """Columns of the ledger by name (K,), SI.  Raises BadInput."""
-        books = Books.of(read_ledger(self.folder / files.LEDGER))
+        books = LedgerColumns.from_rows(read_ledger(self.folder / files.LEDGER))
         return Columns({name: books[name] for name in books.columns})
 
     @cached_property

@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import NoSuchAttribute, did_you_mean
 
 MODULES = (
-    "clusters", "fits", "fractal", "frame_statistics", "ledger_columns", "magnetism", "network", "quantities", "shape",
+    "clusters", "fits", "fractal", "frame_statistics", "ledger_columns", "network", "quantities", "shape",
     "tracking",
 )  # fmt: skip
 """What there is to be used."""

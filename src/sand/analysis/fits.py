@@ -17,7 +17,7 @@ SAME = 1e-9
 """Difference of two logarithms below which they may be the same but for rounding."""
 
 
-class PowerLaw(NamedTuple):
+class PowerLawFit(NamedTuple):
     """y = prefactor · x^exponent, fitted to the logarithms by least squares."""
 
     exponent: float
@@ -34,7 +34,7 @@ class PowerLaw(NamedTuple):
 
 
 @checked
-def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) -> PowerLaw:
+def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) -> PowerLawFit:
     """Fit y ∝ x^exponent; errors by a jackknife over groups.
 
     Parameters
@@ -65,7 +65,7 @@ def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) ->
     slope, offset = _line(sums.sum(axis=1))
     slopes, _ = _line(sums.sum(axis=1)[:, None] - sums)
     error, low, high = jackknife(float(slope), slopes)
-    return PowerLaw(float(slope), error, low, high, float(np.exp(offset - slope * middle)), len(x), count)
+    return PowerLawFit(float(slope), error, low, high, float(np.exp(offset - slope * middle)), len(x), count)
 
 
 def jackknife(whole: float, without: np.ndarray) -> tuple[float, float, float]:

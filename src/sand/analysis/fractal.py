@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import checked
 from ..errors import BadInput
-from .fits import PowerLaw, power_law
+from .fits import PowerLawFit, power_law
 from .shape import gyration_radius
 
 FEWEST = 32
@@ -166,7 +166,7 @@ def _of_slopes(x: np.ndarray, y: np.ndarray, unit: float, window: tuple[float, f
     used = y > 0
     if used.sum() < 3:
         raise BadInput("there is nothing within most of the window")
-    whole: PowerLaw = power_law(x[used], y[used])
+    whole: PowerLawFit = power_law(x[used], y[used])
     thirds = [part for part in np.array_split(np.flatnonzero(used), 3) if len(part) > 1]
     thirds = thirds if len(thirds) > 1 else [np.arange(2), np.arange(len(x) - 2, len(x))]
     slopes = [power_law(x[part], y[part]).exponent for part in thirds]

@@ -8,8 +8,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import refuse_other
-from .clusters import cluster_labels, unwrapped
-from .magnetism import aggregate_moments
+from .clusters import aggregate_moments, cluster_labels, unwrapped
 from .network import network
 from .shape import elongation, filling_factor, gyration_radius
 
@@ -31,7 +30,7 @@ COLUMNS = {
 
 
 @checked
-def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
+def aggregate_statistics(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
     """The aggregates of a frame, the largest first: columns (K,) as in COLUMNS.
 
     Parameters

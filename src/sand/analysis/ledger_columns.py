@@ -25,7 +25,7 @@ def dissipated_in(row: Mapping[str, float]) -> float:
     return math.fsum([*(row[name] for name in channels), max(row["lost_gas"], 0.0)])
 
 
-class Books:
+class LedgerColumns:
     """Rows, oldest first, and their columns by name.
 
     Parameters
@@ -41,16 +41,16 @@ class Books:
         self.rows: list[dict[str, float]] = list(rows)
 
     @classmethod
-    def of(cls, rows: Sequence[dict[str, float]]) -> Books:
+    def from_rows(cls, rows: Sequence[dict[str, float]]) -> LedgerColumns:
         """Of the rows of a ledger file; no columns where there is no row."""
-        return Books(tuple(rows[0]) if rows else (), rows)
+        return LedgerColumns(tuple(rows[0]) if rows else (), rows)
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def taken(self, numbers: Iterable[int]) -> Books:
-        """Books of some of the rows."""
-        return Books(self.columns, (self.rows[k] for k in numbers))
+    def select(self, numbers: Iterable[int]) -> LedgerColumns:
+        """LedgerColumns of some of the rows."""
+        return LedgerColumns(self.columns, (self.rows[k] for k in numbers))
 
     def __getitem__(self, column: str) -> np.ndarray:
         """One column over time.  Raises BadInput for a name that is no column."""

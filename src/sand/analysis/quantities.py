@@ -10,8 +10,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.frame import MODES as SHARES
-from .clusters import cluster_labels, cluster_sizes
-from .magnetism import aggregate_moments
+from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 
 MODES = ("within its limits", *SHARES)

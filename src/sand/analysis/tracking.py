@@ -15,7 +15,7 @@ CHECKPOINTS = 64 * 2**20
 """Bytes of names that a `Lineage` keeps, about."""
 
 
-def named(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
+def inherit_names(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
     """Names of the clusters of a frame, from the names that their grains had in the frame before.
 
     A cluster takes the name that most of its grains had, the lower of two that are as many.  Where several claim one
@@ -101,7 +101,7 @@ class Lineage:
         for number in range(start + 1, frame + 1):
             now = self._readable(number)
             if now is not None and (pairs is None or not np.array_equal(now, pairs)):
-                names = named(names, cluster_labels(self.count, now))
+                names = inherit_names(names, cluster_labels(self.count, now))
             pairs = pairs if now is None else now
             self._keep(number, names)
         if pairs is not None:
