@@ -1,14 +1,13 @@
-"""Arguments of public functions and classes: a slip of the caller becomes one line, not a traceback of Python.
+"""Checks of the arguments of public functions and classes: a wrong argument raises BadInput with a one-line message.
 
-`checked` looks at names and kinds alone: arguments that do not exist or are missing, a number where text is due, a
-class where an object is due. Numbers, their units and ranges are checked by the functions themselves (`units`).
+`checked` compares names and types with the signature: unknown or missing arguments, a number in place of text, a class
+in place of an object. Numbers, their units and ranges are checked by the functions themselves (`units`).
 """
 
 from __future__ import annotations
 
 import collections.abc
 import dataclasses
-import difflib
 import functools
 import inspect
 import numbers
@@ -20,18 +19,27 @@ from typing import Any, NamedTuple, TypeVar
 
 from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
 
+MOST_GRAINS = 100_000_000
+"""Largest number of grains of one simulation. The state takes about a kilobyte per grain, 100 GB in all."""
+MOST_STEPS = 2**62
+"""Largest number of steps; steps are counted in 64 bits."""
+MOST_SEED = 2**63 - 1
+"""Largest seed that the kernels take."""
+MOST_PROCESSES = 1024
+"""Largest number of processes or threads."""
+
 T = TypeVar("T")
 _LISTS = (collections.abc.Sequence, collections.abc.Iterable, list)
 _WORDS = {2: "two", 3: "three"}
-_MAKERS = {"Generator": "numpy.random.default_rng(seed)", "Executor": "a concurrent.futures executor"}
+_CONSTRUCTORS = {"Generator": "numpy.random.default_rng(seed)", "Executor": "a concurrent.futures executor"}
 
 
 def checked(thing: T) -> T:
-    """Decorator of a public function, method or class (then of its `__init__`): refuses slips with BadInput.
+    """Decorator of a public function, method or class (then of its `__init__`) that checks the arguments.
 
-    Kinds follow from annotations: int, bool, str, paths, arrays (lists of numbers become arrays), functions, lists,
-    tuples of a length and classes are looked at; Any and float are left to the function. Frozen dataclasses also
-    refuse assignments in a line.
+    Types are taken from the annotations int, bool, str, paths, arrays (lists of numbers are converted), functions,
+    lists, tuples of fixed length and classes; Any and float are not checked. Assignment to an attribute of a decorated
+    frozen dataclass raises a one-line NoSuchAttribute.
     """
     if not isinstance(thing, type):
         return typing.cast(T, _wrapped(typing.cast(Callable, thing)))
@@ -39,26 +47,28 @@ def checked(thing: T) -> T:
     if "__init__" in vars(thing):
         thing.__init__ = _wrapped(thing.__init__, settings=settings)  # type: ignore[misc]
     if settings:
-        refused = ("__setattr__", "__delattr__")
-        for name in refused:
-            setattr(thing, name, _refuse_change)
+        for name in ("__setattr__", "__delattr__"):
+            setattr(thing, name, _refuse_assignment)
     return thing
 
 
-def _refuse_change(self: Any, name: str, *value: Any) -> None:
-    kind = shown(type(self))
+def _refuse_assignment(self: Any, name: str, *value: Any) -> None:
+    label = shown(type(self))
     known = [field.name for field in dataclasses.fields(self)]
     if name in known:
-        raise NoSuchAttribute(f"{name} of {kind} cannot be assigned; make a new one: {kind}({name}=…)")
-    raise NoSuchAttribute(f"{kind} has no '{name}'; {did_you_mean(name, known)}")
+        raise NoSuchAttribute(f"{name} of {label} cannot be assigned; make a new one: {label}({name}=…)")
+    raise NoSuchAttribute(f"{label} has no '{name}'; {did_you_mean(name, known)}")
 
 
 def _wrapped(function: Callable, *, settings: bool = False) -> Callable:
-    """The function behind a check of its arguments; `settings` also say what else is wrong with them."""
+    """The function with a check of its arguments in front.
+
+    For the `__init__` of `settings` classes, errors of type and of value are reported together.
+    """
 
     @functools.wraps(function)
     def call(*args: Any, **given: Any) -> Any:
-        signature, readers = _known(function)
+        signature, readers = _readers(function)
         try:
             bound = signature.bind(*args, **given)
         except TypeError:
@@ -71,7 +81,7 @@ def _wrapped(function: Callable, *, settings: bool = False) -> Callable:
                 except BadInput as error:
                     problems[name] = error.problems
         if problems:
-            others = _complaints(function, bound) if settings else []
+            others = _value_errors(function, bound) if settings else []
             own = [line for name in problems if not any(f"{name} =" in o for o in others) for line in problems[name]]
             raise BadInput([*own, *others])
         return function(*bound.args, **bound.kwargs)
@@ -79,20 +89,20 @@ def _wrapped(function: Callable, *, settings: bool = False) -> Callable:
     return call
 
 
-def _complaints(function: Callable, bound: inspect.BoundArguments) -> list[str]:
-    """What settings, of which some are of a wrong kind, say themselves."""
+def _value_errors(function: Callable, bound: inspect.BoundArguments) -> list[str]:
+    """Errors that the function itself finds in arguments some of which are of a wrong type."""
     try:
         function(*bound.args, **bound.kwargs)
     except BadInput as error:
         return error.problems
-    except Exception:  # whatever values of a wrong kind lead to
+    except Exception:  # any consequence of the wrong types
         pass
     return []
 
 
 @functools.cache
-def _known(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[[Any, str], Any]]]:
-    """The signature, and a reader for each argument whose kind can be checked; made at the first call."""
+def _readers(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[[Any, str], Any]]]:
+    """The signature, and a reader for each argument whose type can be checked; built at the first call."""
     signature = inspect.signature(function)
     readers: dict[str, Callable[[Any, str], Any]] = {}
     for name, parameter in signature.parameters.items():
@@ -100,76 +110,81 @@ def _known(function: Callable) -> tuple[inspect.Signature, dict[str, Callable[[A
         if isinstance(annotation, str):
             try:
                 annotation = eval(annotation, getattr(function, "__globals__", {}))
-            except (NameError, AttributeError, TypeError):  # names for the type checker alone
+            except (NameError, AttributeError, TypeError):  # names imported for the type checker only
                 continue
         plain = parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
-        if plain and annotation is not parameter.empty and (kinds := _kinds(annotation)):
-            readers[name] = functools.partial(_read, kinds)
+        if plain and annotation is not parameter.empty and (allowed := _allowed_types(annotation)):
+            readers[name] = functools.partial(_read, allowed)
     return signature, readers
 
 
-class _Kind(NamedTuple):
-    """One of the kinds that an argument may have."""
+class _TypeCheck(NamedTuple):
+    """Check of an argument against one allowed type."""
 
     fits: Callable[[Any], bool]
-    words: str  # what a message says of it: "must be …"
-    made: str = ""  # for classes, how such an object is made: "give …"
+    words: str  # description for the message: "must be …"
+    constructor: str = ""  # for classes, the call that makes such an object: "give …"
     array: bool = False
 
 
-def _kinds(annotation: Any) -> list[_Kind]:
-    """Of an annotation; none where anything may be given."""
+def _allowed_types(annotation: Any) -> list[_TypeCheck]:
+    """Checks of an annotation; an empty list if every value is allowed."""
     union = typing.get_origin(annotation) in (typing.Union, types.UnionType)
     parts = typing.get_args(annotation) if union else (annotation,)
-    kinds = [_kind(part) for part in parts]
-    found = [kind for kind in kinds if kind is not None]
-    by_name = any(kind.made for kind in found) and any(kind.words == "text" for kind in found)
-    # of an object or its name, such as a material, the function knows the names
-    return [] if len(found) < len(kinds) or by_name else found
+    checks = [_type_check(part) for part in parts]
+    found = [check for check in checks if check is not None]
+    by_name = any(check.constructor for check in found) and any(check.words == "text" for check in found)
+    # arguments that are an object or its name, such as a material, are checked by the function, which has the names
+    return [] if len(found) < len(checks) or by_name else found
 
 
-def _kind(part: Any) -> _Kind | None:
+def _type_check(part: Any) -> _TypeCheck | None:
     origin, inner = typing.get_origin(part) or part, typing.get_args(part)
     simple = {
-        type(None): _Kind(lambda v: v is None, ""),
-        int: _Kind(lambda v: isinstance(v, numbers.Integral) and not isinstance(v, bool), "a whole number"),
-        bool: _Kind(lambda v: isinstance(v, bool) or type(v).__name__ == "bool", "True or False"),  # numpy.bool too
-        str: _Kind(lambda v: isinstance(v, str), "text"),
+        type(None): _TypeCheck(lambda v: v is None, ""),
+        int: _TypeCheck(lambda v: isinstance(v, numbers.Integral) and not isinstance(v, bool), "a whole number"),
+        bool: _TypeCheck(
+            lambda v: isinstance(v, bool) or type(v).__name__ == "bool", "True or False"
+        ),  # numpy.bool too
+        str: _TypeCheck(lambda v: isinstance(v, str), "text"),
     }
     if isinstance(origin, type) and origin in simple:
         return simple[origin]
     if origin is collections.abc.Callable:
-        return _Kind(lambda v: callable(v) and not isinstance(v, type), "a function")
+        return _TypeCheck(lambda v: callable(v) and not isinstance(v, type), "a function")
     if origin is tuple and inner and inner[-1] is not Ellipsis:
         what = "whole numbers" if set(inner) == {int} else "values"
         words = f"{_WORDS.get(len(inner), len(inner))} {what}"
-        return _Kind(lambda v: not isinstance(v, str) and hasattr(v, "__len__") and len(v) == len(inner), words)
+        return _TypeCheck(lambda v: not isinstance(v, str) and hasattr(v, "__len__") and len(v) == len(inner), words)
     if origin in _LISTS:
-        return _Kind(lambda v: not isinstance(v, (str, bytes)) and hasattr(v, "__iter__"), "a list")
+        return _TypeCheck(lambda v: not isinstance(v, (str, bytes)) and hasattr(v, "__iter__"), "a list")
     anything = origin is Any or not isinstance(origin, type) or origin in (float, complex, object)
     if anything or getattr(origin, "_is_protocol", False):
         return None
     if issubclass(origin, os.PathLike):
-        return _Kind(lambda v: isinstance(v, os.PathLike), "a path")
+        return _TypeCheck(lambda v: isinstance(v, os.PathLike), "a path")
     if issubclass(origin, collections.abc.Mapping):
-        return _Kind(lambda v: isinstance(v, collections.abc.Mapping), "a dictionary")
+        return _TypeCheck(lambda v: isinstance(v, collections.abc.Mapping), "a dictionary")
     if (origin.__module__, origin.__name__) == ("numpy", "ndarray"):
-        return _Kind(lambda v: isinstance(v, origin) and v.dtype.kind in "biufc", "an array of numbers", array=True)
-    return _Kind(lambda v: isinstance(v, origin), "", made=_MAKERS.get(origin.__name__, f"{_public(origin)}(…)"))
+        return _TypeCheck(
+            lambda v: isinstance(v, origin) and v.dtype.kind in "biufc", "an array of numbers", array=True
+        )
+    call = _CONSTRUCTORS.get(origin.__name__, f"{_public_name(origin)}(…)")
+    return _TypeCheck(lambda v: isinstance(v, origin), "", constructor=call)
 
 
-def _public(kind: type) -> str:
-    """The name a user writes for a class."""
-    package = kind.__module__.split(".")
-    return f"sand.setup.{kind.__name__}" if package[:2] == ["sand", "setup"] else shown(kind)
+def _public_name(cls: type) -> str:
+    """The name by which users write a class."""
+    package = cls.__module__.split(".")
+    return f"sand.setup.{cls.__name__}" if package[:2] == ["sand", "setup"] else shown(cls)
 
 
-def _read(kinds: list[_Kind], value: Any, name: str) -> Any:
-    """The value, where lists are due to be arrays as an array.  Raises BadInput if it is of none of the kinds."""
-    if any(kind.fits(value) for kind in kinds):
+def _read(allowed: list[_TypeCheck], value: Any, name: str) -> Any:
+    """The value, converted to an array if only an array is allowed. Raises BadInput if it has none of the types."""
+    if any(check.fits(value) for check in allowed):
         return value
-    if any(kind.array for kind in kinds) and not isinstance(value, str):
-        import numpy as np  # late: commands that take no array need not load it
+    if any(check.array for check in allowed) and not isinstance(value, str):
+        import numpy as np  # here, because commands that take no array start faster without it
 
         try:
             array = np.asarray(value)
@@ -177,45 +192,39 @@ def _read(kinds: list[_Kind], value: Any, name: str) -> Any:
             array = np.zeros(1, object)
         if array.dtype.kind in "biufc":
             return array
-    makers = [kind.made for kind in kinds if kind.made]
-    words = [kind.words for kind in kinds if kind.words]
-    if isinstance(value, type) and f"{_public(value)}(…)" in makers:
-        raise BadInput(f"{name} = {_public(value)} is a class; write {_public(value)}(…) to make one")
-    if "a path" in words:  # a path may be given as text
+    constructors = [check.constructor for check in allowed if check.constructor]
+    words = [check.words for check in allowed if check.words]
+    if isinstance(value, type) and f"{_public_name(value)}(…)" in constructors:
+        raise BadInput(f"{name} = {_public_name(value)} is a class; write {_public_name(value)}(…) to make one")
+    if "a path" in words:  # paths may also be given as text
         words.remove("text")
-    wanted = f" must be {' or '.join(words)}" if words else f"; give {' or '.join(makers)}"
+    wanted = f" must be {' or '.join(words)}" if words else f"; give {' or '.join(constructors)}"
     raise BadInput(f"{name} = {shown(value)}{wanted}")
 
 
 def _mismatch(
     function: Callable, signature: inspect.Signature, args: tuple[Any, ...], given: dict[str, Any]
 ) -> list[str]:
-    """What is wrong with the names and the number of arguments."""
+    """Messages about the names and the number of arguments."""
     label = function.__qualname__.removesuffix(".__init__").rpartition("<locals>.")[2]
     every = list(signature.parameters.values())
     is_method = bool(every) and every[0].name in ("self", "cls")
     own = every[1:] if is_method else every
-    by_place = [p.name for p in own if p.kind is p.POSITIONAL_OR_KEYWORD]
+    positional = [p.name for p in own if p.kind is p.POSITIONAL_OR_KEYWORD]
     names = [p.name for p in own if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
     count = len(args) - is_method
     problems = []
-    if count > len(by_place):
-        plural = "" if len(by_place) == 1 else "s"
-        told = f" ({', '.join(by_place)})" if by_place else ""
-        more = "; give the others by name" if len(names) > len(by_place) else ""
-        problems.append(f"{label} takes {len(by_place)} argument{plural} without a name{told}, not {count}{more}")
+    if count > len(positional):
+        plural = "" if len(positional) == 1 else "s"
+        listed = f" ({', '.join(positional)})" if positional else ""
+        more = "; give the others by name" if len(names) > len(positional) else ""
+        problems.append(f"{label} takes {len(positional)} argument{plural} without a name{listed}, not {count}{more}")
     free = any(p.kind is p.VAR_KEYWORD for p in own)
     unknown = [] if free else [name for name in given if name not in names]
-    problems += [f"{label}: there is no argument '{name}'; {_advice(name, names)}" for name in unknown]
-    problems += [f"{label}: {name} is given twice" for name in by_place[: max(count, 0)] if name in given]
+    problems += [f"{label}: there is no argument '{name}'; {did_you_mean(name, names or ['none'])}" for name in unknown]
+    problems += [f"{label}: {name} is given twice" for name in positional[: max(count, 0)] if name in given]
     if not problems:
         missing = [p.name for p in own if p.default is p.empty and p.name in names]
-        left = [name for name in missing if name not in given and name not in by_place[: max(count, 0)]]
+        left = [name for name in missing if name not in given and name not in positional[: max(count, 0)]]
         problems = [f"{label}: {name} is missing; add {name}=…" for name in left]
     return problems or [f"{label}: the arguments do not fit; it takes {', '.join(names)}"]
-
-
-def _advice(name: str, names: list[str]) -> str:
-    """The nearest argument, with one letter more or less counting as near."""
-    near = difflib.get_close_matches(name, names, n=1)
-    return f"did you mean '{near[0]}'?" if near else did_you_mean(name, names or ["none"])

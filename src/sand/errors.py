@@ -1,8 +1,9 @@
-"""Everything SAND may complain about."""
+"""Exceptions, warnings and the wording that error messages share."""
 
 from __future__ import annotations
 
 import difflib
+import importlib
 import sys
 import warnings
 from collections.abc import Iterable, Sequence
@@ -13,71 +14,77 @@ LONGEST = 80
 
 
 class SandError(Exception):
-    """Base of all our errors; the command line prints it without a traceback."""
+    """Base class of all exceptions of this package; the command line prints them without a traceback."""
 
 
 class BadInput(SandError, ValueError):
-    """The user's mistakes, one line each: what, where, unit, what is allowed, what to do.
+    """Invalid input. One line per error: what, where, unit, what is allowed, what to do.
 
     Parameters
     ----------
     problems : str or Iterable[str]
-        one sentence, or several when a file holds several mistakes.
+        One message, or several, for example all errors of a case file.
     """
 
     def __init__(self, problems: str | Iterable[str]):
         given = [problems] if isinstance(problems, str) else list(problems)
-        # what the user wrote may hold line breaks, and is shown as it would be typed
+        # line breaks in the user's values are shown escaped, so that each error stays on one line
         self.problems: list[str] = ["\\n".join(problem.splitlines()) for problem in given]
         super().__init__("\n".join(self.problems))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For other processes, which would otherwise take all mistakes for one."""
+        """Pickle the list of errors, not its joined text."""
         return type(self), (self.problems,)
 
     def at(self, where: str) -> BadInput:
-        """The same mistakes with the place in front, for example `iron-gas.toml: grains.radius`."""
+        """The same errors, each with a location in front, for example `iron-gas.toml: grains.radius`."""
         return BadInput(f"{where}: {problem}" for problem in self.problems)
 
 
 class NoSuchKey(BadInput, KeyError):
-    """A table has no column of this name; a KeyError, so that `in` and `get` work."""
+    """A table has no column of this name. Derived from KeyError, so that `in` and `get` work."""
 
     __str__ = Exception.__str__  # KeyError would show the text in quotes
 
 
 class NoSuchAttribute(BadInput, AttributeError):
-    """An object has no attribute of this name, or one that cannot be assigned; so `hasattr` works."""
+    """An attribute does not exist or is read-only. Derived from AttributeError, so that `hasattr` works."""
 
 
 class FilesFailed(SandError, OSError):
-    """A file or folder could not be read or written; what was there before is untouched."""
+    """A file or folder could not be read or written; earlier contents are unchanged."""
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C or SIGTERM reached a run; its checkpoint is written. `result` says how far it came."""
+    """A run was stopped by Ctrl-C or SIGTERM after writing its checkpoint.
+
+    Attributes
+    ----------
+    result : object
+        The result of the run up to the interruption.
+    """
 
     def __init__(self, result: object):
         super().__init__()
         self.result = result
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For other processes."""
+        """Pickle the result, for other processes."""
         return type(self), (self.result,)
 
 
 FORBID_EXTRA = {"extra": "forbid"}
-"""Marks the settings classes that case files build: an unknown key is a mistake, never ignored."""
+"""Pydantic configuration of the settings classes that case files build: unknown keys are errors."""
 
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:
-    """A closing remark for a misspelt word: the nearest allowed one, or all of them."""
+    """Advice for a misspelt word: the nearest allowed one, or the list of all."""
     near = difflib.get_close_matches(word, allowed, n=1)
     return f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(allowed)}"
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: short, arrays by their shape, classes by their name."""
+    """Short text for a value in a message; arrays are shown by shape, classes by name."""
     if isinstance(value, type):
         return f"sand.{value.__name__}" if value.__module__.startswith("sand.") else value.__name__
     shape = getattr(value, "shape", None)
@@ -85,19 +92,40 @@ def shown(value: Any) -> str:
         return f"array of shape {shape}"
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # an integer of thousands of digits, lists in lists without end
+    except (ValueError, RecursionError):  # integers of thousands of digits, lists that contain themselves
         return f"<{type(value).__name__}>"
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
 def refuse_other(frame: Any, *names: str) -> None:
-    """Raises BadInput if what should be a frame lacks one of these attributes."""
+    """Raise BadInput if `frame` lacks one of these attributes."""
     if not all(hasattr(frame, name) for name in names):
         raise BadInput(f"frame = {shown(frame)}; give a frame, such as sand.open(DIR).frames[-1]")
 
 
+def import_optional(package: str, purpose: str) -> Any:
+    """Import a package that only some functions need and that is not installed with SAND.
+
+    Parameters
+    ----------
+    package : str
+        Name of the package.
+    purpose : str
+        Function that needs it, for the message.
+
+    Raises
+    ------
+    BadInput
+        If the package is not installed.
+    """
+    try:
+        return importlib.import_module(package)
+    except ImportError:
+        raise BadInput(f"{purpose} needs {package}, which is not installed: pip install {package}") from None
+
+
 def warn(text: str) -> None:
-    """Issue a warning that names the first line outside this package."""
+    """Issue a warning that refers to the caller's line outside this package."""
     frame, depth = sys._getframe(1), 2
     while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "sand":
         frame, depth = frame.f_back, depth + 1

@@ -1,4 +1,4 @@
-"""The grains: spheres with position, spin and magnetic moment."""
+"""Class Grains: spheres with position, velocity, spin, magnetic moment and charge."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ from .schema import BY_NAME, FIELDS, blank, public, stored
 from .units import in_unit
 
 ROUNDING = 1e-7
-"""Gap that still is a contact, as a part of the sum of radii: coordinates of seven digits; no adhesion."""
+"""Largest gap of a contact without adhesion, relative to the sum of radii; allows for coordinates of seven digits."""
 
+SMALLEST = 1e-10
+"""Smallest radius [m] of a grain, that of an atom."""
 
 NAMES = (*BY_NAME, "material", "id")
-"""Quantities of grains that a user can read."""
+"""Public quantities of `Grains`."""
 
 
 class GrainArrays(NamedTuple):
-    """Every array of the field table in stored shape, (N,) or (width, N); what kernels read and write."""
+    """Arrays of the field table in stored shape, (N,) or (width, N), on which kernels work."""
 
     radius: np.ndarray
     mass: np.ndarray
@@ -41,16 +43,30 @@ class GrainArrays(NamedTuple):
     torque: np.ndarray
     field: np.ndarray
     material: np.ndarray  # index into Grains.materials, uint32
-    id: np.ndarray  # number the user knows the grain by, uint32
+    id: np.ndarray  # the user's index of the grain, uint32
 
 
 def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.ndarray]:
-    """The distinct materials and each grain's index among them.
+    """Find the distinct materials and each grain's index into them.
 
     Parameters
     ----------
-    material
-        a Material or preset name for all grains, or a sequence of N of them.
+    material : Material or str or sequence
+        A Material or preset name for all grains, or a sequence of N of them.
+    count : int
+        Number of grains N.
+
+    Returns
+    -------
+    materials : tuple of Material
+        Distinct materials, in order of first occurrence.
+    index : ndarray
+        Index (N,) into `materials`, uint32.
+
+    Raises
+    ------
+    BadInput
+        If the length is not N, a material is unknown, or two different materials have the same name.
     """
     several = isinstance(material, (Sequence, np.ndarray)) and not isinstance(material, str)
     each: Sequence[Any] = list(material) if several else [as_material(material)] * count
@@ -63,45 +79,42 @@ def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.nd
         numbers[i] = index.setdefault(found, len(index))
     names = [m.name for m in index]
     if doubles := sorted({name for name in names if names.count(name) > 1}):
-        raise BadInput(f"two different materials are called '{doubles[0]}'; name one anew: material.but(name='…')")
+        raise BadInput(f"two different materials are called '{doubles[0]}'; rename one: material.but(name='…')")
     return tuple(index), numbers
-
-
-SMALLEST = 1e-10
-"""Radius [m] below which a grain is no longer made of atoms."""
 
 
 @checked
 class Grains:
-    """N spheres.  What they are is fixed once they are made; a simulation works on a copy.
+    """N spherical grains. Their properties are read-only; a simulation works on a copy.
+
+    All numbers may be SI floats, text with a unit, or pint/astropy quantities.
 
     Parameters
     ----------
-    position
-        (N, 3) [m], laboratory frame.
-    radius
-        scalar or (N,) [m] ≥ 1e-10, an atom.
-    material
-        one `sand.Material` (or preset name) for all, or a sequence of N.
-    velocity : optional
-        (N, 3) or, the same for all, (3,) [m/s], slower than light; at rest by default.
-    spin : optional
-        (N, 3) or (3,) [rad/s], laboratory frame, surfaces slower than light; none by default.
-    moment : optional
-        (N, 3) or (3,) [A m²] in the laboratory frame at the start, or one size (then along +z) as text,
-        "6.6e-18 A m^2" or per mass "200 A m^2/kg"; "material" takes each material's own specific moment; none
-        by default.
-    charge : optional
-        scalar or (N,) [C]; none by default.
-    mass : optional
-        scalar or (N,) [kg] > 0; by default density × volume.
-
-    All numbers may be SI floats, text with a unit, or pint/astropy quantities.
+    position : array_like
+        Centres (N, 3) [m] in the laboratory frame.
+    radius : float or str or array_like
+        Scalar or (N,) [m], at least 1e-10 m, the radius of an atom.
+    material : Material or str or sequence
+        One `sand.Material` (or preset name) for all grains, or a sequence of N.
+    velocity : array_like, optional
+        (N, 3), or (3,) for all grains [m/s], below the speed of light. Default: zero.
+    spin : array_like, optional
+        Angular velocity (N, 3) or (3,) [rad/s] in the laboratory frame, with surface speeds below that of light.
+        Default: zero.
+    moment : array_like or str, optional
+        Magnetic moments (N, 3) or (3,) [A m²] in the laboratory frame at the start; or one magnitude, along +z, as
+        text: absolute "6.6e-18 A m^2", per mass "200 A m^2/kg", or "material" for the specific moment of each material.
+        Default: zero.
+    charge : float or str or array_like, optional
+        Scalar or (N,) [C]. Default: zero.
+    mass : float or str or array_like, optional
+        Scalar or (N,) [kg] > 0. Default: density × volume.
 
     Raises
     ------
     BadInput
-        one line for each quantity that is wrong.
+        If quantities are invalid; one line for each.
     """
 
     def __init__(
@@ -137,7 +150,7 @@ class Grains:
                 arrays["body_moment"] = _moments(moment, arrays["mass"], specific, count)
         except BadInput as error:
             problems += error.problems
-        if problems := problems or _impossible(arrays):
+        if problems := problems or _range_errors(arrays):
             raise BadInput(problems)
         arrays["inertia"] = 0.4 * arrays["mass"] * arrays["radius"] ** 2
         arrays["orientation"][3] = 1.0
@@ -148,13 +161,13 @@ class Grains:
         return self.arrays.radius.size
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Any quantity of the field table, (N,) or (N, width), read only."""
+        """Read-only view of a quantity of the field table, (N,) or (N, width)."""
         if name not in NAMES:
             raise NoSuchAttribute(f"grains have no '{name}'; {did_you_mean(name, NAMES)}")
         return public(getattr(self.arrays, name))
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refused, since neither the arrays nor what follows from them would know."""
+        """Refuse assignments, which would leave the arrays and derived quantities unchanged."""
         if name == "arrays" or (name == "materials" and name not in self.__dict__):
             object.__setattr__(self, name, value)
         elif name in NAMES or name == "materials":
@@ -182,16 +195,16 @@ class Grains:
         self.__dict__.update(state)
 
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
-        """Overlap δ [m] of each pair of grains (P, 2); negative for surfaces apart."""
+        """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""
         i, j = np.asarray(pairs).T
-        apart = box.nearest(self.position[i] - self.position[j])
-        return self.radius[i] + self.radius[j] - np.linalg.norm(apart, axis=1)
+        separation = box.nearest(self.position[i] - self.position[j])
+        return self.radius[i] + self.radius[j] - np.linalg.norm(separation, axis=1)
 
     def copy(self) -> Grains:
-        """An independent copy: a snapshot."""
-        twin = copy.copy(self)
-        twin.arrays = GrainArrays(*(a.copy() for a in self.arrays))
-        return twin
+        """Return an independent copy."""
+        other = copy.copy(self)
+        other.arrays = GrainArrays(*(a.copy() for a in self.arrays))
+        return other
 
 
 def _count(position: Any) -> int:
@@ -202,10 +215,10 @@ def _count(position: Any) -> int:
     return int(np.shape(array)[0])
 
 
-def _impossible(arrays: dict[str, np.ndarray]) -> list[str]:
-    """Complaints about radii, speeds and spins that no grain can have."""
-    radius, speed, spin = arrays["radius"], _sizes(arrays["velocity"]), _sizes(arrays["spin"])
-    small, fast, whirling = int(np.argmin(radius)), int(np.argmax(speed)), int(np.argmax(spin * radius))
+def _range_errors(arrays: dict[str, np.ndarray]) -> list[str]:
+    """Messages about radii below that of an atom and speeds or surface speeds above that of light."""
+    radius, speed, spin = arrays["radius"], _magnitudes(arrays["velocity"]), _magnitudes(arrays["spin"])
+    small, fast, spinning = int(np.argmin(radius)), int(np.argmax(speed)), int(np.argmax(spin * radius))
     problems = []
     if radius[small] < SMALLEST:
         problems.append(f"radius of grain {small} is {radius[small]:g} m, less than that of an atom, {SMALLEST:g} m")
@@ -213,21 +226,21 @@ def _impossible(arrays: dict[str, np.ndarray]) -> list[str]:
         problems.append(
             f"velocity of grain {fast} is {speed[fast]:g} m/s; it must be below that of light, {LIGHT:.4g} m/s"
         )
-    if spin[whirling] * radius[whirling] >= LIGHT:
-        surface = f"{spin[whirling] * radius[whirling]:g} m/s"
+    if spin[spinning] * radius[spinning] >= LIGHT:
+        surface = f"{spin[spinning] * radius[spinning]:g} m/s"
         problems.append(
-            f"spin of grain {whirling} moves its surface at {surface}; it must be below that of light, {LIGHT:.4g} m/s"
+            f"spin of grain {spinning} moves its surface at {surface}; it must be below that of light, {LIGHT:.4g} m/s"
         )
     return problems
 
 
-def _sizes(vectors: np.ndarray) -> np.ndarray:
-    """Sizes (N,) of vectors (3, N), whose squares may be out of range."""
+def _magnitudes(vectors: np.ndarray) -> np.ndarray:
+    """Magnitudes (N,) of vectors (3, N), without overflow of the squares."""
     return np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
 
 
 def vector_for_all(moment: Any) -> np.ndarray | None:
-    """The moment (3,) [A m²] that all grains are given, or None where sizes or (N, 3) are given.  Raises BadInput."""
+    """Moment (3,) [A m²] common to all grains; None if `moment` is a magnitude or (N, 3). Raises BadInput."""
     vector = None if isinstance(moment, str) else in_unit(moment, "A m^2")
     if vector is None or np.shape(vector) != (3,):
         return None
@@ -235,7 +248,7 @@ def vector_for_all(moment: Any) -> np.ndarray | None:
 
 
 def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) -> np.ndarray:
-    """(3, N) [A m²] from vectors, or from a size (absolute or per mass), then along +z."""
+    """Moments (3, N) [A m²] from vectors, or from a magnitude (absolute or per mass) along +z."""
     if not isinstance(moment, str) and np.ndim(in_unit(moment, "A m^2")) > 0:
         return stored(BY_NAME["body_moment"], moment, count, called="moment")
     vectors = np.zeros((3, count))
@@ -244,12 +257,21 @@ def _moments(moment: Any, mass: np.ndarray, specific: np.ndarray, count: int) ->
 
 
 def moment_size(moment: Any, mass: np.ndarray, specific: np.ndarray | float = 0.0) -> np.ndarray:
-    """Sizes (N,) [A m²] of moments given as one number [A m²], or as text, absolute or per mass.
+    """Magnitudes (N,) [A m²] of moments given as a number [A m²] or as text, absolute or per mass.
 
     Parameters
     ----------
+    moment : float or str or array_like
+        One magnitude or N of them; "material" for `specific` × `mass`.
+    mass : ndarray
+        Masses (N,) [kg].
     specific : ndarray or float, optional
-        moment per mass [A m²/kg] of each grain's material, for "material".
+        Moment per mass [A m²/kg] of each grain's material, for "material".
+
+    Raises
+    ------
+    BadInput
+        If the unit or the number of values is wrong, or a value is negative or not finite.
     """
     if isinstance(moment, str) and moment == "material":
         return specific * mass

@@ -1,4 +1,4 @@
-"""What grains are made of."""
+"""Materials of grains, and presets with values from the literature."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ _UNITS = {
 @checked
 @dataclass(frozen=True)
 class Material:
-    """One material.  Numbers are SI or text with a unit; all problems are reported at once.
+    """Properties of one material. Numbers are in SI or text with a unit.
 
     Parameters
     ----------
     name : str
-        how case files and tables call it.
-    density
-        ρ [kg/m³] > 0.
-    surface_energy
-        γ of one free surface [J/m²] ≥ 0; None where no value can be recommended (then the
-        user has to give one before grains may touch).
-    young_modulus
-        E [Pa] > 0.
-    poisson_ratio
-        ν, −1 < ν ≤ 0.5.
-    rolling_limit : optional
-        critical rolling displacement ξ_c [m] > 0; 10 Å in SAND (Dominik & Nübold 2002, A.5).
-    specific_moment : optional
-        magnetic moment per mass [A m²/kg] ≥ 0.
+        Name in case files and tables.
+    density : float or str
+        Density ρ [kg/m³] > 0.
+    surface_energy : float or str or None
+        Energy γ of one free surface [J/m²] ≥ 0. None if there is no recommended value; a contact of such grains raises
+        BadInput.
+    young_modulus : float or str
+        Young's modulus E [Pa] > 0.
+    poisson_ratio : float or str
+        Poisson's ratio ν, −1 < ν ≤ 0.5.
+    rolling_limit : float or str, optional
+        Critical rolling displacement ξ_c [m] > 0, 10 Å by default (Dominik & Nübold 2002, A.5).
+    specific_moment : float or str, optional
+        Magnetic moment per mass [A m²/kg] ≥ 0.
 
     Raises
     ------
     BadInput
-        one line for each number that cannot be right.
+        If numbers are invalid; one line for each.
     """
 
     name: str
@@ -79,11 +79,11 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / (2 (1 + ν)) [Pa]"""
+        """Shear modulus G = E / (2 (1 + ν)) [Pa]."""
         return float(self.young_modulus / (2.0 * (1.0 + self.poisson_ratio)))
 
     def but(self, **changes: Any) -> Material:
-        """A copy with some numbers changed: `sand.IRON.but(surface_energy="1 J/m^2")`."""
+        """Return a copy with some values changed: `sand.IRON.but(surface_energy="1 J/m^2")`."""
         known = [f.name for f in dataclasses.fields(self)]
         for key in changes:
             if key not in known:
@@ -103,14 +103,14 @@ FORSTERITE = Material("forsterite", 3210.0, 0.07, 204.0e9, 0.24)
 IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, specific_moment=200.0)
 """Iron (DT97), 200 A m²/kg as in the paper."""
 MAGNETITE = Material("magnetite", 5200.0, None, 230.0e9, 0.26, specific_moment=92.0)
-"""Magnetite at saturation; its surface energy has to be given: `MAGNETITE.but(surface_energy=…)`."""
+"""Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`."""
 
 PRESETS = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
 PRESETS["quartz"] = SILICA.but(name="quartz")
 
 
 def material_named(name: str) -> Material:
-    """The preset of that name (case ignored).  Raises BadInput with the nearest name."""
+    """Look up a preset by name (case ignored). Raises BadInput that suggests the nearest name."""
     try:
         return PRESETS[name.lower()]
     except KeyError:
@@ -118,15 +118,15 @@ def material_named(name: str) -> Material:
 
 
 def like_preset(preset: str, name: str) -> Material:
-    """The preset that a material called `name` is like.  Raises BadInput if another preset has this name."""
+    """Look up the preset from which a material `name` is derived. Raises BadInput if `name` is a different preset."""
     found = material_named(preset)
     if PRESETS.get(name.lower(), found).name != found.name:
-        raise BadInput(f"'{name}' is a material of its own, like = '{preset}' makes it another; give it another name")
+        raise BadInput(f"'{name}' is the name of a preset, but like = '{preset}'; choose another name")
     return found
 
 
 def as_material(given: Any, name: str = "material") -> Material:
-    """A Material from a Material or the name of a preset.  Raises BadInput."""
+    """Convert a Material or the name of a preset to a Material. Raises BadInput."""
     found = material_named(given) if isinstance(given, str) else given
     if not isinstance(found, Material):
         raise BadInput(f"{name} = {shown(given)}; give a sand.Material or the name of a preset: {', '.join(PRESETS)}")

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .analysis.clusters import cluster_labels
-from .analysis.ledger_columns import Books
+from .analysis.ledger_columns import LedgerColumns
 from .arguments import checked
 from .config.case import read_case
-from .errors import BadInput, NoSuchKey, did_you_mean, shown
+from .errors import BadInput, NoSuchKey, did_you_mean, import_optional, shown
 from .io import run_folder as files
 from .io.export import export_frames
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
-from .optional import optional
 from .setup.from_frame import from_frame
 from .simulation.simulation import Simulation
 from .units import si
@@ -76,7 +75,7 @@ class Run:
     @cached_property
     def ledger(self) -> dict[str, np.ndarray]:
         """Columns of the ledger by name (K,), SI.  Raises BadInput."""
-        books = Books.of(read_ledger(self.folder / files.LEDGER))
+        books = LedgerColumns.from_rows(read_ledger(self.folder / files.LEDGER))
         return Columns({name: books[name] for name in books.columns})
 
     @cached_property
@@ -182,7 +181,7 @@ class Run:
 
     def to_xarray(self) -> Any:
         """All frames as an xarray Dataset with dimensions frame, grain and axis, SI; xarray has to be installed."""
-        xarray = optional("xarray", "to_xarray")
+        xarray = import_optional("xarray", "to_xarray")
         whole: list[Frame] = list(self.frames)
         vectors = ("position", "velocity", "moment", "spin")
         data = {
@@ -201,7 +200,7 @@ class Run:
 
     def to_pandas(self) -> Any:
         """The ledger as a pandas DataFrame; pandas has to be installed."""
-        return optional("pandas", "to_pandas").DataFrame(self.ledger)
+        return import_optional("pandas", "to_pandas").DataFrame(self.ledger)
 
     def __repr__(self) -> str:
         return f"<run in {self.folder}: {len(self.frames)} frames>"

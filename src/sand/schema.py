@@ -1,7 +1,4 @@
-"""One table describes every per-grain quantity.
-
-Storage, validation, file layout, axis labels and the reference page are all made from it.
-"""
+"""Table of the per-grain quantities, the source of storage, validation, file layout, labels and reference."""
 
 from __future__ import annotations
 
@@ -14,12 +11,12 @@ from .units import EXAMPLES, in_unit
 
 
 class Field(NamedTuple):
-    """One quantity per grain."""
+    """Description of one per-grain quantity."""
 
     name: str
     width: int  # numbers per grain
     unit: str
-    kind: str  # "fixed": set once; "moving": changes each step; "load": worked out from the others
+    kind: str  # "fixed": constant; "moving": integrated in time; "load": computed from the others
     meaning: str
     symbol: str
 
@@ -44,36 +41,42 @@ BY_NAME = {field.name: field for field in FIELDS}
 
 
 def blank(field: Field, count: int) -> np.ndarray:
-    """Zeros in the stored shape: (count,) or (width, count), contiguous, float64."""
+    """Zeros in stored shape: (count,) or (width, count), contiguous, float64."""
     return np.zeros(count if field.width == 1 else (field.width, count))
 
 
 def public(array: np.ndarray) -> np.ndarray:
-    """The view a user sees: (N,) or (N, width), no copy, read only."""
+    """Read-only view in public shape: (N,) or (N, width)."""
     view = array.T if array.ndim == 2 else array.view()
     view.flags.writeable = False
     return view
 
 
 def stored(field: Field, values: Any, count: int, *, positive: bool = False, called: str = "") -> np.ndarray:
-    """`values` in the stored shape, or one line for what is wrong with them.
+    """Convert values of a quantity to an array of stored shape, (N,) or (width, N).
 
     Parameters
     ----------
-    values
-        SI numbers, text with a unit, or a quantity; one value serves all grains where width is 1, one vector
-        where width is 3.
+    field : Field
+        Quantity to convert to.
+    values : array_like or str or quantity
+        SI numbers, text with a unit, or a quantity. One value (width 1) or one vector (width 3) applies to all grains.
     count : int
-        number of grains N.
+        Number of grains N.
     positive : bool, optional
-        every number must be above 0.
+        Require all numbers to be above 0.
     called : str, optional
-        what the user calls it, if that is not the name of the field.
+        Name for messages, if it is not the name of the field.
+
+    Returns
+    -------
+    ndarray
+        New contiguous array.
 
     Raises
     ------
     BadInput
-        wrong unit, shape (N, width) or a value that is not finite, with the first grain concerned.
+        If the unit or the shape is wrong, or a value is not finite; names the first such grain.
     """
     name = called or field.name
     array = in_unit(values, field.unit)
@@ -95,8 +98,8 @@ def stored(field: Field, values: Any, count: int, *, positive: bool = False, cal
     bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if bad.size:
         raise BadInput(
-            f"{name} of grain {bad[0]} is {array[bad[0]]}: numbers must be finite, in {field.unit};"
-            f" {bad.size} of {count} concerned"
+            f"{name} of grain {bad[0]} is {array[bad[0]]}: numbers must be finite, in {field.unit}"
+            f" ({bad.size} of {count} grains affected)"
         )
     if positive and (low := np.flatnonzero(~(rows > 0.0).all(axis=1))).size:
         raise BadInput(f"{name} of grain {low[0]} is {array[low[0]]:g} {field.unit}: it must be above 0")

@@ -1,4 +1,4 @@
-"""How many threads large simulations may use."""
+"""Number of threads of large simulations."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import os
 from .arguments import checked
 from .errors import BadInput, shown
 
-_wished: int | None = None
+_requested: int | None = None
 
 
 def cores() -> int:
-    """Processor cores that this process may run on."""
+    """Number of processor cores available to this process."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
@@ -20,34 +20,39 @@ def cores() -> int:
 
 @checked
 def set_threads(number: int | None) -> None:
-    """Let large simulations of this process use so many threads; None: as many as there are cores, or `$SAND_THREADS`.
+    """Set the number of threads of large simulations in this process.
 
-    No result depends on it, to the last bit. Small simulations use one thread, whatever is set.
+    Results do not depend on it, to the last bit. Small simulations always use one thread.
+
+    Parameters
+    ----------
+    number : int or None
+        At least 1. None: `$SAND_THREADS`, or else the number of cores.
 
     Raises
     ------
     BadInput
-        less than 1.
+        If the number is less than 1.
     """
-    global _wished
-    _wished = None if number is None else _checked(number, "threads")
+    global _requested
+    _requested = None if number is None else _positive_integer(number, "threads")
 
 
 def threads() -> int:
-    """Threads that a large simulation uses.
+    """Number of threads of a large simulation.
 
     Raises
     ------
     BadInput
-        `$SAND_THREADS` is not a whole number above 0.
+        If `$SAND_THREADS` is not a whole number above 0.
     """
-    if _wished is not None:
-        return _wished
-    told = os.environ.get("SAND_THREADS")
-    return cores() if not told else _checked(told, "the environment variable SAND_THREADS")
+    if _requested is not None:
+        return _requested
+    variable = os.environ.get("SAND_THREADS")
+    return cores() if not variable else _positive_integer(variable, "the environment variable SAND_THREADS")
 
 
-def _checked(number: int | str, name: str) -> int:
+def _positive_integer(number: int | str, name: str) -> int:
     try:
         if int(number) == float(number) and int(number) >= 1:
             return int(number)

@@ -1,7 +1,7 @@
-"""Units at the door: text and quantities come in, SI floats go on.
+"""Conversion of the user's quantities to SI floats, with checks of unit and range.
 
-A bare number is SI already.  Text is a number and a unit ("10 nm", "200 A m^2/kg", "1 us").  Quantities of
-pint and astropy are accepted by what they can do, so neither has to be installed for plain numbers.
+Plain numbers are in SI. Text is a number with a unit ("10 nm", "200 A m^2/kg", "1 us"). Quantities of pint and astropy
+are recognised by their attributes, so that neither package is imported for plain numbers.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 from .constants import LIGHT
 from .errors import BadInput, shown
 
-#: one example per unit, for error messages
 EXAMPLES = {
     "m": "10 nm",
     "s": "5 us",
@@ -35,18 +34,18 @@ EXAMPLES = {
     "A m^2/kg": "200 A m^2/kg",
     "C": "1.6e-19 C",
 }
+"""One quantity per unit, for error messages."""
 
-# A number, then a unit made of names, small integer powers, products and quotients; nothing that computes.
+# A number, then a unit of names, integer powers of one digit, products and quotients; no arithmetic.
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|[+-]?(?:inf|nan)"
 _UNIT = r"[A-Za-zµμΩÅ°%][A-Za-zµμΩÅ°]*(?:(?:\^|\*\*)?-?\d|[²³])?"
-# Only one way leads through each text: otherwise a text that does not fit takes longer than anybody waits.
+# The pattern is unambiguous: with several ways to match, text that does not match would take exponential time.
 _TEXT = re.compile(rf"\s*({_NUMBER})\s*({_UNIT}(?:(?:\s*[*/·]\s*|\s+){_UNIT})*)?\s*", re.IGNORECASE)
 LONGEST_TEXT = 100
 """Characters of a number with its unit; longer text is refused before it is parsed."""
 
-
-# Tens, and powers of m, kg, s, A, K: what is written with these alone needs no pint, which takes 0.3 s to load.
-_ENTIRE = {
+# Exponents of 10, m, kg, s, A, K. Units made of these are converted without pint, whose import takes 0.3 s.
+_BASIC = {
     "m": (0, 1, 0, 0, 0, 0),
     "g": (-3, 0, 1, 0, 0, 0),
     "s": (0, 0, 0, 1, 0, 0),
@@ -60,21 +59,21 @@ _ENTIRE = {
 }
 _PREFIXES = {"": 0, "f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "μ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}
 _NAMED = {"rad": (0, 0, 0, 0, 0, 0), "angstrom": (-10, 1, 0, 0, 0, 0), "Å": (-10, 1, 0, 0, 0, 0)}
-_COMMON = {p + u: (t + own[0], *own[1:]) for u, own in _ENTIRE.items() for p, t in _PREFIXES.items()} | _NAMED
+_COMMON = {p + u: (t + powers[0], *powers[1:]) for u, powers in _BASIC.items() for p, t in _PREFIXES.items()} | _NAMED
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([^\W\d²³]+)(?:(?:\^|\*\*)?(-?\d)|([²³]))?")
 
 
 def _powers(text: str) -> tuple[int, ...] | None:
-    """Powers of ten, m, kg, s, A and K in one `text`, or None if there is any other unit in it."""
+    """Exponents of ten, m, kg, s, A and K of a unit, or None if it contains a unit that is not in `_COMMON`."""
     total: tuple[int, ...] = (0,) * 6
-    place = 0
-    while place < len(text):
-        found = _FACTOR.match(text, place)
+    position = 0
+    while position < len(text):
+        found = _FACTOR.match(text, position)
         if found is None or found[2] not in _COMMON:
             return None
         power = int(found[3] or {"²": 2, "³": 3}.get(found[4], 1)) * (-1 if found[1] == "/" else 1)
         total = tuple(a + power * b for a, b in zip(total, _COMMON[found[2]], strict=True))
-        place = found.end()
+        position = found.end()
     return total
 
 
@@ -82,13 +81,12 @@ def _powers(text: str) -> tuple[int, ...] | None:
 def _registry() -> Any:
     import pint
 
-    registry = pint.UnitRegistry(cache_folder=None)
-    return registry
+    return pint.UnitRegistry(cache_folder=None)
 
 
 @functools.lru_cache(maxsize=512)
 def _factor(text: str, unit: str) -> float | None:
-    """What one `text` is in `unit`, or None where that makes no sense."""
+    """Factor from the unit `text` to `unit`, or None if they are not multiples of each other."""
     given, wanted = _powers(text), _powers(unit)
     if given and wanted:
         factor = float(f"1e{given[0] - wanted[0]}")
@@ -99,21 +97,21 @@ def _factor(text: str, unit: str) -> float | None:
     spelled = re.sub(r"(?<=[A-Za-zµμΩÅ°])(-?\d)", r"**\1", spelled)
     try:
         none, one = (_registry().Quantity(n, spelled).to(unit.replace("^", "**")).magnitude for n in (0.0, 1.0))
-        # 0 degC is not 0 K, and 0 dB is 1: such units have no factor
+        # units with an offset (0 degC is not 0 K) and logarithmic units (0 dB is 1) have no factor
         return float(one) if none == 0.0 and 0.0 < one < math.inf else None
     except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError, ValueError, AssertionError):
         return None
 
 
 def _times(number: str, factor: float) -> float:
-    """number × factor; exact in decimals where the factor is a power of ten: '5 us' is 5e-06."""
+    """Product number × factor, in exact decimal arithmetic if the factor is a power of ten: '5 us' is 5e-06."""
     power = round(math.log10(factor)) if factor > 0.0 else 0
     if factor == float(f"1e{power}") and "n" not in number.lower():
         return float(Decimal(number).scaleb(power))
     return float(number) * factor
 
 
-def _complain(value: Any, unit: str, name: str) -> BadInput:
+def _wrong_unit(value: Any, unit: str, name: str) -> BadInput:
     example = EXAMPLES.get(unit, f"1 {unit}")
     return BadInput(
         f"{name} = {shown(value)} is not a quantity in {unit}; give a number in SI or text such as '{example}'"
@@ -121,9 +119,14 @@ def _complain(value: Any, unit: str, name: str) -> BadInput:
 
 
 def in_unit(value: Any, unit: str) -> Any:
-    """`value` as an SI float or array of `unit`, or None if it is of another kind.
+    """Convert a quantity to SI.
 
-    Text without a unit counts as SI where the unit is "1", and where the number is 0, which is the same in all units.
+    Text without a unit is accepted if `unit` is "1" or if the number is 0.
+
+    Returns
+    -------
+    float or ndarray or None
+        The value in `unit`; None if it is not a quantity of that dimension.
     """
     if isinstance(value, str):
         match = _TEXT.fullmatch(value) if len(value) <= LONGEST_TEXT else None
@@ -138,9 +141,9 @@ def in_unit(value: Any, unit: str) -> Any:
     if hasattr(value, "to_value"):  # astropy
         try:
             return np.asarray(value.to_value(unit.replace("^", "**").replace(" ", "*")), dtype=np.float64)[()]
-        except Exception:  # astropy's own error classes are not ours to import
+        except Exception:  # astropy's error classes are not imported here
             return None
-    if hasattr(value, "magnitude"):  # pint, of whatever registry
+    if hasattr(value, "magnitude"):  # pint, of any registry
         factor = _factor(str(value.units), unit)
         return None if factor is None else np.asarray(value.magnitude, dtype=np.float64)[()] * factor
     try:
@@ -151,15 +154,11 @@ def in_unit(value: Any, unit: str) -> Any:
 
 
 LEAST, MOST = 1e-60, 1e60
-"""Sizes of SI numbers whose products and powers do not run out of the range of double precision."""
-
-
+"""Range of the magnitudes of SI numbers; their products and powers stay within double precision."""
 MELTED = 5000.0
-"""Temperature [K] at which no material is solid."""
+"""Temperature [K] above which no material is solid."""
 HOTTEST = 1e12
-"""Temperature [K] from which on there are no atoms, and no nuclei."""
-MOST_GRAINS = 100_000_000
-"""More do not fit into the memory of a machine: a grain takes about a kilobyte."""
+"""Highest temperature [K] accepted; above it there are neither atoms nor nuclei."""
 
 
 def si(
@@ -171,53 +170,58 @@ def si(
     least: float | None = None,
     below: float | None = None,
 ) -> float:
-    """One finite number in SI.
+    """Convert a quantity to one finite SI number.
 
     Parameters
     ----------
-    value
-        float in SI, text with a unit, or a pint or astropy quantity.
+    value : float or str or quantity
+        Float in SI, text with a unit, or a pint or astropy quantity.
     unit : str
-        the SI unit, e.g. "m", "A m^2/kg"; "1" for a pure number.
+        SI unit, for example "m" or "A m^2/kg"; "1" for a pure number.
     name : str
-        how the user called it, for the message.
+        Name of the argument, for the message.
     above, least, below : float or None, optional
-        the number must be > above, ≥ least, < below.
+        Allowed range: number > above, number ≥ least, number < below.
+
+    Returns
+    -------
+    float
+        The number in `unit`.
 
     Raises
     ------
     BadInput
-        wrong unit, not a number, not finite, or out of range, a temperature above `HOTTEST`, a speed above
-        that of light unless `below` is given; one line.
+        If the unit is wrong, the value is not a number, not finite or out of range, a temperature exceeds `HOTTEST`, or
+        a speed reaches that of light and `below` is not given.
     """
     number = in_unit(value, unit)
     if number is None or np.ndim(number) != 0:
-        raise _complain(value, unit, name)
-    told = f"{name} = {shown(value)}"
+        raise _wrong_unit(value, unit, name)
+    label = f"{name} = {shown(value)}"
     if not math.isfinite(number):
-        raise BadInput(f"{told} is not finite; give a number in {unit}")
+        raise BadInput(f"{label} is not finite; give a number in {unit}")
     if number != 0.0 and not LEAST < abs(number) < MOST:
-        raise BadInput(f"{told} is not between {LEAST:g} and {MOST:g} {unit}, where numbers can be computed with")
+        raise BadInput(f"{label} is not between {LEAST:g} and {MOST:g} {unit}, the range of the computation")
     if above is not None and not number > above:
-        raise BadInput(f"{told} must be above {above:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{label} must be above {above:g} {unit}".removesuffix(" 1"))
     if least is not None and not number >= least:
-        raise BadInput(f"{told} must be at least {least:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{label} must be at least {least:g} {unit}".removesuffix(" 1"))
     if below is not None and not number < below:
-        raise BadInput(f"{told} must be below {below:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{label} must be below {below:g} {unit}".removesuffix(" 1"))
     if unit == "m/s" and below is None and not abs(number) < LIGHT:
-        raise BadInput(f"{told} is not below the speed of light, {LIGHT:.4g} m/s")
+        raise BadInput(f"{label} is not below the speed of light, {LIGHT:.4g} m/s")
     if unit == "K" and number > HOTTEST:
-        raise BadInput(f"{told} is above {HOTTEST:g} K, where no matter is made of atoms")
+        raise BadInput(f"{label} is above {HOTTEST:g} K, where matter has no atoms")
     return float(number)
 
 
 def is_word(value: Any, word: str) -> bool:
-    """True for this text; arrays, which cannot be compared with text, are another thing."""
+    """Whether `value` is this text; False for arrays, whose comparison with text would be an array."""
     return isinstance(value, str) and value == word
 
 
 def whole_number(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
-    """A whole number from `least` to `most`.  Raises BadInput."""
+    """Check a whole number from `least` to `most`. Raises BadInput."""
     is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_whole or value < least or (most is not None and value > most):
         bounds = (
@@ -228,7 +232,7 @@ def whole_number(value: Any, name: str, least: int = 1, most: int | None = None)
 
 
 def seed_given(value: Any, bits: int = 64) -> int:
-    """The seed of random numbers, below two to the power of `bits`.  Raises BadInput."""
+    """Check a random seed, 0 … 2**bits − 1. Raises BadInput."""
     is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_whole or not 0 <= value < 2**bits:
         raise BadInput(f"seed = {shown(value)} must be a whole number of at least 0, below 2**{bits}")
@@ -236,7 +240,7 @@ def seed_given(value: Any, bits: int = 64) -> int:
 
 
 def format_quantity(value: float, unit: str) -> str:
-    """A number for people, with an SI prefix: 1.2e-6 m → '1.2 um'."""
+    """Format a number with an SI prefix: 1.2e-6 m → '1.2 um'."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g} {unit}"
     prefixes = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from sand.analysis.clusters import cluster_labels, unwrapped
+from sand.analysis.clusters import aggregate_moments, cluster_labels, unwrapped
 from sand.analysis.fractal import FEWEST, correlation_dimension
-from sand.analysis.magnetism import aggregate_moments
 from sand.analysis.shape import gyration_radius
 from sand.errors import BadInput
 

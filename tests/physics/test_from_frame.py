@@ -1,4 +1,4 @@
-"""A frame of a trajectory as a new start: single precision healed, no contact made or broken."""
+"""A frame of a trajectory as a new start: single precision corrected, no contact made or broken."""
 
 import copy
 import math
@@ -9,7 +9,7 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.io.trajectory import read_frames
-from sand.setup.from_frame import SINGLE, healed
+from sand.setup.from_frame import SINGLE, restore_overlaps
 
 RADIUS = 1e-8
 STIFFNESS = 100.0
@@ -129,7 +129,7 @@ def test_healing_against_chance():
         held = overlap > -0.01 * RADIUS  # some of them stretched
         touching = pairs[held]
         rounded = np.float64(np.float32(true / RADIUS)) * RADIUS
-        found = healed(rounded, radius, box, touching, overlap[held])
+        found = restore_overlaps(rounded, radius, box, touching, overlap[held])
         apart = np.linalg.norm(box.nearest(found[touching[:, 0]] - found[touching[:, 1]]), axis=1)
         assert radius[touching].sum(axis=1) - apart == pytest.approx(
             overlap[held], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
@@ -149,7 +149,7 @@ def test_a_rigid_packing_that_hardly_touches():
     none = np.zeros((0, 2), int)
     for away in (0.0, 1e5 * RADIUS):
         rounded = np.float64(np.float32((block + away) / RADIUS)) * RADIUS
-        found = healed(rounded, np.full(32, RADIUS), sand.Box.open(), none, np.zeros(0))
+        found = restore_overlaps(rounded, np.full(32, RADIUS), sand.Box.open(), none, np.zeros(0))
         pairs = sand.Box.open().close_pairs(found, 2.5 * RADIUS)
         assert np.linalg.norm(found[pairs[:, 0]] - found[pairs[:, 1]], axis=1).min() > 2.0 * RADIUS
         assert np.abs(found - rounded).max() < 1e-3 * RADIUS + 64 * SINGLE * away
@@ -170,7 +170,7 @@ def test_what_rounding_brought_together_is_parted():
     """Two grains a hair apart that overlap once rounded: no contact is made."""
     place = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
     none = np.zeros((0, 2), int)
-    found = healed(place, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
+    found = restore_overlaps(place, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
     gap = np.linalg.norm(found[0] - found[1]) / (2 * RADIUS) - 1
     assert 0 < gap < 2e-9
     assert (found[2] == place[2]).all()
@@ -266,4 +266,4 @@ def test_a_frame_that_does_not_fit_itself(crash):
     overlap = frame.overlap.copy()
     overlap[5] += 0.3 * RADIUS
     with pytest.raises(sand.BadInput, match="damaged"):
-        healed(frame.position, frame.radius, frame.box, frame.pair.astype(int), overlap)
+        restore_overlaps(frame.position, frame.radius, frame.box, frame.pair.astype(int), overlap)

@@ -16,7 +16,7 @@ MARKS = "<!-- layers -->\n", "<!-- end of layers -->"
 
 LAYERS = (
     ("errors", "constants", "version"),
-    ("units", "limits", "optional"),
+    ("units",),
     ("arguments",),
     ("material", "schema", "threads"),
     ("compiler",),

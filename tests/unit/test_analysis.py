@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from sand import BadInput
+from sand.analysis.clusters import aggregate_moments
 from sand.analysis.fits import power_law, rate_law, separation
 from sand.analysis.fractal import box_dimension, correlation_dimension, ensemble_dimension, grains_within
-from sand.analysis.frame_statistics import COLUMNS, census, size_distribution
-from sand.analysis.magnetism import aggregate_moments
+from sand.analysis.frame_statistics import COLUMNS, aggregate_statistics, size_distribution
 from sand.analysis.network import network
 from sand.analysis.shape import (
     coordination,
@@ -306,7 +306,7 @@ def test_a_census_across_the_faces():
         pair=np.array([[3, 0], [0, 1], [1, 2], [5, 4]]),
         box=Box.periodic(10.0),
     )
-    rows = census(frame)
+    rows = aggregate_statistics(frame)
     assert list(rows) == list(COLUMNS)
     assert rows["grains"].tolist() == [4, 2]
     assert rows["mass"].tolist() == [8, 4]
@@ -315,7 +315,7 @@ def test_a_census_across_the_faces():
     assert rows["longest"].tolist() == [4, 2]
     assert rows["rings"].tolist() == [0, 0]
     assert size_distribution(np.array([0, 0, 0, 0, 1, 1, 2]))[0].tolist() == [1, 2, 4]
-    assert census(frame, least=5)["grains"].size == 0
+    assert aggregate_statistics(frame, least=5)["grains"].size == 0
 
 
 @pytest.mark.parametrize(

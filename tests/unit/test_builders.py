@@ -14,11 +14,11 @@ from sand.contact.jkr import rest_overlap, rest_radius
 from sand.contact.mixing import pairing_between
 from sand.io.bodies import read_body, write_body
 from sand.setup import KINDS, bcca, bpca, build, chain, dla, dlca, fractal, hexagonal, magnetic_energy, rbd, relaxed
-from sand.setup._kernels.aggregation import returned
-from sand.setup._kernels.hash_grid import gap_at, join_hash_grid
+from sand.setup._kernels.aggregation import return_to_sphere
+from sand.setup._kernels.hash_grid import gap_to_nearest, insert_grain
 from sand.setup.aggregates import rest_distance
 from sand.setup.deposit import cut_sphere
-from sand.setup.growing import room
+from sand.setup.growing import empty_hash_grid
 from sand.setup.population import Lognormal, PowerLaw, grain_set_of
 
 R, M = 3e-7, sand.SILICA
@@ -156,7 +156,7 @@ def test_walkers_come_back_as_brownian_motion_does():
     the mean R/|x|: both harmonic functions.  Four standard errors of 4000 walkers."""
     x, count, cosines = (0.0, 0.0, 2.0), 4000, []
     for number in range(count):
-        there, back = returned(np.uint64(5), number, 1, x, 1.0)
+        there, back = return_to_sphere(np.uint64(5), number, 1, x, 1.0)
         if back:
             assert np.linalg.norm(there) == pytest.approx(1.0, rel=1e-12, abs=0.0)
             cosines.append(there[2])
@@ -166,22 +166,22 @@ def test_walkers_come_back_as_brownian_motion_does():
 
 @pytest.mark.compiled("small")
 def test_gaps_are_never_overrated():
-    """Against all grains: `gap_at` is at most the gap of surfaces, and just that where it names a grain."""
+    """Against all grains: `gap_to_nearest` is at most the gap of surfaces, and just that where it names a grain."""
     body, rng, named = dla(60, seed=1, **MIXED), np.random.default_rng(2), 0
     grain_set = grain_set_of(body.radius, [body.materials[k] for k in body.material])
-    crowd = room(grain_set)
+    grid = empty_hash_grid(grain_set)
     for i in range(60):
-        join_hash_grid(crowd, i, tuple(body.position[i]))
+        insert_grain(grid, i, tuple(body.position[i]))
     for number in range(900):
         x = rng.normal(size=3) * size_of(body) * rng.choice([0.3, 5.0, 50.0])
         if number % 3:  # where a look at cells says just so much
             x = body.position[number % 60] + rng.normal(size=3) * rng.choice([2.0, 5.0]) * grain_set.largest
-        gap, mate = gap_at(crowd, body.arrays.position, grain_set, 0, tuple(x))
+        gap, neighbour = gap_to_nearest(grid, body.arrays.position, grain_set, 0, tuple(x))
         true = np.linalg.norm(body.position - x, axis=1) - body.radius - body.radius[0]
         assert gap <= true.min() + 1e-20
-        if mate >= 0:
+        if neighbour >= 0:
             named += 1
-            assert mate == true.argmin() and gap == pytest.approx(true.min(), rel=1e-9, abs=1e-18)
+            assert neighbour == true.argmin() and gap == pytest.approx(true.min(), rel=1e-9, abs=1e-18)
         else:
             assert gap > 0.0
     assert 90 < named < 810
@@ -331,11 +331,14 @@ def test_only_ten_grains_are_named(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: build("chain", 10_000, dimension=3, radius=R, material=M), "a chain has a dimension of its own"),
+        (
+            lambda: build("chain", 10_000, dimension=3, radius=R, material=M),
+            "a chain always has a dimension of about 1",
+        ),
         (lambda: fractal(10_000, dimension=3, radius=R, material=M), "dimension = 3 must not exceed 2.4"),
         (lambda: fractal(100, dimension=1.1, radius=R, material=M), "at least 1.3"),
-        (lambda: fractal(100, dimension=1.3, prefactor=0.1, radius=R, material=M), "even a straight chain has only"),
-        (lambda: fractal(100, dimension=2.4, prefactor=20, radius=R, material=M), "packed as densely as can be"),
+        (lambda: fractal(100, dimension=1.3, prefactor=0.1, radius=R, material=M), "but a straight chain has only"),
+        (lambda: fractal(100, dimension=2.4, prefactor=20, radius=R, material=M), "a random close packing has"),
         (lambda: bpca(9, radius="power law(-3.5, 1 nm, 1 um)", material=M), "at most 200 is allowed"),
         (lambda: bpca(9, radius="lognormal(1 nm)", material=M), "wrong number of arguments"),
         (lambda: bpca(9, radius="lognormal(9 nm, 3)", material=M), "must not exceed 2"),
@@ -347,9 +350,9 @@ def test_only_ten_grains_are_named(tmp_path):
         (lambda: bpca(9, radius=R, material=M, moments="relax"), "did you mean 'relaxed'"),
         (lambda: bpca(9, radius=R, material=M, magnetic=1.5), "must not exceed 1"),
         (lambda: bpca(9, radius=R, material=M, seed=-1), "seed = -1"),
-        (lambda: rbd(9, radius=[R] * 9, material=M), "is cut from more grains"),
+        (lambda: rbd(9, radius=[R] * 9, material=M), "is cut from a deposit of more grains"),
         (lambda: hexagonal(3, radius="lognormal(9 nm, 0.1)", material=M), "only if its grains are equal"),
-        (lambda: build("lattice", 10, radius=R, material=M), "10 grains are no cube"),
+        (lambda: build("lattice", 10, radius=R, material=M), "10 is not a cube number"),
         (lambda: build("bpca", radius=R, material=M), "grains is missing"),
         (lambda: build("bpca", 8, shape=[2, 2, 2], radius=R, material=M), "shape = .* is for lattice"),
     ],
@@ -383,7 +386,7 @@ def test_the_command(tmp_path, capsys, monkeypatch, kind):
         (["bpca", "--out", "a.xyz"], "grains is missing"),
         (["bpca", "--grains", "9", "--out", "a.pdb"], "allowed: .xyz, .extxyz, .gsd"),
         (["bpca", "--grains", "9", "--out", "no/a.xyz"], "there is no folder no"),
-        (["chain", "--grains", "10000", "--dimension", "3", "--out", "a.xyz"], "dimension of its own, about 1"),
+        (["chain", "--grains", "10000", "--dimension", "3", "--out", "a.xyz"], "dimension of about 1"),
         (["lattice", "--shape", "2,2", "--out", "a.xyz"], "three whole numbers"),
         (["lattice", "--grains", "8", "--shape", "2,2,2", "--out", "a.xyz"], "leave --grains out"),
         (["bpca", "--grains", "9", "--material", "silica:x", "--out", "a.xyz"], "--material 'silica:x'"),

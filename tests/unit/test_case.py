@@ -102,7 +102,7 @@ def problems_of(content):
         ({"materials__mine__density": "3 g/cm^3"}, ["mine lacks young_modulus, poisson_ratio"]),
         # what shows when grains, forces and box come together
         ({"box__periodic": "30 nm"}, ["box", "too small", "3 diameters"]),
-        ({"box__periodic": "62 nm", "grains__number": 30}, ["no room for grain", "take a larger box or fewer grains"]),
+        ({"box__periodic": "62 nm", "grains__number": 30}, ["too full", "use a larger box or fewer grains"]),
         ({"box__periodic": None}, ["a gas needs a box"]),
         ({"box__periodic": ["1 um", "1 um", "open"]}, ["a gas needs a box"]),
         ({"forces__dipoles__cutoff": "300 nm"}, ["cutoff = 300 nm", "exceeds half the box (200 nm)"]),

@@ -65,7 +65,7 @@ def test_same_seed_same_grains():
     ("changes", "message"),
     [
         ({"number": 0}, "number = 0"),
-        ({"number": 60, "box": "80 nm"}, "no room for grain"),
+        ({"number": 60, "box": "80 nm"}, "the box is too full"),
         ({"box": "40 nm"}, "too small"),
         ({"box": None}, "periodic on all three axes"),
         ({"spins": "kt"}, "spins = 'kt'"),

@@ -9,14 +9,14 @@ import pytest
 
 from sand.analysis import tracking as lineage
 from sand.analysis.clusters import cluster_labels
-from sand.analysis.tracking import SINGLE, Lineage, named
+from sand.analysis.tracking import SINGLE, Lineage, inherit_names
 from sand.errors import BadInput
 
 
 def names_of(before, count, pairs):
     """Names from contacts."""
     start = np.full(count, SINGLE, np.uint32) if before is None else before
-    return named(start, cluster_labels(count, np.array(pairs).reshape(-1, 2)))
+    return inherit_names(start, cluster_labels(count, np.array(pairs).reshape(-1, 2)))
 
 
 def referee(before, labels):
@@ -83,7 +83,7 @@ def test_as_the_rule_says(seed):
     for held in frames:
         labels = cluster_labels(count, held)
         want = referee(names, labels)
-        names = named(names, labels)
+        names = inherit_names(names, labels)
         assert (names == want).all()
         bound = np.bincount(labels)[labels] > 1
         assert ((names != SINGLE) == bound).all()
@@ -141,8 +141,8 @@ def test_many_grains_take_little_time():
     rng = np.random.default_rng(3)
     count = 100_000
     labels = cluster_labels(count, rng.integers(0, count, (60_000, 2)))
-    before = named(np.full(count, SINGLE, np.uint32), labels)
+    before = inherit_names(np.full(count, SINGLE, np.uint32), labels)
     labels = cluster_labels(count, rng.integers(0, count, (60_000, 2)))
     begun = time.perf_counter()
-    named(before, labels)
+    inherit_names(before, labels)
     assert time.perf_counter() - begun < 0.5

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.analysis.ledger_columns import Books
+from sand.analysis.ledger_columns import LedgerColumns
 from sand.errors import BadInput
 from sand.io.ledger_table import read_ledger
 from sand.plotting.plots import HISTORY, grains_figure, history_figure
@@ -14,7 +14,7 @@ from sand.plotting.plots import HISTORY, grains_figure, history_figure
 def test_books_that_are_read_are_those_that_were_written(in_a_field):
     """Drift and columns of ledger.csv are the summary's; curves drawn are the ledger's columns."""
     rows = read_ledger(in_a_field / "ledger.csv")
-    books = Books(tuple(rows[0]), rows)
+    books = LedgerColumns(tuple(rows[0]), rows)
     assert books.drift == sand.open(in_a_field).summary["drift"]
     for name in HISTORY:
         assert history_figure(books, name, 8, 0.0, dark=name == "size").axes

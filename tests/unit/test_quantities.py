@@ -32,7 +32,7 @@ def test_quantities_are_what_they_say():
     np.testing.assert_array_equal(cluster_rank(4, np.array([(2, 3)])), [1, 2, 0, 0])
     assert all(quantity(name).meaning for name in GRAIN_NAMES)
     with pytest.raises(
-        BadInput, match="field_alignment is not known: no grain has a moment, or there is no outside field"
+        BadInput, match="field_alignment is not known: no grain has a moment, or there is no external field"
     ):
         measured(frame, "field_alignment")
     with pytest.raises(BadInput, match="did you mean 'speed'"):

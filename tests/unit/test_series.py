@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from sand.analysis.ledger_columns import Books
+from sand.analysis.ledger_columns import LedgerColumns
 from sand.viewer.dataset import run_dataset
 from sand.viewer.series import MOST, of_ledger, thinned
 
@@ -37,7 +37,7 @@ def test_long_and_broken_ledgers(looked_at):
     row = dict(looked_at[1].ledger.rows[-1])
     rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
     rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
-    series = of_ledger(Books.of(rows))
+    series = of_ledger(LedgerColumns.from_rows(rows))
     assert len(series["time"]) == MOST and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
     assert sum(series["events"]["made"]) == 15000 and sum(series["events"]["broken"]) == 2500
     assert len(series["events"]["time"]) < MOST

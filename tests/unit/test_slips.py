@@ -209,7 +209,7 @@ EXPERIMENTS = [
     ("sand.analysis.fits.power_law('a', [1, 2])", "x = 'a' must be an array of numbers"),
     ("sand.analysis.fits.power_law([1, 2], [1, 2], groups=[1])", "groups must have one entry for each"),
     ("sand.analysis.quantities.measured(frame, np.ones(2))", "name = array of shape (2,) must be text"),
-    ("sand.analysis.frame_statistics.census(7)", "frame = 7; give a frame"),
+    ("sand.analysis.frame_statistics.aggregate_statistics(7)", "frame = 7; give a frame"),
 ]
 
 SLIPS = [*ARGUMENTS, *SIMULATIONS, *SETUPS, *EXPERIMENTS]

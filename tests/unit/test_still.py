@@ -192,5 +192,5 @@ def test_all_mistakes_are_told():
             still_picture(frame_of([[0, 0, 0]]), view=view)
     with pytest.raises(BadInput, match="no grain with a finite position"):
         still_picture(frame_of([[np.nan, 0, 0]]))
-    with pytest.raises(BadInput, match="alignment is not known: no grain that touches"):
+    with pytest.raises(BadInput, match="alignment is not known: no grain in contact"):
         still_picture(frame_of([[0, 0, 0]]), colour="alignment")

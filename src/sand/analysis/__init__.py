@@ -1,6 +1,6 @@
-"""Measuring what has grown.
+"""Analysis of clusters: size, shape, contact network, fractal dimension, magnetic moment and growth laws.
 
-Modules are loaded when first used: `sand.analysis.fits.power_law(...)` needs no import of its own.
+Submodules are imported on first use: `sand.analysis.fits.power_law(...)` needs no further import.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from typing import Any
 from ..errors import NoSuchAttribute, did_you_mean
 
 MODULES = (
-    "clusters", "fits", "fractal", "frame_statistics", "ledger_columns", "magnetism", "network", "quantities", "shape",
+    "clusters", "fits", "fractal", "frame_statistics", "ledger_columns", "network", "quantities", "shape",
     "tracking",
 )  # fmt: skip
-"""What there is to be used."""
+"""Public submodules."""
 
 
 def __getattr__(name: str) -> Any:

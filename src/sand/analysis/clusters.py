@@ -1,4 +1,4 @@
-"""Clusters: grains connected by contacts."""
+"""Clusters, the connected components of the contact graph."""
 
 from __future__ import annotations
 
@@ -9,24 +9,29 @@ from ..box import Box
 from ..errors import BadInput
 
 FEW = 200
-"""Grains and contacts together that are followed one by one sooner than SciPy makes its graph (130 µs)."""
+"""Grains plus contacts up to which a disjoint-set forest in Python is faster than SciPy's graph (130 µs)."""
 
 
 @checked
 def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
-    """The cluster each grain belongs to, numbered by their lowest grain.
+    """Label the cluster of each grain; clusters are numbered by their lowest grain.
 
     Parameters
     ----------
     count : int
-        number of grains N.
+        Number of grains N.
     pairs : ndarray
-        contacts, (C, 2) grain numbers.
+        Contacts (C, 2), indices of grains.
 
     Returns
     -------
     ndarray
-        (N,) integers 0…K−1.
+        Labels (N,), integers 0…K−1.
+
+    Raises
+    ------
+    BadInput
+        If `pairs` is not (C, 2) or has indices outside 0 … N−1.
     """
     ends = np.asarray(pairs, dtype=np.int64)
     if ends.size % 2:
@@ -35,9 +40,9 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     if len(ends) and not 0 <= ends.min() <= ends.max() < count:
         raise BadInput(f"pairs name grains from {ends.min()} to {ends.max()}; there are {count}, 0 to {count - 1}")
     if not len(ends):
-        return np.arange(count)  # a gas need not wait for SciPy's graphs, which take long to load
+        return np.arange(count)  # avoids the slow import of SciPy's graphs
     if count + len(ends) <= FEW:
-        return _followed(count, ends)
+        return _disjoint_sets(count, ends)
 
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -46,40 +51,55 @@ def cluster_labels(count: int, pairs: np.ndarray) -> np.ndarray:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def _followed(count: int, ends: np.ndarray) -> np.ndarray:
-    """The same, contact by contact: two clusters that meet go by the lowest grain of both."""
-    lower = list(range(count))
+def _disjoint_sets(count: int, ends: np.ndarray) -> np.ndarray:
+    """The same with a disjoint-set forest whose roots are the lowest grains."""
+    parent = list(range(count))
 
-    def lowest(grain: int) -> int:
-        while lower[grain] != grain:
-            grain = lower[grain]
+    def root(grain: int) -> int:
+        while parent[grain] != grain:
+            grain = parent[grain]
         return grain
 
     for one, other in ends.tolist():
-        a, b = lowest(one), lowest(other)
-        lower[max(a, b)] = min(a, b)
-    numbers: dict[int, int] = {}
-    return np.array([numbers.setdefault(lowest(grain), len(numbers)) for grain in range(count)], dtype=np.int64)
+        a, b = root(one), root(other)
+        parent[max(a, b)] = min(a, b)
+    labels: dict[int, int] = {}
+    return np.array([labels.setdefault(root(grain), len(labels)) for grain in range(count)], dtype=np.int64)
 
 
 @checked
 def cluster_sizes(labels: np.ndarray) -> np.ndarray:
-    """Number of grains of each cluster, (K,)."""
+    """Number of grains of each cluster (K,)."""
     return np.bincount(labels)
 
 
 @checked
 def mean_cluster_size(labels: np.ndarray) -> float:
-    """S = Σ s² n_s / Σ s n_s (Eq. 17): the size of the cluster of a grain picked at random."""
+    """Mass-weighted mean cluster size S = Σ s² n_s / Σ s n_s (Dominik & Nübold 2002, Eq. 17).
+
+    It is the expected size of the cluster of a randomly chosen grain.
+    """
     sizes = cluster_sizes(labels).astype(np.float64)
     return float((sizes**2).sum() / sizes.sum())
 
 
 @checked
 def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
-    """Positions (N, 3) [m] in which clusters are whole, not cut by the faces of a periodic box.
+    """Positions (N, 3) [m] with every cluster in one piece across periodic boundaries.
 
-    Each cluster keeps the image of its lowest grain; the others follow along their contacts.
+    Parameters
+    ----------
+    position : ndarray
+        (N, 3) [m].
+    pairs : ndarray
+        Contacts (C, 2).
+    box : Box
+        Boundary conditions.
+
+    Returns
+    -------
+    ndarray
+        Positions; the lowest grain of each cluster keeps its image.
     """
     count = len(position)
     neighbours: list[list[int]] = [[] for _ in range(count)]
@@ -101,3 +121,27 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
                     whole[j] = whole[i] + box.nearest(whole[j] - whole[i])
                     queue.append(j)
     return whole
+
+
+def aggregate_moments(moment: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Total moment and alignment of each cluster.
+
+    Parameters
+    ----------
+    moment : ndarray
+        (N, 3) [A m²].
+    labels : ndarray
+        Cluster of each grain (N,), 0…K−1.
+
+    Returns
+    -------
+    sums : ndarray
+        Σμ of each cluster (K, 3) [A m²].
+    alignment : ndarray
+        |Σμ|/Σ|μ| of each cluster (K,), 0 without moments.
+    """
+    mu = np.asarray(moment, float)
+    sums = np.column_stack([np.bincount(labels, mu[:, axis]) for axis in range(3)])
+    sizes = np.bincount(labels, np.linalg.norm(mu, axis=1))
+    with np.errstate(invalid="ignore"):
+        return sums, np.where(sizes > 0.0, np.linalg.norm(sums, axis=1) / sizes, 0.0)

@@ -1,4 +1,7 @@
-"""Power laws with errors between boxes: each box is left out in turn, because what happens in one hangs together."""
+"""Fits of power laws and growth laws, with jackknife errors over independent boxes.
+
+Data of one box are correlated; the jackknife therefore omits whole boxes.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,14 @@ from ..arguments import checked
 from ..errors import BadInput
 
 STEEPEST = 0.99
-"""Degree from which on growth cannot be told from an exponential: z = 100."""
-
+"""Largest degree λ, z = 100; faster growth is indistinguishable from exponential growth."""
 
 SAME = 1e-9
-"""Difference of two logarithms below which they may be the same but for rounding."""
+"""Difference of two logarithms that is attributed to rounding."""
 
 
-class PowerLaw(NamedTuple):
-    """y = prefactor · x^exponent, fitted to the logarithms by least squares."""
+class PowerLawFit(NamedTuple):
+    """Least-squares fit of y = prefactor · x^exponent to the logarithms."""
 
     exponent: float
     error: float  # standard error, by a jackknife over groups
@@ -29,49 +31,64 @@ class PowerLaw(NamedTuple):
     groups: int
 
     def at(self, x: np.ndarray | float) -> np.ndarray | float:
-        """Its value at x."""
+        """Value of the fit at x."""
         return self.prefactor * np.asarray(x) ** self.exponent
 
 
 @checked
-def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) -> PowerLaw:
-    """Fit y ∝ x^exponent; errors by a jackknife over groups.
+def power_law(x: np.ndarray, y: np.ndarray, groups: np.ndarray | None = None) -> PowerLawFit:
+    """Fit y ∝ x^exponent by linear regression of the logarithms, with jackknife errors over groups.
 
     Parameters
     ----------
     x, y : ndarray
         (K,), all above 0, K ≥ 2.
     groups : ndarray or None, optional
-        (K,) number of the box, or run, that a point is from; each point is its own group by default.
+        Number (K,) of the box or run of each point; by default each point is its own group.
+
+    Returns
+    -------
+    PowerLawFit
+        Exponent with standard error and 95 % interval, and prefactor.
 
     Raises
     ------
     BadInput
-        fewer than two different x, or values that have no logarithm.
+        If there are fewer than two different x, or values are not positive and finite.
     """
     x, y = np.asarray(x, float), np.asarray(y, float)
     if x.shape != y.shape or x.ndim != 1 or not ((x > 0) & (y > 0) & np.isfinite(x) & np.isfinite(y)).all():
-        raise BadInput("a power law needs as many y as x, all finite and above 0")
+        raise BadInput("a power-law fit needs x and y of equal length, all finite and above 0")
     if np.ptp(np.log(x)) < SAME:
-        raise BadInput("a power law needs at least two different x")
+        raise BadInput("a power-law fit needs at least two different x")
     group = np.arange(len(x)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
     if len(group) != len(x):
         raise BadInput(f"groups must have one entry for each of {len(x)} points, not {len(group)}")
-    # about the middle, so that sums of squares lose no digits
-    middle = float(np.log(x).mean())
-    u, v = np.log(x) - middle, np.log(y)
+    # centred, so that sums of squares lose no digits
+    mean = float(np.log(x).mean())
+    u, v = np.log(x) - mean, np.log(y)
     count = int(group.max()) + 1
     sums = np.array([np.bincount(group, w, count) for w in (np.ones_like(u), u, v, u * u, u * v)])
     slope, offset = _line(sums.sum(axis=1))
     slopes, _ = _line(sums.sum(axis=1)[:, None] - sums)
     error, low, high = jackknife(float(slope), slopes)
-    return PowerLaw(float(slope), error, low, high, float(np.exp(offset - slope * middle)), len(x), count)
+    return PowerLawFit(float(slope), error, low, high, float(np.exp(offset - slope * mean)), len(x), count)
 
 
-def jackknife(whole: float, without: np.ndarray) -> tuple[float, float, float]:
-    """Standard error and 95 % interval of a number, from what it is without each of n independent groups.
+def jackknife(estimate: float, without: np.ndarray) -> tuple[float, float, float]:
+    """Standard error and 95 % interval of an estimate by the jackknife.
 
-    Not a number for one group, or where what is left without one does not tell the number.
+    Parameters
+    ----------
+    estimate : float
+        Estimate from all groups.
+    without : ndarray
+        Estimates (n,) that omit one of n independent groups each.
+
+    Returns
+    -------
+    error, low, high : float
+        NaN for a single group, or if an estimate is not finite.
     """
     from scipy.stats import t
 
@@ -79,22 +96,22 @@ def jackknife(whole: float, without: np.ndarray) -> tuple[float, float, float]:
     if n < 2 or not np.isfinite(without).all():
         return np.nan, np.nan, np.nan
     error = float(np.sqrt((n - 1) / n * ((without - without.mean()) ** 2).sum()))
-    reach = float(t.ppf(0.975, n - 1)) * error
-    return error, whole - reach, whole + reach
+    half_width = float(t.ppf(0.975, n - 1)) * error
+    return error, estimate - half_width, estimate + half_width
 
 
 def _line(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slope and offset of least squares from n, Σu, Σv, Σu², Σuv."""
+    """Slope and intercept of linear regression from n, Σu, Σv, Σu², Σuv."""
     n, u, v, uu, uv = sums
     with np.errstate(divide="ignore", invalid="ignore"):
         spread = n * uu - u * u
-        # a sample whose x are all alike has no slope
+        # the slope is undefined if all x are equal
         slope = np.where(spread > 1e-12 * n * uu, (n * uv - u * v) / spread, np.nan)
         return slope, (v - slope * u) / n
 
 
 class RateLaw(NamedTuple):
-    """dS/dt = S^degree/τ from S(0) = 1 on, so that S = (1 + t/zτ)^z with z = 1/(1 − degree)."""
+    """Growth law dS/dt = S^degree/τ with S(0) = 1, that is S = (1 + t/zτ)^z with z = 1/(1 − degree)."""
 
     exponent: float  # z; infinite from degree 1 on
     error: float  # standard error, from that of the degree
@@ -113,25 +130,32 @@ class RateLaw(NamedTuple):
 
 @checked
 def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
-    """Fit S = (1 + t/zτ)^z to ln S of the mean over boxes; errors by a jackknife over boxes.
+    """Fit S = (1 + t/zτ)^z to ln S of the mean over boxes, with jackknife errors over boxes.
 
-    Unlike a straight line through ln S over ln t this knows that S begins at 1, which bends the line for long: where
-    S ∝ t² in the end, the local slope z(1 − S^(−1/z)) is 0.6 at S = 2 and 1.4 at S = 10.
+    Unlike a straight line in ln S over ln t, this includes S(0) = 1, which affects the local slope for long: for S ∝
+    t² at late times, the local slope z(1 − S^(−1/z)) is 0.6 at S = 2 and 1.4 at S = 10.
 
     Parameters
     ----------
     time : ndarray
-        (K,) [s] > 0; sizes: S (boxes, K) ≥ 1.
+        (K,) [s] > 0.
+    sizes : ndarray
+        Mean cluster size S (boxes, K) ≥ 1.
+
+    Returns
+    -------
+    RateLaw
+        Exponent z and degree with errors, and τ.
 
     Raises
     ------
     BadInput
-        fewer than three times, or S that does not grow.
+        If there are fewer than three times, or S does not grow.
     """
     t, s = np.asarray(time, float), np.asarray(sizes, float)
     fits = t.ndim == 1 and len(t) >= 3 and s.shape[1:] == t.shape
     if not fits or not (t > 0).all() or not (s.mean(axis=0)[-1] > 1.0 + SAME):
-        raise BadInput("a law of growth needs at least three times above 0, and sizes that grow beyond 1")
+        raise BadInput("a growth law needs at least three times above 0, and sizes that grow beyond 1")
     degree, tau = _rate(t, s.mean(axis=0))
     if degree > STEEPEST:
         raise BadInput(f"S grows faster than any power of time (dS/dt ∝ S^{degree:.2f})")
@@ -143,17 +167,17 @@ def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
 
 
 def _exponent_of(degree: np.ndarray) -> np.ndarray:
-    """z = 1/(1 − degree), infinite from 1 on."""
+    """Exponent z = 1/(1 − degree), infinite for degree ≥ 1."""
     return np.where(degree >= 1.0, np.inf, 1.0 / np.where(degree >= 1.0, 1.0, 1.0 - degree))
 
 
 def _grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
-    """S of dS/dt = S^degree/τ, S(0) = 1: (1 + (1 − degree) t/τ)^(1/(1 − degree)); exponential at degree 1."""
+    """Solution of dS/dt = S^degree/τ, S(0) = 1: (1 + (1 − degree) t/τ)^(1/(1 − degree)); exponential at degree 1."""
     return np.exp(_log_grown(time, degree, tau))
 
 
 def _log_grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
-    """ln of that, to all digits near degree 1; far below 0 where S was infinite before."""
+    """Logarithm of that solution, accurate near degree 1; strongly negative after a divergence of S."""
     rest = 1.0 - degree
     if abs(rest) < 1e-15:
         return time / tau
@@ -161,31 +185,31 @@ def _log_grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
 
 
 def _rate(time: np.ndarray, size: np.ndarray) -> tuple[float, float]:
-    """Degree and τ [s] = 1/Ṡ(0) of the best law for one S(t)."""
+    """Degree and τ [s] = 1/Ṡ(0) of the least-squares fit to one S(t)."""
     from scipy.optimize import least_squares
 
     first = time[-1] / max(float(np.log(size[-1])), 1e-3)
 
-    def misses(free: np.ndarray) -> np.ndarray:
+    def residuals(free: np.ndarray) -> np.ndarray:
         return _log_grown(time, float(free[0]), first * float(np.exp(free[1]))) - np.log(size)
 
-    found = least_squares(misses, [0.5, 0.5], bounds=([-3.0, -5.0], [1.5, 5.0]))
+    found = least_squares(residuals, [0.5, 0.5], bounds=([-3.0, -5.0], [1.5, 5.0]))
     return float(found.x[0]), float(first * np.exp(found.x[1]))
 
 
 @checked
 def separation(first: np.ndarray, second: np.ndarray) -> float:
-    """How far the mean of `first` lies above that of `second`, in standard errors of the difference (Welch).
+    """Difference of two means in standard errors (Welch statistic), positive if `first` is larger.
 
     Parameters
     ----------
     first, second : ndarray
-        values of independent boxes, at least two each.
+        Values of independent boxes, at least two each.
 
     Raises
     ------
     BadInput
-        fewer.
+        If one has fewer than two values.
     """
     a, b = np.asarray(first, float), np.asarray(second, float)
     if a.size < 2 or b.size < 2:

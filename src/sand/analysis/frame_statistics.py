@@ -1,4 +1,4 @@
-"""Every aggregate of a frame, counted and measured."""
+"""Statistics of all aggregates of one frame."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..errors import refuse_other
-from .clusters import cluster_labels, unwrapped
-from .magnetism import aggregate_moments
+from .clusters import aggregate_moments, cluster_labels, unwrapped
 from .network import network
 from .shape import elongation, filling_factor, gyration_radius
 
@@ -19,27 +18,32 @@ COLUMNS = {
     "gyration_radius": ("m", "radius of gyration, centres only"),
     "elongation": ("1", "longest over shortest principal length, extent of grains included"),
     "filling_factor": ("1", "volume of grains over that of the sphere with this radius of gyration"),
-    "moment": ("A m^2", "size of the sum of all moments"),
-    "alignment": ("1", "that over the sum of their sizes"),
+    "moment": ("A m^2", "magnitude of the total moment"),
+    "alignment": ("1", "magnitude of the total moment over the sum of the magnitudes"),
     "coordination": ("1", "mean number of contacts of a grain"),
     "ends": ("1", "grains with one contact"),
-    "junctions": ("1", "grains with three or more"),
+    "junctions": ("1", "grains with three or more contacts"),
     "rings": ("1", "independent closed loops"),
-    "longest": ("1", "grains on the longest way along contacts"),
+    "longest": ("1", "grains on the longest path along contacts"),
 }
-"""Name, unit and meaning of every column of a census."""
+"""Unit and meaning of every column of `aggregate_statistics`."""
 
 
 @checked
-def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
-    """The aggregates of a frame, the largest first: columns (K,) as in COLUMNS.
+def aggregate_statistics(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
+    """Size, shape, moment and contact network of each aggregate of a frame, largest first.
 
     Parameters
     ----------
-    frame
-        of a trajectory, or anything with position, radius, mass, moment, pair (C, 2) and box.
+    frame : Frame
+        Frame of a trajectory, or any object with position, radius, mass, moment, pair (C, 2) and box.
     least : int, optional
-        aggregates of fewer grains are left out.
+        Smallest number of grains of an aggregate.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Columns (K,) as in `COLUMNS`.
     """
     refuse_other(frame, "position", "pair", "moment", "box")
     labels = cluster_labels(len(frame.position), frame.pair)
@@ -48,20 +52,20 @@ def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
     moments, aligned = aggregate_moments(frame.moment, labels)
     order = np.argsort(-sizes, kind="stable")
     members = np.split(np.argsort(labels, kind="stable"), np.cumsum(sizes)[:-1])
-    of_pair = labels[frame.pair[:, 0]] if len(frame.pair) else np.zeros(0, int)
+    label_of_pair = labels[frame.pair[:, 0]] if len(frame.pair) else np.zeros(0, int)
     rows = []
     for k in order[sizes[order] >= least]:
-        who = members[k]
-        held = np.searchsorted(who, frame.pair[of_pair == k])
-        place, mass, radius = whole[who], np.asarray(frame.mass, float)[who], frame.radius[who]
-        net = network(len(who), held)
+        grains = members[k]
+        pairs = np.searchsorted(grains, frame.pair[label_of_pair == k])
+        position, mass, radius = whole[grains], np.asarray(frame.mass, float)[grains], frame.radius[grains]
+        net = network(len(grains), pairs)
         rows.append(
             (
-                len(who),
+                len(grains),
                 mass.sum(),
-                gyration_radius(place, mass),
-                elongation(place, mass, radius),
-                filling_factor(place, radius),
+                gyration_radius(position, mass),
+                elongation(position, mass, radius),
+                filling_factor(position, radius),
                 np.linalg.norm(moments[k]),
                 aligned[k],
                 net.coordination,
@@ -77,6 +81,12 @@ def census(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
 
 @checked
 def size_distribution(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes s (K,) that occur and how many clusters n_s (K,) have each."""
+    """Sizes s (K,) that occur, and the number n_s (K,) of clusters of each size.
+
+    Parameters
+    ----------
+    labels : ndarray
+        Cluster of each grain (N,).
+    """
     sizes, numbers = np.unique(np.bincount(labels), return_counts=True)
     return sizes, numbers

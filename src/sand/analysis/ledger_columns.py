@@ -1,4 +1,4 @@
-"""The rows of a ledger, of a run that goes on or of one that is read: columns over time, what they add up to."""
+"""Columns of a ledger over time, of a run in progress or from a file, with dissipated energy and drift."""
 
 from __future__ import annotations
 
@@ -12,28 +12,27 @@ from ..state.state import LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 ROUNDING = 4.0 * np.finfo(float).eps
-"""Change of the total, in itself, that is none: its last digits; of bodies at rest, up to 64,000 grains, one."""
+"""Relative change of the total energy attributed to rounding; bodies at rest of up to 64,000 grains change by one unit in the last place."""
 
 
 def dissipated_in(row: Mapping[str, float]) -> float:
-    """Energy dissipated up to a row [J], forming included.
+    """Energy dissipated up to a row of the ledger [J], contact formation included.
 
-    What stiffnesses make or destroy and what the sources of outside forces give is not; a gas counts if it took more
-    than it gave.
+    Work of stiffness changes and of external fields is excluded; the gas counts if it took more energy than it gave.
     """
     channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
     return math.fsum([*(row[name] for name in channels), max(row["lost_gas"], 0.0)])
 
 
-class Books:
-    """Rows, oldest first, and their columns by name.
+class LedgerColumns:
+    """Rows of a ledger, oldest first, with access to columns by name.
 
     Parameters
     ----------
-    columns : Sequence[str]
-        names, in the order of the file.
-    rows : Iterable[dict[str, float]], optional
-        each a number for every column.
+    columns : sequence of str
+        Names, in the order of the file.
+    rows : iterable of dict, optional
+        One number for every column each.
     """
 
     def __init__(self, columns: Sequence[str], rows: Iterable[dict[str, float]] = ()):
@@ -41,25 +40,25 @@ class Books:
         self.rows: list[dict[str, float]] = list(rows)
 
     @classmethod
-    def of(cls, rows: Sequence[dict[str, float]]) -> Books:
-        """Of the rows of a ledger file; no columns where there is no row."""
-        return Books(tuple(rows[0]) if rows else (), rows)
+    def from_rows(cls, rows: Sequence[dict[str, float]]) -> LedgerColumns:
+        """Build from the rows of a ledger file; without rows there are no columns."""
+        return LedgerColumns(tuple(rows[0]) if rows else (), rows)
 
     def __len__(self) -> int:
         return len(self.rows)
 
-    def taken(self, numbers: Iterable[int]) -> Books:
-        """Books of some of the rows."""
-        return Books(self.columns, (self.rows[k] for k in numbers))
+    def select(self, numbers: Iterable[int]) -> LedgerColumns:
+        """Copy with the rows of these indices."""
+        return LedgerColumns(self.columns, (self.rows[k] for k in numbers))
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """One column over time.  Raises BadInput for a name that is no column."""
+        """Values of one column over time. Raises NoSuchKey if there is no such column."""
         if column not in self.columns:
             raise NoSuchKey(f"there is no column {shown(column)}; {did_you_mean(str(column), self.columns)}")
         return np.array([row[column] for row in self.rows])
 
     def _change(self) -> float:
-        """|change of the total| [J]; 0 where it is rounding."""
+        """Magnitude of the change of the total energy [J]; 0 within rounding."""
         if not self.rows:
             return 0.0
         first, last = self.rows[0]["total"], self.rows[-1]["total"]
@@ -68,14 +67,15 @@ class Books:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated so far [J], forming included, see `dissipated_in`; 0 without a row."""
+        """Energy dissipated so far [J], see `dissipated_in`; 0 without rows."""
         return dissipated_in(self.rows[-1]) if self.rows else 0.0
 
     @property
     def drift(self) -> float:
-        """|change of the total| / (energy dissipated, forming included, + largest kinetic energy of any row).
+        """Relative energy error |ΔE_total| / (energy dissipated + largest kinetic energy of any row).
 
-        0 where the change is within the rounding of the total, as in a body at rest.
+        Formation of contacts counts as dissipation. 0 if the change is within the rounding of the total, as in a body
+        at rest.
         """
         largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
         scale = self.dissipated + largest

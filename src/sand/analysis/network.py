@@ -1,4 +1,4 @@
-"""How grains hang together: ends, junctions, rings, chains."""
+"""Contact network of an aggregate: ends, junctions, rings and chains."""
 
 from __future__ import annotations
 
@@ -13,40 +13,41 @@ from .shape import coordination
 
 
 class Network(NamedTuple):
-    """Of one aggregate."""
+    """Topology of the contact network of one aggregate."""
 
     ends: int  # grains with one contact
-    junctions: int  # grains with three or more
+    junctions: int  # grains with three or more contacts
     rings: int  # independent closed loops, C − N + 1
-    longest: int  # grains on the longest of all shortest ways from grain to grain
-    chains: np.ndarray  # grains of each piece without junctions, ends and links included, largest first
+    longest: int  # grains on the longest of the shortest paths between grains (graph diameter)
+    chains: np.ndarray  # grains of each piece between junctions, largest first
     coordination: float  # mean number of contacts of a grain
 
 
 def network(count: int, pairs: np.ndarray) -> Network:
     """Ends, junctions, rings and chains of one aggregate.
 
+    `longest` is exact for trees. With rings it is the path between two distant ends found by two breadth-first
+    searches.
+
     Parameters
     ----------
     count : int
-        grains N ≥ 1, all connected.
+        Number of grains N ≥ 1, all connected.
     pairs : ndarray
-        contacts (C, 2), each once.
-
-    `longest` is exact for trees, and the way between two far ends (found by two searches) where there are rings.
+        Contacts (C, 2), each once.
     """
     ends = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
-    held = coordination(count, ends)
-    inside = (held[ends] <= 2).all(axis=1)
-    pieces = cluster_labels(count, ends[inside])
-    lengths = np.bincount(pieces[held <= 2], minlength=1)
+    contacts = coordination(count, ends)
+    unbranched = (contacts[ends] <= 2).all(axis=1)
+    pieces = cluster_labels(count, ends[unbranched])
+    lengths = np.bincount(pieces[contacts <= 2], minlength=1)
     return Network(
-        int((held == 1).sum()),
-        int((held >= 3).sum()),
+        int((contacts == 1).sum()),
+        int((contacts >= 3).sum()),
         int(len(ends) - count + connected_components(_graph(count, ends), directed=False)[0]),
         _longest(count, ends),
         np.sort(lengths[lengths > 0])[::-1],
-        float(held.mean()),
+        float(contacts.mean()),
     )
 
 
@@ -55,13 +56,13 @@ def _graph(count: int, ends: np.ndarray) -> coo_array:
 
 
 def _longest(count: int, ends: np.ndarray) -> int:
-    """The farthest grain from the farthest grain from any grain; in grains."""
-    graph, at = _graph(count, ends), 0
+    """Number of grains on the path to the farthest grain from the farthest grain from grain 0."""
+    graph, start = _graph(count, ends), 0
     steps = np.zeros(count, dtype=int)
     for _ in range(2):
-        order, before = breadth_first_order(graph, at, directed=False)
-        steps[at] = 0
+        order, predecessor = breadth_first_order(graph, start, directed=False)
+        steps[start] = 0
         for grain in order[1:]:
-            steps[grain] = steps[before[grain]] + 1
-        at = int(order[-1])
-    return int(steps[at]) + 1
+            steps[grain] = steps[predecessor[grain]] + 1
+        start = int(order[-1])
+    return int(steps[start]) + 1

@@ -1,4 +1,4 @@
-"""The area that a heap of discs covers."""
+"""Exact area of the union of discs, for projected areas of aggregates."""
 
 import math
 
@@ -9,14 +9,14 @@ from ..compiler.jit import kernel, loop
 
 @loop
 def _covered(x, y, r, i, reach, start, end):
-    """Arcs of circle i that lie within other discs: their number in `start` and `end`, or −1 if all of it does."""
+    """Arcs of circle i covered by other discs: their number, with limits in `start` and `end`; −1 if all is covered."""
     n, found = x.size, 0
     for way in (-1, 1):
         j = i + way
         while 0 <= j < n and abs(x[j] - x[i]) < r[i] + reach:
             dx, dy = x[j] - x[i], y[j] - y[i]
             d = math.sqrt(dx * dx + dy * dy)
-            # of two discs that are the same, the later one is hidden
+            # of two identical discs, the later one is covered
             if d + r[i] < r[j] or (d + r[i] == r[j] and (r[j] > r[i] or j < i)):
                 return -1
             if d < r[i] + r[j] and d + r[j] > r[i]:
@@ -39,14 +39,14 @@ def _covered(x, y, r, i, reach, start, end):
 
 @loop
 def _arc(x, y, r, low, high):
-    """½∮(x dy − y dx) along an arc of a circle."""
+    """Contribution ½∮(x dy − y dx) of an arc of a circle."""
     turned = r * (high - low) + x * (math.sin(high) - math.sin(low)) - y * (math.cos(high) - math.cos(low))
     return 0.5 * r * turned
 
 
 @loop
 def _sort(start, end, count):
-    """Sort arcs by where they start."""
+    """Sort arcs by their start (insertion sort)."""
     for a in range(1, count):
         low, high, b = start[a], end[a], a - 1
         while b >= 0 and start[b] > low:
@@ -57,7 +57,7 @@ def _sort(start, end, count):
 
 @kernel
 def _union(x, y, r, reach, start, end):
-    """Sum of the free arcs of all circles (Green's theorem)."""
+    """Area by Green's theorem: sum over the uncovered arcs of all circles."""
     area = 0.0
     for i in range(x.size):
         count = _covered(x, y, r, i, reach, start, end)
@@ -80,9 +80,9 @@ def area_of_union(x: np.ndarray, y: np.ndarray, r: np.ndarray, reach: float) -> 
     Parameters
     ----------
     x, y, r : ndarray
-        (N,) centres, sorted by x, and radii [m].
+        Centres, sorted by x, and radii (N,) [m].
     reach : float
-        the largest radius [m].
+        Largest radius [m].
     """
-    room = 2 * len(x) + 2
-    return float(_union(x, y, np.ascontiguousarray(r), reach, np.empty(room), np.empty(room)))
+    size = 2 * len(x) + 2
+    return float(_union(x, y, np.ascontiguousarray(r), reach, np.empty(size), np.empty(size)))

@@ -1,4 +1,4 @@
-"""What each grain, and each contact, of a frame can be told by: one table for pictures, histograms and viewers."""
+"""Quantities of grains and contacts in a frame: one table for colours, histograms and the viewer."""
 
 from __future__ import annotations
 
@@ -10,20 +10,19 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.frame import MODES as SHARES
-from .clusters import cluster_labels, cluster_sizes
-from .magnetism import aggregate_moments
+from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 
 MODES = ("within its limits", *SHARES)
-"""Of `mode`: which way a contact has reached what it can bear."""
+"""Names of the values of `mode`: the contact mode that is at its limit."""
 AT_LIMIT = 0.999
-"""Share of what a contact can bear from which a mode is at its limit; a clamp holds it at 1 but for rounding."""
+"""Fraction of the critical displacement from which a mode is at its limit; clamping keeps it at 1 but for rounding."""
 
 
 class Quantity(NamedTuple):
     """One number per grain, or per contact.
 
-    `of(frame, field)` gives them, NaN where there is none; `field` is the flux density of outside [T] (3,) or None.
+    `of(frame, field)` computes them, NaN where undefined; `field` is the external flux density (3,) [T] or None.
     """
 
     name: str
@@ -31,18 +30,18 @@ class Quantity(NamedTuple):
     meaning: str
     kind: str  # "sequential", "diverging" about zero, "categorical": whole numbers
     of: Callable[[Any, np.ndarray | None], np.ndarray]
-    missing: str  # why there is none, where all are NaN
+    missing: str  # reason if all values are NaN
 
 
 def cluster_rank(count: int, pairs: np.ndarray) -> np.ndarray:
-    """The cluster of each grain (N,), counted from the largest, 0; of equal ones that with the lowest grain first."""
+    """Rank of the cluster of each grain (N,) by size, 0 for the largest; equal sizes by their lowest grain."""
     labels = cluster_labels(count, pairs)
     order = np.argsort(-cluster_sizes(labels), kind="stable")
     return np.argsort(order, kind="stable")[labels]
 
 
 def material_names(frame: Any) -> list[str]:
-    """Names that `material` counts in."""
+    """Names of the materials, in the order of the indices in `material`."""
     return [str(getattr(one, "name", one)) for one in frame.materials]
 
 
@@ -71,7 +70,7 @@ def _cluster_size(frame: Any) -> np.ndarray:
 def _alignment(frame: Any, _: np.ndarray | None) -> np.ndarray:
     labels = cluster_labels(len(frame.radius), frame.pair)
     sums, aligned = aggregate_moments(frame.moment, labels)
-    known = (aligned > 1e-9) & (cluster_sizes(labels) > 1)  # with itself a single grain is always aligned
+    known = (aligned > 1e-9) & (cluster_sizes(labels) > 1)  # a single grain is trivially aligned
     return _cosine(frame.moment, np.where(known[:, None], sums, 0.0)[labels])
 
 
@@ -89,7 +88,7 @@ def _load(frame: Any, _: np.ndarray | None) -> np.ndarray:
 
 def _mode(frame: Any, _: np.ndarray | None) -> np.ndarray:
     share = np.abs(np.asarray(frame.share, dtype=np.float64)).reshape(-1, 4)
-    share[:, 0] = np.asarray(frame.share, dtype=np.float64).reshape(-1, 4)[:, 0]  # pressed is no limit
+    share[:, 0] = np.asarray(frame.share, dtype=np.float64).reshape(-1, 4)[:, 0]  # compression has no limit
     worst = np.argmax(np.where(np.isnan(share), -np.inf, share), axis=1) + 1.0
     reached = np.max(share, axis=1, initial=-np.inf, where=~np.isnan(share)) >= AT_LIMIT
     return np.where(np.isnan(share).all(axis=1), np.nan, np.where(reached, worst, 0.0))
@@ -113,7 +112,7 @@ GRAINS = (
         "cosine of moment to that of its cluster",
         "diverging",
         _alignment,
-        "no grain that touches another has a moment",
+        "no grain in contact has a moment",
     ),
     Quantity(
         "field_alignment",
@@ -121,16 +120,16 @@ GRAINS = (
         "cosine of moment to field",
         "diverging",
         _field_alignment,
-        "no grain has a moment, or there is no outside field",
+        "no grain has a moment, or there is no external field",
     ),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
 )
-"""Of grains (N,)."""
+"""Quantities of grains (N,)."""
 CONTACTS = (
     Quantity("load", "N", "normal force, above 0 if pressed", "diverging", _load, "the file holds no forces"),
-    Quantity("mode", "1", "mode at its limit", "categorical", _mode, "the file does not say what contacts bear"),
+    Quantity("mode", "1", "mode at its limit", "categorical", _mode, "the file has no contact displacements"),
 )
-"""Of contacts (C,)."""
+"""Quantities of contacts (C,)."""
 GRAIN_NAMES = tuple(one.name for one in GRAINS)
 CONTACT_NAMES = tuple(one.name for one in CONTACTS)
 _BY_NAME: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS)}
@@ -138,7 +137,7 @@ _BY_NAME: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS
 
 @checked
 def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
-    """The quantity of that name.  Raises BadInput."""
+    """Look up a quantity by name. Raises BadInput if it is not one of `allowed`."""
     if name not in allowed:
         raise BadInput(f"there is no quantity '{name}'; {did_you_mean(name, allowed)}")
     return _BY_NAME[name]
@@ -146,21 +145,21 @@ def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
 
 @checked
 def measured(frame: Any, name: str, field: np.ndarray | None = None) -> np.ndarray:
-    """The numbers of a quantity in a frame, SI: (N,) of grains or (C,) of contacts, NaN where there is none.
+    """Values of a quantity in a frame (SI): (N,) for grains or (C,) for contacts, NaN where undefined.
 
     Parameters
     ----------
-    frame
-        of a trajectory, or anything that has its attributes.
+    frame : Frame
+        Frame of a trajectory, or any object with its attributes.
     name : str
-        see GRAINS and CONTACTS.
+        Name in `GRAINS` or `CONTACTS`.
     field : ndarray or None, optional
-        flux density of outside (3,) [T].
+        External flux density (3,) [T].
 
     Raises
     ------
     BadInput
-        no such quantity, or the frame has no number for it.
+        If there is no such quantity, or all its values are undefined.
     """
     found = quantity(name, GRAIN_NAMES + CONTACT_NAMES)
     refuse_other(frame, "radius", "pair")

@@ -1,4 +1,4 @@
-"""Names of clusters that stay while clusters grow: the same aggregate has the same name in all frames."""
+"""Persistent names of clusters: a growing aggregate keeps its name from frame to frame."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from ..errors import BadInput
 from .clusters import cluster_labels
 
 SINGLE = 0xFFFFFFFF
-"""Name of a grain that touches none."""
+"""Name of a grain without contacts."""
 CHECKPOINTS = 64 * 2**20
-"""Bytes of names that a `Lineage` keeps, about."""
+"""Approximate memory for the names kept by a `Lineage` [bytes]."""
 
 
-def named(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Names of the clusters of a frame, from the names that their grains had in the frame before.
+def inherit_names(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Name the clusters of a frame after the names of their grains in the frame before.
 
-    A cluster takes the name that most of its grains had, the lower of two that are as many.  Where several claim one
-    name, the one with most grains of that name keeps it, of two that are as many the one with the lowest grain.  All
-    others get a new name: the number of their lowest grain, or the lowest number that neither is nor was a name.
+    A cluster claims the most frequent name of its grains, the lower one in a tie. If several clusters claim a name,
+    the one with most grains of that name keeps it, in a tie the one with the lowest grain. All others get a new name:
+    the index of their lowest grain, or the lowest number that is not in use in either frame.
 
     Parameters
     ----------
     before : ndarray
-        names (N,) uint32, SINGLE for grains that touched none.
+        Names (N,) uint32, `SINGLE` for grains without contacts.
     labels : ndarray
-        cluster of each grain now (N,), 0…K−1, numbered by their lowest grain.
+        Cluster of each grain now (N,), 0…K−1, numbered by their lowest grain.
 
     Returns
     -------
     ndarray
-        Names (N,) uint32 below N, SINGLE for single grains.
+        Names (N,) uint32 below N, `SINGLE` for grains without contacts.
     """
     count = len(labels)
     sizes = np.bincount(labels)
@@ -41,9 +41,9 @@ def named(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
     if voting.any():
         keys, votes = np.unique(labels[voting].astype(np.int64) * count + before[voting], return_counts=True)
         cluster, name = keys // count, keys % count
-        ballot = _first(cluster, np.lexsort((name, -votes, cluster)))  # the name each cluster claims
-        cluster, name, votes = cluster[ballot], name[ballot], votes[ballot]
-        kept = _first(name, np.lexsort((cluster, -votes, name)))  # the cluster each name goes to
+        claims = _first(cluster, np.lexsort((name, -votes, cluster)))  # the name that each cluster claims
+        cluster, name, votes = cluster[claims], name[claims], votes[claims]
+        kept = _first(name, np.lexsort((cluster, -votes, name)))  # the cluster that keeps each name
         of_cluster[cluster[kept]] = name[kept]
     new = np.flatnonzero((sizes > 1) & (of_cluster == SINGLE))
     if new.size:
@@ -52,20 +52,20 @@ def named(before: np.ndarray, labels: np.ndarray) -> np.ndarray:
 
 
 def _first(group: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """The first of each group in an order that keeps groups together."""
+    """First element of each group, in an order that keeps groups contiguous."""
     head = np.ones(len(order), dtype=bool)
     head[1:] = group[order][1:] != group[order][:-1]
     return order[head]
 
 
 def _new_names(before: np.ndarray, labels: np.ndarray, taken: np.ndarray, new: np.ndarray) -> np.ndarray:
-    """Names of the clusters `new`; there are enough, because clusters then and now are at most N/2 each."""
+    """Unused names for the clusters `new`; they suffice, because both frames have at most N/2 clusters each."""
     count = len(labels)
     free = np.ones(count, dtype=bool)
     free[before[before != SINGLE]] = False
     free[taken[taken != SINGLE]] = False
     lowest = np.empty(len(taken), dtype=np.int64)
-    lowest[labels[::-1]] = np.arange(count)[::-1]  # the last one assigned stays
+    lowest[labels[::-1]] = np.arange(count)[::-1]  # the last assignment, that of the lowest grain, remains
     names = lowest[new]
     others = ~free[names]
     free[names] = False
@@ -74,18 +74,18 @@ def _new_names(before: np.ndarray, labels: np.ndarray, taken: np.ndarray, new: n
 
 
 class Lineage:
-    """Names of the clusters in each of many frames, worked out from the first on.
+    """Names of the clusters in each frame of a trajectory, propagated from the first frame on.
+
+    Names of a frame depend only on the frames up to it, not on the order of access. They are kept for every m-th
+    frame, and m doubles when they take more than `CHECKPOINTS` bytes.
 
     Parameters
     ----------
     count : int
-        number of grains N.
-    pairs : Callable[[int], ndarray]
-        contacts (C, 2) of a frame by its number; BadInput for one that cannot be read, which leaves names as
-        they were before it, as one of other grains does.
-
-    Names of a frame depend on the frames before it alone, not on what was asked for before: they are kept of every m-th
-    frame, and m doubles when that takes more than CHECKPOINTS bytes.
+        Number of grains N.
+    pairs : callable
+        Returns the contacts (C, 2) of a frame by its index. Frames for which it raises BadInput, or that have other
+        grains, keep the names of the frame before.
     """
 
     def __init__(self, count: int, pairs: Callable[[int], np.ndarray]):
@@ -93,15 +93,15 @@ class Lineage:
         self._every = 1
         self._most = max(CHECKPOINTS // (4 * max(count, 1)), 4)
         self._kept: dict[int, np.ndarray] = {}
-        self._at: tuple[int, np.ndarray, np.ndarray] | None = None  # number, contacts, names of the last one asked for
+        self._at: tuple[int, np.ndarray, np.ndarray] | None = None  # index, contacts, names of the last frame read
 
     def names(self, frame: int) -> np.ndarray:
-        """Names (N,) uint32 of the clusters in a frame ≥ 0, SINGLE for single grains."""
+        """Names (N,) uint32 of the clusters in a frame ≥ 0, `SINGLE` for grains without contacts."""
         start, pairs, names = self._nearest(frame)
         for number in range(start + 1, frame + 1):
             now = self._readable(number)
             if now is not None and (pairs is None or not np.array_equal(now, pairs)):
-                names = named(names, cluster_labels(self.count, now))
+                names = inherit_names(names, cluster_labels(self.count, now))
             pairs = pairs if now is None else now
             self._keep(number, names)
         if pairs is not None:
@@ -109,7 +109,7 @@ class Lineage:
         return names
 
     def _readable(self, number: int) -> np.ndarray | None:
-        """Contacts of a frame; None if they cannot be had."""
+        """Contacts of a frame; None if they cannot be read."""
         try:
             pairs = self._pairs(number)
         except BadInput:
@@ -117,7 +117,7 @@ class Lineage:
         return pairs if pairs.size == 0 or int(pairs.max()) < self.count else None
 
     def _nearest(self, frame: int) -> tuple[int, np.ndarray | None, np.ndarray]:
-        """The last frame up to this one whose names are known, its contacts if they are, and its names."""
+        """Index, contacts (if known) and names of the last frame up to this one whose names are known."""
         kept = max((k for k in self._kept if k <= frame), default=-1)
         if self._at is not None and kept <= self._at[0] <= frame:
             return self._at

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
+from ..arguments import MOST_GRAINS
 from ..errors import BadInput
-from ..limits import MOST_GRAINS
 from . import options, report
 from .exits import DONE
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import click
 
+from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 from ..io.run_folder import checked_name
-from ..limits import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
 
 
 class PathName(click.ParamType):

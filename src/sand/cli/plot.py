@@ -152,12 +152,12 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
 
 def _history(source: Source) -> tuple[Any, int, float]:
     """The ledger, the number of grains, and their temperature at the start [K].  Raises BadInput."""
-    from ..analysis.ledger_columns import Books
+    from ..analysis.ledger_columns import LedgerColumns
     from ..forces.pair.dipoles import kinetic_temperature
     from ..io.ledger_table import read_ledger
     from ..io.run_folder import LEDGER
 
-    books = Books.of(read_ledger(source.path / LEDGER))
+    books = LedgerColumns.from_rows(read_ledger(source.path / LEDGER))
     first = _frame(source, 0)
     return books, len(first), kinetic_temperature(first)
 

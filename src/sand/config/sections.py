@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
 from ..io.run_folder import checked_name
-from ..limits import MOST_GRAINS, MOST_SEED, MOST_STEPS
 from ..simulation.stop import duration
 from ..units import si
 

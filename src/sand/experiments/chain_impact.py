@@ -19,7 +19,7 @@ from ..errors import BadInput
 from ..integrate.verlet import Verlet
 from ..material import Material
 from ..setup.aggregates import chain, rest_distance
-from ..setup.encounters import joined
+from ..setup.encounters import combined
 from ..simulation.simulation import Simulation
 from ..units import si
 
@@ -81,7 +81,7 @@ def strike(
     body = chain(grains, radius=r, material=material)
     above = body.position[-1] + r * np.array([place, START, 0.0])
     projectile = chain(1, radius=r, material=material)
-    met = joined([body, projectile], shifts=[np.zeros(3), above], velocities=[np.zeros(3), np.array([0.0, -v, 0.0])])
+    met = combined([body, projectile], shifts=[np.zeros(3), above], velocities=[np.zeros(3), np.array([0.0, -v, 0.0])])
     options.setdefault("frame_every", FLIGHT * r / v)
     fine = stepping or Verlet(steps_per_period=FINE)
     simulation = Simulation(met, [contact or Contact()], stepping=fine, **options)

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from ..arguments import MOST_GRAINS
 from ..config.bodies import body_from_file
 from ..config.case import (
     INTEGRATORS,
@@ -30,11 +31,10 @@ from ..errors import BadInput, did_you_mean
 from ..grains import Grains, moment_size
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
-from ..limits import MOST_GRAINS
 from ..material import PRESETS, Material
 from ..setup.aggregates import build
 from ..setup.encounters import offset_of
-from ..setup.moments import WAYS
+from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
 from .collision import Approach, Collision, approach, finished, gone_on_with, prepared
@@ -79,8 +79,8 @@ class BodySection(Section):
     @field_validator("moments")
     @classmethod
     def _moments(cls, value: str | None) -> str | None:
-        if value is not None and value not in WAYS:
-            raise ValueError(f"moments = {value!r}; {did_you_mean(value, list(WAYS))}")
+        if value is not None and value not in MOMENT_MODES:
+            raise ValueError(f"moments = {value!r}; {did_you_mean(value, list(MOMENT_MODES))}")
         return value
 
     @field_validator("moment")

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.fits import PowerLaw, RateLaw, power_law, rate_law
+from ..analysis.fits import PowerLawFit, RateLaw, power_law, rate_law
 from ..analysis.fractal import Dimension, ensemble_dimension
-from ..analysis.frame_statistics import COLUMNS, census
+from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..results import Run
@@ -57,7 +57,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
     found: list[dict[str, np.ndarray]] = []
     for number in numbers:
         frame = frames[int(number)]
-        rows = census(frame, least)
+        rows = aggregate_statistics(frame, least)
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
     first = frames[0]
     frames.close()
@@ -102,9 +102,9 @@ class Growth(NamedTuple):
     sizes: np.ndarray  # (boxes, K): S(t)
     window: tuple[float, float]  # of S, for z
     z: RateLaw | None  # dS/dt ∝ S^λ, S = (1 + t/zτ)^z
-    slope: PowerLaw | None  # the straight line S ∝ t^slope
-    moment: PowerLaw | None  # μ/μ1 = N^γ
-    moment_without_rings: PowerLaw | None  # the same, of aggregates without rings
+    slope: PowerLawFit | None  # the straight line S ∝ t^slope
+    moment: PowerLawFit | None  # μ/μ1 = N^γ
+    moment_without_rings: PowerLawFit | None  # the same, of aggregates without rings
     dimension: Dimension | None  # N = k (r_g/a)^D
     missing: dict[str, str]
 
@@ -158,7 +158,7 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
 
     of_box, rows = _all_aggregates(boxes)
 
-    def moment_law(which: np.ndarray) -> PowerLaw:
+    def moment_law(which: np.ndarray) -> PowerLawFit:
         if boxes[0].moment == 0.0:
             raise BadInput("the grains have no moments")
         return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
@@ -189,7 +189,7 @@ def _within(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) ->
     return time[used], sizes[:, used]
 
 
-def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLaw:
+def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLawFit:
     return power_law(np.tile(time, len(sizes)), sizes.ravel(), np.repeat(np.arange(len(sizes)), len(time)))
 
 

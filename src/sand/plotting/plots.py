@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..analysis.clusters import cluster_labels
 from ..analysis.frame_statistics import size_distribution
-from ..analysis.ledger_columns import Books
+from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import material_names, measured, quantity
 from ..errors import BadInput
 from .panels import (
@@ -44,12 +44,12 @@ HISTORY = tuple(_DRAW)
 """Figures over time."""
 
 
-def history_figure(books: Books, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
+def history_figure(books: LedgerColumns, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
     """One figure over time, of those in HISTORY.
 
     Parameters
     ----------
-    books : Books
+    books : LedgerColumns
         rows of a run's ledger.
     grains : int
         their number; temperature: kinetic, of the start [K]: energies are in N k_B T, in joules if it is 0.

@@ -1,4 +1,4 @@
-"""How simulations begin."""
+"""Initial conditions: gases, lattices, aggregates, collision set-ups and frames of earlier runs."""
 
 from ..neighbours.spatial_sort import in_space_order
 from .aggregates import KINDS, build, chain, grain, hexagonal, lattice
@@ -13,7 +13,7 @@ from .moments import magnetic_energy, relaxed
 from .population import Lognormal, PowerLaw
 
 pca = bpca
-"""The former name."""
+"""Former name of `bpca`."""
 
 __all__ = [
     "KINDS",

@@ -1,4 +1,4 @@
-"""Aggregates from straight flights: particle–cluster and cluster–cluster."""
+"""Ballistic aggregation: particle–cluster (BPCA) and cluster–cluster (BCCA)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ import numpy as np
 
 from ..arguments import checked
 from ..grains import Grains
-from ._kernels.aggregation import begin_hash_grid, grow_ballistic
+from ._kernels.aggregation import grow_ballistic, place_first_grain
 from ._kernels.cluster_cluster import join_ballistic
-from .growing import TRIES, halves, require_all_placed, room
-from .moments import magnetised
-from .population import Population, centred_grains, population, streams, whole
-
-ADVICE = "take larger grains, stiffer ones, or a narrower law of radii"
+from .growing import TRIES, empty_hash_grid, halves, require_all_placed
+from .moments import assign_moments
+from .population import Population, centred_grains, grain_count, population, random_streams
 
 
 @checked
@@ -22,41 +20,41 @@ def bpca(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,
 ) -> Grains:  # fmt: skip
-    """Ballistic particle–cluster aggregate: grains fly in one by one, from all sides on straight lines, and stay.
+    """Ballistic particle–cluster aggregate: grains arrive on random straight lines and stay at first contact.
 
-    A dense ball with a fractal dimension near 3: N − 1 contacts, each at rest.
+    A compact aggregate with a fractal dimension near 3 and N − 1 contacts, each in mechanical equilibrium.
 
     Parameters
     ----------
     grains : int
-        N ≥ 1.
-    radius
-        [m], one, (N,), or a law: `Lognormal`, `PowerLaw`, or text as for `radii_of`.
-    material
-        one, N of them, or parts of each, {"silica": 0.7, "iron": 0.3}.
-    moment : optional
-        size of each moment, as for `sand.Grains`, or one vector (3,) [A m²], which all then have whatever
-        `moments` says, but for "relaxed"; none by default.
+        Number of grains N ≥ 1.
+    radius : float or str or array_like or Lognormal or PowerLaw
+        One radius [m], (N,) radii, or a distribution: `Lognormal`, `PowerLaw`, or text as for `radii_of`.
+    material : Material or str or sequence or mapping
+        One material, N of them, or fractions, {"silica": 0.7, "iron": 0.3}.
+    moment : float or str or array_like, optional
+        Magnitude of each moment, as for `sand.Grains`, or one vector (3,) [A m²] for all grains, which replaces the
+        directions of `moments` except for "relaxed". Default: no moments.
     moments : str, optional
-        "random", "aligned" (along z) or "relaxed" (in each other's field, a minimum of the energy).
-    magnetic : optional
-        part of the grains that have the moment, 0 … 1.
+        Directions: "random", "aligned" (along z) or "relaxed" (a local minimum of the magnetic energy).
+    magnetic : float, optional
+        Fraction of the grains that have a moment, 0 … 1.
     seed : int, optional
-        same seed, same aggregate.
+        Seed of the random numbers; equal seeds give equal aggregates.
 
     Raises
     ------
     BadInput
-        wrong numbers, or grains that cannot touch one at a time.
+        If an argument is invalid, or grains cannot be placed with a single contact.
     """
-    chance = streams(seed)
-    made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)
-    position, crowd = np.zeros((3, len(made.radius))), room(made.grain_set)
-    begin_hash_grid(crowd, position)
-    count, size = len(made.radius), float(made.radius[0])
-    done, _ = grow_ballistic(crowd, position, made.grain_set, 1, count, size, chance.places, TRIES)
-    require_all_placed(done, count, f"grain {done}", ADVICE)
-    return magnetised(centred_grains(position.T, made), moment, moments, magnetic, chance.moments)
+    rng = random_streams(seed)
+    sample = population(grain_count(grains, "grains of an aggregate"), radius, material, rng.population)
+    position, grid = np.zeros((3, len(sample.radius))), empty_hash_grid(sample.grain_set)
+    place_first_grain(grid, position)
+    count, size = len(sample.radius), float(sample.radius[0])
+    done, _ = grow_ballistic(grid, position, sample.grain_set, 1, count, size, rng.positions, TRIES)
+    require_all_placed(done, count, f"grain {done}")
+    return assign_moments(centred_grains(position.T, sample), moment, moments, magnetic, rng.moments)
 
 
 @checked
@@ -64,42 +62,44 @@ def bcca(
     grains: int, *, radius: Any, material: Any, moment: Any = None, moments: str = "random", magnetic: Any = 1.0,
     seed: int = 0,
 ) -> Grains:  # fmt: skip
-    """Ballistic cluster–cluster aggregate: halves, made the same way, turned at random, fly into each other.
+    """Ballistic cluster–cluster aggregate: recursively built halves collide in random orientation on straight lines.
 
-    Fractal dimension about 1.9.  Arguments and errors as for `bpca`; N need not be a power of 2.
+    Fractal dimension about 1.9. Parameters and errors as for `bpca`; N need not be a power of 2.
     """
-    chance = streams(seed)
-    made = population(whole(grains, "grains of an aggregate"), radius, material, chance.population)
-    position = joined(made, halves(0, len(made.radius)), None, chance.places, 1)
-    return magnetised(centred_grains(position, made), moment, moments, magnetic, chance.moments)
+    rng = random_streams(seed)
+    sample = population(grain_count(grains, "grains of an aggregate"), radius, material, rng.population)
+    position = merge_clusters(sample, halves(0, len(sample.radius)), None, rng.positions, 1)
+    return assign_moments(centred_grains(position, sample), moment, moments, magnetic, rng.moments)
 
 
-def joined(
-    made: Population, joins: list[tuple[int, int, int]], goals: np.ndarray | None, seed: np.uint64, choices: int
+def merge_clusters(
+    sample: Population, joins: list[tuple[int, int, int]], goals: np.ndarray | None, seed: np.uint64, choices: int
 ) -> np.ndarray:
-    """Places (N, 3) [m] of grains whose clusters fly into each other, see
-    `setup._kernels.cluster_cluster.join_ballistic`.
+    """Positions (N, 3) [m] of grains whose clusters merge in ballistic collisions.
 
     Parameters
     ----------
+    sample : Population
+        Radii and materials of the grains.
+    joins : list of tuple of int
+        Pairs of clusters (first, middle, last), see `halves`.
     goals : ndarray or None
-        radius of gyration [m] wanted after each join; None: whatever chance gives.
+        Target radius of gyration [m] of each merged cluster; None: none.
+    seed : int
+        Seed of the random numbers.
     choices : int
-        meetings to choose from where one is wanted.
+        Number of collisions from which the one nearest to the target is taken.
 
     Raises
     ------
     BadInput
-        two clusters did not meet in a single contact.
+        If two clusters found no collision with a single contact.
     """
-    position = np.zeros((3, len(made.radius)))
+    position = np.zeros((3, len(sample.radius)))
     plan = np.array(joins, dtype=np.int64).reshape(-1, 3).T.copy()
     aims = np.full(plan.shape[1], np.inf) if goals is None else goals
-    table = room(made.grain_set, 2.0 * made.grain_set.largest)
-    done = join_ballistic(table, position, np.zeros_like(position), made.grain_set, plan, aims, seed, TRIES, choices)
-    require_all_placed(done, plan.shape[1], f"a cluster of {_size(joins, done)} grains", ADVICE)
+    table = empty_hash_grid(sample.grain_set, 2.0 * sample.grain_set.largest)
+    done = join_ballistic(table, position, np.zeros_like(position), sample.grain_set, plan, aims, seed, TRIES, choices)
+    if done < len(joins):
+        require_all_placed(done, len(joins), f"a cluster of {joins[done][2] - joins[done][1]} grains")
     return position.T
-
-
-def _size(joins: list[tuple[int, int, int]], done: int) -> int:
-    return joins[done][2] - joins[done][1] if done < len(joins) else 0

@@ -1,4 +1,4 @@
-"""Whether grains that are given can be the start of anything: overlaps and gaps, named grain by grain."""
+"""Checks of bodies read from files: excessive overlaps and disconnected grains, reported with grain indices."""
 
 from __future__ import annotations
 
@@ -10,36 +10,44 @@ from ..grains import ROUNDING, Grains
 from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)
-"""Overlaps at the start may reach 2 δ0 or 1e-3 radii, whichever is more."""
-TOLD = 10
+"""Largest initial overlap: the larger of 2 δ0 and 1e-3 of the smaller radius."""
+MOST_MESSAGES = 10
+"""Number of errors that are listed."""
 
 
 def most_overlap(rest: np.ndarray | float, smaller: np.ndarray | float) -> np.ndarray:
-    """Largest overlap at the start [m] of grains with this overlap at rest [m], the smaller of this radius [m]."""
+    """Largest allowed initial overlap [m] for an equilibrium overlap and a smaller radius of the pair [m]."""
     return np.maximum(MOST_OVERLAP[0] * np.asarray(rest), MOST_OVERLAP[1] * np.asarray(smaller))
 
 
 def check_body(body: Grains, origin: str) -> None:
-    """Raises BadInput naming grains (the first ten) that overlap by too much, or touch none of the largest cluster.
+    """Check a body for excessive overlaps and for grains that are not connected to its largest cluster.
 
     Parameters
     ----------
+    body : Grains
+        The body.
     origin : str
-        where the body comes from, for the message.
+        Source of the body, for the message.
+
+    Raises
+    ------
+    BadInput
+        One line for each of the first ten such grains or pairs.
     """
     problems = _overlaps(body) or _gaps(body)
     if problems:
-        more = len(problems) - TOLD
-        told = problems if more <= 0 else [*problems[:TOLD], f"… and {more} more"]
-        raise BadInput(f"{origin}: {problem}" for problem in told)
+        more = len(problems) - MOST_MESSAGES
+        listed = problems if more <= 0 else [*problems[:MOST_MESSAGES], f"… and {more} more"]
+        raise BadInput(f"{origin}: {problem}" for problem in listed)
 
 
 def _pairs(body: Grains) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs that touch (P, 2), and their overlaps [m]."""
+    """Pairs of grains in contact (P, 2), and their overlaps [m]."""
     pairs = Box.open().close_pairs(body.position, 2.0 * float(body.radius.max()) * (1.0 + ROUNDING))
     overlap = body.overlaps(pairs, Box.open())
-    near = overlap >= -ROUNDING * body.radius[pairs].sum(axis=1)
-    return pairs[near], overlap[near]
+    touching = overlap >= -ROUNDING * body.radius[pairs].sum(axis=1)
+    return pairs[touching], overlap[touching]
 
 
 def _overlaps(body: Grains) -> list[str]:
@@ -49,15 +57,15 @@ def _overlaps(body: Grains) -> list[str]:
     rest = touch - rest_distances(grain_set, pairs[:, 0], pairs[:, 1])
     most = most_overlap(rest, body.radius[pairs].min(axis=1))
     return [
-        f"grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m; at most {most[k]:.3g} m may be: "
+        f"grains {pairs[k, 0]} and {pairs[k, 1]} overlap by {overlap[k]:.3g} m, at most {most[k]:.3g} m is allowed: "
         "move them apart"
         for k in np.flatnonzero(overlap > most)
     ]
 
 
 def _gaps(body: Grains) -> list[str]:
-    """Grains outside the largest cluster, with their nearest neighbour."""
-    from scipy.sparse import csr_array  # slow to load, and only bodies from files are looked at
+    """Messages about grains outside the largest cluster, with their nearest neighbour in it."""
+    from scipy.sparse import csr_array  # slow to import, and used for bodies from files only
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
@@ -70,9 +78,9 @@ def _gaps(body: Grains) -> list[str]:
     if not len(outside):
         return []
     distance, nearest = cKDTree(body.position[main]).query(body.position[outside])
-    mates = np.flatnonzero(main)[nearest]
+    neighbours = np.flatnonzero(main)[nearest]
     return [
         f"grain {i} has no contact with the rest of the body: a gap of about "
         f"{max(d - body.radius[i] - body.radius[j], 0.0):.3g} m to grain {j}; close it, or leave the grain out"
-        for i, j, d in zip(outside, mates, distance, strict=True)
+        for i, j, d in zip(outside, neighbours, distance, strict=True)
     ]

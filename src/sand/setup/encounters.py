@@ -1,4 +1,4 @@
-"""Two bodies aimed at each other."""
+"""Initial conditions of a collision of two bodies."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 GAP = 0.5
-"""Least distance between the bodies' surfaces at the start, in radii of the smallest grain."""
+"""Smallest initial gap between the bodies, in radii of the smallest grain."""
 
 
 class Encounter(NamedTuple):
-    """Target and projectile as one set of grains, and how many belong to the target."""
+    """Target and projectile in one set of grains."""
 
     grains: Grains
     target: int  # grains 0 … target − 1 are the target's
-    flight: float  # time until the bodies can touch first [s], about
+    flight: float  # approximate time of the earliest possible contact [s]
 
 
 @checked
 def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
-    """The body turned as a whole by a random rotation about its centre of mass; moments turn with it."""
+    """Rotate a body by a random rotation about its centre of mass, with velocities, spins and moments."""
     from scipy.spatial.transform import Rotation  # slow to load
 
     return turned(body, Rotation.random(random_state=rng))
@@ -37,9 +37,9 @@ def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
 
 @checked
 def turned(body: Grains, rotation: Rotation) -> Grains:
-    """The body turned as a whole about its centre of mass, velocities, spins and moments too."""
+    """Rotate a body about its centre of mass, with velocities, spins and moments."""
     middle = np.average(body.position, axis=0, weights=body.mass)
-    # SciPy does not take the read-only views
+    # SciPy does not accept read-only views
     velocity, spin, moment = (rotation.apply(v.copy()) for v in (body.velocity, body.spin, body.moment))
     return Grains(
         middle + rotation.apply(body.position - middle),
@@ -57,24 +57,25 @@ def turned(body: Grains, rotation: Rotation) -> Grains:
 def encounter(
     target: Grains, projectile: Grains, *, speed: Any, impact_parameter: Any = 0.0, along: Any = "x"
 ) -> Encounter:
-    """Put the projectile before the target, on a straight line towards it, in the frame of their centre of mass.
+    """Place two bodies on a collision course, in the frame of their centre of mass.
 
     Parameters
     ----------
     target, projectile : Grains
-        bodies; their own velocities and spins are kept and the relative motion added.
-    speed
-        relative speed of the centres of mass [m/s] > 0.
-    impact_parameter : optional
-        distance of the two lines of flight [m], or a fraction of the sum of the bodies' outer
+        The bodies. Their own velocities and spins are kept; the relative motion is added.
+    speed : float or str
+        Relative speed of the centres of mass [m/s] > 0.
+    impact_parameter : float or str, optional
+        Distance of the lines of flight of the two centres of mass [m], or a fraction of the sum of the bodies' outer
         radii as text, "0.5 b" (b is that sum).
-    along : optional
-        direction the projectile flies in, "x", "y", "z" or a vector; the offset is along the next axis.
+    along : str or array_like, optional
+        Direction of flight of the projectile, "x", "y", "z" or a vector. The offset is perpendicular to it, along the
+        next axis.
 
     Raises
     ------
     BadInput
-        wrong numbers, or grains of a body that overlap those of the other.
+        If an argument is invalid, or a body contains overlapping grains.
     """
     v = si(speed, "m/s", "speed", above=0.0)
     direction = _direction(along)
@@ -97,13 +98,13 @@ def encounter(
     masses = target.mass.sum(), projectile.mass.sum()
     share = masses[0] / sum(masses)
     gap = GAP * min(target.radius.min(), projectile.radius.min())
-    away = [np.zeros(3), shift]
-    thrown = [-(1 - share) * v * direction, share * v * direction]
-    return Encounter(joined([target, projectile], away, thrown), len(target), float(gap / v))
+    velocities = [-(1 - share) * v * direction, share * v * direction]
+    grains = combined([target, projectile], [np.zeros(3), shift], velocities)
+    return Encounter(grains, len(target), float(gap / v))
 
 
-def joined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities: Sequence[np.ndarray]) -> Grains:
-    """All bodies as one set of grains, each moved by its shift [m], with its velocity [m/s] added."""
+def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities: Sequence[np.ndarray]) -> Grains:
+    """Combine bodies into one set of grains, each shifted [m] and with a velocity [m/s] added."""
 
     def all_of(name: str) -> np.ndarray:
         return np.concatenate([getattr(body, name) for body in bodies])
@@ -132,29 +133,30 @@ def _direction(along: Any) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def offset_of(given: Any, whole: float) -> float:
-    """The impact parameter [m] as `encounter` takes it.
+def offset_of(given: Any, total: float) -> float:
+    """Convert an impact parameter to a length [m].
 
     Parameters
     ----------
-    given
-        a length, or a part of `whole` as text, "0.5 b".
-    whole : float
-        sum of the outer radii [m].
+    given : float or str
+        A length, or a fraction of `total` as text, "0.5 b".
+    total : float
+        Sum of the outer radii b [m].
 
     Raises
     ------
     BadInput
-        neither, or below 0.
+        If it is neither, or negative.
     """
     if isinstance(given, str) and given.strip().endswith("b"):
-        part = in_unit(given.strip()[:-1], "1")
-        offset = None if part is None else part * whole
+        fraction = in_unit(given.strip()[:-1], "1")
+        offset = None if fraction is None else fraction * total
     else:
         offset = in_unit(given, "m")
     if offset is None or np.ndim(offset) != 0 or not 0.0 <= offset < MOST:
         raise BadInput(
-            f"impact_parameter = {shown(given)} must be a length ≥ 0 such as '10 nm', or a part of the reach, '0.5 b'"
+            f"impact_parameter = {shown(given)} must be a length ≥ 0 such as '10 nm', or a fraction of the sum of the "
+            "outer radii, such as '0.5 b'"
         )
     return float(offset)
 
@@ -162,13 +164,13 @@ def offset_of(given: Any, whole: float) -> float:
 def _clearance(
     target: np.ndarray, r1: np.ndarray, projectile: np.ndarray, r2: np.ndarray, direction: np.ndarray
 ) -> float:
-    """How far to move the projectile back so that its grains clear the target's by GAP, seen along its flight."""
+    """Distance [m] by which the projectile must be moved back to keep all gaps above `GAP`."""
     gap = GAP * min(float(r1.min()), float(r2.min()))
     apart = projectile[:, None] - target[None]
     along = apart @ direction
     miss = (apart**2).sum(axis=2) - along**2
     reach = (r2[:, None] + r1[None] + gap) ** 2
     meets = miss < reach
-    if not meets.any():  # it flies past: start beside the target's far side
+    if not meets.any():  # a miss: start behind all grains of the target
         return float(along.max() + r1.max() + r2.max() + gap)
     return float((along[meets] + np.sqrt(reach[meets] - miss[meets])).max())

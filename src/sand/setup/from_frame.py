@@ -1,4 +1,4 @@
-"""A frame of a trajectory as a new start."""
+"""Initial conditions from a frame of a trajectory."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..material import Material
 from ..units import format_quantity
 
 APART = 1e-9
-"""Gap that pairs which do not touch get, if single precision has brought them to overlap, in their mean radius."""
-ROUNDS = 30
+"""Gap, in mean radii, given to pairs without a contact that overlap because of single precision."""
+ITERATIONS = 30
 SINGLE = 6e-8
-"""Rounding of single precision; diameters and masses are kept in it."""
+"""Relative rounding error of single precision, in which diameters and masses are stored."""
 
 
 class Bonds(NamedTuple):
-    """Contacts at the start of a simulation, with what they remember; laboratory frame.
+    """Initial contacts with their displacements, in the laboratory frame.
 
-    Grains that overlap are in contact anyway, unstrained; this is for stretched and for strained contacts.
+    Overlapping grains are in contact anyway, without displacements; bonds add stretched and strained contacts.
     """
 
     pair: np.ndarray  # (C, 2) grains
@@ -34,115 +34,133 @@ class Bonds(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Give `grains` and `contacts` to a Simulation, with `box`."""
+    """Arguments of a `Simulation`: `grains`, `contacts` and `box`."""
 
     grains: Grains
     contacts: Bonds | None
     box: Box
-    note: str  # where they came from, and what was done to them
+    note: str  # origin and corrections
 
 
 @checked
 def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
-    """Grains and contacts of one frame, as `sand.open(DIR).frames` gives it.
+    """Restore grains and contacts from one frame of `sand.open(DIR).frames`.
 
-    A frame holds positions in single precision, overlaps in double: positions are moved by as little as gives each
-    contact its overlap again and keeps apart what does not touch.  No contact is made or broken by that.
+    A frame holds positions in single precision but overlaps in double precision. Positions are corrected by the
+    smallest displacements that restore the overlap of each contact and separate all other pairs; no contact is formed
+    or broken.
 
     Parameters
     ----------
-    frame
-        a `sand.io.trajectory.Frame`.
-    materials : Mapping[str, Material]
-        those of the run by name.
+    frame : Frame
+        A `sand.io.trajectory.Frame`.
+    materials : mapping of str to Material
+        Materials of the run by name.
+
+    Returns
+    -------
+    Start
+        Grains, contacts and box, and a note on their origin.
 
     Raises
     ------
     BadInput
-        an unknown material, or overlaps that do not fit the positions.
+        If a material is unknown, or the overlaps do not fit the positions.
     """
     refuse_other(frame, "materials", "pair", "overlap", "position")
     if unknown := [name for name in frame.materials if name not in materials]:
         raise BadInput(
-            f"the frame has grains of '{unknown[0]}', which is no known material; describe it in "
+            f"the frame has grains of the unknown material '{unknown[0]}'; define it in "
             f"[materials.{unknown[0]}]; {did_you_mean(unknown[0], list(materials))}"
         )
     for name in ("position", "velocity", "spin", "moment", "overlap"):
         if not np.isfinite(getattr(frame, name)).all():
-            raise BadInput(f"step {frame.step}: {name} has numbers that are not finite; take an earlier frame")
+            raise BadInput(f"step {frame.step}: {name} has values that are not finite; use an earlier frame")
     pair = np.asarray(frame.pair, dtype=np.int64)
-    position = healed(frame.position, frame.radius, frame.box, pair, frame.overlap)
-    blank = Grains(position, frame.radius, [materials[frame.materials[k]] for k in frame.material])
-    rounded = np.abs(frame.mass - blank.mass) <= 8.0 * SINGLE * blank.mass
+    position = restore_overlaps(frame.position, frame.radius, frame.box, pair, frame.overlap)
+    kinds = [materials[frame.materials[k]] for k in frame.material]
+    nominal = Grains(position, frame.radius, kinds).mass
+    rounded = np.abs(frame.mass - nominal) <= 8.0 * SINGLE * nominal
     grains = Grains(
         position,
         frame.radius,
-        [materials[frame.materials[k]] for k in frame.material],
+        kinds,
         velocity=frame.velocity,
         spin=frame.spin,
         moment=frame.moment,
         charge=frame.charge,
-        mass=np.where(rounded, blank.mass, frame.mass),
+        mass=np.where(rounded, nominal, frame.mass),
     )
     moved = float(np.abs(frame.box.nearest(position - frame.position)).max())
     kept = f"{len(pair)} contact{'s' * (len(pair) != 1)} kept"
     known = not np.isnan(frame.twist).any()
     if len(pair) and not known:
-        kept += " unstrained, because the file does not say how they were strained"
+        kept += " unstrained, because the file does not contain their displacements"
     bonds = Bonds(pair, *(np.nan_to_num(given) for given in (frame.slide, frame.roll, frame.twist)))
     note = f"step {frame.step}, {format_quantity(frame.time, 's')}, of an earlier run; {kept}"
     if moved > 0.0:
-        note += f", grains moved by at most {moved:.2g} m to give them the overlaps they had"
+        note += f", positions corrected by at most {moved:.2g} m to restore the overlaps"
     return Start(grains, bonds, frame.box, note)
 
 
-def healed(position: np.ndarray, radius: np.ndarray, box: Box, pair: np.ndarray, overlap: np.ndarray) -> np.ndarray:
-    """Positions (N, 3) [m] next to the given ones, where each of these pairs has its overlap and no other touches.
+def restore_overlaps(
+    position: np.ndarray, radius: np.ndarray, box: Box, pair: np.ndarray, overlap: np.ndarray
+) -> np.ndarray:
+    """Correct positions so that each of the given pairs has its overlap and no other pair touches.
 
-    Newton's method; each round takes the smallest displacement, in the sense of least squares, that mends all pairs.
+    Newton iteration; each step takes the least-squares smallest displacements that satisfy all linearised conditions.
 
     Parameters
     ----------
+    position, radius : ndarray
+        (N, 3) and (N,) [m].
+    box : Box
+        Boundary conditions.
     pair, overlap : ndarray
         (C, 2) and (C,) [m] of the contacts.
+
+    Returns
+    -------
+    ndarray
+        Positions (N, 3) [m].
 
     Raises
     ------
     BadInput
-        there are no such positions within 1e-3 of a radius.
+        If there are no such positions within 1e-3 of a radius.
     """
     unit = float(radius.mean())
-    begun, size = position / unit, radius / unit
-    place, known = begun, {tuple(sorted(p)) for p in pair.tolist()}
-    apart_by = np.zeros((0, 2), dtype=np.int64)  # pairs that single precision brought to touch
-    room = Box(tuple(None if v is None else v / unit for v in box.lengths))  # type: ignore[arg-type]
-    rounding = float(np.abs(begun).max())
+    initial, size = position / unit, radius / unit
+    x, known = initial, {tuple(sorted(p)) for p in pair.tolist()}
+    spurious = np.zeros((0, 2), dtype=np.int64)  # pairs without a contact that overlap because of single precision
+    scaled = Box(tuple(None if v is None else v / unit for v in box.lengths))  # type: ignore[arg-type]
+    rounding = float(np.abs(initial).max())
     tolerance = 64.0 * np.finfo(float).eps * max(1.0, rounding)
-    wanted = size[pair].sum(axis=1) - overlap / unit
-    for _ in range(ROUNDS):
-        touching = [p for p in _overlapping(place, size, room) if tuple(sorted(p)) not in known]
+    target = size[pair].sum(axis=1) - overlap / unit
+    for _ in range(ITERATIONS):
+        touching = [p for p in _overlapping(x, size, scaled) if tuple(sorted(p)) not in known]
         known |= {tuple(sorted(p)) for p in touching}
-        apart_by = np.concatenate([apart_by, np.array(touching, dtype=np.int64).reshape(-1, 2)])
-        held = np.concatenate([pair, apart_by])
-        lacking, n = _lacking(place, held, np.concatenate([wanted, size[apart_by].sum(axis=1)]), room)
-        free = np.arange(len(held)) >= len(pair)
-        # of what must not touch, only what does is pushed, and a hair further than needed
-        lacking = np.where(free, np.where(lacking >= 0.0, lacking + max(APART, 4.0 * tolerance), 0.0), lacking)
-        if not len(held) or np.abs(lacking).max() <= tolerance:
+        spurious = np.concatenate([spurious, np.array(touching, dtype=np.int64).reshape(-1, 2)])
+        constrained = np.concatenate([pair, spurious])
+        deficit, n = _deficit(x, constrained, np.concatenate([target, size[spurious].sum(axis=1)]), scaled)
+        free = np.arange(len(constrained)) >= len(pair)
+        # pairs without a contact are separated only if they overlap, with a small gap
+        deficit = np.where(free, np.where(deficit >= 0.0, deficit + max(APART, 4.0 * tolerance), 0.0), deficit)
+        if not len(constrained) or np.abs(deficit).max() <= tolerance:
             break
-        use = ~free | (lacking > 0.0)
-        place = place + _least_shift(held[use], n[use], lacking[use], len(place))
+        use = ~free | (deficit > 0.0)
+        x = x + _least_shift(constrained[use], n[use], deficit[use], len(x))
     else:
-        i, j = held[int(np.abs(lacking).argmax())]
+        i, j = constrained[int(np.abs(deficit).argmax())]
         raise BadInput(f"the overlap of grains {i} and {j} does not fit their positions; the frame is damaged")
-    if np.abs(place - begun).max() > max(1e-3, 64.0 * SINGLE * rounding):
-        raise BadInput("the overlaps of the frame do not fit its positions; it is damaged, or not of SAND")
-    # what needs no mending is not to be rounded either
-    return np.where(place == begun, position, place * unit)
+    if np.abs(x - initial).max() > max(1e-3, 64.0 * SINGLE * rounding):
+        raise BadInput("the overlaps of the frame do not fit its positions; it is damaged, or not from SAND")
+    # positions that need no correction keep their bits
+    return np.where(x == initial, position, x * unit)
 
 
-def _lacking(place: np.ndarray, pair: np.ndarray, wanted: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray]:
-    """What each pair's distance (C,) lacks, and its direction (C, 3)."""
+def _deficit(place: np.ndarray, pair: np.ndarray, wanted: np.ndarray, box: Box) -> tuple[np.ndarray, np.ndarray]:
+    """Deficit of each pair's distance (C,), and its direction (C, 3)."""
     apart = box.nearest(place[pair[:, 0]] - place[pair[:, 1]])
     distance = np.linalg.norm(apart, axis=1)
     return wanted - distance, apart / distance[:, None]
@@ -156,7 +174,7 @@ def _overlapping(place: np.ndarray, size: np.ndarray, box: Box) -> list[tuple[in
 
 
 def _least_shift(pair: np.ndarray, n: np.ndarray, lacking: np.ndarray, count: int) -> np.ndarray:
-    """The smallest displacements (N, 3) that lengthen each distance by what it lacks, to first order."""
+    """Smallest displacements (N, 3) that compensate the deficit of each distance to first order."""
     from scipy.sparse import csr_array
     from scipy.sparse.linalg import lsqr
 

@@ -1,4 +1,4 @@
-"""Magnetic moments of the grains of an aggregate: by chance, aligned, or at rest in each other's field."""
+"""Magnetic moments of the grains of an aggregate: random, aligned, or relaxed in each other's field."""
 
 from __future__ import annotations
 
@@ -14,83 +14,107 @@ from ..units import si
 from ._kernels.moment_relaxation import alignment_energy, relax
 from .gas import directions
 
-WAYS = ("random", "aligned", "relaxed")
+MOMENT_MODES = ("random", "aligned", "relaxed")
 MOST_RELAXED = 3000
-"""Magnetic grains that can be relaxed: sweeps look at all pairs and grow in number; these take half a minute."""
+"""Largest number of moments to relax: a sweep costs O(N²) and more sweeps are needed; this many take half a minute."""
 TOLERANCE = 1e-6
-"""Relaxed moments make at most this angle with the field at their place [rad], about."""
+"""Approximate largest angle between a relaxed moment and the local field [rad]."""
 SWEEPS = 20_000
+"""Largest number of sweeps."""
 
 
-def part_given(moment: Any, ways: str, magnetic: Any) -> float:
-    """The part of the grains that have a moment; the arguments are those of `magnetised`.  Raises BadInput."""
-    if ways not in WAYS:
-        raise BadInput(f"moments = {ways!r}; {did_you_mean(str(ways), list(WAYS))}")
-    part = si(magnetic, "1", "magnetic", least=0.0)
-    if part > 1.0:
-        raise BadInput(f"magnetic = {magnetic!r} is the part of grains with a moment; it must not exceed 1")
-    if moment is None and (ways == "relaxed" or part < 1.0):
-        given = f"moments = {ways!r}" if ways == "relaxed" else f"magnetic = {magnetic!r}"
+def magnetic_fraction(moment: Any, mode: str, magnetic: Any) -> float:
+    """Check the arguments of `assign_moments` and return the fraction of grains with a moment. Raises BadInput."""
+    if mode not in MOMENT_MODES:
+        raise BadInput(f"moments = {mode!r}; {did_you_mean(str(mode), list(MOMENT_MODES))}")
+    fraction = si(magnetic, "1", "magnetic", least=0.0)
+    if fraction > 1.0:
+        raise BadInput(f"magnetic = {magnetic!r} is the fraction of grains with a moment; it must not exceed 1")
+    if moment is None and (mode == "relaxed" or fraction < 1.0):
+        given = f"moments = {mode!r}" if mode == "relaxed" else f"magnetic = {magnetic!r}"
         raise BadInput(f"{given} needs a moment; give one, such as moment = '200 A m^2/kg' or 'material'")
-    return part
+    return fraction
 
 
-def magnetised(body: Grains, moment: Any, ways: str, magnetic: Any, rng: np.random.Generator, axis: int = 2) -> Grains:
-    """The same grains with magnetic moments, in place.
+def assign_moments(
+    body: Grains, moment: Any, mode: str, magnetic: Any, rng: np.random.Generator, axis: int = 2
+) -> Grains:
+    """Assign magnetic moments to the grains of a body, in place.
 
     Parameters
     ----------
-    moment
-        size of each, as for `sand.Grains`, or one vector (3,) [A m²], the same for all; None: no moments.
-    ways : str
-        "random": isotropic; "aligned": along `axis`; "relaxed": from random ones, see `relaxed`.
-    magnetic
-        part of the grains that have a moment, 0 … 1; which ones is drawn by chance.
+    body : Grains
+        The body, without moments.
+    moment : float or str or array_like or None
+        Magnitude of each moment, as for `sand.Grains`, or one vector (3,) [A m²] for all; None: no moments.
+    mode : str
+        "random": isotropic; "aligned": along `axis`; "relaxed": random, then see `relaxed`.
+    magnetic : float
+        Fraction of randomly chosen grains that have a moment, 0 … 1.
+    rng : Generator
+        Source of random numbers.
+    axis : int, optional
+        Axis of aligned moments.
+
+    Returns
+    -------
+    Grains
+        The body.
 
     Raises
     ------
     BadInput
-        an unknown way, a part outside 0 … 1, or too many moments to be relaxed.
+        If the mode is unknown, the fraction is outside 0 … 1, or there are too many moments to relax.
     """
-    part = part_given(moment, ways, magnetic)
+    fraction = magnetic_fraction(moment, mode, magnetic)
     if moment is None:
         return body
     count = len(body)
     specific = np.array([m.specific_moment for m in body.materials])[body.material]
     vector = vector_for_all(moment)
-    told = moment if vector is None else float(np.linalg.norm(vector))
-    size = np.array(moment_size(told, body.mass, specific), dtype=float)
-    size[rng.permutation(count)[: count - int(np.rint(part * count))]] = 0.0
-    # drawn in any case: other ways leave the rest of what is drawn as it is
-    way = directions(count, rng)
-    if ways == "aligned":
-        way = np.tile(np.eye(3)[axis], (count, 1))
+    magnitude = moment if vector is None else float(np.linalg.norm(vector))
+    size = np.array(moment_size(magnitude, body.mass, specific), dtype=float)
+    size[rng.permutation(count)[: count - int(np.rint(fraction * count))]] = 0.0
+    # drawn for every mode, so that the mode does not change later random numbers
+    direction = directions(count, rng)
+    if mode == "aligned":
+        direction = np.tile(np.eye(3)[axis], (count, 1))
     if vector is not None:
-        way = np.tile(vector / (np.linalg.norm(vector) or 1.0), (count, 1))
-    body.arrays.body_moment[...] = (way * size[:, None]).T
+        direction = np.tile(vector / (np.linalg.norm(vector) or 1.0), (count, 1))
+    body.arrays.body_moment[...] = (direction * size[:, None]).T
     body.arrays.moment[...] = body.arrays.body_moment
-    return relaxed(body) if ways == "relaxed" else body
+    return relaxed(body) if mode == "relaxed" else body
 
 
 @checked
 def relaxed(body: Grains) -> Grains:
-    """Turn the moments until each lies along the field of the others, in place.
+    """Rotate the moments of a body, in place, until each is parallel to the field of the others.
 
-    Gauss–Seidel: one after the other, each moment is laid along the flux density at its place from all others in open
-    space, which lowers U = ½ Σ −μ·B by what it can; sweeps go on until no moment turns by more than 1e-6.  That is a
-    minimum of the energy near the start, not always the deepest; sizes do not change.  The grains must not have turned
-    yet: moments in their own frames are taken for those in the laboratory.
+    Gauss–Seidel iteration: each moment in turn is aligned with the flux density of all others (open boundaries), which
+    minimises its term of U = −½ Σ μ·B, until no moment rotates by more than 1e-6 rad in a sweep. The result is a local
+    minimum of the energy near the initial state; magnitudes do not change. The orientations of the grains must be those
+    of the start, with body frames parallel to the laboratory frame.
+
+    Parameters
+    ----------
+    body : Grains
+        At most 3000 grains with a moment.
+
+    Returns
+    -------
+    Grains
+        The body.
 
     Raises
     ------
     BadInput
-        more than 3000 moments.
+        If there are more than 3000 moments.
     """
     chosen = np.flatnonzero((body.moment**2).sum(axis=1) > 0.0)
     if len(chosen) > MOST_RELAXED:
         raise BadInput(
-            f"{len(chosen)} moments cannot be relaxed, at most {MOST_RELAXED}: each sweep looks at all pairs; "
-            "take fewer magnetic grains, or moments = 'random'"
+            f"{len(chosen)} moments cannot be relaxed, at most {MOST_RELAXED}: each sweep computes all pairs; "
+            "use fewer magnetic grains, or moments = 'random'"
         )
     if len(chosen) < 2:
         return body
@@ -98,8 +122,7 @@ def relaxed(body: Grains) -> Grains:
     moment = np.ascontiguousarray(body.arrays.body_moment[:, chosen])
     sweeps, worst = relax(position, moment, MAGNETIC, TOLERANCE, SWEEPS)
     if worst > TOLERANCE:
-        told = f"moments still turn by {worst:.1e} rad a sweep after {sweeps} sweeps: nearly at rest, no more"
-        warn(told)
+        warn(f"moments are not fully relaxed: after {sweeps} sweeps they still rotate by {worst:.1e} rad per sweep")
     body.arrays.body_moment[:, chosen] = moment
     body.arrays.moment[...] = body.arrays.body_moment
     return body
@@ -107,5 +130,5 @@ def relaxed(body: Grains) -> Grains:
 
 @checked
 def magnetic_energy(body: Grains) -> float:
-    """Energy of all moments in each other's field [J], open space: U = ½ Σ −μ·B."""
+    """Magnetic interaction energy of all moments with open boundaries [J]: U = −½ Σ μ·B."""
     return float(alignment_energy(body.arrays.position, body.arrays.moment, MAGNETIC))

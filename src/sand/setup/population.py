@@ -1,4 +1,4 @@
-"""What the grains of an aggregate are, before there are places for them: their radii and materials."""
+"""Radii and materials of the grains of an aggregate, before their positions are known."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import checked
+from ..arguments import MOST_GRAINS, checked
 from ..contact.jkr import rest_overlap, rest_radius
 from ..contact.mixing import pairing_between
 from ..errors import BadInput, shown
 from ..grains import Grains, materials_of
 from ..material import Material, as_material
-from ..units import MOST_GRAINS, format_quantity, in_unit, seed_given, si, whole_number
+from ..units import format_quantity, in_unit, seed_given, si, whole_number
 from ._kernels.hash_grid import GrainSet
 
 WIDEST = 200.0
-"""Largest radius over smallest; beyond it nearly all grains of a power law are too small to matter."""
+"""Largest ratio of radii; above it nearly all grains of a power law are too small to matter."""
 DEEPEST = 0.5
-"""Overlap at rest, as a part of the smaller radius, from which on grains are too small for JKR to make sense."""
+"""Largest equilibrium overlap, in units of the smaller radius, for which JKR theory is used."""
 FORMS = "a length, N of them, 'lognormal(MEDIAN, SIGMA, LEAST, MOST)' or 'power law(EXPONENT, LEAST, MOST)'"
 
 
 @checked
 @dataclass(frozen=True)
 class Lognormal:
-    """Radii whose logarithms are normal about ln(median), with spread sigma, none outside least … most.
+    """Truncated lognormal distribution of radii: ln r is normal about ln(median) with standard deviation sigma.
 
     Parameters
     ----------
-    median
-        [m] > 0.
-    sigma
-        standard deviation of ln r, 0 < σ ≤ 2.
-    least, most : optional
-        [m]; by default 3 σ from the median, which cuts 0.27 %.  What falls outside is drawn again.
+    median : float or str
+        Median [m] > 0.
+    sigma : float
+        Standard deviation of ln r, 0 < σ ≤ 2.
+    least, most : float or str, optional
+        Range of the radii [m], 3 σ from the median by default, which excludes 0.27 % of the distribution.
     """
 
     median: Any
@@ -47,7 +47,7 @@ class Lognormal:
     most: Any = None
 
     def bounds(self) -> tuple[float, float]:
-        """Least and most radius [m].  Raises BadInput."""
+        """Smallest and largest radius [m]. Raises BadInput."""
         middle, spread = si(self.median, "m", "median of the radii", above=0.0), self._spread()
         least = middle * math.exp(-3.0 * spread) if self.least is None else self.least
         most = middle * math.exp(3.0 * spread) if self.most is None else self.most
@@ -60,14 +60,14 @@ class Lognormal:
         return spread
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Radii (count,) [m].  Raises BadInput."""
+        """Draw radii (count,) [m] by inversion. Raises BadInput."""
         from scipy.special import ndtr, ndtri
 
         (least, most), spread = self.bounds(), self._spread()
         middle = math.log(si(self.median, "m", "median of the radii", above=0.0))
         low, high = (float(ndtr((math.log(v) - middle) / spread)) for v in (least, most))
         if high - low < 1e-12:
-            raise BadInput("radii: hardly any of this lognormal law lie between least and most; move the bounds")
+            raise BadInput("radii: less than 1e-12 of this lognormal distribution lies between least and most")
         drawn = np.exp(middle + spread * ndtri(low + (high - low) * rng.random(count)))
         return np.clip(drawn, least, most)
 
@@ -75,14 +75,14 @@ class Lognormal:
 @checked
 @dataclass(frozen=True)
 class PowerLaw:
-    """Radii with dN/dr ∝ r^exponent between least and most.
+    """Power-law distribution of radii: dN/dr ∝ r^exponent for least ≤ r ≤ most.
 
     Parameters
     ----------
-    exponent
-        such as −3.5 (Mathis, Rumpl & Nordsieck 1977).
-    least, most
-        [m], at most a factor of 200 apart.
+    exponent : float
+        For example −3.5 (Mathis, Rumpl & Nordsieck 1977).
+    least, most : float or str
+        Range [m], with a ratio of at most 200.
     """
 
     exponent: Any
@@ -90,11 +90,11 @@ class PowerLaw:
     most: Any
 
     def bounds(self) -> tuple[float, float]:
-        """Least and most radius [m].  Raises BadInput."""
+        """Smallest and largest radius [m]. Raises BadInput."""
         return _bounds(self.least, self.most)
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Radii (count,) [m].  Raises BadInput."""
+        """Draw radii (count,) [m] by inversion. Raises BadInput."""
         (least, most), power = self.bounds(), si(self.exponent, "1", "exponent of the radii") + 1.0
         if abs(power) > 100.0:
             raise BadInput(f"exponent of the radii = {self.exponent!r} must lie within ±100")
@@ -115,21 +115,26 @@ def _bounds(least: Any, most: Any) -> tuple[float, float]:
 def _refuse_wide(low: float, high: float) -> None:
     if high > WIDEST * low:
         raise BadInput(
-            f"radii from {format_quantity(low, 'm')} to {format_quantity(high, 'm')} differ by a factor of {high / low:.3g}; such grains "
-            f"do not pack into one aggregate, at most {WIDEST:g} is allowed: raise the least or lower the most"
+            f"radii from {format_quantity(low, 'm')} to {format_quantity(high, 'm')} differ by a factor of "
+            f"{high / low:.3g}; at most {WIDEST:g} is allowed: raise the least or lower the most"
         )
 
 
 def radii_of(given: Any) -> Any:
-    """One radius [m], N of them (N,), or a law, from a number, an array, or text.
+    """Read radii from a number, an array or text.
 
-    Text is a length, 'lognormal(0.1 um, 0.3)', 'lognormal(0.1 um, 0.3, 50 nm, 0.3 um)' or
-    'power law(-3.5, 50 nm, 500 nm)'.
+    Text is a length, 'lognormal(0.1 um, 0.3)', 'lognormal(0.1 um, 0.3, 50 nm, 0.3 um)' or 'power law(-3.5, 50 nm, 500
+    nm)'.
+
+    Returns
+    -------
+    float or ndarray or Lognormal or PowerLaw
+        One radius [m], radii (N,) [m], or a distribution.
 
     Raises
     ------
     BadInput
-        none of these.
+        If it is none of these.
     """
     if isinstance(given, (Lognormal, PowerLaw)):
         given.bounds()
@@ -144,7 +149,7 @@ def radii_of(given: Any) -> Any:
         return law
     values = in_unit(given, "m")
     if values is None:
-        raise BadInput(f"radius = {shown(given)} is not known; give {FORMS}")
+        raise BadInput(f"radius = {shown(given)} is not a radius or a distribution; give {FORMS}")
     if np.ndim(values) == 0:
         return si(given, "m", "radius", above=0.0)
     values = np.asarray(values)
@@ -156,7 +161,7 @@ def radii_of(given: Any) -> Any:
 
 
 class Population(NamedTuple):
-    """Grains that have no places yet."""
+    """Radii and materials of N grains."""
 
     radius: np.ndarray  # (N,) [m]
     material: list[Material]  # N of them
@@ -164,25 +169,29 @@ class Population(NamedTuple):
 
 
 def population(count: int, radius: Any, material: Any, rng: np.random.Generator) -> Population:
-    """So many grains.
+    """Radii and materials of `count` grains.
 
     Parameters
     ----------
-    radius
-        as for `radii_of`.
-    material
-        one, or N of them, or parts of each as {"silica": 0.7, "iron": 0.3}: the grains that get it are
-        drawn by chance, their number is N times the part to within rounding (of a whole deposit for `rbd`).
+    count : int
+        Number of grains N.
+    radius : float or str or array_like or Lognormal or PowerLaw
+        As for `radii_of`.
+    material : Material or str or sequence or mapping
+        One material, N of them, or fractions {"silica": 0.7, "iron": 0.3}: randomly chosen grains get each material, N
+        times the fraction to within rounding (for `rbd` N is the number of grains of the deposit).
+    rng : Generator
+        Source of random numbers.
 
     Raises
     ------
     BadInput
-        numbers of radii or materials that are not N, parts that are not positive, or grains so small that
-        they would sink into one another.
+        If the number of radii or materials is not N, a fraction is not positive, or grains are too small for JKR
+        contacts.
     """
     size, kinds = radii_of(radius), _materials(material, count, rng)
     if isinstance(size, np.ndarray) and len(size) != count:
-        raise BadInput(f"radius has {len(size)} entries but there are {count} grains; give as many, or a law")
+        raise BadInput(f"radius has {len(size)} entries but there are {count} grains; give {count}, or a distribution")
     if isinstance(size, float):
         size = np.full(count, size)
     elif not isinstance(size, np.ndarray):
@@ -196,7 +205,7 @@ def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Materia
         return [distinct[k] for k in index]
     parts = np.array([si(part, "1", f"part of {name}", above=0.0) for name, part in given.items()])
     if not len(parts):
-        raise BadInput("material = {} names no material; give parts such as {'silica': 0.7, 'iron': 0.3}")
+        raise BadInput("material = {} names no material; give fractions such as {'silica': 0.7, 'iron': 0.3}")
     kinds = [as_material(m) for m in given]
     ends = np.rint(count * np.cumsum(parts) / parts.sum()).astype(int)
     index = rng.permutation(np.searchsorted(ends, np.arange(count), side="right"))
@@ -204,12 +213,12 @@ def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Materia
 
 
 def grain_set_of(radius: np.ndarray, kinds: list[Material]) -> GrainSet:
-    """The grains for kernels.
+    """Properties of grains for the kernels.
 
     Raises
     ------
     BadInput
-        grains so small that two of them at rest overlap by more than half the smaller radius.
+        If grains are so small that the equilibrium overlap of a pair exceeds half the smaller radius.
     """
     distinct, index = materials_of(kinds, len(radius))
     pairings = [[pairing_between(_sticky(a), _sticky(b)) for b in distinct] for a in distinct]
@@ -221,20 +230,20 @@ def grain_set_of(radius: np.ndarray, kinds: list[Material]) -> GrainSet:
             sunk = rest_overlap(rest_radius(gamma[a, b], reduced, modulus[a, b]), reduced)
             if sunk > DEEPEST * small:
                 raise BadInput(
-                    f"grains of {distinct[a].name} of radius {format_quantity(small, 'm')} would sink by {format_quantity(sunk, 'm')} "
-                    f"into grains of {distinct[b].name}: too small for JKR contacts; take larger ones"
+                    f"grains of {distinct[a].name} of radius {format_quantity(small, 'm')} would overlap grains of "
+                    f"{distinct[b].name} by {format_quantity(sunk, 'm')}: too small for JKR contacts; use larger grains"
                 )
     mass = np.array([m.density for m in distinct])[index] * (4.0 / 3.0 * np.pi) * radius**3
     return GrainSet(radius, mass, index.astype(np.int64), gamma, modulus, float(radius.max()))
 
 
 def _sticky(material: Material) -> Material:
-    """The material, without adhesion where no surface energy is known."""
+    """The material, with zero surface energy if none is defined."""
     return material if material.surface_energy is not None else material.but(surface_energy=0.0)
 
 
 def rest_distances(grain_set: GrainSet, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Distances of the centres of pairs of grains in contact at rest [m]: r1 + r2 − δ0."""
+    """Equilibrium distances of the centres of pairs of grains in contact [m]: r1 + r2 − δ0."""
     r1, r2 = grain_set.radius[first], grain_set.radius[second]
     pair = grain_set.material[first], grain_set.material[second]
     reduced = r1 * r2 / (r1 + r2)
@@ -243,26 +252,26 @@ def rest_distances(grain_set: GrainSet, first: np.ndarray, second: np.ndarray) -
     )
 
 
-class Streams(NamedTuple):
-    """Sources of chance that do not depend on one another."""
+class RandomStreams(NamedTuple):
+    """Independent sources of random numbers."""
 
     population: np.random.Generator
-    places: np.uint64  # seed for kernels
+    positions: np.uint64  # seed for kernels
     moments: np.random.Generator
 
 
-def whole(number: Any, name: str) -> int:
-    """A number of grains, from 1 to what a machine can hold.  Raises BadInput."""
+def grain_count(number: Any, name: str) -> int:
+    """Check a number of grains, from 1 to `MOST_GRAINS`. Raises BadInput."""
     return whole_number(number, name, 1, MOST_GRAINS)
 
 
-def streams(seed: Any) -> Streams:
-    """Raises BadInput for a seed that is not a whole number."""
+def random_streams(seed: Any) -> RandomStreams:
+    """Independent streams of random numbers from one seed. Raises BadInput if it is not a whole number."""
     one, two, three = np.random.SeedSequence(seed_given(seed)).spawn(3)
-    return Streams(np.random.default_rng(one), two.generate_state(1, np.uint64)[0], np.random.default_rng(three))
+    return RandomStreams(np.random.default_rng(one), two.generate_state(1, np.uint64)[0], np.random.default_rng(three))
 
 
-def centred_grains(position: np.ndarray, made: Population) -> Grains:
-    """Grains at these places (N, 3) [m], at rest, their centre of mass at the origin."""
-    middle = np.average(position, axis=0, weights=made.grain_set.mass)
-    return Grains(position - middle, made.radius, made.material)
+def centred_grains(position: np.ndarray, sample: Population) -> Grains:
+    """Grains at rest at these positions (N, 3) [m], shifted so that their centre of mass is the origin."""
+    middle = np.average(position, axis=0, weights=sample.grain_set.mass)
+    return Grains(position - middle, sample.radius, sample.material)

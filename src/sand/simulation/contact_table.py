@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
-from ..errors import NoSuchKey, did_you_mean, shown
-from ..optional import optional
+from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..state.state import CONTACTS, RECORDED, State
 
 COLUMNS = (
@@ -78,11 +77,11 @@ class ContactTable(Mapping[str, np.ndarray]):
 
     def to_pandas(self) -> Any:
         """A pandas DataFrame; pandas has to be installed."""
-        return optional("pandas", "to_pandas").DataFrame(self._flat())
+        return import_optional("pandas", "to_pandas").DataFrame(self._flat())
 
     def to_xarray(self) -> Any:
         """An xarray Dataset with dimension `contact` and units as attributes; xarray has to be installed."""
-        xarray = optional("xarray", "to_xarray")
+        xarray = import_optional("xarray", "to_xarray")
         units = {name: unit for name, unit, _ in COLUMNS}
         variables = {
             name: ("contact", column, {"units": units.get(name, units.get(name[:-2], ""))})

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
-from ..analysis.ledger_columns import LOSSES, Books, dissipated_in
+from ..analysis.ledger_columns import LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES, measure_energies
 from ..errors import BadInput
@@ -72,7 +72,7 @@ def momenta(grains: Grains) -> list[float]:
     return [*p.sum(axis=0).tolist(), *angular.sum(axis=0).tolist()]
 
 
-class Ledger(Books):
+class Ledger(LedgerColumns):
     """The rows written so far, oldest first.
 
     Parameters

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import MOST_STEPS
 from ..errors import BadInput, shown
-from ..limits import MOST_STEPS
 from ..units import si
 
 SHORTEST = 1e-21

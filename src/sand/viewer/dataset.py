@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.ledger_columns import Books
+from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.tracking import SINGLE, Lineage
 from ..errors import BadInput
 from ..io import run_folder as files
@@ -44,7 +44,7 @@ class RunDataset:
         of the run.
     place : str
         its folder, or its file.
-    books : Callable[[], Books or None]
+    books : Callable[[], LedgerColumns or None]
         the ledger so far; None where there is none.
     summary : Callable[[], Mapping[str, Any] or None]
         how the run ended; None while it has not, empty where nobody knows.
@@ -62,7 +62,7 @@ class RunDataset:
         name: str,
         place: str,
         *,
-        books: Callable[[], Books | None],
+        books: Callable[[], LedgerColumns | None],
         summary: Callable[[], Mapping[str, Any] | None],
         field: FieldDescription | None = None,
         chosen: slice = slice(None),

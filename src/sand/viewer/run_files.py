@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..analysis.ledger_columns import Books
+from ..analysis.ledger_columns import LedgerColumns
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_rows
@@ -52,16 +52,16 @@ class RunBooks:
 
     def __init__(self, folder: Path):
         self._path, self.problem = folder / files.LEDGER, ""
-        self._known: tuple[tuple[int, int], Books | None] = ((0, 0), None)
+        self._known: tuple[tuple[int, int], LedgerColumns | None] = ((0, 0), None)
 
-    def __call__(self) -> Books | None:
+    def __call__(self) -> LedgerColumns | None:
         try:
             found = self._path.stat()
             stamp = (found.st_size, found.st_mtime_ns)
             if stamp != self._known[0]:
                 self._known = (stamp, None)
                 rows, self.problem = read_rows(self._path)
-                self._known = (stamp, Books.of(rows))
+                self._known = (stamp, LedgerColumns.from_rows(rows))
         except OSError:
             return None
         except BadInput as error:

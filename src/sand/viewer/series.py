@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
-from ..analysis.ledger_columns import Books
+from ..analysis.ledger_columns import LedgerColumns
 from ..errors import BadInput
 from ..io.run_folder import plain
 from ..plotting.panels import COUNTS, column, energies_drawn, losses_drawn, peak
@@ -26,9 +26,9 @@ def thinned(count: int, most: int = MOST) -> np.ndarray:
     return np.rint(np.linspace(0, count - 1, most)).astype(int)
 
 
-def of_ledger(whole: Books) -> dict[str, Any]:
+def of_ledger(whole: LedgerColumns) -> dict[str, Any]:
     """Plots and events of a ledger; a plot whose columns a ledger lacks is left out."""
-    books = whole.taken(thinned(len(whole)))
+    books = whole.select(thinned(len(whole)))
     plots = []
     for plot in (_clusters, _energies, _losses, _contacts, _balance):
         try:
@@ -73,38 +73,38 @@ def _clusters(books: Any) -> dict[str, Any]:
     return _plot("clusters", "Clusters", lines, log=True)
 
 
-def _energies(books: Books) -> dict[str, Any]:
+def _energies(books: LedgerColumns) -> dict[str, Any]:
     lines = [_line(name, colour, values) for name, (values, colour) in energies_drawn(books).items()]
     return _plot("energies", "Energies", lines, "J")
 
 
-def _losses(books: Books) -> dict[str, Any]:
+def _losses(books: LedgerColumns) -> dict[str, Any]:
     lines = [_line(name, colour, size) for name, (size, colour) in losses_drawn(books).items() if peak(size)]
     return _plot("losses", "Losses", lines, "J", log=True)
 
 
-def _contacts(books: Books) -> dict[str, Any]:
+def _contacts(books: LedgerColumns) -> dict[str, Any]:
     lines = [_line(label, colour, books[name]) for name, (label, colour) in COUNTS.items()]
     return _plot("contacts", "Contacts", lines)
 
 
-def _balance(books: Books) -> dict[str, Any]:
+def _balance(books: LedgerColumns) -> dict[str, Any]:
     total = column(books, "total")
     return _plot("balance", "Balance", [_line("total − start", INK, total - total[0])], "J")
 
 
-def _events(books: Books) -> dict[str, Any]:
+def _events(books: LedgerColumns) -> dict[str, Any]:
     """When contacts were made or broken, and how many since the row before."""
     if not {"made", "broken"} <= set(books.columns):
         return {"time": [], "made": [], "broken": []}
 
-    def grown(some: Books) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def grown(some: LedgerColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         made, broken = (np.maximum(np.diff(some[name]), 0.0) for name in ("made", "broken"))
         return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
 
     rows, made, broken = grown(books)
     if len(rows) > MOST:
-        books = books.taken(thinned(len(books)))
+        books = books.select(thinned(len(books)))
         rows, made, broken = grown(books)
     return {
         "time": _numbers(books["time"][1:][rows], 10),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.ledger_columns import Books
+from ..analysis.ledger_columns import LedgerColumns
 from ..io.frame import Frame, stored_frame
 from .dataset import FieldDescription, RunDataset
 
@@ -44,7 +44,7 @@ def snapshot_dataset(simulation: Simulation, field: FieldDescription | None) -> 
     """The state of a simulation and what happened until then; later steps are not in it."""
     state = simulation.state
     stored: Any = stored_frame(state.steps, state.time, state.grains, state.box, simulation.contacts)
-    books = Books(simulation.ledger.columns, simulation.ledger.rows)
+    books = LedgerColumns(simulation.ledger.columns, simulation.ledger.rows)
     now = Snapshot(Frame(stored))
     story = RunDataset(now, "simulation", "in memory", books=lambda: books, summary=dict, field=field)
     story.notes.append("this simulation keeps no files: its state of now, and what its ledger holds")

@@ -1,6 +1,7 @@
-"""Aggregates that grow grain by grain: on straight lines from all sides, or by diffusion.
+"""Particle–cluster aggregation: grains arrive one by one, ballistically from all directions or by diffusion.
 
-Chance comes from `numerics.random`, by seed, number of the try, grain and purpose: an aggregate depends on nothing else.
+Random numbers are counter-based (`numerics.random`): functions of the seed, the attempt, the grain and the purpose
+only.
 """
 
 import math
@@ -8,18 +9,28 @@ import math
 from ...compiler.jit import kernel, loop
 from ...numerics.random import normal_pair, random_words, uniform
 from ...numerics.vec import across, add, axpy, dot, load, norm, put, scale, sub
-from .hash_grid import EMPTY, clear, free_width, gap_at, head_around, join_hash_grid, rest_between, touches_other
+from .hash_grid import (
+    EMPTY,
+    clear,
+    empty_distance,
+    gap_to_nearest,
+    head_of_neighbour_cell,
+    insert_grain,
+    pair_rest_distance,
+    touches_other,
+)
 
 DIRECTION, OFFSET, START, STEPS, RETURN, SIDEWAYS, TURN1, TURN2 = range(8)
-"""What random numbers are for."""
+"""Purposes of random numbers."""
 TOUCH = 1e-3
-"""A walk ends where surfaces are this close, in radii of the largest grain; then the grains are pulled together."""
+"""Gap, in radii of the largest grain, at which a walk ends; the grains are then length into contact."""
 MOST_STEPS = 100_000
+"""Largest number of steps of one walk."""
 
 
 @loop
 def random_direction(seed, number, grain, stream):
-    """A unit vector, evenly spread, and a number evenly spread over 0 … 1."""
+    """Random isotropic unit vector, and a random number uniform in 0 … 1."""
     a, b, _, d = random_words(seed, number, grain, stream)
     z, angle = 2.0 * uniform(a) - 1.0, 2.0 * math.pi * uniform(b)
     flat = math.sqrt(1.0 - z * z)
@@ -27,8 +38,8 @@ def random_direction(seed, number, grain, stream):
 
 
 @loop
-def random_across(seed, number, grain, u):
-    """A point of the unit disc across the unit vector u, evenly spread."""
+def random_point_on_disc(seed, number, grain, u):
+    """Random point, uniform on the unit disc perpendicular to the unit vector u."""
     a, b, c, d = random_words(seed, number, grain, OFFSET)
     x, y = normal_pair(a, b)
     side = across((x, y, normal_pair(c, d)[0]), u)
@@ -36,70 +47,92 @@ def random_across(seed, number, grain, u):
 
 
 @loop
-def first_touch(crowd, position, grain_set, b, start, u, way):
-    """Where on the line from `start` along u grain b first comes to rest at another, and which; `way` for a miss."""
+def first_contact_on_line(grid, position, grain_set, b, start, u, longest):
+    """Find the first contact of grain b on the line from `start` along the unit vector u.
+
+    Returns
+    -------
+    path : float
+        Distance from `start` at which b is at its equilibrium distance from a grain; `longest` if there is none.
+    neighbour : int
+        The grain in contact, or EMPTY.
+    """
     reach = grain_set.radius[b] + grain_set.largest
-    done = 0.0
-    while done < way:
-        here = axpy(done, u, start)
-        free = free_width(crowd, here)
+    path = 0.0
+    while path < longest:
+        x = axpy(path, u, start)
+        free = empty_distance(grid, x)
         if free > 0.0:
-            done += free - reach
+            path += free - reach
             continue
-        best, mate = crowd.width - reach, EMPTY
+        best, neighbour = grid.width - reach, EMPTY
         for step in range(27):
-            j = head_around(crowd, here, step)
+            j = head_of_neighbour_cell(grid, x, step)
             while j != EMPTY:
-                to = sub(load(position, j), here)
+                to = sub(load(position, j), x)
                 along = dot(to, u)
                 miss = dot(to, to) - along * along
                 if miss < (grain_set.radius[b] + grain_set.radius[j]) ** 2:
-                    rest = rest_between(grain_set, b, j)
-                    # grains that are behind have been missed; none of them comes this far
+                    rest = pair_rest_distance(grain_set, b, j)
+                    # grains behind x were passed without contact, and cannot satisfy this condition
                     if miss < rest * rest and along - math.sqrt(rest * rest - miss) <= best:
-                        best, mate = along - math.sqrt(rest * rest - miss), j
-                j = crowd.before[j]
-        done += best
-        if mate != EMPTY:
-            return done, mate
-    return way, EMPTY
+                        best, neighbour = along - math.sqrt(rest * rest - miss), j
+                j = grid.next_in_cell[j]
+        path += best
+        if neighbour != EMPTY:
+            return path, neighbour
+    return longest, EMPTY
 
 
 @loop
-def stays(crowd, position, grain_set, b, x, mate):
-    """Put grain b at x, where it touches its mate, unless it touched another there; whether it stays."""
-    if touches_other(crowd, position, grain_set, b, x, mate):
+def try_place(grid, position, grain_set, b, x, neighbour):
+    """Place grain b at x, in contact with `neighbour`, if it touches no other grain; return whether it was placed."""
+    if touches_other(grid, position, grain_set, b, x, neighbour):
         return False
     put(position, b, x)
-    join_hash_grid(crowd, b, x)
+    insert_grain(grid, b, x)
     return True
 
 
 @kernel
-def grow_ballistic(crowd, position, grain_set, first, last, extent, seed, tries):
-    """Grains first … last − 1 fly in from all sides, one by one, and stay where they touch first.
+def grow_ballistic(grid, position, grain_set, first, last, extent, seed, tries):
+    """Add grains first … last − 1 one by one along random straight lines; each stays at its first contact.
 
     Parameters
     ----------
-    crowd
-        those before `first`, within `extent` [m] of the origin.
+    grid : HashGrid
+        Contains the grains before `first`.
+    position : ndarray
+        (3, N) [m], modified.
+    grain_set : GrainSet
+        Properties of the grains.
+    first, last : int
+        Range of the grains to add.
+    extent : float
+        Outer radius of the aggregate about the origin [m].
+    seed : int
+        Seed of the random numbers.
+    tries : int
+        Largest number of attempts per grain.
 
     Returns
     -------
-    result
-        The next grain to fly (less than `last` if one met nobody in `tries` tries, or touched two), and the extent.
+    done : int
+        First grain that was not placed: `last`, or less if a grain found no single contact in `tries` attempts.
+    extent : float
+        New outer radius [m].
     """
     for b in range(first, last):
         size = extent + grain_set.radius[b]
         placed = False
         for number in range(tries):
             u, _ = random_direction(seed, number, b, DIRECTION)
-            offset = scale(size, random_across(seed, number, b, u))
+            offset = scale(size, random_point_on_disc(seed, number, b, u))
             back = math.sqrt(max(size * size - dot(offset, offset), 0.0))
             start = axpy(-back, u, offset)
-            way, mate = first_touch(crowd, position, grain_set, b, start, u, 2.0 * back)
-            x = axpy(way, u, start)
-            if mate != EMPTY and stays(crowd, position, grain_set, b, x, mate):
+            path, neighbour = first_contact_on_line(grid, position, grain_set, b, start, u, 2.0 * back)
+            x = axpy(path, u, start)
+            if neighbour != EMPTY and try_place(grid, position, grain_set, b, x, neighbour):
                 extent = max(extent, norm(x) + grain_set.radius[b])
                 placed = True
                 break
@@ -109,92 +142,120 @@ def grow_ballistic(crowd, position, grain_set, first, last, extent, seed, tries)
 
 
 @loop
-def returned(seed, number, grain, x, size):
-    """Where a walker outside a sphere comes back to it first, and whether it ever does.
+def return_to_sphere(seed, number, grain, x, size):
+    """Random first-return point on a sphere of radius R = `size` about the origin, for Brownian motion from x outside.
 
-    It does with probability R/|x|; s, the distance of that point from x, has 1/s evenly spread (Poisson's kernel).
+    The return probability is R/|x|. For the distance s of the return point from x, 1/s is uniformly distributed
+    (Poisson kernel of the exterior of a sphere).
+
+    Returns
+    -------
+    point : tuple of float
+        Return point [m]; x if there is none.
+    returns : bool
+        Whether the walker returns.
     """
-    far = norm(x)
+    distance = norm(x)
     words = random_words(seed, number, grain, RETURN)
-    if uniform(words[0]) * far > size:
+    if uniform(words[0]) * distance > size:
         return x, False
-    ratio = far / size
+    ratio = distance / size
     inverse = 1.0 / (ratio + 1.0) + uniform(words[1]) * 2.0 / (ratio * ratio - 1.0)
     c = min(max((1.0 + ratio * ratio - 1.0 / (inverse * inverse)) / (2.0 * ratio), -1.0), 1.0)
-    u = scale(1.0 / far, x)
+    u = scale(1.0 / distance, x)
     side = across(random_direction(seed, number, grain, SIDEWAYS)[0], u)
     sine = math.sqrt(1.0 - c * c) / norm(side)
     return scale(size, axpy(sine, side, scale(c, u))), True
 
 
 @loop
-def walk_in(crowd, position, grain_set, first, last, bound, inner, size, address):
-    """Grains first … last − 1, placed about their own centre, diffuse as one until they touch the crowd at the origin.
+def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, counter):
+    """Diffuse grains first … last − 1 as a rigid body, without rotation, until it touches the aggregate at the origin.
 
-    A walk on spheres: each step goes as far as nothing can be touched, in any direction.  `bound` keeps for each grain
-    how far it is from touching at least, so that few have to be looked at in a step.
+    Walk on spheres: each step has a random direction and the length of a lower bound of the gap to the aggregate.
 
     Parameters
     ----------
-    inner
-        the crowd lies within this radius [m].
-    size
-        where the centre of the body is farther out nothing can be touched [m].
+    grid : HashGrid
+        Contains the grains of the aggregate.
+    position : ndarray
+        (3, N) [m]; those of the body relative to its centre.
+    grain_set : GrainSet
+        Properties of the grains.
+    first, last : int
+        Range of the grains of the body.
+    bound : ndarray
+        Work array (N,): a lower bound of the gap of each grain [m], so that few gaps are computed per step.
+    inner : float
+        Outer radius of the aggregate about the origin [m].
+    size : float
+        Radius [m] of the sphere on which the body starts; contact is impossible with its centre farther out.
+    counter : tuple of int
+        Seed, attempt and grain of the random numbers.
 
     Returns
     -------
-    result
-        The centre, the two grains that are about to touch (EMPTY if the walk did not end), and the gap [m].
+    x : tuple of float
+        Centre of the body [m].
+    one, other : int
+        Grains of the body and of the aggregate that are about to touch; `other` is EMPTY if the walk did not end.
+    gap : float
+        Gap between these two [m].
     """
-    seed, number, grain = address
+    seed, number, grain = counter
     u, _ = random_direction(seed, number, grain, START)
     x = scale(size, u)
-    moved, near = math.inf, first
+    length, start = math.inf, first
     for step in range(MOST_STEPS):
-        turn = number * MOST_STEPS + step
-        best, who, whom = math.inf, first, EMPTY
+        draw = number * MOST_STEPS + step
+        best, one, other = math.inf, first, EMPTY
         for k in range(last - first):
-            b = near + k if near + k < last else near + k - (last - first)
-            here = add(x, load(position, b))
-            bound[b] = bound[b] - moved if moved < math.inf else norm(here) - grain_set.radius[b] - inner
+            b = start + k if start + k < last else start + k - (last - first)
+            place = add(x, load(position, b))
+            bound[b] = bound[b] - length if length < math.inf else norm(place) - grain_set.radius[b] - inner
             if bound[b] < best:
-                bound[b], j = gap_at(crowd, position, grain_set, b, here)
+                bound[b], j = gap_to_nearest(grid, position, grain_set, b, place)
                 if bound[b] < best:
-                    best, who, whom = bound[b], b, j
-        near = who
-        if whom != EMPTY and best < TOUCH * grain_set.largest:
-            return x, who, whom, best
-        moved = max(best, TOUCH * grain_set.largest)
-        u, _ = random_direction(seed, turn, grain, STEPS)
-        x = axpy(moved, u, x)
+                    best, one, other = bound[b], b, j
+        start = one
+        if other != EMPTY and best < TOUCH * grain_set.largest:
+            return x, one, other, best
+        length = max(best, TOUCH * grain_set.largest)
+        u, _ = random_direction(seed, draw, grain, STEPS)
+        x = axpy(length, u, x)
         if norm(x) > size * (1.0 + 1e-9):
-            x, back = returned(seed, turn, grain, x, size)
-            if not back:  # another comes from far away, from anywhere
-                x = scale(size, random_direction(seed, turn, grain, DIRECTION)[0])
-            moved = math.inf
+            x, back = return_to_sphere(seed, draw, grain, x, size)
+            if not back:  # replaced by another walker from infinity, uniform on the sphere
+                x = scale(size, random_direction(seed, draw, grain, DIRECTION)[0])
+            length = math.inf
     return x, first, EMPTY, 0.0
 
 
 @loop
-def pulled(position, grain_set, x, offset, b, j):
-    """The centre of a body once its grain b has been pulled to rest at grain j, along the line of their centres."""
-    apart = sub(add(x, offset), load(position, j))
-    distance = norm(apart)
-    return axpy((rest_between(grain_set, b, j) - distance) / distance, apart, x)
+def pull_to_rest(position, grain_set, x, offset, b, j):
+    """Centre of a body at x length so that its grain b, at `offset`, is at its equilibrium distance from grain j."""
+    separation = sub(add(x, offset), load(position, j))
+    distance = norm(separation)
+    return axpy((pair_rest_distance(grain_set, b, j) - distance) / distance, separation, x)
 
 
 @kernel
-def grow_diffusing(crowd, position, bound, grain_set, first, last, extent, seed, tries):
-    """As `grow_ballistic` for grains that diffuse, all at the origin before; `bound` is room for N numbers."""
+def grow_diffusing(grid, position, bound, grain_set, first, last, extent, seed, tries):
+    """Add grains first … last − 1 one by one by diffusion.
+
+    As `grow_ballistic`; positions of grains to be added must be 0, and `bound` is a work array (N,).
+    """
     for b in range(first, last):
         placed = False
         for number in range(tries):
             size = extent + grain_set.radius[b]
-            x, _, mate, _ = walk_in(crowd, position, grain_set, b, b + 1, bound, extent, size, (seed, number, b))
-            if mate == EMPTY:
+            x, _, neighbour, _ = walk_on_spheres(
+                grid, position, grain_set, b, b + 1, bound, extent, size, (seed, number, b)
+            )
+            if neighbour == EMPTY:
                 continue
-            x = pulled(position, grain_set, x, (0.0, 0.0, 0.0), b, mate)
-            if stays(crowd, position, grain_set, b, x, mate):
+            x = pull_to_rest(position, grain_set, x, (0.0, 0.0, 0.0), b, neighbour)
+            if try_place(grid, position, grain_set, b, x, neighbour):
                 extent = max(extent, norm(x) + grain_set.radius[b])
                 placed = True
                 break
@@ -204,8 +265,8 @@ def grow_diffusing(crowd, position, bound, grain_set, first, last, extent, seed,
 
 
 @kernel
-def begin_hash_grid(crowd, position):
-    """The first grain is there, at the origin."""
-    clear(crowd)
+def place_first_grain(grid, position):
+    """Clear the grid and place grain 0 at the origin."""
+    clear(grid)
     put(position, 0, (0.0, 0.0, 0.0))
-    join_hash_grid(crowd, 0, (0.0, 0.0, 0.0))
+    insert_grain(grid, 0, (0.0, 0.0, 0.0))

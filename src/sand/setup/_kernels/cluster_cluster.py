@@ -1,4 +1,4 @@
-"""Aggregates that grow by meeting of clusters: each pair is turned at random, flies or diffuses until it touches."""
+"""Cluster–cluster aggregation: pairs of clusters in random orientation approach ballistically or by diffusion."""
 
 import math
 
@@ -6,29 +6,29 @@ from ...compiler.jit import kernel, loop
 from ...numerics.quaternion import normalised, turned
 from ...numerics.random import normal_pair, random_words, uniform
 from ...numerics.vec import add, axpy, load, norm, put, scale, sub
-from .aggregation import OFFSET, TURN1, TURN2, pulled, walk_in
+from .aggregation import OFFSET, TURN1, TURN2, pull_to_rest, walk_on_spheres
 from .hash_grid import (
     APART,
     EMPTY,
     HashGrid,
-    add_to_cell,
     cell_key,
     cell_on_axis,
     clear,
-    join_hash_grid,
-    place_of,
-    places_for,
-    rest_between,
+    insert_grain,
+    insert_in_cell,
+    pair_rest_distance,
+    slot_of,
+    table_size,
     touches_other,
 )
 
-CLOSE_ENOUGH = 0.003
-"""A meeting is taken at once if its distance of centres is the wanted one to this part."""
+DISTANCE_TOLERANCE = 0.003
+"""Relative error of the distance of centres at which a collision is accepted without further attempts."""
 
 
 @loop
-def middle_of(position, grain_set, first, last):
-    """Centre of mass of grains first … last − 1, and their mass."""
+def centre_of_mass(position, grain_set, first, last):
+    """Centre of mass [m] and mass [kg] of grains first … last − 1."""
     total, x = 0.0, (0.0, 0.0, 0.0)
     for i in range(first, last):
         total += grain_set.mass[i]
@@ -37,8 +37,8 @@ def middle_of(position, grain_set, first, last):
 
 
 @loop
-def gyration_square(position, grain_set, first, last, middle, total):
-    """Σ m |x − x₀|² / Σ m [m²]"""
+def squared_gyration_radius(position, grain_set, first, last, middle, total):
+    """Squared radius of gyration Σ m |x − x₀|² / Σ m [m²]."""
     square = 0.0
     for i in range(first, last):
         d = sub(load(position, i), middle)
@@ -47,8 +47,8 @@ def gyration_square(position, grain_set, first, last, middle, total):
 
 
 @loop
-def random_turn(seed, number, grain, stream):
-    """ϱ of a rotation, evenly over all (Shoemake 1992)."""
+def random_rotation(seed, number, grain, stream):
+    """Random quaternion, uniform over all rotations (Shoemake 1992)."""
     a, b, c, d = random_words(seed, number, grain, stream)
     x, y = normal_pair(a, b)
     z, w = normal_pair(c, d)
@@ -56,8 +56,8 @@ def random_turn(seed, number, grain, stream):
 
 
 @loop
-def lay(position, work, grain_set, first, last, middle, q):
-    """Put the cluster into `work`, its centre at the origin and turned by q; returns its outer radius [m]."""
+def place_rotated(position, work, grain_set, first, last, middle, q):
+    """Write the cluster to `work`, centred at the origin and rotated by q; return its outer radius [m]."""
     outer = 0.0
     for i in range(first, last):
         x = turned(q, sub(load(position, i), middle))
@@ -67,88 +67,114 @@ def lay(position, work, grain_set, first, last, middle, q):
 
 
 @loop
-def column(x, y, step, width):
-    """The column of cells `step` further, 4 being that of x, y."""
+def column_key(x, y, step, width):
+    """Key of the column of cells number `step` of the 3 × 3 columns around (x, y); number 4 contains it."""
     return cell_key(0, cell_on_axis(x, width) + step % 3 - 1, cell_on_axis(y, width) + step // 3 - 1, 0)
 
 
 @loop
-def met(crowd, work, grain_set, middle, last, dx, dy):
-    """Height at which the second cluster, coming from below at dx, dy, touches the first; and the two grains."""
+def contact_height(grid, work, grain_set, middle, last, dx, dy):
+    """Shift along z of the second cluster, coming from below with offset (dx, dy), at its first contact.
+
+    Returns
+    -------
+    height : float
+        Shift [m]; infinite for a miss.
+    one, other : int
+        Grains of the second and the first cluster in contact, or EMPTY.
+    """
     height, one, other = math.inf, EMPTY, EMPTY
     for b in range(middle, last):
         x, y, z = work[0, b] + dx, work[1, b] + dy, work[2, b]
         for step in range(9):
-            key = column(x, y, step, crowd.width)
-            at = place_of(crowd, key)
-            j = crowd.head[at] if crowd.key[at] == key else EMPTY
+            key = column_key(x, y, step, grid.width)
+            slot = slot_of(grid, key)
+            j = grid.head[slot] if grid.key[slot] == key else EMPTY
             while j != EMPTY:
                 miss = (x - work[0, j]) ** 2 + (y - work[1, j]) ** 2
                 if (
                     miss < (grain_set.radius[b] + grain_set.radius[j]) ** 2
                     and work[2, j] - z - 2.0 * grain_set.largest < height
                 ):
-                    rest = rest_between(grain_set, b, j)
+                    rest = pair_rest_distance(grain_set, b, j)
                     if miss < rest * rest and work[2, j] - math.sqrt(rest * rest - miss) - z < height:
                         height, one, other = work[2, j] - math.sqrt(rest * rest - miss) - z, b, j
-                j = crowd.before[j]
+                j = grid.next_in_cell[j]
     return height, one, other
 
 
 @loop
-def strained(crowd, work, grain_set, middle, last, shift, one, other):
-    """Whether any pair of the two clusters touches but these two."""
+def has_other_contact(grid, work, grain_set, middle, last, shift, one, other):
+    """Whether any pair of grains of the two clusters other than (`one`, `other`) is in contact."""
     for b in range(middle, last):
         x = add(load(work, b), shift)
         for step in range(9):
-            key = column(x[0], x[1], step, crowd.width)
-            at = place_of(crowd, key)
-            j = crowd.head[at] if crowd.key[at] == key else EMPTY
+            key = column_key(x[0], x[1], step, grid.width)
+            slot = slot_of(grid, key)
+            j = grid.head[slot] if grid.key[slot] == key else EMPTY
             while j != EMPTY:
                 touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
                 d = sub(x, load(work, j))
                 if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= touch * touch and not (b == one and j == other):
                     return True
-                j = crowd.before[j]
+                j = grid.next_in_cell[j]
     return False
 
 
 @loop
-def flown(table, position, work, grain_set, ends, middles, address, wanted):
-    """One flight of the second cluster into the first, along z; both lie in `work`.
+def try_merge(table, position, work, grain_set, ends, middles, counter, target):
+    """Collide two clusters along z, with random orientations and a random offset; both are written to `work`.
 
     Parameters
     ----------
-    ends
-        the clusters are grains ends[0] … ends[1] − 1 and ends[1] … ends[2] − 1.
-    wanted
-        distance of centres that is wished for [m], not met by flights further out; infinite: any.
+    table : HashGrid
+        Work space for the grid of the first cluster.
+    position, work : ndarray
+        (3, N) [m].
+    grain_set : GrainSet
+        Properties of the grains.
+    ends : tuple of int
+        The clusters are grains ends[0] … ends[1] − 1 and ends[1] … ends[2] − 1.
+    middles : tuple
+        Centres of mass of the clusters in `position` [m].
+    counter : tuple of int
+        Seed, attempt and grain of the random numbers.
+    target : float
+        Target distance of the centres of mass [m], the upper limit of the offset; infinite: no target.
 
     Returns
     -------
-    result
-        Whether they met (in one contact), and the shift of the second cluster.
+    merged : bool
+        Whether the clusters touch in exactly one contact.
+    shift : tuple of float
+        Shift of the second cluster [m].
     """
-    seed, number, grain = address
+    seed, number, grain = counter
     first, middle, last = ends
-    reach = lay(position, work, grain_set, first, middle, middles[0], random_turn(seed, number, grain, TURN1))
-    reach += lay(position, work, grain_set, middle, last, middles[1], random_turn(seed, number, grain, TURN2))
-    crowd = HashGrid(table.key, table.head, table.before, places_for(middle - first, table.mask + 1) - 1, table.width)
-    clear(crowd)
+    reach = place_rotated(
+        position, work, grain_set, first, middle, middles[0], random_rotation(seed, number, grain, TURN1)
+    )
+    reach += place_rotated(
+        position, work, grain_set, middle, last, middles[1], random_rotation(seed, number, grain, TURN2)
+    )
+    grid = HashGrid(
+        table.key, table.head, table.next_in_cell, table_size(middle - first, table.mask + 1) - 1, table.width
+    )
+    clear(grid)
     for i in range(first, middle):
-        add_to_cell(crowd, column(work[0, i], work[1, i], 4, crowd.width), i)
+        insert_in_cell(grid, column_key(work[0, i], work[1, i], 4, grid.width), i)
     words = random_words(seed, number, grain, OFFSET)
-    offset = min(reach, wanted) * math.sqrt(uniform(words[0]))
+    offset = min(reach, target) * math.sqrt(uniform(words[0]))
     angle = 2.0 * math.pi * uniform(words[1])
     dx, dy = offset * math.cos(angle), offset * math.sin(angle)
-    height, one, other = met(crowd, work, grain_set, middle, last, dx, dy)
+    height, one, other = contact_height(grid, work, grain_set, middle, last, dx, dy)
     shift = (dx, dy, height)
-    return one != EMPTY and not strained(crowd, work, grain_set, middle, last, shift, one, other), shift
+    return one != EMPTY and not has_other_contact(grid, work, grain_set, middle, last, shift, one, other), shift
 
 
 @loop
-def settle(position, work, ends, shift):
-    """The two clusters as they lie in `work` are one now."""
+def merge(position, work, ends, shift):
+    """Copy two clusters from `work` to `position`, the second one shifted."""
     first, middle, last = ends
     for i in range(first, middle):
         put(position, i, load(work, i))
@@ -157,8 +183,15 @@ def settle(position, work, ends, shift):
 
 
 @loop
-def wanted_distance(goal, squares, masses):
-    """Γ of Filippov et al. (2000) [m]: Γ² = M²/(M1M2) (R² − (M1R1² + M2R2²)/M), 0 if the clusters are too wide."""
+def target_distance(goal, squares, masses):
+    """Distance of centres of mass Γ [m] for a radius of gyration R of the pair; 0 if the clusters are too wide.
+
+    Γ² = M²/(M1M2) (R² − (M1R1² + M2R2²)/M)
+
+    References
+    ----------
+    Filippov, Zurita & Rosner (2000), J. Colloid Interface Sci. 229, 261.
+    """
     total = masses[0] + masses[1]
     rest = goal * goal - (masses[0] * squares[0] + masses[1] * squares[1]) / total
     return math.sqrt(max(rest * total * total / (masses[0] * masses[1]), 0.0))
@@ -166,80 +199,95 @@ def wanted_distance(goal, squares, masses):
 
 @kernel
 def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, choices):
-    """Pairs of clusters fly into each other, one pair after the other; each becomes one cluster.
+    """Merge pairs of clusters by ballistic collisions.
 
     Parameters
     ----------
-    joins
-        (3, K) the clusters of join k are grains joins[0] … joins[1] − 1 and joins[1] … joins[2] − 1.
-    goals
-        (K,) radius of gyration [m] wanted of each new cluster; infinite: whatever chance gives.
-    choices
-        meetings to choose from where one is wanted.
+    table : HashGrid
+        Work space for the grid of the first cluster.
+    position, work : ndarray
+        (3, N) [m]; `position` is modified.
+    grain_set : GrainSet
+        Properties of the grains.
+    joins : ndarray
+        (3, K); pair k is grains joins[0] … joins[1] − 1 and joins[1] … joins[2] − 1.
+    goals : ndarray
+        (K,) target radius of gyration of each merged cluster [m]; infinite: none.
+    seed : int
+        Seed of the random numbers.
+    tries : int
+        Largest number of attempts per pair.
+    choices : int
+        Number of successful collisions from which the one nearest to the target is taken.
 
     Returns
     -------
-    result
-        Number of joins done; less than K where two did not meet in `tries` tries.
+    int
+        Number of merged pairs; less than K if a pair found no single contact in `tries` attempts.
     """
     for k in range(goals.size):
         ends = (joins[0, k], joins[1, k], joins[2, k])
-        middle1, mass1 = middle_of(position, grain_set, ends[0], ends[1])
-        middle2, mass2 = middle_of(position, grain_set, ends[1], ends[2])
-        wanted = math.inf
+        middle1, mass1 = centre_of_mass(position, grain_set, ends[0], ends[1])
+        middle2, mass2 = centre_of_mass(position, grain_set, ends[1], ends[2])
+        target = math.inf
         if goals[k] < math.inf:
-            square1 = gyration_square(position, grain_set, ends[0], ends[1], middle1, mass1)
-            square2 = gyration_square(position, grain_set, ends[1], ends[2], middle2, mass2)
-            wanted = wanted_distance(goals[k], (square1, square2), (mass1, mass2))
+            square1 = squared_gyration_radius(position, grain_set, ends[0], ends[1], middle1, mass1)
+            square2 = squared_gyration_radius(position, grain_set, ends[1], ends[2], middle2, mass2)
+            target = target_distance(goals[k], (square1, square2), (mass1, mass2))
         best, chosen, found = math.inf, -1, 0
         for number in range(tries):
-            address = (seed, number, joins[1, k])
-            good, shift = flown(table, position, work, grain_set, ends, (middle1, middle2), address, wanted)
-            if good:
+            counter = (seed, number, joins[1, k])
+            merged, shift = try_merge(table, position, work, grain_set, ends, (middle1, middle2), counter, target)
+            if merged:
                 found += 1
-                wrong = abs(norm(shift) - wanted) if wanted < math.inf else 0.0
-                if wrong < best:
-                    best, chosen = wrong, number
-                if found == choices or wrong <= CLOSE_ENOUGH * wanted or wanted == math.inf:
+                error = abs(norm(shift) - target) if target < math.inf else 0.0
+                if error < best:
+                    best, chosen = error, number
+                if found == choices or error <= DISTANCE_TOLERANCE * target or target == math.inf:
                     break
         if chosen < 0:
             return k
-        address = (seed, chosen, joins[1, k])
-        good, shift = flown(table, position, work, grain_set, ends, (middle1, middle2), address, wanted)
-        settle(position, work, ends, shift)
+        counter = (seed, chosen, joins[1, k])
+        merged, shift = try_merge(table, position, work, grain_set, ends, (middle1, middle2), counter, target)
+        merge(position, work, ends, shift)
     return goals.size
 
 
 @kernel
 def join_diffusing(table, position, work, bound, grain_set, joins, seed, tries):
-    """As `join_ballistic`, for clusters that diffuse without turning; `bound` is room for N numbers."""
+    """Merge pairs of clusters by diffusion without rotation.
+
+    As `join_ballistic`; `bound` is a work array (N,).
+    """
     for k in range(joins.shape[1]):
         ends = (joins[0, k], joins[1, k], joins[2, k])
-        middle1, _ = middle_of(position, grain_set, ends[0], ends[1])
-        middle2, _ = middle_of(position, grain_set, ends[1], ends[2])
-        places = places_for(ends[1] - ends[0], table.mask + 1)
-        crowd = HashGrid(table.key, table.head, table.before, places - 1, table.width)
+        middle1, _ = centre_of_mass(position, grain_set, ends[0], ends[1])
+        middle2, _ = centre_of_mass(position, grain_set, ends[1], ends[2])
+        slots = table_size(ends[1] - ends[0], table.mask + 1)
+        grid = HashGrid(table.key, table.head, table.next_in_cell, slots - 1, table.width)
         done = False
         for number in range(tries):
-            inner = lay(position, work, grain_set, ends[0], ends[1], middle1, random_turn(seed, number, ends[1], TURN1))
-            size = inner + lay(
-                position, work, grain_set, ends[1], ends[2], middle2, random_turn(seed, number, ends[1], TURN2)
+            inner = place_rotated(
+                position, work, grain_set, ends[0], ends[1], middle1, random_rotation(seed, number, ends[1], TURN1)
             )
-            clear(crowd)
+            size = inner + place_rotated(
+                position, work, grain_set, ends[1], ends[2], middle2, random_rotation(seed, number, ends[1], TURN2)
+            )
+            clear(grid)
             for i in range(ends[0], ends[1]):
-                join_hash_grid(crowd, i, load(work, i))
-            address = (seed, number, ends[1])
-            x, one, other, _ = walk_in(crowd, work, grain_set, ends[1], ends[2], bound, inner, size, address)
+                insert_grain(grid, i, load(work, i))
+            counter = (seed, number, ends[1])
+            x, one, other, _ = walk_on_spheres(grid, work, grain_set, ends[1], ends[2], bound, inner, size, counter)
             if other == EMPTY:
                 continue
-            x = pulled(work, grain_set, x, load(work, one), one, other)
-            alone = True
+            x = pull_to_rest(work, grain_set, x, load(work, one), one, other)
+            single = True
             for b in range(ends[1], ends[2]):
-                if touches_other(crowd, work, grain_set, b, add(x, load(work, b)), other if b == one else EMPTY):
-                    alone = False
+                if touches_other(grid, work, grain_set, b, add(x, load(work, b)), other if b == one else EMPTY):
+                    single = False
                     break
-            if alone:
-                settle(position, work, ends, x)
+            if single:
+                merge(position, work, ends, x)
                 done = True
                 break
         if not done:

@@ -1,8 +1,8 @@
-"""Grains that come one after another, found by where they are: cells of widths w, 2w, 4w … in one hash table.
+"""Hierarchical hash grid for neighbour search in growing aggregates.
 
-Aggregates grow in all directions and may be fluffy; a hash table needs neither a box nor room for what is empty.
-Cells of the lowest level list their grains, those above only say that there are some: where nothing is near, one look
-tells how far the next grain is at least.
+Cells of widths w, 2w, 4w … of several levels share one hash table, which needs no bounding box and no memory for empty
+cells. Cells of the lowest level hold linked lists of their grains; cells of higher levels only record that they are
+occupied, from which a lower bound of the distance to the nearest grain follows.
 """
 
 import math
@@ -16,19 +16,19 @@ from ...numerics.vec import dot, load, sub
 
 EMPTY = -1
 LEVELS = 8
-"""Widths, each twice the one below; the widest cells are 128 w wide."""
-PLACES_PER_GRAIN, PLACES = 4, 512
-"""Least size of the table.  Connected grains occupy at most three cells each on all levels together, and the corners of
-eight on each; a table must never be full."""
+"""Number of levels; each doubles the cell width, up to 128 w."""
+SLOTS_PER_GRAIN, MIN_SLOTS = 4, 512
+"""Smallest size of the table: a connected grain occupies at most three cells, summed over the levels, apart from up to
+eight cells per level at its corners; the table must never be full."""
 APART = 1e-9
-"""Least gap of surfaces that do not touch, in the sum of their radii."""
+"""Smallest gap of surfaces that do not touch, relative to the sum of their radii."""
 _HALF = 1 << 19
 _SIDE = 1 << 20
-_SPREAD = -7046029254386353131  # 2⁶⁴ over the golden ratio, odd, as a signed number
+_MULTIPLIER = -7046029254386353131  # Fibonacci hashing: 2⁶⁴ over the golden ratio, odd, as a signed integer
 
 
 class GrainSet(NamedTuple):
-    """What the grains of a growing aggregate are."""
+    """Properties of the grains of a growing aggregate."""
 
     radius: np.ndarray  # (N,) [m]
     mass: np.ndarray  # (N,) [kg]
@@ -39,18 +39,18 @@ class GrainSet(NamedTuple):
 
 
 class HashGrid(NamedTuple):
-    """The cells; `mask` + 1 places of the table are in use, a power of two."""
+    """Hash table of cells with open addressing; the first `mask` + 1 slots, a power of two, are in use."""
 
-    key: np.ndarray  # (places,) which cell has this place, or EMPTY
-    head: np.ndarray  # (places,) the grain that came last into the cell
-    before: np.ndarray  # (N,) the grain that came before it, or EMPTY
+    key: np.ndarray  # (slots,) key of the cell, or EMPTY
+    head: np.ndarray  # (slots,) first grain of the cell's linked list
+    next_in_cell: np.ndarray  # (N,) next grain of the list, or EMPTY
     mask: Any
-    width: float  # w [m]
+    width: float  # cell width w of the lowest level [m]
 
 
 @formula
-def rest_between(grain_set, i, j):
-    """Distance of the centres of grains i and j in contact at rest [m]: r1 + r2 − δ0; r1 + r2 without adhesion."""
+def pair_rest_distance(grain_set, i, j):
+    """Equilibrium distance of the centres of grains i and j in contact [m]: r1 + r2 − δ0, δ0 = 0 without adhesion."""
     r1, r2 = grain_set.radius[i], grain_set.radius[j]
     a, b = grain_set.material[i], grain_set.material[j]
     reduced = r1 * r2 / (r1 + r2)
@@ -61,129 +61,137 @@ def rest_between(grain_set, i, j):
 
 @formula
 def cell_on_axis(x, width):
-    """The cell of a coordinate."""
+    """Cell index of a coordinate."""
     return math.floor(x / width)
 
 
 @formula
 def cell_key(level, x, y, z):
-    """One whole number for a cell, each coordinate within ±2¹⁹."""
+    """Integer key of a cell; each index must lie within ±2¹⁹."""
     return ((level * _SIDE + x + _HALF) * _SIDE + y + _HALF) * _SIDE + z + _HALF
 
 
 @loop
-def place_of(crowd, key):
-    """The place of a cell in the table: where it is, or the empty place where it belongs.
+def slot_of(grid, key):
+    """Slot of a cell in the table, or the empty slot in which to insert it (linear probing).
 
-    Eight cells in a row, which differ in the last bits, lie together in memory.
+    Eight consecutive cells, whose keys differ in the last bits, are adjacent in memory.
     """
-    at = ((((key >> 3) * _SPREAD) >> 32 << 3) + (key & 7)) & crowd.mask
-    while crowd.key[at] != EMPTY and crowd.key[at] != key:
-        at = (at + 1) & crowd.mask
-    return at
+    slot = ((((key >> 3) * _MULTIPLIER) >> 32 << 3) + (key & 7)) & grid.mask
+    while grid.key[slot] != EMPTY and grid.key[slot] != key:
+        slot = (slot + 1) & grid.mask
+    return slot
 
 
 @loop
-def places_for(grains, most):
-    """Size of the table for so many grains, a power of two, at most `most`."""
-    size = PLACES
-    while size < PLACES_PER_GRAIN * grains + PLACES and size < most:
+def table_size(grains, most):
+    """Number of slots for this number of grains, a power of two, at most `most`."""
+    size = MIN_SLOTS
+    while size < SLOTS_PER_GRAIN * grains + MIN_SLOTS and size < most:
         size *= 2
     return size
 
 
 @loop
-def clear(crowd):
-    """Nobody is there."""
-    for at in range(crowd.mask + 1):
-        crowd.key[at] = EMPTY
+def clear(grid):
+    """Empty the table."""
+    for slot in range(grid.mask + 1):
+        grid.key[slot] = EMPTY
 
 
 @loop
-def add_to_cell(crowd, key, i):
-    """Grain i is in this cell."""
-    at = place_of(crowd, key)
-    crowd.before[i] = crowd.head[at] if crowd.key[at] == key else EMPTY
-    crowd.key[at] = key
-    crowd.head[at] = i
+def insert_in_cell(grid, key, i):
+    """Insert grain i in the list of a cell."""
+    slot = slot_of(grid, key)
+    grid.next_in_cell[i] = grid.head[slot] if grid.key[slot] == key else EMPTY
+    grid.key[slot] = key
+    grid.head[slot] = i
 
 
 @loop
-def join_hash_grid(crowd, i, x):
-    """Grain i is at x, on all levels."""
-    width = crowd.width
+def insert_grain(grid, i, x):
+    """Insert grain i at x in the lowest level, and mark its cells of all higher levels as occupied."""
+    width = grid.width
     key = cell_key(0, cell_on_axis(x[0], width), cell_on_axis(x[1], width), cell_on_axis(x[2], width))
-    add_to_cell(crowd, key, i)
+    insert_in_cell(grid, key, i)
     for level in range(1, LEVELS):
         width *= 2.0
         key = cell_key(level, cell_on_axis(x[0], width), cell_on_axis(x[1], width), cell_on_axis(x[2], width))
-        at = place_of(crowd, key)
-        if crowd.key[at] == key:
+        slot = slot_of(grid, key)
+        if grid.key[slot] == key:
             return
-        crowd.key[at] = key
+        grid.key[slot] = key
 
 
 @loop
-def anyone_around(crowd, level, width, x):
-    """Whether a grain is in the cell of x on this level, or in one of the 26 around it."""
+def occupied_around(grid, level, width, x):
+    """Whether the cell of x on this level or one of its 26 neighbours is occupied."""
     cx, cy, cz = cell_on_axis(x[0], width), cell_on_axis(x[1], width), cell_on_axis(x[2], width)
     for step in range(27):
-        turn = (step + 13) % 27  # the middle first
-        key = cell_key(level, cx + turn % 3 - 1, cy + turn // 3 % 3 - 1, cz + turn // 9 - 1)
-        if crowd.key[place_of(crowd, key)] == key:
+        cell = (step + 13) % 27  # the central cell first
+        key = cell_key(level, cx + cell % 3 - 1, cy + cell // 3 % 3 - 1, cz + cell // 9 - 1)
+        if grid.key[slot_of(grid, key)] == key:
             return True
     return False
 
 
 @loop
-def free_width(crowd, x):
-    """A length [m] within which of x no grain has its centre; 0 if some may be within w."""
-    width = crowd.width * (1 << (LEVELS - 1))
-    for down in range(LEVELS):
-        if not anyone_around(crowd, LEVELS - 1 - down, width, x):
+def empty_distance(grid, x):
+    """Lower bound of the distance from x to the nearest grain centre [m]; 0 if it may be less than w."""
+    width = grid.width * (1 << (LEVELS - 1))
+    for k in range(LEVELS):
+        if not occupied_around(grid, LEVELS - 1 - k, width, x):
             return width
         width *= 0.5
     return 0.0
 
 
 @loop
-def head_around(crowd, x, step):
-    """The last grain in the `step`-th of the 27 lowest cells around x, or EMPTY."""
-    cx, cy, cz = (cell_on_axis(x[0], crowd.width), cell_on_axis(x[1], crowd.width), cell_on_axis(x[2], crowd.width))
+def head_of_neighbour_cell(grid, x, step):
+    """First grain in the list of cell number `step` of the 27 lowest-level cells around x, or EMPTY."""
+    cx, cy, cz = (cell_on_axis(x[0], grid.width), cell_on_axis(x[1], grid.width), cell_on_axis(x[2], grid.width))
     key = cell_key(0, cx + step % 3 - 1, cy + step // 3 % 3 - 1, cz + step // 9 - 1)
-    at = place_of(crowd, key)
-    return crowd.head[at] if crowd.key[at] == key else EMPTY
+    slot = slot_of(grid, key)
+    return grid.head[slot] if grid.key[slot] == key else EMPTY
 
 
 @loop
-def gap_at(crowd, position, grain_set, b, x):
-    """Gap [m] between the surface of grain b at x and the nearest one, or less; and that grain, EMPTY if far."""
+def gap_to_nearest(grid, position, grain_set, b, x):
+    """Gap between grain b at x and the nearest other grain.
+
+    Returns
+    -------
+    gap : float
+        Gap between the surfaces [m], or a lower bound of it.
+    nearest : int
+        The nearest grain; EMPTY if `gap` is a lower bound.
+    """
     reach = grain_set.radius[b] + grain_set.largest
-    free = free_width(crowd, x)
+    free = empty_distance(grid, x)
     if free > 0.0:
         return free - reach, EMPTY
-    best, nearest = crowd.width - reach, EMPTY
+    best, nearest = grid.width - reach, EMPTY
     for step in range(27):
-        j = head_around(crowd, x, step)
+        j = head_of_neighbour_cell(grid, x, step)
         while j != EMPTY:
-            apart = sub(x, load(position, j))
+            separation = sub(x, load(position, j))
             touch = grain_set.radius[b] + grain_set.radius[j]
-            square = dot(apart, apart)
+            square = dot(separation, separation)
             if square < (best + touch) ** 2:
                 best, nearest = math.sqrt(square) - touch, j
-            j = crowd.before[j]
+            j = grid.next_in_cell[j]
     return best, nearest
 
 
 @loop
-def touches_other(crowd, position, grain_set, b, x, mate):
-    """Whether grain b at x touches any grain but `mate`."""
+def touches_other(grid, position, grain_set, b, x, neighbour):
+    """Whether grain b at x touches any grain other than `neighbour`."""
     for step in range(27):
-        j = head_around(crowd, x, step)
+        j = head_of_neighbour_cell(grid, x, step)
         while j != EMPTY:
-            apart = sub(x, load(position, j))
+            separation = sub(x, load(position, j))
             touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
-            if j != mate and dot(apart, apart) <= touch * touch:
+            if j != neighbour and dot(separation, separation) <= touch * touch:
                 return True
-            j = crowd.before[j]
+            j = grid.next_in_cell[j]
     return False

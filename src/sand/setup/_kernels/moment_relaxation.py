@@ -1,4 +1,4 @@
-"""Moments that turn into the field of the others while the grains stay where they are."""
+"""Relaxation of magnetic moments at fixed positions to a local minimum of the dipole energy."""
 
 import math
 
@@ -9,24 +9,39 @@ from ...numerics.vec import add, dot, load, norm, put, scale, sub
 
 @loop
 def flux_density_at(position, moment, i, k):
-    """B [T] at moment i from all others, open space."""
-    here, own, total = load(position, i), load(moment, i), (0.0, 0.0, 0.0)
+    """Flux density B [T] at moment i due to all other moments, open boundaries."""
+    x, own, total = load(position, i), load(moment, i), (0.0, 0.0, 0.0)
     for first, last in ((0, i), (i + 1, position.shape[1])):
         for j in range(first, last):
-            total = add(total, pair_load(sub(here, load(position, j)), own, load(moment, j), k)[1])
+            total = add(total, pair_load(sub(x, load(position, j)), own, load(moment, j), k)[1])
     return total
 
 
 @kernel
 def relax(position, moment, k, tolerance, most):
-    """Lay each moment along the field of the others, one after the other, until none turns by more than `tolerance`.
+    """Align each moment in turn with the field of the others, until none rotates by more than `tolerance`.
 
-    Each turn lowers the energy, −μ·B of this moment, and no other part of it changes.
+    Gauss–Seidel iteration: each rotation lowers the term −μ·B of this moment and changes no other term of the energy.
+
+    Parameters
+    ----------
+    position : ndarray
+        (3, N) [m].
+    moment : ndarray
+        (3, N) [A m²], modified.
+    k : float
+        μ0/4π [T m/A].
+    tolerance : float
+        Angle [rad].
+    most : int
+        Largest number of sweeps.
 
     Returns
     -------
-    result
-        Number of sweeps, and the largest turn of the last one [rad].
+    sweeps : int
+        Number of sweeps.
+    worst : float
+        Largest rotation in the last sweep [rad].
     """
     worst = math.inf
     for sweep in range(most):
@@ -46,7 +61,7 @@ def relax(position, moment, k, tolerance, most):
 
 @kernel
 def alignment_energy(position, moment, k):
-    """½ Σ −μ·B [J]"""
+    """Magnetic interaction energy U = −½ Σ μ·B [J]."""
     total = 0.0
     for i in range(position.shape[1]):
         total -= 0.5 * dot(load(moment, i), flux_density_at(position, moment, i, k))
