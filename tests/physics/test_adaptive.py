@@ -170,7 +170,7 @@ def test_a_grazing_pass_is_seen_and_a_miss_is_none():
         sim.run(until="200 ns")
         assert sim.state.count[MADE] == made
         if not made:
-            longest = sim._engine.rules.control.longest
+            longest = sim._engine.parameters.control.longest
             assert sim.state.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
 
 
@@ -201,7 +201,7 @@ def test_a_contact_that_breaks_gives_the_world_back():
     sim.run(until="100 ns")
     row = sim.ledger.rows[-1]
     assert (row["made"], row["broken"], row["contacts"]) == (1, 1, 0)
-    assert sim.state.clock[FLIGHT] == sim._engine.rules.control.longest
+    assert sim.state.clock[FLIGHT] == sim._engine.parameters.control.longest
     assert sim.ledger.drift < 1e-3
 
 
@@ -381,7 +381,7 @@ def test_what_no_step_can_follow_stops_the_run():
     along = SIZE * np.array([[1.0, 0, 0], [1.0, 0, 0]])
     grains = sand.Grains([[0, 0, 0], [4e-8, 0, 0]], R, sand.IRON, moment=along)
     sim = flight(grains)
-    sim._engine.rules = sim._engine.rules._replace(contact=sim._engine.rules.contact._replace(on=False))
+    sim._engine.parameters = sim._engine.parameters._replace(contact=sim._engine.parameters.contact._replace(on=False))
     result = sim.run(until="1 us")
     assert result.outcome is sand.Outcome.NO_STEP
     assert result.grains != ()

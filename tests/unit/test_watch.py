@@ -65,7 +65,7 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     """
     monkeypatch.setattr(translate, "is_large", lambda grains: blocks)
     sim = crowd(margin="5 nm")
-    control, search = sim._engine.rules.control, sim._engine.rules.search
+    control, search = sim._engine.parameters.control, sim._engine.parameters.search
     limits = {
         LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
         PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.reach),
@@ -74,7 +74,7 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     spared = 0
     for steps in (1, 2, 3, 5, 8, 13, 21, 34, 55):
         sim._engine.advance(np.inf, steps)
-        w, span = sim.state, sim._engine.rules.span
+        w, span = sim.state, sim._engine.parameters.span
         for place, (group, name, limit) in limits.items():
             strayed = largest_displacement(w.grains.arrays, getattr(getattr(w, group), name), span)
             assert w.pair_list.skin[place] <= limit - strayed + 1e-12 * limit
@@ -93,7 +93,7 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     pick in each.
     """
     sim, twin = crowd(), crowd()
-    limit, span = SOON_PART * sim._engine.rules.control.reach, sim._engine.rules.span
+    limit, span = SOON_PART * sim._engine.parameters.control.reach, sim._engine.parameters.span
     for each in (sim, twin):
         each.run(steps=1)
     looked_at = 0

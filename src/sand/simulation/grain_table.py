@@ -26,7 +26,7 @@ def at_grains(engine: Engine) -> dict[str, np.ndarray]:
     external = [at(state.time) for force in engine.external if (at := getattr(force, "flux_density_at", None))]
     moving = 0.5 * grains.mass * (grains.velocity**2).sum(axis=1)
     spinning = 0.5 * grains.arrays.inertia * (grains.spin**2).sum(axis=1)
-    table = ContactTable(state, engine.rules.contact.follow)
+    table = ContactTable(state, engine.parameters.contact.follow)
     half = 0.5 * np.sum([table[name] for name in ELASTIC], axis=0)
     contacts = np.zeros(len(grains))
     for side in range(2):

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from ..forces.base import LongRangeForce
-from .stop import SHORTEST
+from .stop import SHORTEST_DURATION
 
 
 def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
@@ -23,7 +23,7 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     names = [m.name for m in materials]
     run = {
-        "until": max(until, SHORTEST),  # a run to time 0 can be gone on with, too
+        "until": max(until, SHORTEST_DURATION),  # a run to time 0 can be gone on with, too
         "steps": last_step if last_step == float("inf") else int(last_step),
         "frame_every": simulation.frame_every,
         "seed": int(simulation.seed or 0),

@@ -21,7 +21,7 @@ ADVICE = {
     "out": "sand.Simulation(sim.grains, sim.forces, out=…)",
 }
 """Arguments of a simulation that hold for all of its life, and how one with others is built."""
-RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "record", "choices", "is_sound")
+RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound")
 """What follows from the run."""
 
 

@@ -34,7 +34,7 @@ from .pace import Pace
 from .run_writer import RunWriter
 from .settings import ReadOnlySettings, forces_given
 from .signals import Signals
-from .stop import SHORTEST, stop_criteria
+from .stop import SHORTEST_DURATION, stop_criteria
 
 BURST = 0.1
 """Wall time [s] the compiled driver stays away from Python, about."""
@@ -111,7 +111,7 @@ class Simulation(ReadOnlySettings):
         self.ledger = Ledger(
             [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
         )
-        self.record = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
+        self.writer = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
         self.wall_seconds, self._begun = 0.0, restart is not None
         self._broken = ""  # why it cannot be run any further
         if restart is not None:
@@ -142,7 +142,7 @@ class Simulation(ReadOnlySettings):
     @property
     def is_sound(self) -> bool:
         """False if numbers are no longer finite, or most of the energy came from nowhere."""
-        return not self.ledger.runs_away(self._stock())
+        return not self.ledger.runs_away(self._log_row())
 
     @property
     def grains(self) -> Grains:
@@ -153,7 +153,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """The contacts as they are now: displacements, shares of their limits, loads, energies, what each lost."""
         self._start()
-        return ContactTable(self.state, self._engine.rules.contact.follow)
+        return ContactTable(self.state, self._engine.parameters.contact.follow)
 
     @property
     def choices(self) -> dict[str, str]:
@@ -174,7 +174,7 @@ class Simulation(ReadOnlySettings):
     def loads(self) -> dict[str, Any]:
         """Force (N, 3) [N], torque (N, 3) [N m], field (N, 3) [T], energies by name [J]; no step is taken."""
         self._start()
-        row = self._stock()
+        row = self._log_row()
         names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.force_energies()))
         return {
             "force": self.grains.force.copy(),
@@ -215,11 +215,11 @@ class Simulation(ReadOnlySettings):
             raise BadInput(f"this simulation cannot go on: {self._broken}")
         end, last = stop_criteria(until, steps, self.time, self.steps, self.planned)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
-            self.frame_every = max((end - self.time) / 200.0, SHORTEST)
+            self.frame_every = max((end - self.time) / 200.0, SHORTEST_DURATION)
         try:
             self._start()
-            if self.record:
-                self.record.open(self, end, last)
+            if self.writer:
+                self.writer.open(self, end, last)
             begun = wall.monotonic()
             with Signals() as signals:
                 try:
@@ -229,13 +229,13 @@ class Simulation(ReadOnlySettings):
                     self._engine.restore_user_order()
             return self._close(outcome)
         except FilesFailed as error:
-            if self.record:
-                self.record.rescue()
+            if self.writer:
+                self.writer.rescue()
             self._broken = f"its files could not be written ({error}); go on with sand.resume, or start again"
             raise
         finally:
-            if self.record:
-                self.record.release()
+            if self.writer:
+                self.writer.release()
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:
@@ -260,18 +260,18 @@ class Simulation(ReadOnlySettings):
         if not self._begun:
             self._engine.begin()
             self._begun = True
-            self._look()
+            self._record_output()
 
-    def _stock(self) -> dict[str, float]:
-        return log_row(self.state, self._engine.rules, self._engine.force_energies())
+    def _log_row(self) -> dict[str, float]:
+        return log_row(self.state, self._engine.parameters, self._engine.force_energies())
 
-    def _look(self) -> None:
+    def _record_output(self) -> None:
         """A row of the ledger, a frame and everyone who looks on."""
-        row = self._stock()
+        row = self._log_row()
         if not self.ledger.add(row):
             return
-        if self.record:
-            self.record.write(self, row)
+        if self.writer:
+            self.writer.write(self, row)
         for observer in self.observers:
             observer.see(self, row)
 
@@ -295,12 +295,12 @@ class Simulation(ReadOnlySettings):
             done = self.time >= end or self.steps >= last
             output = stop is Stop.TIME_REACHED or done
             if output:
-                self._look()
+                self._record_output()
                 frames.pass_by(self.time)
             if done:
                 return Outcome.FINISHED if self.is_sound else Outcome.RUNAWAY
-            if self.record:
-                self.record.tick(self, output)
+            if self.writer:
+                self.writer.tick(self, output)
             tick_all(self.observers, self)
             if signals.received:
                 return Outcome.INTERRUPTED
@@ -310,10 +310,10 @@ class Simulation(ReadOnlySettings):
         if outcome is Outcome.RUNAWAY:
             named = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
         if outcome.is_physics:
-            self._look()
+            self._record_output()
         result = Result(outcome, self.steps, self.time, self.ledger.drift, named)
-        if self.record:
-            self.record.close(self, result)
+        if self.writer:
+            self.writer.close(self, result)
         for observer in self.observers:
             observer.close(self, result)
         if outcome is Outcome.INTERRUPTED:
