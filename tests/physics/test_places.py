@@ -298,7 +298,7 @@ def test_a_run_that_is_broken_off_leaves_grains_at_home():
     """Also where nobody looked: the progress bar says that it does not."""
 
     class Clumsy(sand.Observer):
-        looks_in_ticks = False
+        tick_reads_grains = False
 
         def tick(self, simulation):
             assert simulation._engine._is_sorted
@@ -315,7 +315,7 @@ def test_who_gets_an_order_of_its_own():
     """ "auto" means ten thousand grains or more; the settled word stands in the choices; a wrong word is refused."""
     assert sand.Neighbours().along_curve(4000) and not sand.Neighbours().along_curve(3999)
     assert not sand.Neighbours(order="as given").along_curve(10**6)
-    assert stirred().neighbours.order == "curve" and "along a curve" in stirred().choices["neighbours"]
+    assert stirred().neighbours.order == "curve" and "space-filling curve" in stirred().choices["neighbours"]
     assert stirred("auto").neighbours.order == "as given" and "curve" not in stirred("auto").choices["neighbours"]
     with pytest.raises(sand.BadInput, match=r"order = 'curves'.*curve"):
         sand.Neighbours(order="curves")

@@ -1,4 +1,4 @@
-"""A world and the compiled code that moves it."""
+"""The engine of a simulation: its state, the compiled driver, and the parameters that the driver takes."""
 
 from __future__ import annotations
 
@@ -46,26 +46,26 @@ from ..state.state import (
 
 @dataclass
 class Engine:
-    """A world and the compiled code that moves it.
+    """The state of a simulation and the compiled driver that advances it.
 
     Attributes
     ----------
-    world
-        the state, its grains numbered as the user knows them.
-    parameters : Rules
-        everything that does not change, as the kernels take it.
+    state : State
+        The state, with grains in the user's order.
+    parameters : StepParameters
+        Constants of the run, as the kernels take them.
     warnings : list[str]
-        what the forces had to say about these grains.
-    far : Sequence[tuple[LongRangeForce, Any, Any]]
-        the long-range forces that some grain feels, with their loops and numbers.
-    outside : Sequence[GrainForce]
-        the per-grain forces.
+        Warnings of the forces about these grains.
+    external : Sequence[GrainForce]
+        Per-grain forces.
+    long_range : Sequence[tuple[LongRangeForce, Any, Any]]
+        Long-range forces that act on at least one grain, with their loops and numbers.
     search : str
-        how neighbours are found, in words.
+        Description of the neighbour search and the reason for its choice.
     stepping : Verlet or Adaptive
-        the integrator, with a number for everything that depends on the grains at the start.
+        The integrator, with all automatic settings resolved.
     neighbours : Neighbours
-        their settings, likewise, unless they are those of an earlier run.
+        Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
     """
 
     _state: State
@@ -77,18 +77,20 @@ class Engine:
     stepping: Verlet | Adaptive
     neighbours: Neighbours
     _kernel_spec: KernelSpec
-    _is_sorted: bool = field(init=False, default=False)  # are grains at places of their own now?
+    _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _advance: Callable = field(init=False)
     _workers: WorkerThreads | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self._advance = flight_driver_for(self._kernel_spec) if self._kernel_spec.adaptive else driver_for(self._kernel_spec)
+        self._advance = (
+            flight_driver_for(self._kernel_spec) if self._kernel_spec.adaptive else driver_for(self._kernel_spec)
+        )
         if self._kernel_spec.queue:
             self._workers = WorkerThreads(worker_loops(self._kernel_spec)[1])
 
     @property
     def state(self) -> State:
-        """The state, its grains numbered as the user knows them."""
+        """The state, with grains in the user's order."""
         self.restore_user_order()
         return self._state
 
@@ -97,23 +99,23 @@ class Engine:
         self._state, self._is_sorted = other, False
 
     def restore_user_order(self) -> None:
-        """Give every grain the number back that the user knows it by, until the next step is taken."""
+        """Undo the spatial sorting of the arrays, until the next step."""
         if self._is_sorted:
             rearrange(self._state, inverse(self._state.order))
             self._is_sorted = False
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulation time [s]."""
         return self._state.time
 
     @property
     def steps(self) -> int:
-        """Taken so far."""
+        """Number of steps taken so far."""
         return self._state.steps
 
     def _sort_in_space(self) -> None:
-        """Grains where steps are fast, if that is not where they are."""
+        """Bring the arrays into Morton order; the order is recomputed every `RENEWED_EVERY` steps."""
         if not self._state.order.size or self.steps >= self._state.count[ORDERED] + RENEWED_EVERY:
             state = self.state
             state.order, state.count[ORDERED] = spatial_order(state), state.steps
@@ -125,7 +127,7 @@ class Engine:
         self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
-        """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
+        """Take steps up to `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed."""
         last = min(self.steps + most_steps, 2**62)
         if not self.neighbours.along_curve(len(self._state.grains)):
             return self._drive(until, last)
@@ -138,11 +140,20 @@ class Engine:
                 return stop
 
     def _drive(self, until: float, last: float) -> Stop:
-        """On to a time [s] or a step, as the grains stand now."""
+        """Take steps up to a time [s] or a step, in the present order of the arrays; enlarges arrays that overflow."""
         state = self._state
         while True:
             stages = (state.stages,) if self._kernel_spec.adaptive else ()
-            arrays = (state.grains.arrays, state.contacts, state.pair_list, state.long_range, *stages, state.clock, state.count, state.lost)
+            arrays = (
+                state.grains.arrays,
+                state.contacts,
+                state.pair_list,
+                state.long_range,
+                *stages,
+                state.clock,
+                state.count,
+                state.lost,
+            )
             parameters = self._start_workers()
             try:
                 stop = Stop(self._advance(*arrays, parameters, float(until), int(last)))
@@ -153,7 +164,7 @@ class Engine:
             if stop is Stop.CONTACTS_FULL:
                 state.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
-                found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # none of the list holds
+                found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
                 state.grow_pairs(int(SPARE * found))
             elif stop is Stop.LIST_FULL:
                 state.grow_rows()
@@ -161,7 +172,7 @@ class Engine:
                 return stop
 
     def _start_workers(self) -> StepParameters:
-        """The parameters for one call of the driver, with a crew at work if there is one."""
+        """Start worker threads for one call of the driver, where there are any; returns the driver's parameters."""
         if self._workers is None:
             return self.parameters
         state = self._state
@@ -171,16 +182,26 @@ class Engine:
         return parameters
 
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
-        """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""
+        """Add contacts before the first step; array shapes (C, …).
+
+        Returns
+        -------
+        int
+            Index of the first contact that is stretched beyond its breaking point, or −1.
+        """
         state = self.state
         if state.contacts.pair.shape[1] < len(pair):
             state.grow_contacts(len(pair))
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
-        return int(seed_contacts(state.grains.arrays, state.contacts, state.count, state.box.span, self.parameters.contact, pairs, *given))
+        return int(
+            seed_contacts(
+                state.grains.arrays, state.contacts, state.count, state.box.span, self.parameters.contact, pairs, *given
+            )
+        )
 
     def begin(self) -> None:
-        """Contacts of grains that touch at the start, nothing booked, and the first loads."""
+        """Form contacts between grains that touch at the start, with no energy booked, and compute the first loads."""
         state = self.state
         state.count[STAGE] = 1
         state.count[CHECKED] = state.count[STEP_INCREASES] = -GROW_EVERY
@@ -191,10 +212,10 @@ class Engine:
         state.contacts.lost[:] = 0.0
 
     def load_state(self, saved: dict[str, np.ndarray]) -> None:
-        """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
+        """Restore a saved state; quantities that a checkpoint does not hold are recomputed."""
         state = self.state
         state.from_arrays(saved)
-        if state.order.size:  # lists depend on it
+        if state.order.size:  # the order of the lists depends on it
             rearrange(state, state.order)
             self._is_sorted = True
         elif state.contacts.gather_order.size:
@@ -204,13 +225,13 @@ class Engine:
         self._rebuild_list()
 
     def _rebuild_list(self) -> None:
-        """The list of the anchors, if there is one, for the numbers that grains have now."""
+        """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
         state, search = self._state, self.parameters.search
         while search.listed and rebuild_verlet_list(state.long_range, state.box.span, search.reach) == FULL:
             state.grow_rows()
 
     def _list_lasts(self) -> bool:
-        """False if a run of an earlier version had no list, or a wider one, for which grains may have gone farther."""
+        """Whether no grain has moved more than half the margin of the Verlet list since the saved reference positions."""
         state = self._state
         if not np.isfinite(state.long_range.anchor).all():
             return False
@@ -218,11 +239,13 @@ class Engine:
         return bool((moved**2).sum(axis=1).max() <= (0.5 * self.parameters.search.margin) ** 2)
 
     def energies_at_grains(self) -> dict[str, np.ndarray]:
-        """Energy [J] of each grain, (N,), by force: half of each pair's, and what per-grain forces give."""
+        """Energy [J] of each grain (N,) by force: half of each pair energy, and the energies of per-grain forces."""
         state = self.state
         shares = {force.column: np.zeros(len(state.grains)) for force, _, _ in self.long_range}
         for force, sums, numbers in self.long_range:
-            shares_for(sums.energies)(state.grains.arrays, state.long_range, self.parameters.span, numbers, shares[force.column])
+            shares_for(sums.energies)(
+                state.grains.arrays, state.long_range, self.parameters.span, numbers, shares[force.column]
+            )
         for outer in self.external:
             shares[outer.name] = np.zeros(len(state.grains))
             fill = outside_shares_for(outer.formula)
@@ -230,9 +253,9 @@ class Engine:
         return shares
 
     def force_energies(self) -> dict[str, float]:
-        """Energy [J] of all long-range and per-grain forces by column of the ledger."""
+        """Total energy [J] of each long-range and per-grain force, by ledger column."""
         return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
 
     def limiting_grains(self) -> tuple[int, ...]:
-        """The grains that the last stop was about."""
+        """Indices of the grains that caused the last stop."""
         return tuple(sorted({int(self.state.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))

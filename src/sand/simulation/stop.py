@@ -36,9 +36,7 @@ def duration(value: Any, name: str) -> float:
     return seconds
 
 
-def stop_criteria(
-    until: Any, steps: int | None, time: float, step: int, planned: tuple[float, float]
-) -> StopCriteria:
+def stop_criteria(until: Any, steps: int | None, time: float, step: int, planned: tuple[float, float]) -> StopCriteria:
     """Resolve the arguments of `Simulation.run` to absolute stop criteria.
 
     Parameters
