@@ -529,7 +529,7 @@ def _model_rows(section: str, model: Any, notes: dict[str, str]) -> list[list[st
 def case_page() -> str:
     """The model of sand.config.case: sections, keys, defaults, units."""
     from sand.material import Material
-    from sand.config import case
+    from sand.config import case, sections
 
     head = ["key", "default", "unit", "meaning"]
     out = [
@@ -562,9 +562,9 @@ def case_page() -> str:
                     out += [f"### `[forces.{key}]`", f"{escaped(first_sentence(law.__doc__))} {page}"]
                     out += [_settings(law, head)]
             elif name == "stepping":
-                words = ", ".join(f'`"{m}"`' for m in case.INTEGRATORS)
+                words = ", ".join(f'`"{m}"`' for m in sections.INTEGRATORS)
                 out += [f"## `[{name}]`", "The integrator, by `method`; each has keys of its own."]
-                for word, law in case.INTEGRATORS.items():
+                for word, law in sections.INTEGRATORS.items():
                     first = [["`method`", '`"verlet"`', "", f'`"{word}"`, one of {words}']]
                     out += [
                         f'### `method = "{word}"`',

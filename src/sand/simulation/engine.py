@@ -231,7 +231,7 @@ class Engine:
             state.grow_rows()
 
     def _list_lasts(self) -> bool:
-        """Whether no grain has moved more than half the margin of the Verlet list since the saved reference positions."""
+        """Whether no grain is more than half the margin of the Verlet list from its reference position."""
         state = self._state
         if not np.isfinite(state.long_range.anchor).all():
             return False
