@@ -27,11 +27,11 @@ def costs(count: int = 10_000) -> dict[str, Any]:
             frame_every="1 s",
         )
         sim.run(steps=100)
-        record, spent = sim.record, {"row": [], "frame": [], "checkpoint": []}
+        record, spent = sim.writer, {"row": [], "frame": [], "checkpoint": []}
         for _ in range(5):
             sim.run(steps=20)
             row = sim.ledger.rows[-1]
-            spent["row"].append(_seconds(sim._stock))
+            spent["row"].append(_seconds(sim._log_row))
             spent["frame"].append(_seconds(lambda row=row: (record.write(sim, row), record._trajectory.flush(True))))
             spent["checkpoint"].append(_seconds(lambda: record.save(sim)))
         sizes = {path.suffix: path.stat().st_size for path in (Path(place) / "run").iterdir()}

@@ -74,7 +74,7 @@ def savings(counts: tuple[int, ...] = (100, 1000, 10_000)) -> list[dict[str, Any
                 sim = dimers(count, density, search, far)
                 row[way] = 1e6 * seconds_per_step(sim)
                 if way == "lists":
-                    row["listed"] = sim._engine.rules.search.listed
+                    row["listed"] = sim._engine.parameters.search.listed
             row["lists save"] = row["naive"] / row["lists"]
             row["cycles save"] = row["lists"] / row["lists + cycles"]
             rows.append(row)

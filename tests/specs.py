@@ -82,7 +82,7 @@ def _key(plan: KernelSpec) -> KernelSpec:
 def _plans() -> dict[KernelSpec, str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return {_key(make()._engine._plan): name for name, make in DRIVERS.items()}
+        return {_key(make()._engine._kernel_spec): name for name, make in DRIVERS.items()}
 
 
 def name_of(plan: KernelSpec) -> str | None:

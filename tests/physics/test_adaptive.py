@@ -381,7 +381,7 @@ def test_what_no_step_can_follow_stops_the_run():
     along = SIZE * np.array([[1.0, 0, 0], [1.0, 0, 0]])
     grains = sand.Grains([[0, 0, 0], [4e-8, 0, 0]], R, sand.IRON, moment=along)
     sim = flight(grains)
-    sim._engine.rules = sim._engine.rules._replace(contact=sim._engine.rules.contact._replace(on=False))
+    sim._engine.parameters = sim._engine.parameters._replace(contact=sim._engine.parameters.contact._replace(on=False))
     result = sim.run(until="1 us")
     assert result.outcome is sand.Outcome.NO_STEP
     assert result.grains != ()

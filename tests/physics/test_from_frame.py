@@ -216,7 +216,7 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
     [
         (["--frame", "3"], ["--from"]),
         ([], ["CASE.toml", "--from"]),
-        (["bare.toml", "--from", "RUN", "--out", "RUN", "--overwrite"], ["holds the run that grains are taken from"]),
+        (["bare.toml", "--from", "RUN", "--out", "RUN", "--overwrite"], ["holds the run that the grains come from"]),
         (["--from", "bare.toml"], ["holds no grains"]),
         (["--from", "."], ["not the folder of a run"]),
         (["iron.toml"], ["grains.material", "silica", "iron"]),

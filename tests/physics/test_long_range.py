@@ -168,7 +168,7 @@ def test_kicks_come_in_time():
     The step is a power of two of a second, at most the period; the end of the step nearest to the period is taken.
     """
     sim, _, tau = brownian(3)
-    period = sim._engine.rules.gas.period
+    period = sim._engine.parameters.gas.period
     assert period == pytest.approx(tau / 20, rel=1e-12, abs=0.0)
     times = [0.0]
     for _ in range(300):

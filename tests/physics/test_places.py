@@ -220,7 +220,7 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
     sim.run(steps=EVERY)
     listed = sim.state.count[REBUILT]
     sim._engine.advance(np.inf, 1)
-    w, reach = sim._engine._world, sim._engine.rules.criteria.reach
+    w, reach = sim._engine._state, sim._engine.rules.criteria.reach
     assert w.count[ORDERED] == EVERY and w.count[REBUILT] == listed
     i, j = w.pair_list.pair[:, : w.count[PAIRS]].astype(int)
     apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)
@@ -298,10 +298,10 @@ def test_a_run_that_is_broken_off_leaves_grains_at_home():
     """Also where nobody looked: the progress bar says that it does not."""
 
     class Clumsy(sand.Observer):
-        looks_in_ticks = False
+        tick_reads_grains = False
 
         def tick(self, simulation):
-            assert simulation._engine._away
+            assert simulation._engine._is_sorted
             raise RuntimeError("stumbled")
 
     sim = stirred(observers=[Clumsy()], frame_every="1 s")

@@ -9,7 +9,7 @@ import pytest
 import sand
 from sand import threads
 from sand.errors import BadInput
-from sand.integrate.task_queue import ACTIVE, QUIT, TASK, WORD, uses_task_queue, new_task_queue, worker_loops
+from sand.integrate.task_queue import ACTIVE, QUIT, TASK, WORD, new_task_queue, uses_task_queue, worker_loops
 from sand.simulation import assemble as translate
 from sand.simulation import engine
 from sand.state.state import CONTACTS, OUTSIDE, SLIPPED
@@ -58,7 +58,7 @@ def test_threads_change_no_bit(cutoff, size):
     for number in (1, 2, 3):
         sand.set_threads(number)
         sim = shaken_lattice(cutoff, size)
-        assert sim._engine._plan.queue and sim._engine._plan.contacts_only is (cutoff == "bare")
+        assert sim._engine._kernel_spec.queue and sim._engine._kernel_spec.contacts_only is (cutoff == "bare")
         sim.run(steps=25)
         sim.run(steps=35)
         ends.append(state(sim))
@@ -77,7 +77,7 @@ def test_blocks_change_only_rounding(monkeypatch):
     for large in (True, False):
         monkeypatch.setattr(translate, "uses_task_queue", lambda grains, large=large: large)
         sim[large] = shaken_lattice(None)
-        assert sim[large]._engine._plan.queue is large
+        assert sim[large]._engine._kernel_spec.queue is large
         sim[large].run(steps=1)
     for name in ("force", "torque", "velocity", "spin", "position"):
         one, other = (getattr(sim[large].state.grains.arrays, name) for large in (True, False))
@@ -113,7 +113,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     crew = new_task_queue(len(world.grains), world.contacts.flag.size)
     crew.words[WORD] = QUIT << TASK
     rules = sim._engine.rules._replace(queue=crew)
-    worker_loops(sim._engine._plan)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
+    worker_loops(sim._engine._kernel_spec)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
     assert crew.words[ACTIVE] == 0
     assert state(sim) == before
 
@@ -142,7 +142,7 @@ def test_helpers_leave_a_driver_that_fails(monkeypatch):
     assert boards[-1].words[ACTIVE] == 0
     sim._engine._advance = works
     sim.run(steps=1)
-    assert copy.deepcopy(sim._engine._hands) is not sim._engine._hands
+    assert copy.deepcopy(sim._engine._workers) is not sim._engine._workers
 
 
 @pytest.mark.compiled("threads")
@@ -178,9 +178,9 @@ def test_helpers_come_where_they_save_time(number, forces, helpers):
     chain = sand.Grains(place, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
     sim = sand.Simulation(chain, [sand.Contact(), *forces])
     sim.run(steps=1)
-    assert sim._engine._plan.queue
+    assert sim._engine._kernel_spec.queue
     assert sim.state.count[CONTACTS] == number - 1
-    assert len(sim._engine._hands._inboxes) == helpers
+    assert len(sim._engine._workers._inboxes) == helpers
 
 
 def test_small_simulations_have_no_crew():

@@ -169,7 +169,7 @@ def fast_gas(box, seed, contacts=False, **neighbours):
 def referee(sim):
     """Far forces, torques and fields of the same world over all pairs."""
     world = sim.state.copy()
-    rules, far = sim._engine.rules, empty_long_range_arrays(len(world.grains), 0)
+    rules, far = sim._engine.parameters, empty_long_range_arrays(len(world.grains), 0)
     all_pairs(world.grains.arrays, far, rules.span, rules.long_range[0])
     return far.force, far.torque, world.grains.arrays.field
 
@@ -192,7 +192,7 @@ def test_listed_forces_are_those_of_all_pairs(lengths, margin, contacts):
     it is made anew many times; a missed pair at 0.9 r_c would show at 1e-3.  Sums in another order: ε × neighbours.
     """
     sim = fast_gas(Box(lengths), 3, contacts, search="cells", margin=margin)
-    assert sim._engine.rules.search.listed, sim.choices
+    assert sim._engine.parameters.search.listed, sim.choices
     sim.run(steps=1)
     for step in range(1000):
         sim._engine.advance(np.inf, 1)
@@ -292,7 +292,7 @@ def test_a_resumed_run_looks_for_neighbours_as_before(tmp_path, search):
     begun.run(steps=20)
     assert begun.state.count[MADE] == 0
     rest = sand.resume(tmp_path / "begun")
-    assert rest._engine.rules.search == whole._engine.rules.search
+    assert rest._engine.parameters.search == whole._engine.parameters.search
     assert rest.choices["neighbours"] == whole.choices["neighbours"]
     whole.run(steps=600)
     rest.run(steps=580)
@@ -348,7 +348,7 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     mixed = sand.Grains(1.03 * block.position, radius, [sand.IRON if k % 3 else sand.SILICA for k in range(125)])
     sim = sand.Simulation(mixed, [sand.Contact()])
     sim.run(steps=1)
-    near, law, a = sim.state.pair_list, sim._engine.rules.contact, sim.grains.arrays
+    near, law, a = sim.state.pair_list, sim._engine.parameters.contact, sim.grains.arrays
     pairs = sim.state.count[PAIRS]
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):

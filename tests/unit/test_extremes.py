@@ -201,7 +201,7 @@ def test_frames_closer_than_the_clock_can_tell(every):
     """The next frame is due after the present time, however close frames are to be; and it is found at once."""
     schedule = Schedule(every, 1e-12)
     assert schedule.due > 1e-12
-    schedule.pass_by(2e-12)
+    schedule.advance(2e-12)
     assert schedule.due > 2e-12
 
 
@@ -210,4 +210,4 @@ def test_frames_are_due_at_multiples():
     schedule = Schedule(0.1, 0.0)
     for number in range(1, 1000):
         assert schedule.due == number * 0.1
-        schedule.pass_by(schedule.due)
+        schedule.advance(schedule.due)

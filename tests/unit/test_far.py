@@ -9,7 +9,7 @@ import sand
 from sand.constants import COULOMB, GRAVITATION, MAGNETIC
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import Cutoff, cut_weight, pair_load_cut
-from sand.forces.pair.dipole_rates import uncut_rates, cut_curvature, pair_rates
+from sand.forces.pair.dipole_rates import cut_curvature, pair_rates, uncut_rates
 from sand.forces.pair.inverse_square_formulas import central_field, central_potential, central_rate
 
 SMOOTH = cutoff_for(1.0, "smooth")
@@ -75,7 +75,7 @@ def test_taylor_torque_is_the_whole_product_rule():
 
     sim = sand.Simulation(grains, [sand.Dipoles()], stepping=sand.Verlet(step="1e-15 s"))
     before = sim.loads()
-    w, rules = sim.state, sim._engine.rules
+    w, rules = sim.state, sim._engine.parameters
     far = empty_long_range_arrays(len(grains), 0)  # a run in single steps has no room for rates
     kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.long_range[0])
     force_rate, torque_rate = far.force_rate.T.copy(), far.torque_rate.T.copy()
@@ -157,7 +157,7 @@ def test_listed_charges_are_all_charges():
     for how in ("cells", "all pairs"):
         forces = [sand.Charges(cutoff="0.2 um"), sand.Attraction(cutoff="0.15 um")]
         sim = sand.Simulation(grains, forces, box="1 um", neighbours=sand.Neighbours(how))
-        assert sim._engine.rules.search.listed == (how == "cells")
+        assert sim._engine.parameters.search.listed == (how == "cells")
         found.append((sim.loads()["force"], *sim._engine.energies_at_grains().values()))
     for listed, whole in zip(*found, strict=True):
         assert np.abs(listed - whole).max() < 1e-12 * np.abs(whole).max()

@@ -269,7 +269,7 @@ def test_a_trajectory_beyond_mending_is_moved_aside(tmp_path):
     sim = struck_chain()
     sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="0.1 ns")
     sim.run(until="0.3 ns")
-    sim.record._trajectory.close()
+    sim.writer._trajectory.close()
     (tmp_path / "run" / "trajectory.gsd").write_bytes(b"rubbish" * 1000)
     with pytest.warns(UserWarning, match="beyond mending"):
         sand.resume(tmp_path / "run").run(until="0.5 ns")

@@ -13,7 +13,7 @@ def sim():
 
 
 ARGUMENTS = ("forces", "box", "stepping", "neighbours", "seed", "contacts", "grains", "out")
-RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "record", "choices", "is_sound")
+RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound")
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)

@@ -38,7 +38,7 @@ def test_blocks_of_forces_together_are_their_sum(order):
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
-    of_dipoles, (of_charges, _) = sim._engine.rules.long_range
+    of_dipoles, (of_charges, _) = sim._engine.parameters.long_range
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
     loops = {
         "listed dipoles": dipoles.LISTED_PAIRS,
@@ -46,10 +46,10 @@ def test_blocks_of_forces_together_are_their_sum(order):
         "dipoles": dipoles.ALL_PAIRS_CUT,
     }
     sums, own = compose_long_range([loops[name] for name in order], [numbers[name] for name in order])
-    span, found = sim._engine.rules.span, []
+    span, found = sim._engine.parameters.span, []
     for way in ("at once", "in blocks"):
         arrays, far = sim.state.copy().grains.arrays, empty_long_range_arrays(40, 4000)
-        build_verlet_list(arrays, far, sim.state.count.copy(), span, sim._engine.rules.search)
+        build_verlet_list(arrays, far, sim.state.count.copy(), span, sim._engine.parameters.search)
         clear_long_range_loads(far)
         if way == "at once":
             sums.loads(arrays, far, span, own)

@@ -8,7 +8,7 @@ import pytest
 
 import sand
 from sand.config.case import check_case
-from sand.simulation.pace import Pace
+from sand.simulation.pace import RunTimeEstimate
 
 LIGHT = 299792458.0
 TWO = [[0, 0, 0], [3e-8, 0, 0]]
@@ -118,21 +118,21 @@ def test_a_gas_has_the_same_places_as_ever():
 
 def test_a_run_beyond_patience_is_said_once():
     """After a second of steps: 1e-3 s in steps of 1e-20 s are 1e17 steps; 1e7 more in 1 s each are 0.3 years."""
-    pace = Pace(1e-3, np.inf)
+    pace = RunTimeEstimate(1e-3, np.inf)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        pace.look(1e-18, 100, 20.0)  # compiles
-        pace.look(2e-18, 200, 0.6)
+        pace.update(1e-18, 100, 20.0)  # compiles
+        pace.update(2e-18, 200, 0.6)
     with pytest.warns(UserWarning, match=r"needs about 1e\+17 more steps, about .* years") as caught:
-        pace.look(3e-18, 300, 0.6)
+        pace.update(3e-18, 300, 0.6)
     assert len(caught) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        pace.look(4e-18, 400, 0.6)
-        other = Pace(np.inf, 10**7 + 2)
-        other.look(1e-9, 1, 1.0)
-        other.look(2e-9, 2, 1.0)
+        pace.update(4e-18, 400, 0.6)
+        other = RunTimeEstimate(np.inf, 10**7 + 2)
+        other.update(1e-9, 1, 1.0)
+        other.update(2e-9, 2, 1.0)
     with pytest.warns(UserWarning, match=r"1e\+30 more steps"):
-        long = Pace(np.inf, 1e30)
-        long.look(1e-9, 64, 1.0)
-        long.look(2e-9, 128, 1.0)
+        long = RunTimeEstimate(np.inf, 1e30)
+        long.update(1e-9, 64, 1.0)
+        long.update(2e-9, 128, 1.0)

@@ -80,7 +80,7 @@ def test_contacts_that_are_held_may_overlap_by_more():
     named = [f"grains {i} and {i + 1} overlap by {1.3 * limit:.3g} m at the start" for i in wrong if i not in first]
     *told, rest = caught.value.problems
     assert [line.split(";")[0] for line in told] == named[:10]
-    assert all(f"at most {limit:.3g} m may be: move them apart" in line for line in told)
+    assert all(f"at most {limit:.3g} m is allowed: move them apart" in line for line in told)
     assert rest == f"… and {len(named) - 10} more overlapping pairs"
 
 
@@ -425,7 +425,7 @@ def test_when_frames_are_due():
     """Multiples of the interval, the first after the present time; none if there is no interval."""
     schedule = Schedule(0.1, 0.0)
     assert schedule.due == pytest.approx(0.1, rel=1e-6, abs=0.0)
-    schedule.pass_by(0.35)
+    schedule.advance(0.35)
     assert schedule.due == pytest.approx(0.4, rel=1e-6, abs=0.0)
     assert Schedule(0.1, 7.05).due == pytest.approx(7.1, rel=1e-6, abs=0.0)
     assert Schedule(math.inf, 0.0).due == math.inf

@@ -17,7 +17,7 @@ def test_at_most_eight_specifications():
 def test_other_drivers_have_no_name():
     """Gravity alone is no canonical specification."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, "silica"), [sand.Gravity("9.81 m/s^2")])
-    assert specs.name_of(sim._engine._plan) is None
+    assert specs.name_of(sim._engine._kernel_spec) is None
 
 
 def test_an_unmarked_test_takes_no_steps():

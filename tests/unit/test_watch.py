@@ -73,7 +73,7 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     spared = 0
     for steps in (1, 2, 3, 5, 8, 13, 21, 34, 55):
         sim._engine.advance(np.inf, steps)
-        w, span = sim.state, sim._engine.rules.span
+        w, span = sim.state, sim._engine.parameters.span
         for place, (group, name, limit) in limits.items():
             strayed = largest_displacement(w.grains.arrays, getattr(getattr(w, group), name), span)
             assert w.pair_list.skin[place] <= limit - strayed + 1e-12 * limit

@@ -26,7 +26,7 @@ class Progress(Observer):
         a terminal.
     """
 
-    looks_in_ticks = False
+    tick_reads_grains = False
 
     def __init__(self, end: float, last_step: float, file: IO[str] | None = None):
         self._end, self._last_step = end, last_step

@@ -1,4 +1,4 @@
-"""Bodies from files, looked at before they are used."""
+"""Bodies from files, checked for overlaps and gaps."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..setup.checks import check_body
 
 
 def body_from_file(path: str | Path, material: Material | None = None, *others: Any, **named: Any) -> Grains:
-    """`io.bodies.read_body`, and a body in one piece; takes what that takes.
+    """Read a body that is in one piece; parameters as for `io.bodies.read_body`.
 
     Raises
     ------
     BadInput
-        as `read_body`; also for grains that overlap by more than a simulation allows at its start, and for
-        gaps: grains without a contact to the rest.  The first ten are named.
+        As `read_body`; also for grains that overlap by more than a simulation allows at its start, and for grains
+        without a contact to the rest. The first ten are named.
     """
     body = read_body(path, material, *others, **named)
     check_body(body, str(path))

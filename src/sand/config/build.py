@@ -1,4 +1,4 @@
-"""From a case to a simulation and back, and from a run's folder to the run that goes on."""
+"""Simulations from case files, and resumed simulations from the folder of a run."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from .bodies import body_from_file
 from .case import Case, check_case
 
 ENDS = (("run", "until"), ("run", "steps"))
-"""What may be changed in the case.toml of a run that goes on."""
+"""Keys that may be changed in the case.toml of a resumed run."""
 BODIES = (".xyz", ".extxyz", ".txt", ".dat")
-"""Endings of files that hold a body as text; all others are taken for trajectories."""
+"""Suffixes of text files with a body; all other files are read as trajectories."""
 
 
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
-    """The simulation a case describes.
+    """Build the simulation that a case describes.
 
     Parameters
     ----------
     out : str or Path or None
-        folder for its files, None for none.
+        Folder for its files; None for no files.
     options
-        passed on to `Simulation` (observers, overwrite).
+        Further arguments of `Simulation` (observers, overwrite).
 
     Raises
     ------
     BadInput
-        what only shows when grains, forces and box come together.
+        If grains, forces and box do not fit together.
     """
     if case.grains.kind == "given":
         raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
@@ -64,10 +64,10 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
 
 
 def _refuse_own_source(source: Path, out: Path) -> None:
-    """Raises BadInput where a run would write over what it starts from."""
+    """Raise BadInput if a run would overwrite the files that it starts from."""
     own = source if source.is_dir() else source.parent
     if out.exists() and own.exists() and out.samefile(own):
-        raise BadInput(f"{out} holds the run that grains are taken from; give another folder for the new one")
+        raise BadInput(f"{out} holds the run that the grains come from; give another folder for the new run")
 
 
 def _of_gas(case: Case) -> Start:
@@ -104,16 +104,16 @@ def _of_file(case: Case) -> Start:
     if case.box.periodic is not None and not same_box(case.box.periodic, start.box):
         raise BadInput(
             f"box: it is {case.box.periodic.describe()} here, but {start.box.describe()} in {section.file}; "
-            "leave [box] out, the file's is taken then"
+            "leave [box] out to use the box of the file"
         )
     return start
 
 
 def _of_body(case: Case, path: Path) -> Start:
-    """Grains of extended XYZ or of plain columns, as they lie there but for their centre of mass."""
+    """Grains of extended XYZ or plain columns, shifted so that their centre of mass is at the origin."""
     section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
-        raise BadInput("material of grains in a file must be one name; several stand in the file itself")
+        raise BadInput("material of grains in a file must be one name; several materials are named in the file itself")
     own = library[section.material]
     one = own if "material" in section.model_fields_set else None
     body = body_from_file(path, one, section.radius, section.length, library, otherwise=own)
@@ -122,18 +122,18 @@ def _of_body(case: Case, path: Path) -> Start:
 
 
 def same_box(first: Box, second: Box) -> bool:
-    """True for the same axes, equal to the precision of a trajectory."""
+    """Whether two boxes have the same axes, equal to the precision of a trajectory."""
     pairs = list(zip(first.lengths, second.lengths, strict=True))
     return all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
 
 
 def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]) -> Start:
-    """One frame of a trajectory (or of the run in a folder) as a new start, see `setup.from_frame`.
+    """Read one frame of a trajectory, or of the run in a folder, as a new start; see `setup.from_frame`.
 
     Raises
     ------
     BadInput
-        no such file or frame, or one that cannot be a start.
+        If there is no such file or frame, or the frame cannot be a start.
     """
     place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
     frames = Frames(place)
@@ -147,12 +147,12 @@ def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]
 
 
 def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
-    """The case that a run began with, and in `meta` the end that its case.toml names now.
+    """The case of a run at its start; `meta` receives the end that its case.toml has now.
 
     Raises
     ------
     BadInput
-        case.toml has been changed since, in more than its end.
+        If case.toml has been changed in more than its end.
     """
     path = folder / CASE
     begun: dict[str, Any] = meta["case"]
@@ -160,7 +160,7 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     case = check_case(there, str(path))
 
     def fixed(content: dict[str, Any], name: str) -> Any:
-        """A table but for the end of the run, which may be changed."""
+        """A table without the end of the run, which may be changed."""
         return {key: value for key, value in content.get(name, {}).items() if (name, key) not in ENDS}
 
     was = check_case(begun, str(path))
@@ -168,8 +168,8 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
         meant = name not in {table for table, _ in ENDS} and getattr(was, name) == getattr(case, name)
         if fixed(begun, name) != fixed(there, name) and not meant:
             raise BadInput(
-                f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; put it "
-                f"back, or start a new run from the last frame: sand run CASE.toml --from {folder}"
+                f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; restore it, "
+                f"or start a new run from the last frame: sand run CASE.toml --from {folder}"
             )
     meta["until"], meta["last_step"] = case.run.until, case.run.steps
     return case
@@ -177,19 +177,24 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
 
 @checked
 def resume(folder: str | Path, **options: Any) -> Simulation:
-    """A run's folder at its newest checkpoint as a simulation; `run()` goes on to the end once asked for.
+    """Load the newest checkpoint of a run as a simulation; `run()` continues to the planned end.
 
     Parameters
     ----------
     folder : str or Path
-        of an earlier run; new frames and rows are added to its files.
+        Folder of an earlier run; new frames and rows are appended to its files.
     options
-        passed on to `Simulation` (observers).
+        Further arguments of `Simulation` (observers).
+
+    Returns
+    -------
+    Simulation
+        The simulation at the checkpoint.
 
     Raises
     ------
     BadInput
-        no checkpoint, a damaged one, or a case that needs forces SAND does not know; or another process
+        If there is no checkpoint, it is damaged, the case needs a force that SAND does not know, or another process
         writes to the folder.
     """
     place = Path(folder)

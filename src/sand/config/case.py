@@ -1,12 +1,12 @@
-"""Case files: TOML that builds the same objects as a script."""
+"""Case files of `sand run`: TOML that describes the same objects as a script."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, create_model, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
 
 from ..box import Box, as_box
 from ..contact.model import Contact
@@ -17,22 +17,30 @@ from ..forces.external.magnetic_field import Field as MagneticField
 from ..forces.gas.model import Gas
 from ..forces.pair.dipoles import Dipoles
 from ..forces.pair.inverse_square import Attraction, Charges
-from ..grains import moment_size
-from ..integrate.adaptive import Adaptive
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
 from ..material import PRESETS, Material, like_preset
 from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
 from .commands import refuse_other_command
-from .errors import validation_errors
-from .sections import Count, Duration, PathName, Section, Seed, Steps, quantity
-
-INTEGRATORS: dict[str, type] = {"verlet": Verlet, "adaptive": Adaptive}
+from .errors import validate
+from .sections import (
+    Count,
+    Duration,
+    Moment,
+    PathName,
+    Section,
+    Seed,
+    Steps,
+    quantity,
+    with_integrator,
+    without_method,
+    word,
+)
 
 
 class RunSection(Section):
-    """[run]: how long (a time, or a number of steps), how often, which seed, where to."""
+    """[run]: duration (a time, or a number of steps), interval of frames, seed and output folder."""
 
     until: Duration | None = None
     """End of the run [s], simulated time; either this or `steps` is required."""
@@ -53,7 +61,7 @@ class RunSection(Section):
 
 
 class BoxSection(Section):
-    """[box]: periodic = one length or three, "open" for an open axis; nothing: open space."""
+    """[box]: periodic = one length or three, "open" for an open axis; without it, open space."""
 
     periodic: Any = None
     """Length of a cube or list of three lengths [m], "open" for an open axis; none: open space."""
@@ -67,7 +75,7 @@ class BoxSection(Section):
 
 
 class MaterialSection(Section):
-    """[materials.NAME]: a new material, or changes to the one it is `like`."""
+    """[materials.NAME]: a new material, or changes to the one given by `like`."""
 
     like: str | None = None
     density: Any = None
@@ -78,19 +86,18 @@ class MaterialSection(Section):
     specific_moment: Any = None
 
     def build(self, name: str) -> Material:
-        """Raises BadInput for missing or impossible numbers."""
+        """Build the material.  Raises BadInput for missing or impossible numbers."""
         given = {k: v for k, v in self.model_dump(exclude={"like"}).items() if v is not None}
         if self.like is not None:
             return like_preset(self.like, name).but(name=name, **given)
-        needed = ("density", "young_modulus", "poisson_ratio")
-        missing = [key for key in needed if key not in given]
+        missing = [key for key in ("density", "young_modulus", "poisson_ratio") if key not in given]
         if missing:
             raise BadInput(f"{name} lacks {', '.join(missing)}; give them, or like = 'iron'")
         return Material(name, **({"surface_energy": None} | given))
 
 
 class GrainsSection(Section):
-    """[grains]: a gas of grains, or those of a `file`: a frame of a trajectory, or a body; "given": from a script."""
+    """[grains]: a gas of grains, or grains of a `file`: a frame of a trajectory, or a body; "given": from a script."""
 
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
@@ -100,13 +107,13 @@ class GrainsSection(Section):
     """Radius of each grain [m]; for a body from a file only if the file has none."""
     material: str | list[str] = "iron"
     """Preset or name in [materials]; for a body from a file it takes precedence over the file's material."""
-    moment: Any = None
+    moment: Moment | None = None
     """Moment of each grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moment."""
     charge: quantity("C") | None = None  # type: ignore[valid-type]
     """Charge of each grain [C]; none: no charge."""
     temperature: quantity("K", least=0.0) = 0.0  # type: ignore[valid-type]
     """Temperature of velocities and spins [K]."""
-    spins: str = "kT/2"
+    spins: word(SPINS) = "kT/2"  # type: ignore[valid-type]
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
     file: PathName | None = None
     """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
@@ -115,50 +122,36 @@ class GrainsSection(Section):
     length: str | None = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
 
-    @field_validator("moment")
-    @classmethod
-    def _moment(cls, value: Any) -> Any:
-        if value is not None:
-            moment_size(value, np.ones(1))
-        return value
-
-    @field_validator("spins")
-    @classmethod
-    def _spins(cls, value: str) -> str:
-        if value not in SPINS:
-            raise ValueError(f"spins = {value!r}; {did_you_mean(value, list(SPINS))}")
-        return value
-
     @model_validator(mode="after")
-    def _whole(self) -> GrainsSection:
-        needed, foreign = GRAINS_NEED[self.kind]
+    def _check_keys(self) -> GrainsSection:
+        needed, foreign = GRAINS_KEYS[self.kind]
         problems = [
             f"{name} is missing; add it, for example {name} = {example}"
             for name, example in needed.items()
             if getattr(self, name) is None
         ]
-        told = [name for name in foreign if name in self.model_fields_set]
-        problems += [f"{name} is not for kind = '{self.kind}'; remove it, or change kind" for name in told]
+        given = [name for name in foreign if name in self.model_fields_set]
+        problems += [f"{name} is not for kind = '{self.kind}'; remove it, or change kind" for name in given]
         if problems:
             raise ValueError("\n".join(problems))
         return self
 
     def recipe(self) -> dict[str, Any]:
-        """What a case file says to have these grains, all defaults filled in."""
-        _, foreign = GRAINS_NEED[self.kind]
+        """The [grains] table that describes these grains, all defaults filled in."""
+        _, foreign = GRAINS_KEYS[self.kind]
         return self.model_dump(exclude_none=True, exclude=set(foreign))
 
 
-GRAINS_NEED: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
+GRAINS_KEYS: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
     "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame", "length")),
     "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "temperature", "spins")),
     "given": ({"number": "125"}, ("file", "frame", "length")),
 }
-"""By kind: keys it cannot do without, with an example, and keys that it has no use for."""
+"""By kind: required keys, each with an example, and keys that do not apply."""
 
 
 class ForcesSection(Section):
-    """[forces.*]: each table switches one force on."""
+    """[forces.*]: each table adds one force."""
 
     contact: Contact | None = None
     dipoles: Dipoles | None = None
@@ -179,33 +172,14 @@ class ForcesSection(Section):
         return section
 
     def build(self) -> list[Any]:
-        """The forces that are given, in the order of the file: sums are added in it."""
+        """Build the forces in the order of the file, in which loads are summed."""
         given = {key: getattr(self, key) for key in type(self).model_fields}
         order = [*(key for key in self._order if key in given), *given]
         return [given[key] for key in dict.fromkeys(order) if given[key] is not None]
 
 
-def integrator(value: Any) -> Any:
-    """[stepping] without its `method`, which has picked the model by then (`with_integrator`)."""
-    if isinstance(value, dict) and "method" in value:
-        value = dict(value)
-        method = value.pop("method")
-        if str(method) not in INTEGRATORS:
-            raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
-    return value
-
-
-def with_integrator(model: type[Any], content: dict[str, Any]) -> type[Any]:
-    """The model of a case file whose [stepping] has the keys of the method that `content` names."""
-    given = content.get("stepping")
-    kind = INTEGRATORS.get(str(given.get("method", "verlet"))) if isinstance(given, dict) else None
-    if kind is None or kind is model.model_fields["stepping"].annotation:
-        return model
-    return create_model(model.__name__, __base__=model, stepping=(kind, kind()))
-
-
 class Case(Section):
-    """A whole case file."""
+    """The content of a case file of `sand run`."""
 
     run: RunSection
     box: BoxSection = BoxSection()
@@ -218,46 +192,43 @@ class Case(Section):
     @field_validator("stepping", mode="before")
     @classmethod
     def _method(cls, value: Any) -> Any:
-        return integrator(value)
+        return without_method(value)
 
     def materials_by_name(self) -> dict[str, Material]:
-        """Presets and the case's own materials by name.  Raises BadInput."""
-        own, problems = {}, []
-        for name, section in self.materials.items():
-            try:
-                own[name] = section.build(name)
-            except BadInput as error:
-                problems += error.at("materials").problems
-        if problems:
-            raise BadInput(problems)
-        return {**PRESETS, **own}
+        """Presets and the materials of the case, by name."""
+        return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
 
 
-def wrong_materials(content: dict[str, Any]) -> list[str]:
-    """Complaints about numbers in [materials], where a mistake elsewhere keeps the case from being built."""
+def material_errors(content: dict[str, Any], tables: Iterable[str], default: str = "") -> list[str]:
+    """Error messages for numbers in [materials], and for materials that do not exist.
+
+    Parameters
+    ----------
+    content : dict[str, Any]
+        The content of a case file, not validated yet.
+    tables : Iterable[str]
+        Tables with a key `material`.
+    default : str, optional
+        Value of this key where it is missing.
+    """
     problems: list[str] = []
-    own = content.get("materials", {})
-    for name, section in own.items() if isinstance(own, dict) else ():
+    materials = content.get("materials", {})
+    own = materials if isinstance(materials, dict) else {}
+    for name, section in own.items():
         try:
             MaterialSection.model_validate(section).build(name)
         except ValidationError:
-            continue  # told with the rest
+            continue  # reported by the validation of the whole file
         except BadInput as error:
             problems += error.at("materials").problems
+    known = [*PRESETS, *own]
+    for table in tables:
+        section = content.get(table)
+        given = section.get("material", default) if isinstance(section, dict) else default
+        for name in given if isinstance(given, list) else [given] if given != "" else []:
+            if isinstance(name, str) and name not in known:
+                problems.append(f"{table}.material: unknown material '{name}'; {did_you_mean(name, known)}")
     return problems
-
-
-def _unknown_materials(content: dict[str, Any]) -> list[str]:
-    """Complaints about names in [grains] that are neither presets nor in [materials]."""
-    grains, own = content.get("grains"), content.get("materials", {})
-    given = grains.get("material", []) if isinstance(grains, dict) else []
-    names = [given] if isinstance(given, str) else given if isinstance(given, list) else []
-    known = [*PRESETS, *(own if isinstance(own, dict) else [])]
-    return [
-        f"grains.material: unknown material '{name}'; {did_you_mean(str(name), known)}"
-        for name in names
-        if str(name) not in known
-    ]
 
 
 def read_case(path: str | Path) -> Case:
@@ -266,29 +237,16 @@ def read_case(path: str | Path) -> Case:
     Raises
     ------
     BadInput
-        every mistake of the file, one line each, with its place.
+        If the file has errors; all of them, one line each, with their place.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "run")
     case = check_case(content, str(path))
-    if case.grains.file is not None:  # as seen from the case file
+    if case.grains.file is not None:  # relative to the case file
         case.grains.file = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return case
 
 
 def check_case(content: dict[str, Any], name: str) -> Case:
-    """A Case from a dictionary; `name` stands in front of each complaint.  Raises BadInput."""
-    kinds: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
-    model = with_integrator(Case, content)
-    problems = _unknown_materials(content)
-    try:
-        case = model.model_validate(content)
-        case.materials_by_name()
-    except ValidationError as error:
-        problems += wrong_materials(content)
-        problems += [line for slip in error.errors() for line in validation_errors(slip, model, kinds)]
-    except BadInput as error:
-        problems += error.problems
-    if problems:
-        raise BadInput(f"{name}: {problem}" for problem in problems)
-    return case
+    """Validate the content of a case file; `name` begins each message.  Raises BadInput."""
+    return validate(with_integrator(Case, content), content, name, material_errors(content, ["grains"]))

@@ -1,4 +1,4 @@
-"""Which command a case file is for."""
+"""The command that a case file is meant for."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ OWN_TABLES = {
     "collide": {"impact"},
     "run": {"run", "grains", "box", "neighbours"},
 }
-"""Tables that only the cases of one command have; a case of `sand grow` has those of `sand run`, too."""
+"""Tables found only in case files of one command; a case of `sand grow` also has those of `sand run`."""
 BODIES = {"target", "projectile"}
-"""Tables of `sand collide` and `sand scatter`."""
+"""Tables of the bodies of `sand collide` and `sand scatter`."""
 
 
 def command_for(content: dict[str, Any]) -> str | None:
-    """The command that a case file is for, told by its tables; None if none of them tells."""
+    """The command that a case file is meant for, according to its tables; None if it has none of these tables."""
     for command, tables in OWN_TABLES.items():
         if tables & content.keys():
             return command
@@ -27,9 +27,9 @@ def command_for(content: dict[str, Any]) -> str | None:
 
 
 def refuse_other_command(content: dict[str, Any], path: str | Path, command: str) -> None:
-    """Raises BadInput, in one line, for a case that is for another command than the one given."""
-    meant = command_for(content)
+    """Raise BadInput if a case file is meant for another command than the one given."""
+    intended = command_for(content)
     own = OWN_TABLES[command] | (OWN_TABLES["run"] if command == "grow" else set())
-    if meant in (None, command) or (own & content.keys() and meant != "grow"):
+    if intended in (None, command) or (own & content.keys() and intended != "grow"):
         return
-    raise BadInput(f"{path}: this is a case for `sand {meant}`; use: sand {meant} {path}")
+    raise BadInput(f"{path}: this is a case for `sand {intended}`; use: sand {intended} {path}")

@@ -1,64 +1,83 @@
-"""What is wrong with a case file, in words."""
+"""Validation of case files: pydantic's errors as one line each, with the place and what is allowed."""
 
 from __future__ import annotations
 
 import dataclasses
 import typing
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
-from ..errors import did_you_mean
+from ..errors import BadInput, did_you_mean
+from .sections import INTEGRATORS
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
-def validation_errors(slip: Any, whole: type, extra: dict[type, list[str]]) -> list[str]:
-    """pydantic's error as our lines: place, what is wrong, what to do.
+def validate(model: type[Model], content: Any, name: str, problems: Iterable[str] = (), table: str = "") -> Model:
+    """Validate the content of a case file, or of one of its tables.
 
     Parameters
     ----------
-    slip
-        one entry of `ValidationError.errors()`.
-    whole : type
-        the model of the whole file, to know which keys are allowed where.
-    extra : dict[type, list[str]]
-        keys that some settings classes accept besides their own.
+    model : type
+        Model of the content.
+    name : str
+        Name of the file, at the beginning of each message.
+    problems : Iterable[str], optional
+        Errors found already, which are reported together with those found here.
+    table : str, optional
+        Name of the table, if `content` is only a part of the file.
+
+    Raises
+    ------
+    BadInput
+        All errors, one line each.
     """
-    place = ".".join(str(part) for part in slip["loc"] if not str(part).startswith("function-"))
-    if slip["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        keys = _keys_at(whole, slip["loc"][:-1], extra)
-        return [f"{place}: there is no such key; {did_you_mean(str(slip['loc'][-1]), keys)}"]
-    if slip["type"] == "missing":
+    found, case = list(problems), None
+    try:
+        case = model.model_validate(content)
+    except ValidationError as error:
+        found += [line for slip in error.errors() for line in _messages(slip, model, table)]
+    if found or case is None:
+        raise BadInput(f"{name}: {problem}" for problem in found)
+    return case
+
+
+def _messages(slip: Any, model: type, table: str) -> list[str]:
+    """Messages for one entry of `ValidationError.errors()`."""
+    kind, path, given = slip["type"], slip["loc"], slip["input"]
+    place = ".".join(str(part) for part in (table, *path) if part and not str(part).startswith("function-"))
+    if kind in ("extra_forbidden", "unexpected_keyword_argument"):
+        return [f"{place}: there is no such key; {did_you_mean(str(path[-1]), _keys_at(model, path[:-1]))}"]
+    if kind == "missing":
         return [f"{place} is missing; add it"]
-    if slip["type"] == "value_error":
-        # settings classes name themselves; said once is enough
-        last = f"{slip['loc'][-1]}: "
-        return [f"{place}: {line.removeprefix(last)}" for line in str(slip["ctx"]["error"]).splitlines()]
-    if slip["type"] in ("dataclass_type", "model_type"):
-        return [f"{place} = {slip['input']!r}: it must be a table, [{place}]"]
-    return [f"{place} = {slip['input']!r}: {slip['msg'][0].lower()}{slip['msg'][1:]}"]
+    if kind == "value_error":  # messages of settings classes may begin with the key already
+        return [f"{place}: {line.removeprefix(f'{path[-1]}: ')}" for line in str(slip["ctx"]["error"]).splitlines()]
+    if kind in ("dataclass_type", "model_type"):
+        return [f"{place} = {given!r}: it must be a table, [{place}]"]
+    return [f"{place} = {given!r}: {slip['msg'][0].lower()}{slip['msg'][1:]}"]
 
 
-def _keys_at(whole: type, places: tuple[Any, ...], extra: dict[type, list[str]]) -> list[str]:
-    """The keys allowed at a place of the case file."""
-    here: Any = whole
-    for place in places:
-        fields = _annotations(here, extra)
-        if place not in fields:
-            here = fields.get("*", here)
-            continue
-        here = fields[place]
-    return [k for k in _annotations(here, extra) if k != "*"]
+def _keys_at(model: type, path: tuple[Any, ...]) -> list[str]:
+    """The keys allowed in a table of the case file."""
+    table: Any = model
+    for name in path:
+        fields = _fields(table)
+        table = fields[name] if name in fields else fields.get("*", table)
+    return [key for key in _fields(table) if key != "*"]
 
 
-def _annotations(kind: Any, extra: dict[type, list[str]]) -> dict[str, Any]:
-    inner = [a for a in typing.get_args(kind) if a is not type(None)]
-    if typing.get_origin(kind) is dict:
+def _fields(annotation: Any) -> dict[str, Any]:
+    """Annotations of the keys of a table; "*" stands for any key."""
+    inner = [a for a in typing.get_args(annotation) if a is not type(None)]
+    if typing.get_origin(annotation) is dict:
         return {"*": inner[1]}
-    for candidate in (kind, *inner):
+    for candidate in (annotation, *inner):
         if isinstance(candidate, type) and issubclass(candidate, BaseModel):
             return {k: f.annotation for k, f in candidate.model_fields.items()}
         if dataclasses.is_dataclass(candidate):
             hints = typing.get_type_hints(candidate)
             own = {f.name: hints[f.name] for f in dataclasses.fields(candidate)}
-            return dict.fromkeys(extra.get(typing.cast(type, candidate), [])) | own
+            return {"method": str} | own if candidate in INTEGRATORS.values() else own
     return {}

@@ -1,25 +1,34 @@
-"""What the tables of all case files are made of."""
+"""Building blocks of the tables of all case files: annotated types of values, and the choice of the integrator."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+import numpy as np
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, create_model
 
 from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
+from ..errors import did_you_mean
+from ..grains import moment_size
+from ..integrate.adaptive import Adaptive
+from ..integrate.verlet import Verlet
 from ..io.run_folder import checked_name
 from ..simulation.stop import duration
 from ..units import si
 
+INTEGRATORS: dict[str, type] = {"verlet": Verlet, "adaptive": Adaptive}
+"""Integrators by their `method` in [stepping]."""
+
 
 class Section(BaseModel):
-    """A table of a case file; an unknown key in it is a mistake."""
+    """A table of a case file; unknown keys in it are errors."""
 
     model_config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 
 def quantity(unit: str, **bounds: float) -> Any:
-    """A number with a unit, as text or in SI."""
+    """Type of a number with a unit, given as text or in SI; `bounds` as for `units.si`."""
 
     def read(value: Any, info: ValidationInfo) -> float:
         return si(value, unit, str(info.field_name), **bounds)
@@ -27,21 +36,55 @@ def quantity(unit: str, **bounds: float) -> Any:
     return Annotated[Any, BeforeValidator(read)]
 
 
-def _duration(value: Any, info: ValidationInfo) -> float:
-    return duration(value, str(info.field_name))
+def word(allowed: Collection[str]) -> Any:
+    """Type of a word out of a few."""
+
+    def read(value: str, info: ValidationInfo) -> str:
+        if value not in allowed:
+            raise ValueError(f"{info.field_name} = {value!r}; {did_you_mean(value, list(allowed))}")
+        return value
+
+    return Annotated[str, AfterValidator(read)]
 
 
-def _name(value: str, info: ValidationInfo) -> str:
-    return checked_name(value, str(info.field_name))
+def _named(function: Callable[[Any, str], Any]) -> Callable[[Any, ValidationInfo], Any]:
+    """Validator from a function of a value and the name of its key."""
+    return lambda value, info: function(value, str(info.field_name))
 
 
-Duration = Annotated[Any, BeforeValidator(_duration)]
-"""[s]"""
-PathName = Annotated[str, AfterValidator(_name)]
-"""Of a file or folder."""
+def _checked_moment(value: Any) -> Any:
+    moment_size(value, np.ones(1))
+    return value
+
+
+Duration = Annotated[Any, BeforeValidator(_named(duration))]
+"""A time span [s]."""
+PathName = Annotated[str, AfterValidator(_named(checked_name))]
+"""Name of a file or folder."""
+Moment = Annotated[Any, AfterValidator(_checked_moment)]
+"""A magnetic moment, absolute or per mass; stays as given."""
 Count = Annotated[int, Field(ge=1, le=MOST_GRAINS, strict=True)]
 """A number of grains."""
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS, strict=True)]
 """A number of steps."""
 Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
-"""Of random numbers."""
+"""Seed of random numbers."""
+
+
+def without_method(value: Any) -> Any:
+    """The [stepping] table without `method`, evaluated by `with_integrator`.  Raises ValueError if unknown."""
+    if isinstance(value, dict) and "method" in value:
+        value = dict(value)
+        method = value.pop("method")
+        if str(method) not in INTEGRATORS:
+            raise ValueError(f"method = {method!r}; {did_you_mean(str(method), list(INTEGRATORS))}")
+    return value
+
+
+def with_integrator(model: type[Any], content: dict[str, Any]) -> type[Any]:
+    """The model of a case file whose [stepping] table has the keys of the integrator that `content` selects."""
+    given = content.get("stepping")
+    integrator = INTEGRATORS.get(str(given.get("method", "verlet"))) if isinstance(given, dict) else None
+    if integrator is None or integrator is model.model_fields["stepping"].annotation:
+        return model
+    return create_model(model.__name__, __base__=model, stepping=(integrator, integrator()))

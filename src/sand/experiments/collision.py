@@ -159,7 +159,7 @@ def finished(start: Approach, simulation: Simulation) -> Collision:
         Ctrl-C; `gone_on_with` goes on.
     """
     before = len(simulation.contacts["pair"]) if simulation.steps == 0 else int(simulation.ledger.rows[0]["contacts"])
-    record = simulation.record
+    record = simulation.writer
     if record is not None:
         record.draws = False  # not at each look, but once, when all is over
     quiet = _until_quiet(simulation, start)

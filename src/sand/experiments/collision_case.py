@@ -10,25 +10,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..arguments import MOST_GRAINS
 from ..config.bodies import body_from_file
-from ..config.case import (
-    INTEGRATORS,
-    ForcesSection,
-    MaterialSection,
-    Section,
-    integrator,
-    quantity,
-    with_integrator,
-    wrong_materials,
-)
+from ..config.case import ForcesSection, MaterialSection, material_errors
 from ..config.commands import BODIES, refuse_other_command
-from ..config.errors import validation_errors
-from ..config.sections import Count, PathName, Seed
-from ..errors import BadInput, did_you_mean
-from ..grains import Grains, moment_size
+from ..config.errors import validate
+from ..config.sections import Count, Moment, PathName, Section, Seed, quantity, with_integrator, without_method, word
+from ..grains import Grains
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
 from ..material import PRESETS, Material
@@ -60,9 +50,9 @@ class BodySection(Section):
     """Radius of the grains [m] or a distribution, such as "lognormal(0.1 um, 0.3)"; optional for a file."""
     material: str = "silica"
     """Preset or name in [materials]."""
-    moment: Any = None
+    moment: Moment | None = None
     """Moment of each magnetic grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moments."""
-    moments: str | None = None
+    moments: word(MOMENT_MODES) | None = None  # type: ignore[valid-type]
     """Directions of the moments: `random`, `aligned` or `relaxed`."""
     magnetic: Any = None
     """Fraction of the grains that have a moment, 0 … 1; none: 1."""
@@ -75,22 +65,6 @@ class BodySection(Section):
     @classmethod
     def _radius(cls, value: Any) -> Any:
         return value if value is None else radii_of(value)
-
-    @field_validator("moments")
-    @classmethod
-    def _moments(cls, value: str | None) -> str | None:
-        if value is not None and value not in MOMENT_MODES:
-            raise ValueError(f"moments = {value!r}; {did_you_mean(value, list(MOMENT_MODES))}")
-        return value
-
-    @field_validator("moment")
-    @classmethod
-    def _moment(cls, value: Any) -> Any:
-        if value is not None:
-            import numpy as np
-
-            moment_size(value, np.ones(1))
-        return value
 
     @model_validator(mode="after")
     def _whole(self) -> BodySection:
@@ -156,7 +130,7 @@ class CollisionCase(Section):
     @field_validator("stepping", mode="before")
     @classmethod
     def _method(cls, value: Any) -> Any:
-        return integrator(value)
+        return without_method(value)
 
     def approach(self, seed: int) -> Approach:
         """The bodies of one collision; with `turn` they are turned at random by the seed.  Raises BadInput."""
@@ -195,19 +169,6 @@ class CollisionCase(Section):
         return finished(start, simulation), simulation
 
 
-def wrong_bodies(content: dict[str, Any]) -> list[str]:
-    """What is wrong with the materials of a case with a target and a projectile."""
-    problems = wrong_materials(content)
-    own = content.get("materials", {})
-    known = [*PRESETS, *(own if isinstance(own, dict) else [])]
-    for body in ("target", "projectile"):
-        given = content.get(body)
-        name = given.get("material", "silica") if isinstance(given, dict) else "silica"
-        if str(name) not in known:
-            problems.append(f"{body}.material: unknown material '{name}'; {did_you_mean(str(name), known)}")
-    return problems
-
-
 def with_absolute_paths(content: dict[str, Any]) -> dict[str, Any]:
     """The case with the bodies' files named so that they are found from any folder."""
     whole = dict(content)
@@ -228,16 +189,8 @@ def read_collision(path: str | Path) -> CollisionCase:
     """
     content = read_toml(path)
     refuse_other_command(content, path, "collide")
-    problems = wrong_bodies(content)
-    case, model = None, with_integrator(CollisionCase, content)
-    try:
-        case = model.model_validate(content)
-    except ValidationError as error:
-        extra: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
-        problems += [line for slip in error.errors() for line in validation_errors(slip, model, extra)]
-    if problems or case is None:
-        raise BadInput(f"{path}: {problem}" for problem in problems)
-    return case
+    problems = material_errors(content, ("target", "projectile"), "silica")
+    return validate(with_integrator(CollisionCase, content), content, str(path), problems)
 
 
 def run_seed(text: str, seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:

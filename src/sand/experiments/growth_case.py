@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from ..config.case import Case, check_case
+from ..config.case import check_case
 from ..config.commands import refuse_other_command
-from ..config.errors import validation_errors
+from ..config.errors import validate
 from ..config.sections import Section, Seed
 from ..errors import BadInput
 from ..io.run_folder import read_toml
@@ -20,12 +20,6 @@ class GrowSection(Section):
 
     seeds: list[Seed] = Field(min_length=1)
     """One box is run for each seed."""
-
-
-class GrowthCase(Case):
-    """The case of a box and the seeds of all boxes."""
-
-    grow: GrowSection
 
 
 def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
@@ -46,12 +40,10 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     given = content.pop("grow", None)
     problems: list[str] = []
     seeds = None
-    if given is not None:
-        try:
-            seeds = GrowSection.model_validate(given).seeds
-        except ValidationError as error:
-            slips = [{**slip, "loc": ("grow", *slip["loc"])} for slip in error.errors()]
-            problems += [f"{path}: {line}" for slip in slips for line in validation_errors(slip, GrowthCase, {})]
+    try:
+        seeds = None if given is None else validate(GrowSection, given, str(path), table="grow").seeds
+    except BadInput as error:
+        problems = error.problems
     try:
         case = check_case(content, str(path))
     except BadInput as error:

@@ -1,1 +1,1 @@
-"""The simulation object: composition, stepping, ledger, observers, output."""
+"""The simulation object: assembly, time stepping, ledger, observers and output."""

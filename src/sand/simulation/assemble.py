@@ -1,4 +1,4 @@
-"""From objects to the numbers the compiled driver takes."""
+"""Assembly of the engine: forces, box and settings become kernel specification, step parameters and state."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ..box import Box
 from ..contact.law import Bond
 from ..contact.model import Contact
 from ..errors import BadInput
-from ..forces.base import Force, ExternalForce, LongRangeForce, compose, compose_long_range
+from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
 from ..forces.external.loops import is_builtin
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
 from ..grains import Grains
 from ..integrate.adaptive import Adaptive
-from ..integrate.kernel_spec import ExternalWork, ContactParameters, GasSettings, KernelSpec, StepParameters
+from ..integrate.kernel_spec import ContactParameters, ExternalWork, GasSettings, KernelSpec, StepParameters
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.verlet import Verlet
@@ -38,32 +38,33 @@ from ..state.arrays import (
     stage_arrays,
 )
 from ..state.state import RECORDED, State
-from .checks import impossible, unusual
+from .checks import find_errors, find_warnings
 from .engine import Engine
-from .initial_contacts import NOTHING_TOUCHES, refuse_overlaps, seed_contacts, touching
+from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 
-MATES = 4
-"""Room per grain for neighbours in the list to begin with; it grows when needed."""
-IN_REACH = 1000
-"""Room for the neighbours of one grain, where they are forgotten once those that may touch are picked."""
+NEIGHBOURS_PER_GRAIN = 4
+"""Initial capacity of the Verlet list per grain; it grows on overflow."""
+CELL_NEIGHBOURS = 1000
+"""Capacity for the neighbours of one grain where pairs come straight from the cells and no list is stored."""
 WIDE_FROM = 64
-"""Fewest grains for the longest vectors: of less, much is left over that fills none."""
+"""Fewest grains for the widest SIMD vectors; with fewer, most lanes of the last vector would be idle."""
 IDLE = 1e5
-"""Longest step in sound-crossing times of a grain, for worlds in which nothing happens."""
+"""Longest step in sound-crossing times of a grain, where nothing else limits the step."""
 GAS_PERIOD_FRACTION = 0.05
-"""Time between two kicks of the gas, in shortest stopping times.
+"""Time between two gas kicks, in shortest stopping times.
 
-Kicks come at ends of steps or cycles, 2/3 to 4/3 of it apart; free grains diffuse h²/12τ² too fast, at most 4e-4.
+Kicks are applied at ends of steps or cycles, at intervals h of 2/3 to 4/3 of it; free grains then diffuse too fast by
+h²/12τ², at most 4e-4.
 """
 
 
-class Given(NamedTuple):
-    """The forces by kind."""
+class ForcesByType(NamedTuple):
+    """The forces of a simulation by type."""
 
     contact: Contact | None
-    distant: list[LongRangeForce]  # those that some grain feels
+    long_range: list[LongRangeForce]  # those that act on at least one grain
     external: list[ExternalForce]
-    gas: list[Gas]  # one or none
+    gas: list[Gas]  # at most one
 
 
 def build_engine(
@@ -77,74 +78,74 @@ def build_engine(
     fresh: bool = True,
     contacts: Bonds | None = None,
 ) -> Engine:
-    """Check that everything fits together and translate it.
+    """Check that grains, forces, box and settings fit together, and build the engine.
 
     Parameters
     ----------
     seed : int, optional
-        of random kicks.
+        Seed of the random gas kicks.
     fresh : bool, optional
-        a new start, whose overlaps are looked at; a restart may be in the middle of an impact.
+        Whether this is a new start, whose overlaps are checked; a resumed run may be in the middle of an impact.
     contacts : Bonds or None, optional
-        that are there from the start, with what they remember.
+        Contacts present from the start, with their displacements.
 
     Raises
     ------
     BadInput
-        every problem at once.
+        If something does not fit; all problems at once.
     """
-    warnings = _checked(grains, forces, box, fresh=fresh)
-    given = _given(forces, grains)
+    warnings = _check_system(grains, forces, box, fresh=fresh)
+    by_type = _forces_by_type(forces, grains)
     reach = float(grains.radius.min())
-    cutoffs = [f.choose(grains, box).radius for f in given.distant]
+    cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
     flights = isinstance(stepping, Adaptive)
     found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], adaptive_steps=flights)
-    long_range = _far(given, grains, box, [found.search.listed and r is not None for r in cutoffs])
+    long_range = _long_range_loops(by_type, grains, box, [found.search.listed and r is not None for r in cutoffs])
     verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
-    control = _control(grains, verlet, given, reach)
+    control = _step_control(grains, verlet, by_type, reach)
     if isinstance(stepping, Adaptive):
         stepping = stepping.resolved(grains, control)
-    composed, numbers = compose(given.external)
-    sums, far_numbers = compose_long_range([sums for _, sums, _ in long_range], [own for _, _, own in long_range])
-    rules = StepParameters(
+    external, external_numbers = compose(by_type.external)
+    sums, long_range_numbers = compose_long_range([own for _, own, _ in long_range], [own for _, _, own in long_range])
+    parameters = StepParameters(
         box.span,
-        _contact_rules(given.contact, grains, verlet),
-        far_numbers,
-        numbers,
+        _contact_parameters(by_type.contact, grains, verlet),
+        long_range_numbers,
+        external_numbers,
         found.search,
         verlet.respa_settings(bool(long_range)),
-        _ledger_columns(given.external, box),
-        _stirring(given.gas, grains, seed),
+        _external_work(by_type.external, box),
+        _gas_settings(by_type.gas, grains, seed),
         control,
-        stepping.error_limits(_stride(grains, box, found)) if isinstance(stepping, Adaptive) else (),
+        stepping.error_limits(_longest_displacement(grains, box, found)) if isinstance(stepping, Adaptive) else (),
     )
-    plan = _plan(grains, given, composed, sums, verlet, isinstance(stepping, Adaptive))
-    here = grains.copy()
-    here.arrays.position[...] = box.wrap(grains.position).T
-    start = touching(here, box) if given.contact is not None and fresh else NOTHING_TOUCHES
-    room = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
-    state = _world(here, box, rules, plan, room, all_pairs=not found.search.listed or None in cutoffs)
+    spec = _kernel_spec(grains, by_type, external, sums, verlet, isinstance(stepping, Adaptive))
+    wrapped = grains.copy()
+    wrapped.arrays.position[...] = box.wrap(grains.position).T
+    start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
+    capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
+    state = _new_state(wrapped, box, parameters, spec, capacity, all_pairs=not found.search.listed or None in cutoffs)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
-    search = found.reason + ("; in memory along a curve through space" if chosen.uses_spatial_sort(len(grains)) else "")
-    engine = Engine(state, rules, warnings, given.external, long_range, search, stepping, chosen, plan)
-    held = seed_contacts(engine, given.contact, contacts)
-    if given.contact is not None:
-        refuse_overlaps(here, given.contact, start, held)
+    search = found.reason + ("; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else "")
+    engine = Engine(state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, spec)
+    given = add_contacts(engine, by_type.contact, contacts)
+    if by_type.contact is not None:
+        refuse_overlaps(wrapped, by_type.contact, start, given)
     return engine
 
 
-def _far(
-    given: Given, grains: Grains, box: Box, listed: Sequence[bool]
+def _long_range_loops(
+    forces: ForcesByType, grains: Grains, box: Box, listed: Sequence[bool]
 ) -> list[tuple[LongRangeForce, LongRangeSums, Any]]:
-    """Each long-range force with its loops and numbers."""
-    sums = [force.sums(box, own) for force, own in zip(given.distant, listed, strict=True)]
+    """Long-range forces with their loops and numbers."""
+    sums = [force.sums(box, own) for force, own in zip(forces.long_range, listed, strict=True)]
     if len(grains) >= WIDE_FROM:
         sums = [own.wide or own for own in sums]
-    return [(f, own, f.numbers(grains, box)) for f, own in zip(given.distant, sums, strict=True)]
+    return [(f, own, f.numbers(grains, box)) for f, own in zip(forces.long_range, sums, strict=True)]
 
 
-def _given(forces: Sequence[Force], grains: Grains) -> Given:
-    return Given(
+def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
+    return ForcesByType(
         next((f for f in forces if isinstance(f, Contact)), None),
         [f for f in forces if isinstance(f, LongRangeForce) and f.acts_on(grains)],
         [f for f in forces if isinstance(f, ExternalForce)],
@@ -152,80 +153,84 @@ def _given(forces: Sequence[Force], grains: Grains) -> Given:
     )
 
 
-def _plan(
-    grains: Grains, given: Given, external: Callable, sums: LongRangeSums, verlet: Verlet, adaptive: bool
+def _kernel_spec(
+    grains: Grains, forces: ForcesByType, external: Callable, sums: LongRangeSums, verlet: Verlet, adaptive: bool
 ) -> KernelSpec:
-    """What the driver is compiled from."""
-    # where nothing can touch, or a cycle is one step, nothing is foretold or given apart
-    way = verlet.far if given.distant and given.contact and verlet.max_cycle_steps > 1 else "every step"
+    """Specification from which the driver is compiled."""
+    # without contacts, or with cycles of one step, there is neither extrapolation nor a slow force
+    scheme = verlet.far if forces.long_range and forces.contact and verlet.max_cycle_steps > 1 else "every step"
     return KernelSpec(
         external,
         sums,
-        split=way == "impulse",
-        impulse=way == "impulse",
-        taylor=way.startswith("taylor"),
-        gas=bool(given.gas),
+        split=scheme == "impulse",
+        impulse=scheme == "impulse",
+        taylor=scheme.startswith("taylor"),
+        gas=bool(forces.gas),
         adaptive=adaptive,
         queue=uses_task_queue(len(grains)),
-        keep=all(is_builtin(f.formula) for f in given.external),
+        keep=all(is_builtin(f.formula) for f in forces.external),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
     )
 
 
-def _world(grains: Grains, box: Box, rules: StepParameters, plan: KernelSpec, room: int, *, all_pairs: bool) -> State:
-    """The grains in their box, with `room` for contacts and pairs, and for whatever else plan and rules need."""
-    count, listed, uniform_contacts = len(grains), rules.search.listed, rules.contact.uniform_contacts
-    channels = len(RECORDED) if rules.contact.damped or rules.contact.follow else ALWAYS_RECORDED
-    blocks = all_blocks(grains) if plan.long_range is not NO_LONG_RANGE_FORCE and all_pairs else 0
-    needed = set(LIST_ARRAYS if listed else CELL_ARRAYS if rules.search.celled else ())
-    needed |= set(RESPA_ARRAYS if plan.impulse else ())
-    needed |= set(RATE_ARRAYS if plan.taylor else ())
+def _new_state(
+    grains: Grains, box: Box, parameters: StepParameters, spec: KernelSpec, capacity: int, *, all_pairs: bool
+) -> State:
+    """State with the arrays that the kernels need; `capacity` is that of contacts and pairs."""
+    count, search, contact = len(grains), parameters.search, parameters.contact
+    uniform_contacts = contact.uniform_contacts
+    channels = len(RECORDED) if contact.damped or contact.follow else ALWAYS_RECORDED
+    blocks = all_blocks(grains) if spec.long_range is not NO_LONG_RANGE_FORCE and all_pairs else 0
+    needed = set(LIST_ARRAYS if search.listed else CELL_ARRAYS if search.celled else ())
+    needed |= set(RESPA_ARRAYS if spec.impulse else ())
+    needed |= set(RATE_ARRAYS if spec.taylor else ())
     needed |= {"packed_position", "source"} if blocks else set()
-    needed |= set(FORCE_ARRAYS if plan.long_range is not NO_LONG_RANGE_FORCE or plan.adaptive else ())
+    needed |= set(FORCE_ARRAYS if spec.long_range is not NO_LONG_RANGE_FORCE or spec.adaptive else ())
     return State(
         grains,
         box,
-        empty_contact_arrays(count, room, len(Bond._fields), uniform_contacts=uniform_contacts, channels=channels),
-        empty_pair_list(count, room, uniform_contacts=uniform_contacts),
+        empty_contact_arrays(count, capacity, len(Bond._fields), uniform_contacts=uniform_contacts, channels=channels),
+        empty_pair_list(count, capacity, uniform_contacts=uniform_contacts),
         empty_long_range_arrays(
             count,
-            MATES * count if listed else IN_REACH if rules.search.celled else 0,
+            NEIGHBOURS_PER_GRAIN * count if search.listed else CELL_NEIGHBOURS if search.celled else 0,
             blocks,
             needless={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
-        stages=stage_arrays(count if plan.adaptive else 0),
+        stages=stage_arrays(count if spec.adaptive else 0),
         uniform_contacts=uniform_contacts,
     )
 
 
-def _stride(grains: Grains, box: Box, found: ChosenSearch) -> float:
-    """The longest way [m] that a grain may go in one Runge–Kutta step, so that no pair is missed.
+def _longest_displacement(grains: Grains, box: Box, found: ChosenSearch) -> float:
+    """Longest displacement [m] of a grain in one Runge–Kutta step for which no pair can be missed.
 
-    With a list, Δr/4, as `integrate.event_location.first_touch` argues.  And an image of a grain other than the nearest must not
-    come to touch: it is half a box side away, and two grains close that less r1 + r2 together.  A tenth is kept back
-    for what lies between two stages.
+    With a Verlet list: Δr/4, derived in `integrate.event_location.first_touch`. In a periodic box, two grains must also
+    not touch through an image other than the nearest, which is half a box side away: together they may approach by
+    that distance minus r1 + r2. A tenth is subtracted for positions between two stages.
     """
     images = 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
     return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images
 
 
-def _ledger_columns(external: Sequence[ExternalForce], box: Box) -> ExternalWork:
+def _external_work(external: Sequence[ExternalForce], box: Box) -> ExternalWork:
+    """Whether the energy of external forces depends on time, or on a position that periodic boundaries make jump."""
     position_dependent = any(getattr(f, "position_dependent", False) for f in external)
     return ExternalWork(
         any(getattr(f, "time_dependent", False) for f in external), position_dependent and not box.is_open
     )
 
 
-def _stirring(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
+def _gas_settings(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
     if not gas:
         return GasSettings(math.inf, seed, VACUUM)
     return GasSettings(GAS_PERIOD_FRACTION * gas[0].shortest_time(grains), seed, gas[0].numbers())
 
 
-def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
-    """Warnings of what is unusual.  Raises BadInput for everything that does not fit together."""
-    problems = impossible(grains, forces, box) if fresh else []
+def _check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
+    """Check that grains, forces and box fit together; returns warnings, raises BadInput with all problems."""
+    problems = find_errors(grains, forces, box) if fresh else []
     warnings: list[str] = []
     for force in forces:
         try:
@@ -236,38 +241,38 @@ def _checked(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) 
     if box.shortest < least:
         problems.append(
             f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
-            "or a grain would meet two images of its neighbour"
+            "so that a grain interacts with only one image of each neighbour"
         )
     if problems:
         raise BadInput(problems)
-    return warnings + (unusual(grains, forces, box) if fresh else [])
+    return warnings + (find_warnings(grains, forces, box) if fresh else [])
 
 
-def _control(grains: Grains, stepping: Verlet, given: Given, reach: float) -> StepCriteria:
-    """What the choice of the step needs."""
-    steps = [own() for f in given.external if (own := getattr(f, "longest_step", None)) is not None]
+def _step_control(grains: Grains, stepping: Verlet, forces: ForcesByType, reach: float) -> StepCriteria:
+    """Parameters of the choice of the step size."""
+    steps = [own() for f in forces.external if (own := getattr(f, "longest_step", None)) is not None]
     idle = IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials)))
     return StepCriteria(
         fixed=0.0 if stepping.step == "auto" else stepping.step,
         reach=reach,
-        energy_scale=max((f.energy_scale(grains) for f in given.distant), default=0.0),
+        energy_scale=max((f.energy_scale(grains) for f in forces.long_range), default=0.0),
         accuracy=stepping.accuracy,
-        outer_field=math.fsum(f.flux_density_size() for f in given.external),
+        outer_field=math.fsum(f.flux_density_size() for f in forces.external),
         impact=IMPACT_DISPLACEMENT / stepping.steps_per_period,
-        longest=min([idle, *steps, *(GAS_PERIOD_FRACTION * gas.shortest_time(grains) for gas in given.gas)]),
+        longest=min([idle, *steps, *(GAS_PERIOD_FRACTION * gas.shortest_time(grains) for gas in forces.gas)]),
     )
 
 
 def sound_crossing(grains: Grains, number: int) -> float:
-    """r √(ρ/E) [s] of the smallest grain of one material."""
+    """Sound-crossing time r √(ρ/E) [s] of the smallest grain of one material."""
     material = grains.materials[number]
     radius = float(grains.radius[grains.material == number].min())
     return radius * math.sqrt(material.density / material.young_modulus)
 
 
-def _contact_rules(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactParameters:
+def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactParameters:
     law = contact or Contact()
-    # without a Contact nothing ever touches, and materials may lack what contacts need
+    # without a Contact no grains touch, and materials may lack the constants of contacts
     pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
     return ContactParameters(
         on=contact is not None,

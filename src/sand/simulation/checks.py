@@ -1,4 +1,4 @@
-"""Grains, forces and box together at a new start: what cannot be is refused, what is unusual is warned of."""
+"""Checks of grains, forces and box at a new start: impossible combinations are errors, unusual ones are warnings."""
 
 from __future__ import annotations
 
@@ -12,49 +12,49 @@ from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
 from ..units import format_quantity, is_word
 
-OUTSIDE = 1e-3
-"""How far a centre may lie outside a periodic box, in sides of it: frames in single precision are mended by that."""
-LARGEST = 1e-2
-"""Radius [m] beyond which grains are hardly dust."""
+POSITION_TOLERANCE = 1e-3
+"""Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
+LARGEST_RADIUS = 1e-2
+"""Radius [m] above which a warning asks whether the unit is right."""
 NEAREST = 8
-"""Neighbours of a grain, itself among them, that are looked at for overlaps."""
-SUNK = 1e-3
-"""Overlap, in radii of the smaller grain, that without a contact law is more than rounding."""
+"""Nearest neighbours of a grain, itself included, that are checked for overlaps."""
+OVERLAP_TOLERANCE = 1e-3
+"""Overlap, in radii of the smaller grain, that counts as rounding where there is no contact law."""
 
 
-def impossible(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Complaints about grains outside a periodic box, and cut-offs that end inside a grain."""
-    return [*_outside(grains, box), *_short_cutoffs(grains, forces, box)]
+def find_errors(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """Error messages: grains outside a periodic box, and cut-offs smaller than a grain."""
+    return [*_outside_box(grains, box), *_short_cutoffs(grains, forces, box)]
 
 
-def unusual(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Warnings of very large grains, and of overlaps that no contact law acts on."""
+def find_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """Warnings: very large grains, and overlaps without a contact law."""
     warnings = []
-    sticky = any(isinstance(force, Contact) for force in forces)
+    contact = any(isinstance(force, Contact) for force in forces)
     largest = int(np.argmax(grains.radius))
-    if sticky and grains.radius[largest] > LARGEST:
+    if contact and grains.radius[largest] > LARGEST_RADIUS:
         size = format_quantity(float(grains.radius[largest]), "m")
         warnings.append(
-            f"grain {largest} has a radius of {size}: contacts are made for dust, far below {format_quantity(LARGEST, 'm')}; "
-            "is the unit right?"
+            f"grain {largest} has a radius of {size}: the contact model is meant for dust, far below "
+            f"{format_quantity(LARGEST_RADIUS, 'm')}; is the unit right?"
         )
-    alone = bool(forces) and not any(isinstance(force, LongRangeForce) for force in forces)
-    if not sticky and not alone:
-        warnings += _overlaps(grains, box)  # grains that feel only what surrounds them may be in one place
+    independent = bool(forces) and not any(isinstance(force, LongRangeForce) for force in forces)
+    if not contact and not independent:  # grains that do not interact may overlap
+        warnings += _overlaps(grains, box)
     return warnings
 
 
-def _outside(grains: Grains, box: Box) -> list[str]:
+def _outside_box(grains: Grains, box: Box) -> list[str]:
     lengths = np.array([np.inf if v is None else v for v in box.lengths])
-    wrong = np.flatnonzero((np.abs(grains.position) > (0.5 + OUTSIDE) * lengths).any(axis=1))
+    wrong = np.flatnonzero((np.abs(grains.position) > (0.5 + POSITION_TOLERANCE) * lengths).any(axis=1))
     if not len(wrong):
         return []
     first = int(wrong[0])
-    place = ", ".join(f"{x:.4g}" for x in grains.position[first])
+    position = ", ".join(f"{x:.4g}" for x in grains.position[first])
     others = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
     return [
-        f"grain {first}{others} lies outside the box: it is at ({place}) m, and the box, {box.describe()}, reaches "
-        "from −L/2 to L/2 on each periodic axis; move the grains, or take box.wrap(position)"
+        f"grain {first}{others} lies outside the box: it is at ({position}) m, and the box, {box.describe()}, extends "
+        "from −L/2 to L/2 on each periodic axis; move the grains, or use box.wrap(position)"
     ]
 
 
@@ -71,7 +71,7 @@ def _short_cutoffs(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
         ):
             problems.append(
                 f"{force.name}: cutoff = {format_quantity(cutoff, 'm')} ends within a grain, whose diameter is "
-                f"{format_quantity(diameter, 'm')}; take a longer one, or 'auto'"
+                f"{format_quantity(diameter, 'm')}; give a longer one, or 'auto'"
             )
     return problems
 
@@ -79,19 +79,19 @@ def _short_cutoffs(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
 def _overlaps(grains: Grains, box: Box) -> list[str]:
     pair = _nearest(grains, box)
     overlap = grains.overlaps(pair, box)
-    deep = np.flatnonzero(overlap > SUNK * grains.radius[pair].min(axis=1))
+    deep = np.flatnonzero(overlap > OVERLAP_TOLERANCE * grains.radius[pair].min(axis=1))
     if not len(deep):
         return []
     i, j = pair[deep[0]]
     return [
-        f"grains {i} and {j} overlap by {format_quantity(float(overlap[deep[0]]), 'm')}, and there is no sand.Contact() among "
-        "the forces: grains pass through each other"
+        f"grains {i} and {j} overlap by {format_quantity(float(overlap[deep[0]]), 'm')}, and there is no "
+        "sand.Contact() among the forces: grains pass through each other"
     ]
 
 
 def _nearest(grains: Grains, box: Box) -> np.ndarray:
-    """Pairs (P, 2) of each grain with its few nearest neighbours; all pairs might be too many."""
-    from scipy.spatial import cKDTree  # slow to load
+    """Pairs (P, 2) of each grain with its nearest neighbours only: all overlapping pairs might be too many."""
+    from scipy.spatial import cKDTree  # slow to import
 
     count = len(grains)
     if count == 1:

@@ -1,4 +1,4 @@
-"""The contacts as a table anyone can read."""
+"""Table of contacts: displacements, shares of their limits, loads, energies and losses."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
-from ..errors import NoSuchKey, did_you_mean, import_optional, shown
+from ..errors import NoSuchKey, did_you_mean, shown
 from ..state.state import CONTACTS, RECORDED, State
 
 COLUMNS = (
     ("pair", "", "the two grains"),
-    ("formed", "s", "time of first touch; the start for contacts that were there"),
+    ("formed", "s", "time at which the contact formed; the start for initial contacts"),
     *CONTACT_ROWS,
     *CONTACT_VECTORS,
     ("force", "N", "force on the first grain; the second one's is the opposite"),
@@ -25,9 +25,9 @@ COLUMNS = (
 
 
 class ContactTable(Mapping[str, np.ndarray]):
-    """One row per contact, columns by name (see COLUMNS): `table["roll_share"]`; a snapshot, not a view.
+    """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
 
-    Columns are (C,), but `pair` is (C, 2) and vectors are (C, 3), laboratory frame.
+    Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.
     """
 
     def __init__(self, state: State, follow: bool):
@@ -45,8 +45,8 @@ class ContactTable(Mapping[str, np.ndarray]):
         vectors = rows[scalars:].reshape(len(names), 3, used)
         self._columns |= {name: vectors[k].T.copy() for k, name in enumerate(names)}
         for k, name in enumerate(RECORDED):
-            there = k < len(contacts.lost)
-            self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if there else np.zeros(used)
+            is_recorded = k < len(contacts.lost)
+            self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if is_recorded else np.zeros(used)
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._columns:
@@ -64,7 +64,7 @@ class ContactTable(Mapping[str, np.ndarray]):
         return f"<{len(self['pair'])} contacts: {', '.join(self)}>"
 
     def _flat(self) -> dict[str, np.ndarray]:
-        """Columns of one dimension: vectors are split into components, pairs into grain1 and grain2."""
+        """One-dimensional columns: vectors split into components, pairs into grain1 and grain2."""
         flat: dict[str, np.ndarray] = {}
         for name, column in self.items():
             if name == "pair":
@@ -76,11 +76,11 @@ class ContactTable(Mapping[str, np.ndarray]):
         return flat
 
     def to_pandas(self) -> Any:
-        """A pandas DataFrame; pandas has to be installed."""
+        """Convert to a pandas DataFrame; needs pandas."""
         return import_optional("pandas", "to_pandas").DataFrame(self._flat())
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset with dimension `contact` and units as attributes; xarray has to be installed."""
+        """Convert to an xarray Dataset with dimension `contact` and units as attributes; needs xarray."""
         xarray = import_optional("xarray", "to_xarray")
         units = {name: unit for name, unit, _ in COLUMNS}
         variables = {

@@ -1,6 +1,6 @@
-"""Displays of a simulation, which packages above this one provide.
+"""Registry of displays: functions of upper packages that draw or show a simulation.
 
-`sand/__init__.py` registers them, so that `Simulation.figure`, `Simulation.view` and the figure at the end of a run need
+`entry_points.register` fills it, so that `Simulation.figure`, `Simulation.view` and the figure at the end of a run need
 no import of the packages that draw.
 """
 
@@ -15,14 +15,14 @@ _DISPLAYS: dict[str, Callable[..., Any]] = {}
 
 
 def register_display(name: str, function: Callable[..., Any]) -> None:
-    """Register a display; it replaces an earlier one of the same name.
+    """Register a display, replacing an earlier one of the same name.
 
     Parameters
     ----------
     name : str
-        "figure" (simulation) → figure, "save figure" (simulation, path), or "view" (simulation, path).
+        One of "figure" (simulation) → figure, "save figure" (simulation, path) and "view" (simulation, path).
     function : Callable[..., Any]
-        called with the simulation first.
+        Called with the simulation as first argument.
     """
     _DISPLAYS[name] = function
 

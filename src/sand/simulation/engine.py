@@ -1,4 +1,4 @@
-"""A world and the compiled code that moves it."""
+"""The engine of a simulation: its state, the compiled driver, and the parameters that the driver takes."""
 
 from __future__ import annotations
 
@@ -46,197 +46,216 @@ from ..state.state import (
 
 @dataclass
 class Engine:
-    """A world and the compiled code that moves it.
+    """The state of a simulation and the compiled driver that advances it.
 
     Attributes
     ----------
-    world
-        the state, its grains numbered as the user knows them.
-    rules : Rules
-        everything that does not change, as the kernels take it.
+    state : State
+        The state, with grains in the user's order.
+    parameters : StepParameters
+        Constants of the run, as the kernels take them.
     warnings : list[str]
-        what the forces had to say about these grains.
-    far : Sequence[tuple[LongRangeForce, Any, Any]]
-        the long-range forces that some grain feels, with their loops and numbers.
-    outside : Sequence[ExternalForce]
-        the per-grain forces.
+        Warnings of the forces about these grains.
+    external : Sequence[ExternalForce]
+        Per-grain forces.
+    long_range : Sequence[tuple[LongRangeForce, Any, Any]]
+        Long-range forces that act on at least one grain, with their loops and numbers.
     search : str
-        how neighbours are found, in words.
+        Description of the neighbour search and the reason for its choice.
     stepping : Verlet or Adaptive
-        the integrator, with a number for everything that depends on the grains at the start.
+        The integrator, with all automatic settings resolved.
     neighbours : Neighbours
-        their settings, likewise, unless they are those of an earlier run.
+        Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
     """
 
-    _world: State
-    rules: StepParameters
+    _state: State
+    parameters: StepParameters
     warnings: list[str]
     external: Sequence[ExternalForce]
     long_range: Sequence[tuple[LongRangeForce, Any, Any]]
     search: str
     stepping: Verlet | Adaptive
     neighbours: Neighbours
-    _plan: KernelSpec
-    _away: bool = field(init=False, default=False)  # are grains at places of their own now?
+    _kernel_spec: KernelSpec
+    _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _advance: Callable = field(init=False)
-    _hands: WorkerThreads | None = field(init=False, default=None)
+    _workers: WorkerThreads | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self._advance = adaptive_driver_for(self._plan) if self._plan.adaptive else driver_for(self._plan)
-        if self._plan.queue:
-            self._hands = WorkerThreads(worker_loops(self._plan)[1])
+        self._advance = (
+            adaptive_driver_for(self._kernel_spec) if self._kernel_spec.adaptive else driver_for(self._kernel_spec)
+        )
+        if self._kernel_spec.queue:
+            self._workers = WorkerThreads(worker_loops(self._kernel_spec)[1])
 
     @property
     def state(self) -> State:
-        """The state, its grains numbered as the user knows them."""
+        """The state, with grains in the user's order."""
         self.restore_user_order()
-        return self._world
+        return self._state
 
     @state.setter
     def state(self, other: State) -> None:
-        self._world, self._away = other, False
+        self._state, self._is_sorted = other, False
 
     def restore_user_order(self) -> None:
-        """Give every grain the number back that the user knows it by, until the next step is taken."""
-        if self._away:
-            reorder_grains(self._world, inverse(self._world.order))
-            self._away = False
+        """Undo the spatial sorting of the arrays, until the next step."""
+        if self._is_sorted:
+            reorder_grains(self._state, inverse(self._state.order))
+            self._is_sorted = False
 
     @property
     def time(self) -> float:
-        """[s]"""
-        return self._world.time
+        """Simulation time [s]."""
+        return self._state.time
 
     @property
     def steps(self) -> int:
-        """Taken so far."""
-        return self._world.steps
+        """Number of steps taken so far."""
+        return self._state.steps
 
     def _sort_in_space(self) -> None:
-        """Grains where steps are fast, if that is not where they are."""
-        if not self._world.order.size or self.steps >= self._world.count[ORDERED] + SORT_INTERVAL:
-            w = self.state
-            w.order, w.count[ORDERED] = spatial_order(w), w.steps
-            reorder_grains(w, w.order)
-            sort_contacts_and_pairs(w)
-            self._remake_list()
-        elif not self._away:
-            reorder_grains(self._world, self._world.order)
-        self._away = True
+        """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
+        if not self._state.order.size or self.steps >= self._state.count[ORDERED] + SORT_INTERVAL:
+            state = self.state
+            state.order, state.count[ORDERED] = spatial_order(state), state.steps
+            reorder_grains(state, state.order)
+            sort_contacts_and_pairs(state)
+            self._rebuild_list()
+        elif not self._is_sorted:
+            reorder_grains(self._state, self._state.order)
+        self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
-        """At least `most_steps` steps, or to `until` [s]; ends with a cycle of the long-range forces."""
+        """Take steps up to `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed."""
         last = min(self.steps + most_steps, 2**62)
-        if not self.neighbours.uses_spatial_sort(len(self._world.grains)):
+        if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
             return self._drive(until, last)
         while True:
             if self.time < until and self.steps < last:
                 self._sort_in_space()
-            renewed = self._world.count[ORDERED] + SORT_INTERVAL
+            renewed = self._state.count[ORDERED] + SORT_INTERVAL
             stop = self._drive(until, min(last, renewed))
             if not (stop is Stop.STEPS_DONE and renewed <= self.steps < last):
                 return stop
 
     def _drive(self, until: float, last: float) -> Stop:
-        """On to a time [s] or a step, as the grains stand now."""
-        w = self._world
+        """Take steps up to a time [s] or a step, in the present order of the arrays; enlarges arrays that overflow."""
+        state = self._state
         while True:
-            stages = (w.stages,) if self._plan.adaptive else ()
-            arrays = (w.grains.arrays, w.contacts, w.pair_list, w.long_range, *stages, w.clock, w.count, w.lost)
-            rules = self._rules_with_crew()
+            stages = (state.stages,) if self._kernel_spec.adaptive else ()
+            arrays = (
+                state.grains.arrays,
+                state.contacts,
+                state.pair_list,
+                state.long_range,
+                *stages,
+                state.clock,
+                state.count,
+                state.lost,
+            )
+            parameters = self._start_workers()
             try:
-                stop = Stop(self._advance(*arrays, rules, float(until), int(last)))
+                stop = Stop(self._advance(*arrays, parameters, float(until), int(last)))
             except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
-                if self._hands is not None:
-                    release_workers(rules.queue)
+                if self._workers is not None:
+                    release_workers(parameters.queue)
                 raise
             if stop is Stop.CONTACTS_FULL:
-                w.grow_contacts()
+                state.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
-                found, w.count[PAIRS] = int(w.count[PAIRS]), 0  # none of the list holds
-                w.grow_pairs(int(OVER_ALLOCATION * found))
+                found, state.count[PAIRS] = int(state.count[PAIRS]), 0  # the list is incomplete
+                state.grow_pairs(int(OVER_ALLOCATION * found))
             elif stop is Stop.LIST_FULL:
-                w.grow_rows()
+                state.grow_rows()
             else:
                 return stop
 
-    def _rules_with_crew(self) -> StepParameters:
-        """The rules for one call of the driver, with a crew at work if there is one."""
-        if self._hands is None:
-            return self.rules
-        w = self._world
-        rules = self.rules._replace(queue=new_task_queue(len(w.grains), w.contacts.flag.size))
-        if benefits_from_workers(self._plan, w.grains.arrays, int(w.count[CONTACTS])):
-            self._hands.start((w.grains.arrays, w.contacts, w.long_range, w.count, rules))
-        return rules
+    def _start_workers(self) -> StepParameters:
+        """Start worker threads for one call of the driver, where there are any; returns the driver's parameters."""
+        if self._workers is None:
+            return self.parameters
+        state = self._state
+        parameters = self.parameters._replace(queue=new_task_queue(len(state.grains), state.contacts.flag.size))
+        if benefits_from_workers(self._kernel_spec, state.grains.arrays, int(state.count[CONTACTS])):
+            self._workers.start((state.grains.arrays, state.contacts, state.long_range, state.count, parameters))
+        return parameters
 
     def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
-        """Contacts before the first step, arrays (C, …); the first that is stretched beyond its break, or −1."""
-        w = self.state
-        if w.contacts.pair.shape[1] < len(pair):
-            w.grow_contacts(len(pair))
+        """Add contacts before the first step; array shapes (C, …).
+
+        Returns
+        -------
+        int
+            Index of the first contact that is stretched beyond its breaking point, or −1.
+        """
+        state = self.state
+        if state.contacts.pair.shape[1] < len(pair):
+            state.grow_contacts(len(pair))
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
         return int(
-            add_initial_contacts(w.grains.arrays, w.contacts, w.count, w.box.span, self.rules.contact, pairs, *given)
+            add_initial_contacts(
+                state.grains.arrays, state.contacts, state.count, state.box.span, self.parameters.contact, pairs, *given
+            )
         )
 
     def begin(self) -> None:
-        """Contacts of grains that touch at the start, nothing booked, and the first loads."""
-        w = self.state
-        w.count[STAGE] = 1
-        w.count[CHECKED] = w.count[STEP_INCREASES] = -INCREASE_INTERVAL
-        w.clock[CONTACT_STEP] = math.inf
+        """Form contacts between grains that touch at the start, with no energy booked, and compute the first loads."""
+        state = self.state
+        state.count[STAGE] = 1
+        state.count[CHECKED] = state.count[STEP_INCREASES] = -INCREASE_INTERVAL
+        state.clock[CONTACT_STEP] = math.inf
         self._drive(-math.inf, 1)
-        w.count[STEPS] = w.count[MADE] = w.count[SLIPPED] = w.count[LONG_RANGE_SUMS] = 0
-        w.lost[:] = 0.0
-        w.contacts.lost[:] = 0.0
+        state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
+        state.lost[:] = 0.0
+        state.contacts.lost[:] = 0.0
 
     def load_state(self, saved: dict[str, np.ndarray]) -> None:
-        """Go on from a saved state; what a checkpoint leaves out is worked out from the rest."""
-        w = self.state
-        w.from_arrays(saved)
-        if w.order.size:  # lists depend on it
-            reorder_grains(w, w.order)
-            self._away = True
-        elif w.contacts.gather_order.size:
-            resort_contacts_by_grain(w.contacts, w.count, len(w.grains))
-        if self.rules.search.listed and not self._list_lasts():
-            w.long_range.anchor[...] = w.grains.arrays.position
-        self._remake_list()
+        """Restore a saved state; quantities that a checkpoint does not hold are recomputed."""
+        state = self.state
+        state.from_arrays(saved)
+        if state.order.size:  # the order of the lists depends on it
+            reorder_grains(state, state.order)
+            self._is_sorted = True
+        elif state.contacts.gather_order.size:
+            resort_contacts_by_grain(state.contacts, state.count, len(state.grains))
+        if self.parameters.search.listed and not self._list_lasts():
+            state.long_range.anchor[...] = state.grains.arrays.position
+        self._rebuild_list()
 
-    def _remake_list(self) -> None:
-        """The list of the anchors, if there is one, for the numbers that grains have now."""
-        w, search = self._world, self.rules.search
-        while search.listed and rebuild_verlet_list(w.long_range, w.box.span, search.reach) == FULL:
-            w.grow_rows()
+    def _rebuild_list(self) -> None:
+        """Rebuild the Verlet list, if there is one, from its reference positions for the present order of grains."""
+        state, search = self._state, self.parameters.search
+        while search.listed and rebuild_verlet_list(state.long_range, state.box.span, search.reach) == FULL:
+            state.grow_rows()
 
     def _list_lasts(self) -> bool:
-        """False if a run of an earlier version had no list, or a wider one, for which grains may have gone farther."""
-        w = self._world
-        if not np.isfinite(w.long_range.anchor).all():
+        """Whether no grain is more than half the margin of the Verlet list from its reference position."""
+        state = self._state
+        if not np.isfinite(state.long_range.anchor).all():
             return False
-        moved = w.box.nearest((w.grains.arrays.position - w.long_range.anchor).T)
-        return bool((moved**2).sum(axis=1).max() <= (0.5 * self.rules.search.margin) ** 2)
+        moved = state.box.nearest((state.grains.arrays.position - state.long_range.anchor).T)
+        return bool((moved**2).sum(axis=1).max() <= (0.5 * self.parameters.search.margin) ** 2)
 
     def energies_at_grains(self) -> dict[str, np.ndarray]:
-        """Energy [J] of each grain, (N,), by force: half of each pair's, and what per-grain forces give."""
-        w = self.state
-        shares = {force.column: np.zeros(len(w.grains)) for force, _, _ in self.long_range}
+        """Energy [J] of each grain (N,) by force: half of each pair energy, and the energies of per-grain forces."""
+        state = self.state
+        shares = {force.column: np.zeros(len(state.grains)) for force, _, _ in self.long_range}
         for force, sums, numbers in self.long_range:
             long_range_energies_for(sums.energies)(
-                w.grains.arrays, w.long_range, self.rules.span, numbers, shares[force.column]
+                state.grains.arrays, state.long_range, self.parameters.span, numbers, shares[force.column]
             )
         for outer in self.external:
-            shares[outer.name] = np.zeros(len(w.grains))
+            shares[outer.name] = np.zeros(len(state.grains))
             fill = external_energies_for(outer.formula)
-            fill(w.grains.arrays, w.time, outer.numbers(), shares[outer.name])
+            fill(state.grains.arrays, state.time, outer.numbers(), shares[outer.name])
         return shares
 
     def force_energies(self) -> dict[str, float]:
-        """Energy [J] of all long-range and per-grain forces by column of the ledger."""
+        """Total energy [J] of each long-range and per-grain force, by ledger column."""
         return {name: math.fsum(share) for name, share in self.energies_at_grains().items()}
 
     def limiting_grains(self) -> tuple[int, ...]:
-        """The grains that the last stop was about."""
+        """Indices of the grains that caused the last stop."""
         return tuple(sorted({int(self.state.count[g]) for g in (GRAIN1, GRAIN2)} - {-1}))

@@ -1,4 +1,4 @@
-"""Contacts at the start: those of grains that overlap, and those of an earlier run."""
+"""Initial contacts: of grains that overlap at the start, and of an earlier run."""
 
 from __future__ import annotations
 
@@ -15,30 +15,44 @@ from ..setup.checks import most_overlap
 from ..setup.from_frame import Bonds
 from .engine import Engine
 
-TOLD = 10
+NAMED = 10
+"""Pairs named one by one in a message."""
 
 
-class Touching(NamedTuple):
+class OverlappingPairs(NamedTuple):
     """Pairs of grains that overlap."""
 
-    pair: np.ndarray  # (P, 2), the lower number first, sorted
+    pair: np.ndarray  # (P, 2), the lower index first, sorted
     overlap: np.ndarray  # (P,) [m] > 0
 
 
-NOTHING_TOUCHES = Touching(np.zeros((0, 2), np.int64), np.zeros(0))
+NO_OVERLAPS = OverlappingPairs(np.zeros((0, 2), np.int64), np.zeros(0))
 
 
-def touching(grains: Grains, box: Box) -> Touching:
-    """All pairs that overlap."""
+def overlapping_pairs(grains: Grains, box: Box) -> OverlappingPairs:
+    """All pairs of grains that overlap."""
     pair = box.close_pairs(grains.position, 2.0 * float(grains.radius.max()))
     overlap = grains.overlaps(pair, box)
-    return Touching(pair[overlap > 0.0], overlap[overlap > 0.0])
+    return OverlappingPairs(pair[overlap > 0.0], overlap[overlap > 0.0])
 
 
-def seed_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> np.ndarray:
-    """Put the contacts of an earlier run into the world; returns their pairs (C, 2), sorted.  Raises BadInput."""
+def add_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> np.ndarray:
+    """Add contacts of an earlier run to the state.
+
+    Returns
+    -------
+    ndarray
+        Their pairs (C, 2), sorted.
+
+    Raises
+    ------
+    BadInput
+        If they do not fit the grains, the materials or the forces.
+    """
     if contacts is None or not len(contacts.pair):
-        return NOTHING_TOUCHES.pair
+        return NO_OVERLAPS.pair
+    if contacts is None or not len(contacts.pair):
+        return NO_OVERLAPS.pair
     count, pair = len(engine.state.grains), np.asarray(contacts.pair)
     if contact is None:
         raise BadInput(f"{len(pair)} contacts are given, but there is no sand.Contact() among the forces; add it")
@@ -46,28 +60,33 @@ def seed_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | Non
     if shapes != ((len(pair), 2), (len(pair), 3), (len(pair), 3), (len(pair),)):
         raise BadInput(f"contacts have shapes {shapes}; they must be (C, 2), (C, 3), (C, 3), (C,)")
     if pair.min() < 0 or pair.max() >= count or (pair[:, 0] == pair[:, 1]).any():
-        raise BadInput(f"contacts name grains that are not there; grains are 0 to {count - 1}, two different ones each")
-    held = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
-    if len(held) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
+        raise BadInput(f"contacts name grains that do not exist; each needs two different grains of 0 to {count - 1}")
+    given = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
+    if len(given) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
         raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
     wrong = engine.seed(pair, contacts.slide, contacts.roll, contacts.twist)
     if wrong >= 0:
         i, j = pair[wrong]
         raise BadInput(
-            f"the contact of grains {i} and {j} is stretched beyond its break; these materials and radii do not hold it"
+            f"the contact of grains {i} and {j} is stretched beyond its breaking point for these materials and radii"
         )
-    return held
+    return given
 
 
-def refuse_overlaps(grains: Grains, contact: Contact, found: Touching, held: np.ndarray) -> None:
-    """Raises BadInput naming the grains (first ten pairs) that overlap by too much at the start.
+def refuse_overlaps(grains: Grains, contact: Contact, found: OverlappingPairs, given: np.ndarray) -> None:
+    """Refuse pairs that overlap by too much at the start.
 
     Parameters
     ----------
-    found : Touching
-        the pairs that overlap.
-    held : ndarray
-        pairs of contacts from an earlier run, sorted, (C, 2); they may be in the middle of an impact.
+    found : OverlappingPairs
+        The pairs that overlap.
+    given : ndarray
+        Pairs of contacts from an earlier run, sorted, (C, 2); they may be in the middle of an impact.
+
+    Raises
+    ------
+    BadInput
+        If a pair overlaps by more than `setup.checks.most_overlap`; the first ten pairs are named.
     """
     (i, j), radius = found.pair.T, grains.radius
     count = np.int64(len(grains))
@@ -75,14 +94,14 @@ def refuse_overlaps(grains: Grains, contact: Contact, found: Touching, held: np.
     gamma, modulus = contact.pairings(grains.materials)[:2, grains.material[i], grains.material[j]]
     rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
     limit = most_overlap(rest, np.minimum(radius[i], radius[j]))
-    is_new = ~np.isin(i * count + j, held[:, 0] * count + held[:, 1])
+    is_new = ~np.isin(i * count + j, given[:, 0] * count + given[:, 1])
     wrong = np.flatnonzero((found.overlap > limit) & is_new)
     problems = [
-        f"grains {i[k]} and {j[k]} overlap by {found.overlap[k]:.3g} m at the start; at most {limit[k]:.3g} m may be: "
-        "move them apart"
-        for k in wrong[:TOLD]
+        f"grains {i[k]} and {j[k]} overlap by {found.overlap[k]:.3g} m at the start; "
+        f"at most {limit[k]:.3g} m is allowed: move them apart"
+        for k in wrong[:NAMED]
     ]
-    if len(wrong) > TOLD:
-        problems.append(f"… and {len(wrong) - TOLD} more overlapping pairs")
+    if len(wrong) > NAMED:
+        problems.append(f"… and {len(wrong) - NAMED} more overlapping pairs")
     if problems:
         raise BadInput(problems)

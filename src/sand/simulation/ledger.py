@@ -1,4 +1,4 @@
-"""The books: every joule of a run."""
+"""The energy table of a run: energies, losses per mechanism, momenta, and counts of contacts and clusters."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from ..grains import Grains
 from ..state.state import BROKEN, CONTACTS, MADE, SLIPPED, State
 
 MAGNETIC = "magnetic"
-"""A column that every ledger has, with dipoles or without."""
+"""A column that every ledger has, with or without dipoles."""
 RUNAWAY = 0.5
-"""Change of the total over all energies of the moment and all dissipated, at which a run is stopped."""
+"""Change of the total energy, relative to all present energies and all dissipation, at which a run is stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
-def log_row(state: State, rules: Any, forces: dict[str, float]) -> dict[str, float]:
-    """One row of the ledger: all energies [J], losses [J], momenta (SI), numbers of contacts and clusters.
+def log_row(state: State, parameters: Any, forces: dict[str, float]) -> dict[str, float]:
+    """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
 
     Parameters
     ----------
-    rules
-        of the run, as the driver takes them.
+    parameters : StepParameters
+        Constants of the run, as the driver takes them.
     forces : dict[str, float]
-        energy [J] of each long-range and per-grain force by column.
+        Energy [J] of each long-range and per-grain force by column.
     """
     energies = np.empty(len(ENERGIES))
     grains = state.grains.arrays
-    measure_energies(grains, state.contacts, state.count, state.box.span, rules.contact.follow, energies)
+    measure_energies(grains, state.contacts, state.count, state.box.span, parameters.contact.follow, energies)
     contacts = int(state.count[CONTACTS])
     labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
     row: dict[str, float] = {"step": state.steps, "time": state.time}
@@ -60,25 +60,25 @@ def log_row(state: State, rules: Any, forces: dict[str, float]) -> dict[str, flo
 
 
 def kinetic_energies(grains: Grains) -> np.ndarray:
-    """½mv² + ½Iω² of each grain (N,) [J]."""
-    moving = grains.mass * (grains.velocity**2).sum(axis=1)
-    return 0.5 * (moving + grains.inertia * (grains.spin**2).sum(axis=1))
+    """Kinetic energy ½mv² + ½Iω² of each grain (N,) [J]."""
+    translation = grains.mass * (grains.velocity**2).sum(axis=1)
+    return 0.5 * (translation + grains.inertia * (grains.spin**2).sum(axis=1))
 
 
 def momenta(grains: Grains) -> list[float]:
-    """Momentum [kg m/s] and angular momentum about the origin [J s], spin included: six numbers."""
+    """Momentum [kg m/s] and angular momentum about the origin [J s], spins included: six numbers."""
     p = grains.mass[:, None] * grains.velocity
     angular = np.cross(grains.position, p) + grains.inertia[:, None] * grains.spin
     return [*p.sum(axis=0).tolist(), *angular.sum(axis=0).tolist()]
 
 
 class Ledger(LedgerColumns):
-    """The rows written so far, oldest first.
+    """The ledger of a simulation: all rows so far, oldest first.
 
     Parameters
     ----------
     forces : Sequence[str], optional
-        columns of the long-range and per-grain forces, one energy each.
+        Names of the energy columns of long-range and per-grain forces.
     """
 
     def __init__(self, forces: Sequence[str] = ()):
@@ -86,7 +86,7 @@ class Ledger(LedgerColumns):
         super().__init__(("step", "time", *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS))
 
     def add(self, row: dict[str, float]) -> bool:
-        """Append a row; False if this step is in the books already."""
+        """Append a row; returns False if the ledger already has a row of this step."""
         if self.rows and row["step"] <= self.rows[-1]["step"]:
             return False
         self.rows.append(row)
@@ -103,34 +103,34 @@ class Ledger(LedgerColumns):
         return more
 
     def to_array(self) -> np.ndarray:
-        """All rows (K, columns), for a checkpoint; whole numbers below 2⁵³ are exact in it."""
+        """All rows as an array (K, columns) for a checkpoint; integers below 2⁵³ are exact in it."""
         return np.array([[row[name] for name in self.columns] for row in self.rows], dtype=np.float64)
 
     def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
-        """Take over the rows of `to_array`, whose columns had these names.  Raises BadInput if they are others."""
+        """Restore the rows from the array of `to_array`; raises BadInput if it has other columns."""
         if table.ndim != 2 or table.shape[1] != len(columns) or set(columns) != set(self.columns):
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )
-        kinds = [int if name in WHOLE else float for name in columns]
+        types = [int if name in WHOLE else float for name in columns]
         self.columns = tuple(columns)
         self.rows = [
-            {name: kind(v) for name, kind, v in zip(columns, kinds, row, strict=True)} for row in table.tolist()
+            {name: kind(v) for name, kind, v in zip(columns, types, row, strict=True)} for row in table.tolist()
         ]
 
     def runs_away(self, row: dict[str, float]) -> bool:
-        """True if more than half of all energy that this row has, or dissipated, came from nowhere.
+        """Whether the energy error exceeds half of all energies in this row plus all dissipation.
 
-        It looks at this row and the first alone, so that it does not depend on how often rows are written.
+        Only this row and the first one count, so that the result does not depend on how often rows are written.
         """
         if not self.rows:
             return False
-        held = {"total", "step", "time", *LOSSES, *MOMENTA, *NUMBERS}
-        there = math.fsum(abs(row[name]) for name in self.columns if name not in held)
+        others = {"total", "step", "time", *LOSSES, *MOMENTA, *NUMBERS}
+        energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
-        # written so that what is not a number runs away, too
-        return not change <= RUNAWAY * (there + dissipated_in(row))
+        # this form is also true for NaN
+        return not change <= RUNAWAY * (energies + dissipated_in(row))
 
     def drift_per_kT(self, temperature: float, grains: int) -> float:
-        """The same change over N k_B T; not a number for T = 0."""
+        """Change of the total energy over N k_B T; NaN for T = 0."""
         return self._change() / (grains * BOLTZMANN * temperature) if temperature > 0.0 else math.nan

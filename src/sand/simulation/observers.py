@@ -1,4 +1,4 @@
-"""Those who look on.  They may look, never change."""
+"""Observers of a run and the schedule of its frames."""
 
 from __future__ import annotations
 
@@ -13,58 +13,61 @@ Simulation = Any
 
 
 class Observer:
-    """Derive from this and put an instance into `Simulation(observers=[…])`.
+    """Base class of objects that are called during a run; pass instances as `Simulation(observers=[…])`.
+
+    Observers read the simulation and must not change it.
 
     Attributes
     ----------
-    looks_in_ticks : bool
-        False where `tick` leaves grains and contacts alone; that spares large simulations some time.
+    tick_reads_grains : bool
+        False if `tick` reads neither grains nor contacts; in large simulations this saves restoring their order.
     """
 
-    looks_in_ticks: bool = True
+    tick_reads_grains: bool = True
 
     def see(self, simulation: Simulation, row: dict[str, float]) -> None:
-        """Called at every frame with the new row of the ledger."""
+        """Process the new row of the ledger at every frame."""
 
     def tick(self, simulation: Simulation) -> None:
-        """Called about ten times a second of wall time, between two steps."""
+        """Run between two steps, about ten times a second of wall time."""
 
     def close(self, simulation: Simulation, result: Result) -> None:
-        """Called at the end of each `run`."""
+        """Run at the end of each `run`."""
 
 
-def tick_all(observers: Iterable[Observer], simulation: Simulation) -> None:
-    """Every observer's `tick`, grains having the numbers that all but the drivers know."""
+def call_ticks(observers: Iterable[Observer], simulation: Simulation) -> None:
+    """Call every observer's `tick`; observers that read grains find them in the user's order."""
     for observer in observers:
-        if type(observer).tick is not Observer.tick and getattr(observer, "looks_in_ticks", True):
+        if type(observer).tick is not Observer.tick and getattr(observer, "tick_reads_grains", True):
             simulation._engine.restore_user_order()
         observer.tick(simulation)
 
 
 class Schedule:
-    """When the next frame is due: at multiples of `every` [s] of simulated time, seen from time 0.
+    """Times of frames: multiples of `every` [s] of simulated time.
 
-    A frame is the first step at or after its time; steps are never bent towards it.
+    A frame is the first step at or after a multiple; steps are not shortened to meet it.
     """
 
     def __init__(self, every: float, time: float):
         self._every = every
         self._number = 0
         self._after = -math.inf
-        self.pass_by(time)
+        self.advance(time)
 
     @property
     def due(self) -> float:
+        """Time [s] of the next frame."""
         return max(self._number * self._every, self._after) if math.isfinite(self._every) else math.inf
 
-    def pass_by(self, time: float) -> None:
-        """Move on to the first due time after `time`."""
+    def advance(self, time: float) -> None:
+        """Move to the first multiple after `time`."""
         if not math.isfinite(self._every):
             return
         self._number = max(self._number, math.floor(time / self._every))
-        # rounding may put the first multiple tried, or the second, before `time`
+        # rounding may put the first or the second multiple tried before `time`
         for _ in range(2):
             if self._number * self._every <= time:
                 self._number += 1
-        # multiples that double precision no longer tells from `time`: every step is a frame then
+        # where the spacing of doubles exceeds `every`, each step is a frame
         self._after = math.nextafter(time, math.inf)

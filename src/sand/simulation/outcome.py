@@ -1,4 +1,4 @@
-"""How a run can end."""
+"""Outcomes of a run."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from ..integrate.kernel_spec import Stop
 
 
 class Outcome(Enum):
-    """The values are sentences for the user."""
+    """Why a run ended; the values are sentences for the user."""
 
-    FINISHED = "the end that was asked for is reached"
-    INTERRUPTED = "interrupted from outside; a checkpoint lets the run go on"
+    FINISHED = "the requested end is reached"
+    INTERRUPTED = "interrupted by a signal; a checkpoint lets the run continue"
     NOT_FINITE = "a speed or spin is no longer a finite number"
-    RUNAWAY = "the energy runs away: more than half of it came from nowhere; the step is too long"
-    NO_STEP = "no step can be taken: the physics asks for one too short for the clock"
-    TOO_FAST = "a grain would fly more than half the smallest radius in one step: the step is too long"
-    SPINS_TOO_FAST = "a grain would turn by more than half a radian in one step: the step is too long"
-    OVERCOMPRESSED = "two grains overlap by more than the smaller radius: too fast an impact, or too long a step"
+    RUNAWAY = "the energy runs away: its error exceeds half of all energy in the system; the step is too long"
+    NO_STEP = "no step can be taken: the forces require one too short for the resolution of the time"
+    TOO_FAST = "a grain would move by more than half the smallest radius in one step: the step is too long"
+    SPINS_TOO_FAST = "a grain would rotate by more than half a radian in one step: the step is too long"
+    OVERCOMPRESSED = "two grains overlap by more than the smaller radius: the impact is too fast, or the step too long"
 
     @property
     def is_physics(self) -> bool:
-        """True if the physics stopped the run (exit code 3)."""
+        """Whether the physics or the numerics stopped the run (exit code 3)."""
         return self not in (Outcome.FINISHED, Outcome.INTERRUPTED)
 
 
-OF_STOP = {
+OUTCOME_OF_STOP = {
     Stop.NOT_FINITE: Outcome.NOT_FINITE,
     Stop.NO_STEP: Outcome.NO_STEP,
     Stop.TOO_FAST: Outcome.TOO_FAST,
@@ -37,20 +37,20 @@ OF_STOP = {
 
 @dataclass(frozen=True)
 class Result:
-    """What `Simulation.run` returns.
+    """Result of `Simulation.run`.
 
     Attributes
     ----------
     outcome : Outcome
-        why it ended.
+        Why the run ended.
     steps : int
-        number of steps since the start of the simulation.
+        Number of steps since the start of the simulation.
     time : float
-        [s]
+        Simulation time [s].
     drift : float
-        |change of the ledger's total| / (energy dissipated + largest kinetic energy).
+        Relative energy error: |change of the ledger's total| / (energy dissipated + largest kinetic energy).
     grains : tuple[int, ...]
-        the grains an outcome names; empty if all went well.
+        Indices of the grains that caused the outcome; empty if the run finished.
     """
 
     outcome: Outcome

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder, and when."""
+"""Output of a run: which files are written to its folder, and when."""
 
 from __future__ import annotations
 
@@ -29,25 +29,27 @@ from .serialise import case_of
 Simulation = Any
 """`sand.Simulation`, which imports this module."""
 CHECKPOINT_EVERY = 60.0
-"""Seconds of wall time between checkpoints, at most."""
+"""Longest wall time [s] between checkpoints."""
 AT_OUTPUT_EVERY = 1.0
-"""The same at outputs, at least; longer where checkpoints would take more than COST of the time."""
+"""Shortest wall time [s] between checkpoints at outputs; longer where they would take more than COST of the time."""
 COST = 0.01
+"""Largest part of the wall time spent on checkpoints at outputs."""
 
 
 class RunWriter:
-    """Keeps case.toml, trajectory.gsd, ledger.csv, checkpoints, summary.json and the figure.
+    """Writes case.toml, trajectory.gsd, ledger.csv, checkpoints, summary.json and the figure.
+
+    A lock keeps all other processes and simulations from writing to the folder during each `run`, from `open` to
+    `release`.
 
     Parameters
     ----------
     out : str or Path
-        the folder.
+        The folder.
     overwrite : bool, optional
-        an earlier run's files in it may be replaced.
+        Whether files of an earlier run in it may be replaced.
     resumed : bool, optional
-        the folder is that of the run itself, which goes on.
-
-    A lock keeps all others from writing to the folder during each `run`, from `open` to `release`.
+        Whether the folder is that of this run, which continues.
     """
 
     def __init__(self, out: str | Path, overwrite: bool = False, resumed: bool = False):
@@ -63,14 +65,14 @@ class RunWriter:
         self._known = self._on_disk() if resumed else {}
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
-        """Begin or go on with the files; called by each `run` with its end.
+        """Create the files or continue them; called by each `run` with its stop criteria.
 
         Raises
         ------
         BadInput
-            another process or simulation writes to the folder, or has written to it since this one did.
+            If another process or simulation writes to the folder, or has written to it since this one did.
         FilesFailed
-            nothing can be written.
+            If a file cannot be written.
         """
         lock = FolderLock(self.folder)
         try:
@@ -87,7 +89,7 @@ class RunWriter:
         if self._trajectory is not None:
             return
         if self._resumed:
-            self._look_at_earlier(simulation)
+            self._clean_up_earlier(simulation)
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
         steps = simulation.steps if self._resumed else None
         self._trajectory = TrajectoryWriter(
@@ -98,14 +100,14 @@ class RunWriter:
         self.save(simulation)
 
     def release(self) -> None:
-        """Let others write to the folder; `open` takes the lock again."""
+        """Release the lock of the folder; `open` takes it again."""
         if self._lock is not None:
             self._known = self._on_disk()
             self._lock.release()
             self._lock = None
 
     def _on_disk(self) -> dict[str, tuple[int, int]]:
-        """Size and time of each checkpoint, by which those of others are told."""
+        """Size and modification time of each checkpoint, to recognise those of other runs."""
         found = {}
         for path in self.folder.glob("checkpoint-*.npz"):
             with contextlib.suppress(OSError):
@@ -113,18 +115,18 @@ class RunWriter:
         return found
 
     def _refuse_others_files(self, steps: int) -> None:
-        """Raises BadInput if the folder holds what this simulation, which has taken so many steps, did not write."""
+        """Raise BadInput if the folder holds files that this simulation, at step `steps`, did not write."""
         found, first = self._on_disk(), self._trajectory is None
         begun = self._resumed or not first
         strange = any(self._known.get(name) != seen for name, seen in found.items())
-        if first and self._resumed:  # someone may have gone on since the checkpoint was read
+        if first and self._resumed:  # another process may have continued the run since the checkpoint was read
             strange |= bool(found) and max(found) != checkpoint_name(steps)
         if strange or (not begun and (self.folder / files.TRAJECTORY).exists()):
-            told = "go on from what it left with sand.resume" if begun else "give another folder"
-            raise BadInput(f"another run has written to {self.folder} since this simulation was made; {told}")
+            advice = "continue its run with sand.resume" if begun else "give another folder"
+            raise BadInput(f"another run has written to {self.folder} since this simulation was created; {advice}")
 
-    def _look_at_earlier(self, simulation: Simulation) -> None:
-        """Of a run that goes on: keep a ledger that was damaged, drop a summary of steps that are taken again."""
+    def _clean_up_earlier(self, simulation: Simulation) -> None:
+        """Of a resumed run: keep a copy of a damaged ledger, and delete a summary of steps that are taken again."""
         try:
             keep_if_damaged(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
             with contextlib.suppress(BadInput):
@@ -135,7 +137,7 @@ class RunWriter:
             raise FilesFailed(f"cannot write to folder {self.folder}: {error.strerror}") from error
 
     def write(self, simulation: Simulation, row: dict[str, float]) -> None:
-        """A frame and a row."""
+        """Write a frame and a row of the ledger."""
         if self._ledger is None:
             return
         self._ledger.append(row)
@@ -147,15 +149,15 @@ class RunWriter:
         self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts)
 
     def tick(self, simulation: Simulation, at_output: bool = False) -> None:
-        """A checkpoint if the last one is old."""
+        """Write a checkpoint if the last one is old enough."""
         cheap = max(AT_OUTPUT_EVERY, self._took / COST)
         if wall.monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY):
             self.save(simulation)
 
     def save(self, simulation: Simulation) -> None:
-        """Write a checkpoint now; the trajectory is flushed first, so that nothing before it is lost.
+        """Write a checkpoint; the trajectory is flushed first, so that no earlier frame can be lost.
 
-        A state that is not fit to go on from is not written: the last good one stays.
+        An unsound state is not written: the last good checkpoint stays.
         """
         assert simulation.state.count[STAGE] == 0
         begun = wall.monotonic()
@@ -182,34 +184,34 @@ class RunWriter:
         self._took = self._saved - begun
 
     def flush(self) -> None:
-        """Frames written so far can be read.  Raises FilesFailed."""
+        """Make the frames written so far readable.  Raises FilesFailed."""
         if self._trajectory is not None:
             self._trajectory.flush()
 
     def rescue(self) -> None:
-        """Keep what can be kept after a file could not be written."""
+        """Flush what can be flushed after another file could not be written."""
         if self._trajectory is not None:
             self._trajectory.rescue()
 
     def close(self, simulation: Simulation, result: Result, ledger: Ledger) -> None:
-        """Checkpoint, summary and figure; a further `run` opens the trajectory again."""
+        """Write checkpoint, summary and figure; a further `run` opens the trajectory again."""
         self.save(simulation)
         if self._trajectory is not None:
             self._trajectory.close()
         summary = summary_of(simulation, result, ledger) | (self._ledger.described() if self._ledger else {})
         write_json(self.folder / files.SUMMARY, sealed(plain(summary)))
-        # whoever interrupts a run does not want to wait for its figure
+        # no figure after an interruption: the user is waiting for the prompt
         if self.draws and result.outcome is not Outcome.INTERRUPTED:
             self.draw(simulation)
 
     def draw(self, simulation: Simulation) -> None:
-        """The figure of the run so far."""
+        """Draw the figure of the run so far."""
         if simulation.ledger.rows:
             display("save figure", simulation, self.folder / files.FIGURE)
 
 
 def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[str, Any]:
-    """Everything a table of many runs wants to know of one."""
+    """Build the content of summary.json; `ledger` ends with a row of the present state."""
     last = ledger.rows[-1]
     grain_steps = result.steps * len(simulation.grains)
     return {
@@ -241,6 +243,6 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
 
 
 def versions() -> dict[str, str]:
-    """Of Python and of the packages that can change a number."""
+    """Versions of Python and of the packages that affect results."""
     packages = {name: metadata.version(name) for name in ("numpy", "numba")}
     return {"python": platform.python_version(), **packages}

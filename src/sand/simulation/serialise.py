@@ -1,4 +1,4 @@
-"""The case of a simulation: what its case.toml holds."""
+"""The case of a simulation: the content of its case.toml."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import dataclasses
 from typing import Any
 
 from ..forces.base import LongRangeForce
-from .stop import SHORTEST
+from .stop import SHORTEST_DURATION
 
 
 def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
-    """The case of a simulation, all defaults filled in, SI; what `sand resume` reads back.
+    """Build the case of a simulation, all defaults filled in, SI units; `sand resume` reads it back.
 
     Parameters
     ----------
     until : float
-        time [s] the run is to reach, or infinity.
+        Planned end [s], or infinity.
     last_step : float
-        number of the step it is to reach, or infinity.
+        Planned last step, or infinity.
     """
     materials = simulation.grains.materials
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
     names = [m.name for m in materials]
     run = {
-        "until": max(until, SHORTEST),  # a run to time 0 can be gone on with, too
+        "until": max(until, SHORTEST_DURATION),  # a run to time 0 can also be resumed
         "steps": last_step if last_step == float("inf") else int(last_step),
         "frame_every": simulation.frame_every,
         "seed": int(simulation.seed or 0),
@@ -44,5 +44,5 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
         },
         "forces": forces,
         "stepping": simulation.stepping.parameters(),
-        "neighbours": simulation.neighbours.parameters(),  # as chosen at the start
+        "neighbours": simulation.neighbours.parameters(),  # as resolved at the start
     }

@@ -1,4 +1,4 @@
-"""What of a simulation can be changed once it is built."""
+"""Checks of the arguments of a simulation, and protection against assigning them later."""
 
 from __future__ import annotations
 
@@ -10,62 +10,56 @@ from ..forces.base import Force
 from .observers import Observer
 from .stop import duration
 
-ADVICE = {
-    "grains": "sand.Simulation(grains, …)",
-    "forces": "sand.Simulation(sim.grains, forces=[…])",
-    "box": "sand.Simulation(sim.grains, sim.forces, box=…)",
-    "stepping": "sand.Simulation(sim.grains, sim.forces, stepping=…)",
-    "neighbours": "sand.Simulation(sim.grains, sim.forces, neighbours=…)",
-    "seed": "sand.Simulation(sim.grains, sim.forces, seed=…)",
-    "contacts": "sand.Simulation(sim.grains, sim.forces, contacts=…)",
-    "out": "sand.Simulation(sim.grains, sim.forces, out=…)",
-}
-"""Arguments of a simulation that hold for all of its life, and how one with others is built."""
-RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "record", "choices", "is_sound")
-"""What follows from the run."""
+ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "contacts", "out")
+"""Arguments of a simulation that are fixed once it is built."""
+RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound")
+"""Attributes of a simulation that follow from the run."""
 
 
-def time_between_frames(value: Any) -> float | None:
-    """[s] > 0, or None to leave it to the first `run`.  Raises BadInput."""
+def _rebuild(name: str) -> str:
+    """Code that builds a new simulation with another value of one argument."""
+    others = {"grains": "grains, …", "forces": "sim.grains, forces=[…]"}
+    return f"build a new one: sand.Simulation({others.get(name, f'sim.grains, sim.forces, {name}=…')})"
+
+
+def read_frame_interval(value: Any) -> float | None:
+    """Time between frames [s] > 0, or None if the first `run` is to choose it.  Raises BadInput."""
     return None if value is None else duration(value, "frame_every")
 
 
-def observers_given(value: Any) -> list[Observer]:
-    """A list of observers.  Raises BadInput."""
+def read_observers(value: Any) -> list[Observer]:
+    """Check a list of observers.  Raises BadInput."""
     try:
-        given = list(value)
+        observers = list(value)
     except TypeError:
         raise BadInput(f"observers = {shown(value)}; give a list of sand.Observer objects") from None
     problems = []
-    for one in given:
-        if isinstance(one, type):
-            problems.append(f"observers: {shown(one)} is a class; write {shown(one)}()")
-        elif not all(callable(getattr(one, name, None)) for name in ("see", "tick", "close")):
-            problems.append(f"observers: {shown(one)} is not a sand.Observer: it lacks see, tick or close")
+    for observer in observers:
+        if isinstance(observer, type):
+            problems.append(f"observers: {shown(observer)} is a class; write {shown(observer)}()")
+        elif not all(callable(getattr(observer, name, None)) for name in ("see", "tick", "close")):
+            problems.append(f"observers: {shown(observer)} is not a sand.Observer: it lacks see, tick or close")
     if problems:
         raise BadInput(problems)
-    return given
+    return observers
 
 
 class FixedList(tuple):
-    """A list that cannot be changed; says so when one tries."""
+    """A tuple that refuses the methods of a list with an explanation."""
 
     def __getattr__(self, name: str) -> Any:
-        """Methods that would change it are refused."""
         if hasattr(list, name):
-            raise NoSuchAttribute(f"the forces of a simulation cannot change; build a new one: {ADVICE['forces']}")
+            self.__setitem__()
         raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
 
     def __setitem__(self, *_: Any) -> None:
-        raise NoSuchAttribute(f"the forces of a simulation cannot change; build a new one: {ADVICE['forces']}")
+        raise NoSuchAttribute(f"the forces of a simulation cannot change; {_rebuild('forces')}")
 
 
-def forces_given(value: Any) -> FixedList:
-    """Forces from a list, a single one or None.  Raises BadInput."""
-    if isinstance(value, type):
-        raise BadInput(f"forces: {shown(value)} is a class; write {shown(value)}() to make a force")
-    if isinstance(value, Force):
-        return FixedList([value])
+def read_forces(value: Any) -> FixedList:
+    """Check forces given as a list, a single force or None.  Raises BadInput."""
+    if isinstance(value, (type, Force)):
+        value = [value]
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable | None):
         raise BadInput(f"forces = {shown(value)}; give a list such as [sand.Contact()]")
     forces = FixedList(() if value is None else value)
@@ -76,47 +70,46 @@ def forces_given(value: Any) -> FixedList:
         elif not isinstance(force, Force) or not isinstance(force.name, str):
             problems.append(f"forces: {shown(force)} is not a force; give sand.Contact(), sand.Dipoles(), …")
     names = [force.name for force in forces if not isinstance(force, type) and isinstance(force, Force)]
-    doubles = sorted({name for name in names if names.count(name) > 1})
-    problems += [f"forces: '{name}' is given more than once; keep one" for name in doubles]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    problems += [f"forces: '{name}' is given more than once; keep one" for name in repeated]
     if problems:
         raise BadInput(problems)
     return forces
 
 
 class ReadOnlySettings:
-    """Base of `Simulation`: refuses assignments that the running code would not see, and misspelt names.
+    """Base of `Simulation`: refuses assignments that would have no effect, and misspelt names.
 
-    `frame_every` and `observers` may be assigned at any time; classes derived from `Simulation` may add attributes.
+    `frame_every` and `observers` can be assigned at any time; subclasses of `Simulation` may add attributes.
     """
 
     _built = False
 
-    READERS: ClassVar[dict[str, Callable[[Any], Any]]] = {
-        "frame_every": time_between_frames,
-        "observers": observers_given,
+    CONVERTERS: ClassVar[dict[str, Callable[[Any], Any]]] = {
+        "frame_every": read_frame_interval,
+        "observers": read_observers,
     }
-    KEPT = ("recipe", "origin", "planned")
-    """What the package itself assigns later."""
+    INTERNAL = ("recipe", "origin", "planned", "wall_seconds")
+    """Attributes that SAND itself assigns later."""
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Assign what may change.  Raises BadInput."""
-        if name in ReadOnlySettings.READERS:
-            value = ReadOnlySettings.READERS[name](value)
-        elif self._built and not name.startswith("_") and name not in ReadOnlySettings.KEPT:
-            if name in ADVICE:
-                what = f"{name} of a simulation cannot change once it is built"
-                raise NoSuchAttribute(f"{what}; build a new one: {ADVICE[name]}")
+        """Assign an attribute that may change.  Raises BadInput."""
+        if name in ReadOnlySettings.CONVERTERS:
+            value = ReadOnlySettings.CONVERTERS[name](value)
+        elif self._built and not name.startswith("_") and name not in ReadOnlySettings.INTERNAL:
+            if name in ARGUMENTS:
+                raise NoSuchAttribute(f"{name} of a simulation cannot change once it is built; {_rebuild(name)}")
             if name in RESULTS:
                 raise NoSuchAttribute(f"{name} of a simulation follows from its run and cannot be assigned")
             if type(self).__module__.startswith("sand."):
-                advice = did_you_mean(name, (*ReadOnlySettings.READERS, *ADVICE))
+                advice = did_you_mean(name, (*ReadOnlySettings.CONVERTERS, *ARGUMENTS))
                 raise NoSuchAttribute(f"a simulation has no '{name}'; {advice}")
         object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
-        """Only asked for what is not there."""
+        """Refuse unknown names with a suggestion; Python calls it only for those."""
         if name.startswith("_") or hasattr(type(self), name):
-            return object.__getattribute__(self, name)  # raises what it raised before
+            return object.__getattribute__(self, name)  # raises the original error
         public = [
             own for own in {**vars(self), **vars(ReadOnlySettings), **vars(type(self))} if not own.startswith("_")
         ]

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM ask a run to stop at the next step; nothing is torn apart."""
+"""Ctrl-C and SIGTERM: a run stops after the current step instead of being torn out of it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from types import FrameType
 from typing import Any
 
 STOPS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name))
-"""Signals that ask a program to stop; SIGBREAK is Ctrl-Break of Windows, the one that other programs can send there."""
+"""Signals that ask a program to stop; SIGBREAK is Ctrl-Break on Windows, which other programs can send."""
 
 
 class Signals:
-    """While the block runs, these signals are only noted; a second one acts as usual.
+    """Context manager that records the first stop signal; a second one interrupts at once.
 
-    Outside the main thread Python cannot catch signals, and nothing is changed.
+    Python handles signals in the main thread only; in other threads nothing is changed.
     """
 
     def __init__(self) -> None:

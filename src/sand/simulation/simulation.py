@@ -26,57 +26,60 @@ from ..units import format_quantity, seed_given
 from .assemble import build_engine
 from .contact_table import ContactTable
 from .displays import display
-from .grain_table import at_grains
 from .ledger import Ledger, kinetic_energies, log_row
-from .observers import Observer, Schedule, tick_all
-from .outcome import OF_STOP, Outcome, Result
-from .pace import Pace
+from .observers import Observer, Schedule, call_ticks
+from .outcome import OUTCOME_OF_STOP, Outcome, Result
+from .pace import RunTimeEstimate
 from .run_writer import RunWriter
-from .settings import ReadOnlySettings, forces_given
+from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
-from .stop import SHORTEST, stop_criteria
+from .stop import SHORTEST_DURATION, stop_criteria
 
-BURST = 0.1
-"""Wall time [s] the compiled driver stays away from Python, about."""
-GUARD_EVERY = 10_000
-"""Steps between two looks at whether the energy runs away."""
+RETURN_EVERY = 0.1
+"""Approximate wall time [s] between two returns of the compiled driver to Python, for signals and output."""
+ENERGY_CHECK_EVERY = 10_000
+"""Steps between two checks of the energy error."""
+ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting")
+"""Columns of a contact's elastic energy."""
 
 
 @checked
 class Simulation(ReadOnlySettings):
-    """Grains, forces and a box, and the time they have lived; only `frame_every` and `observers` can be assigned later.
+    """A simulation: grains, forces, boundary conditions and an integrator.
+
+    Only `frame_every` and `observers` can be assigned later.
 
     Parameters
     ----------
     grains : Grains
-        the start; copied.
+        Initial state of the grains; copied.
     forces : Sequence[Force] or Force, optional
-        a list such as `[sand.Contact(), sand.Dipoles()]`, each kind once; or a single one.
-    box : optional
-        a Box, or a length for a periodic cube; open by default.
+        Forces such as `[sand.Contact(), sand.Dipoles()]`, each type at most once; or a single force.
+    box : Box or float or str, optional
+        A box, or the side length of a periodic cube; open by default.
     stepping : Verlet or Adaptive or None, optional
-        the integrator, `sand.Verlet()` by default, or `sand.Adaptive()`.
+        Integrator: `sand.Verlet()`, the default, or `sand.Adaptive()`.
     neighbours : Neighbours or None, optional
-        how pairs within reach are found, `sand.Neighbours()` by default.
+        Settings of the neighbour search, `sand.Neighbours()` by default.
     seed : int or None, optional
-        of random forces, 0 … 2⁶³ − 1; kept with the run.
+        Seed of random forces, 0 … 2⁶³ − 1; saved with the run.
     out : str or Path or None, optional
-        folder for the run's files, made at the first `run`; None keeps everything in memory.
+        Folder for the run's files, created at the first `run`; with None nothing is written.
     overwrite : bool, optional
-        allow `out` to hold an earlier run, whose files are then replaced.
+        Whether files of an earlier run in `out` may be replaced.
     observers : Iterable[Observer], optional
-        objects that look on (see `sand.Observer`); they never change the physics.
-    frame_every : optional
-        time between frames [s]; by default a two-hundredth of the first `run`.
+        Objects that are called during the run (see `sand.Observer`); they must not change the simulation.
+    frame_every : float or str, optional
+        Time between frames [s]; by default 1/200 of the first `run`.
     contacts : Bonds or None, optional
-        present from the start, with their strains, as `sand.setup.from_frame` gives them.
+        Initial contacts with their displacements, from `sand.setup.from_frame`.
     restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
-        arrays and meta of a checkpoint in `out` to go on from (`sand.resume` gives them).
+        Arrays and metadata of a checkpoint in `out` from which to continue; used by `sand.resume`.
 
     Raises
     ------
     BadInput
-        everything that is wrong, one line each.
+        If arguments are invalid or do not fit together; all problems at once, one line each.
     """
 
     def __init__(
@@ -95,14 +98,14 @@ class Simulation(ReadOnlySettings):
         contacts: Bonds | None = None,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
-        self.forces = forces_given(forces)
+        self.forces = read_forces(forces)
         self.box, self.neighbours = as_box(box), neighbours or Neighbours()
         self.seed = None if seed is None else seed_given(seed, bits=63)
         self.observers, self.frame_every = observers, frame_every
-        self._chosen: dict[str, str] = {}  # what the start of a resumed run decided
-        self.recipe: dict[str, Any] | None = None  # how a case file made the grains
-        self.origin = ""  # what is to be said of where the grains came from
-        self.planned = (math.inf, math.inf)  # time [s] and step that a resumed run was to reach
+        self._choices_at_start: dict[str, str] = {}  # of a resumed run, from its checkpoint
+        self.recipe: dict[str, Any] | None = None  # the [grains] table of the case file that described the grains
+        self.origin = ""  # description of the file that the grains come from
+        self.planned = (math.inf, math.inf)  # planned end of a resumed run: time [s] and step
         self.start = grains.copy()
         parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, int(self.seed or 0))
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
@@ -111,16 +114,16 @@ class Simulation(ReadOnlySettings):
         self.ledger = Ledger(
             [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
         )
-        self.record = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
-        self._wall_seconds: float = 0.0
-        self._began_at: float | None = None  # before this call of `run`, and its start
-        self._begun = restart is not None
-        self._broken = ""  # why it cannot be run any further
+        self.writer = RunWriter(out, overwrite, resumed=restart is not None) if out is not None else None
+        self._wall_seconds: float = 0.0  # of earlier calls of `run`
+        self._began_at: float | None = None  # start of the present call of `run` (monotonic clock)
+        self._has_begun = restart is not None
+        self._failure = ""  # why the simulation cannot continue
         if restart is not None:
             arrays, meta = restart
             self._engine.load_state(arrays)
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
-            self._chosen = meta.get("choices", {})
+            self._choices_at_start = meta.get("choices", {})
             if "ledger" in arrays:
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
         for text in self._engine.warnings:
@@ -129,17 +132,17 @@ class Simulation(ReadOnlySettings):
 
     @property
     def state(self) -> State:
-        """The state."""
+        """State of the simulation: grains, contacts, box and clock."""
         return self._engine.state
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulation time [s]."""
         return self._engine.time
 
     @property
     def steps(self) -> int:
-        """Taken so far."""
+        """Number of steps taken so far."""
         return self._engine.steps
 
     @property
@@ -150,40 +153,45 @@ class Simulation(ReadOnlySettings):
 
     @property
     def is_sound(self) -> bool:
-        """False if numbers are no longer finite, or most of the energy came from nowhere."""
-        return not self.ledger.runs_away(self._stock())
+        """Whether the state is finite and the energy error is below the abort threshold."""
+        return not self.ledger.runs_away(self._log_row())
 
     @property
     def grains(self) -> Grains:
-        """The grains as they are now; their arrays are read only."""
+        """The present state of the grains, as read-only arrays."""
         return self.state.grains
 
     @property
     def contacts(self) -> ContactTable:
-        """The contacts as they are now: displacements, shares of their limits, loads, energies, what each lost."""
-        self._start()
-        return ContactTable(self.state, self._engine.rules.contact.follow)
+        """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
+        self._begin()
+        return ContactTable(self.state, self._engine.parameters.contact.follow)
 
     @property
     def choices(self) -> dict[str, str]:
-        """What was decided for the user, and why: boundary, cut-offs, how neighbours are found."""
-        if self._chosen:
-            return self._chosen
-        told = {"start": self.origin} if self.origin else {}
-        told["boundary"] = self.box.describe()
+        """Automatic choices with their reasons: boundary, cut-offs and neighbour search."""
+        if self._choices_at_start:
+            return self._choices_at_start
+        choices = {"start": self.origin} if self.origin else {}
+        choices["boundary"] = self.box.describe()
         for force in self.forces:
             choose = getattr(force, "choose", None)
             if choose is not None:
                 radius, reason = choose(self.start, self.box)
-                told[f"{force.name} cut-off"] = (
-                    f"{'none' if radius is None else format_quantity(radius, 'm')} ({reason})"
-                )
-        return told | {"neighbours": self._engine.search}
+                length = "none" if radius is None else format_quantity(radius, "m")
+                choices[f"{force.name} cut-off"] = f"{length} ({reason})"
+        return choices | {"neighbours": self._engine.search}
 
     def loads(self) -> dict[str, Any]:
-        """Force (N, 3) [N], torque (N, 3) [N m], field (N, 3) [T], energies by name [J]; no step is taken."""
-        self._start()
-        row = self._stock()
+        """Compute the present loads without taking a step.
+
+        Returns
+        -------
+        dict[str, Any]
+            `force` (N, 3) [N], `torque` (N, 3) [N m], `field` (N, 3) [T], and `energy`, a dictionary [J] by name.
+        """
+        self._begin()
+        row = self._log_row()
         names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.force_energies()))
         return {
             "force": self.grains.force.copy(),
@@ -193,42 +201,63 @@ class Simulation(ReadOnlySettings):
         }
 
     def at_grains(self) -> dict[str, np.ndarray]:
-        """Flux density (N, 3) [T] and energies (N,) [J] at each grain, by name; energies sum to the ledger's columns.
+        """Compute flux density and energies of each grain.
 
-        `kinetic`, `contacts`, and one for each force: half of each pair's energy goes to each of its grains.
+        Returns
+        -------
+        dict[str, ndarray]
+            `flux_density` (N, 3) [T] at the centres, from the other grains and from external fields. All others are
+            energies (N,) [J] that sum to the columns of the ledger: `kinetic` (translation and rotation), `contacts`
+            (half of each contact's elastic energy to each of its grains), and one for each long-range force (half of
+            each pair energy; −½ μ·B for dipoles) and each per-grain force, under the names of their columns.
         """
-        self._start()
-        return at_grains(self._engine)
+        state, grains, contacts = self.state, self.grains, self.contacts
+        external = [
+            at(state.time) for force in self._engine.external if (at := getattr(force, "flux_density_at", None))
+        ]
+        flux = np.sum([grains.field, *(np.broadcast_to(b, grains.field.shape) for b in external)], axis=0)
+        half = 0.5 * np.sum([contacts[name] for name in ELASTIC], axis=0)
+        elastic = np.zeros(len(grains))
+        for side in range(2):
+            np.add.at(elastic, contacts["pair"][:, side], half)
+        energies = {"kinetic": kinetic_energies(grains), "contacts": elastic}
+        return {"flux_density": flux} | energies | self._engine.energies_at_grains()
 
     @checked
     def run(self, until: Any = None, *, steps: Any = None) -> Result:
-        """Go on until a time, or for a number of steps, whichever comes first.
+        """Run until a time, or for a number of steps, whichever comes first.
 
         Parameters
         ----------
-        until : optional
-            absolute time [s]; the run ends at the first step at or after it. Resumed runs know theirs.
-        steps : optional
-            number of steps from now, ≥ 1; the last cycle of long-range forces (`Verlet.far`) is finished.
+        until : float or str, optional
+            Absolute simulation time [s]; the run ends at the first step at or after it. A resumed run ends at its
+            planned end by default.
+        steps : int, optional
+            Number of further steps, at least 1; a started r-RESPA cycle (`Verlet.far`) is completed.
+
+        Returns
+        -------
+        Result
+            Why and when the run ended.
 
         Raises
         ------
         BadInput
-            neither is given, or one is out of range, or the run's folder cannot be used.
+            If there is no stop criterion, one is out of range, or the run's folder cannot be used.
         FilesFailed
-            the disk is full, the folder has vanished, …; what was written before stays whole.
+            If a file cannot be written, for example because the disk is full; files written before stay intact.
         Interrupted
-            Ctrl-C or SIGTERM; the checkpoint is written before.
+            After Ctrl-C or SIGTERM, when the checkpoint is written.
         """
-        if self._broken:
-            raise BadInput(f"this simulation cannot go on: {self._broken}")
+        if self._failure:
+            raise BadInput(f"this simulation cannot go on: {self._failure}")
         end, last = stop_criteria(until, steps, self.time, self.steps, self.planned)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
-            self.frame_every = max((end - self.time) / 200.0, SHORTEST)
+            self.frame_every = max((end - self.time) / 200.0, SHORTEST_DURATION)
         try:
-            self._start()
-            if self.record:
-                self.record.open(self, end, last)
+            self._begin()
+            if self.writer:
+                self.writer.open(self, end, last)
             self._began_at = wall.monotonic()
             with Signals() as signals:
                 try:
@@ -238,92 +267,96 @@ class Simulation(ReadOnlySettings):
                     self._engine.restore_user_order()
             return self._close(outcome)
         except FilesFailed as error:
-            if self.record:
-                self.record.rescue()
-            self._broken = f"its files could not be written ({error}); go on with sand.resume, or start again"
+            if self.writer:
+                self.writer.rescue()
+            self._failure = f"its files could not be written ({error}); continue with sand.resume, or start again"
             raise
         finally:
-            if self.record:
-                self.record.release()
+            if self.writer:
+                self.writer.release()
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:
-        """The grains in motion: a widget in a notebook with anywidget, else a page, opened if there is a browser.
+        """Show the grains in motion: a widget in a notebook with anywidget, otherwise a page in the browser.
 
         Parameters
         ----------
         path : str or Path or None, optional
-            of the page; view.html in the run's folder by default, or in a temporary one.
+            File of the page; by default view.html in the run's folder, or in a temporary one.
 
-        Returns the widget, or the path of the page; the figure, with a warning, where the installation lacks the page.
+        Returns
+        -------
+        Any
+            The widget, or the path of the page; where the installation lacks the page, the figure, with a warning.
         """
-        self._start()
+        self._begin()
         return display("view", self, path)
 
     def figure(self) -> Any:
-        """The figure of the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
-        self._start()
+        """Draw the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
+        self._begin()
         return display("figure", self)
 
-    def _start(self) -> None:
-        if not self._begun:
+    def _begin(self) -> None:
+        if not self._has_begun:
             self._engine.begin()
-            self._begun = True
-            self._look()
+            self._has_begun = True
+            self._record_output()
 
-    def _stock(self) -> dict[str, float]:
-        return log_row(self.state, self._engine.rules, self._engine.force_energies())
+    def _log_row(self) -> dict[str, float]:
+        return log_row(self.state, self._engine.parameters, self._engine.force_energies())
 
-    def _look(self) -> None:
-        """A row of the ledger, a frame and everyone who looks on."""
-        row = self._stock()
+    def _record_output(self) -> None:
+        """Add a row to the ledger, write it with a frame, and call the observers."""
+        row = self._log_row()
         if not self.ledger.add(row):
             return
-        if self.record:
-            self.record.write(self, row)
+        if self.writer:
+            self.writer.write(self, row)
         for observer in self.observers:
             observer.see(self, row)
 
     def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
         frames = Schedule(self.frame_every or math.inf, self.time)
-        burst, guarded, pace = 64, self.steps, Pace(end, last)
+        steps_per_call, checked_at, estimate = 64, self.steps, RunTimeEstimate(end, last)
         while True:
             began = wall.monotonic()
-            left = max(min(burst, last - self.steps, guarded + GUARD_EVERY - self.steps), 0)
-            stop = self._engine.advance(min(end, frames.due), left)
-            spent = wall.monotonic() - began
-            if left == burst:
-                burst = max(64, min(int(burst * min(BURST / max(spent, 1e-9), 2.0)), 10**7))
-            if stop in OF_STOP:
-                return OF_STOP[stop]
-            pace.look(self.time, self.steps, spent)
-            if self.steps - guarded >= GUARD_EVERY:
-                guarded = self.steps
+            most_steps = max(min(steps_per_call, last - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
+            stop = self._engine.advance(min(end, frames.due), most_steps)
+            seconds = wall.monotonic() - began
+            if most_steps == steps_per_call:
+                growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)
+                steps_per_call = max(64, min(int(steps_per_call * growth), 10**7))
+            if stop in OUTCOME_OF_STOP:
+                return OUTCOME_OF_STOP[stop]
+            estimate.update(self.time, self.steps, seconds)
+            if self.steps - checked_at >= ENERGY_CHECK_EVERY:
+                checked_at = self.steps
                 if not self.is_sound:
                     return Outcome.RUNAWAY
             done = self.time >= end or self.steps >= last
             output = stop is Stop.TIME_REACHED or done
             if output:
-                self._look()
-                frames.pass_by(self.time)
+                self._record_output()
+                frames.advance(self.time)
             if done:
                 return Outcome.FINISHED if self.is_sound else Outcome.RUNAWAY
-            if self.record:
-                self.record.tick(self, output)
-            tick_all(self.observers, self)
+            if self.writer:
+                self.writer.tick(self, output)
+            call_ticks(self.observers, self)
             if signals.received:
                 return Outcome.INTERRUPTED
 
     def _close(self, outcome: Outcome) -> Result:
-        named = self._engine.limiting_grains() if outcome.is_physics else ()
+        grains = self._engine.limiting_grains() if outcome.is_physics else ()
         if outcome is Outcome.RUNAWAY:
-            named = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
+            grains = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
         if outcome.is_physics:
-            self._look()
-        ledger = self.ledger.with_row(self._stock())
-        result = Result(outcome, self.steps, self.time, ledger.drift, named)
-        if self.record:
-            self.record.close(self, result, ledger)
+            self._record_output()
+        ledger = self.ledger.with_row(self._log_row())
+        result = Result(outcome, self.steps, self.time, ledger.drift, grains)
+        if self.writer:
+            self.writer.close(self, result, ledger)
         for observer in self.observers:
             observer.close(self, result)
         if outcome is Outcome.INTERRUPTED:

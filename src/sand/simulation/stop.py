@@ -1,9 +1,9 @@
-"""How far a run is to go."""
+"""Stop criteria of a run: a time, a step count, or the planned end of a resumed run."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,53 +11,68 @@ from ..arguments import MOST_STEPS
 from ..errors import BadInput, shown
 from ..units import si
 
-SHORTEST = 1e-21
-"""Shortest time [s] that may be asked for; light passes through less than a picometre meanwhile."""
+SHORTEST_DURATION = 1e-21
+"""Shortest accepted time span [s]; light travels less than a picometre in it."""
+
+
+class StopCriteria(NamedTuple):
+    """The end of one call of `Simulation.run`; infinite where a criterion is not set."""
+
+    time: float  # [s]
+    step: float
 
 
 def duration(value: Any, name: str) -> float:
-    """A time span [s] of at least `SHORTEST`.  Raises BadInput."""
-    seconds = si(value, "s", name, above=0.0)
-    if seconds < SHORTEST:
-        raise BadInput(f"{name} = {value!r} must be at least {SHORTEST:g} s: nothing moves in less")
-    return seconds
-
-
-def stop_criteria(
-    until: Any, steps: int | None, time: float, taken: int, planned: tuple[float, float]
-) -> tuple[float, float]:
-    """The time [s] and the step that `Simulation.run(until, steps=steps)` ends at, infinite where it has no such end.
-
-    Parameters
-    ----------
-    time : float
-        now [s].
-    taken : int
-        steps so far.
-    planned : tuple[float, float]
-        what counts where neither is given.
+    """Convert a time span to seconds.
 
     Raises
     ------
     BadInput
-        no end, one that is past, or steps that are no whole number of at least 1.
+        If it is not a time, or shorter than `SHORTEST_DURATION`.
+    """
+    seconds = si(value, "s", name, above=0.0)
+    if seconds < SHORTEST_DURATION:
+        raise BadInput(f"{name} = {value!r} must be at least {SHORTEST_DURATION:g} s")
+    return seconds
+
+
+def stop_criteria(until: Any, steps: int | None, time: float, step: int, planned: tuple[float, float]) -> StopCriteria:
+    """Resolve the arguments of `Simulation.run` to absolute stop criteria.
+
+    Parameters
+    ----------
+    until : float or str, optional
+        Absolute simulation time, in seconds or as text with a unit.
+    steps : int, optional
+        Number of further steps, at least 1.
+    time : float
+        Present time [s].
+    step : int
+        Present step count.
+    planned : tuple[float, float]
+        Time [s] and step used if neither `until` nor `steps` is given, so that a resumed run ends where it was to end.
+
+    Raises
+    ------
+    BadInput
+        If there is no criterion, `until` lies in the past, or `steps` is not a positive integer.
     """
     end = math.inf if until is None else si(until, "s", "until")
-    if 0.0 < end < SHORTEST:
+    if 0.0 < end < SHORTEST_DURATION:
         duration(until, "until")
-    last = math.inf if steps is None else taken + _whole_steps(steps)
+    last = math.inf if steps is None else step + _positive_integer(steps)
     if until is None and steps is None:
         end, last = planned
     if end == last == math.inf:
         raise BadInput("run needs an end: until='5 us' or steps=1000")
     if steps is not None and last > MOST_STEPS:
-        raise BadInput(f"steps = {shown(steps)} are more than can be counted, {MOST_STEPS:.3g}")
+        raise BadInput(f"steps = {shown(steps)}: the step count must not exceed {MOST_STEPS:.3g}")
     if until is not None and end < time:
         raise BadInput(f"until = {until!r} lies before the present time, {time:.6g} s")
-    return end, last
+    return StopCriteria(end, last)
 
 
-def _whole_steps(steps: Any) -> int:
+def _positive_integer(steps: Any) -> int:
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
         raise BadInput(f"steps = {shown(steps)} must be a whole number of at least 1")
     return int(steps)

@@ -57,7 +57,7 @@ def view_simulation(simulation: Simulation, path: str | Path | None) -> Any:
     from .show import show_dataset
     from .snapshot import snapshot_dataset
 
-    record, field = simulation.record, field_of(simulation.forces)
+    record, field = simulation.writer, field_of(simulation.forces)
     folder = None if record is None else record.folder
     if record is not None and (record.folder / TRAJECTORY).exists():
         record.flush()

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 
-from ...config.case import MaterialSection, Section
+from ...config.case import MaterialSection, material_errors
 from ...config.commands import refuse_other_command
-from ...config.errors import validation_errors
-from ...config.sections import PathName, Seed
+from ...config.errors import validate
+from ...config.sections import PathName, Section, Seed
 from ...errors import BadInput
 from ...io.run_folder import read_toml
 from ...material import PRESETS
-from ..collision_case import BodySection, Kind, wrong_bodies
+from ..collision_case import BodySection, Kind
 from .encounters import Flight
 from .problem import ErrorCollector, flight, impact_parameter
 
@@ -147,14 +147,8 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     """
     content = read_toml(path)
     refuse_other_command(content, path, "scatter")
-    problems = wrong_bodies(content)
-    try:
-        case = ScatterCase.model_validate(content)
-    except ValidationError as error:
-        problems += [line for slip in error.errors() for line in validation_errors(slip, ScatterCase, {})]
-        raise BadInput(f"{path}: {problem}" for problem in problems) from None
-    if problems:
-        raise BadInput(f"{path}: {problem}" for problem in problems)
+    problems = material_errors(content, ("target", "projectile"), "silica")
+    case = validate(ScatterCase, content, str(path), problems)
     try:
         return case, case.flights()
     except BadInput as error:
