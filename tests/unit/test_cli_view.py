@@ -91,7 +91,7 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
     monkeypatch.setattr(view_command, "_wait", wait)
     monkeypatch.setenv("SSH_CONNECTION", "a b c d")
     ended = []
-    monkeypatch.setattr(browser, "forget_pages", lambda: ended.append(True))
+    monkeypatch.setattr(browser, "remove_redirects", lambda: ended.append(True))
     before = threading.active_count()
     assert main(["view", str(looked_at[0]), *form]) == 0
     assert got["manifest"]["grains"] == 6 and ended

@@ -12,7 +12,7 @@ import pytest
 import sand
 from sand.viewer import html as page
 from sand.viewer.dataset import run_dataset
-from sand.viewer.html import chosen_frames, fitting, write_page
+from sand.viewer.html import fitting, frame_slice, write_page
 from sand.viewer.packets import decode
 
 from .pages import blocks, elements
@@ -95,7 +95,7 @@ def test_thinned_files(tmp_path):
     """Every second frame of a slice: times are theirs, names are those that all frames give."""
     frames = [[(0, 1)], [(0, 1), (2, 3), (3, 4)], [(0, 1), (2, 3), (3, 4), (1, 2)], [(0, 1)], [], []]
     story = run_dataset(reel(tmp_path / "a.gsd", frames, 6))
-    story.choose(chosen_frames(slice(0, 5), 2), "every other")
+    story.select(frame_slice(slice(0, 5), 2), "every other")
     write_page(story, tmp_path / "a.html")
     manifest, _, packets = blocks(tmp_path / "a.html")
     assert manifest["steps"] == [0, 20, 40] and manifest["note"] == "every other"
@@ -103,9 +103,9 @@ def test_thinned_files(tmp_path):
     assert fitting(story, story.size / 2.5) == 3 and fitting(story, 1e9) == 1
     for wrong in (slice(50, 60), slice(3, 3)):
         with pytest.raises(sand.BadInput, match="none of them was chosen"):
-            story.choose(wrong)
+            story.select(wrong)
     with pytest.raises(sand.BadInput, match="every"):
-        chosen_frames(slice(None), 0)
+        frame_slice(slice(None), 0)
 
 
 def test_dimensions_in_a_file(tmp_path, monkeypatch):

@@ -110,7 +110,7 @@ def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
     assert f'content="0; url={address}"' in text and f'href="{address}" rel="noreferrer"' in text
     if os.name == "posix":
         assert stat.S_IMODE(page.stat().st_mode) == 0o600
-    browser.forget_pages()
+    browser.remove_redirects()
     assert not page.exists()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))  # nowhere to write: the address is typed by hand
     assert not browser.open_page(address) and len(calls) == 1

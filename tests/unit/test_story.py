@@ -17,7 +17,7 @@ from sand.io.trajectory import TrajectoryWriter
 from sand.viewer.dataset import run_dataset
 from sand.viewer.packets import decode
 from sand.viewer.ranges import EXTREMES, PERCENTILES
-from sand.viewer.simulation_view import field_in
+from sand.viewer.simulation_view import read_field
 
 from .reels import append, contacts_of, reel
 
@@ -48,7 +48,7 @@ KEYS = [
 def test_the_manifest_of_a_run(looked_at):
     """All keys of the contract, the run's own numbers, nothing that JSON cannot hold."""
     folder, sim = looked_at
-    told = run_dataset(folder, field_in(folder)).manifest()
+    told = run_dataset(folder, read_field(folder)).manifest()
     assert list(told) == KEYS
     json.dumps(told, allow_nan=False)
     assert (told["format"], told["name"], told["grains"], told["materials"]) == (1, "run", 6, ["iron"])
@@ -189,11 +189,11 @@ def test_the_last_frames_stay_the_same_ones(tmp_path):
     writer = TrajectoryWriter(path)
     append(writer, [[]] * 6, 4)
     story = run_dataset(path)
-    story.choose(slice(-2, None))
+    story.select(slice(-2, None))
     append(writer, [[]] * 2, 4, first=6)
     story.refresh()
     assert story.manifest()["steps"] == [40, 50, 60, 70] and decode(story.frame(0))[0]["step"] == 40
-    story.choose(slice(-100, -3, 2))
+    story.select(slice(-100, -3, 2))
     append(writer, [[]], 4, first=8)
     story.refresh()
     assert story.manifest()["steps"] == [0, 20, 40]

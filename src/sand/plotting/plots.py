@@ -158,7 +158,7 @@ def _darkened(figure: Figure, dark: bool) -> None:
                 line.set_color(CHALK)
 
 
-def picture_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
+def figure_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
     """The figure as a file: the same figure gives the same bytes.
 
     Parameters

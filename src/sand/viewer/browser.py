@@ -44,7 +44,7 @@ def open_page(url: str) -> bool:
 
 
 def _way_to(url: str) -> str:
-    """A page that leads to an address, until `forget_pages` or the end of the program."""
+    """A page that leads to an address, until `remove_redirects` or the end of the program."""
     where = html.escape(url, quote=True)
     page = private_page(
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -53,12 +53,12 @@ def _way_to(url: str) -> str:
         f'<body><p><a href="{where}" rel="noreferrer">The grains of the run</a></p></body>\n</html>\n'
     )
     if not _PAGES:
-        atexit.register(forget_pages)
+        atexit.register(remove_redirects)
     _PAGES.append(page)
     return page.as_uri()
 
 
-def forget_pages() -> None:
+def remove_redirects() -> None:
     """Remove pages that lead to addresses."""
     while _PAGES:
         with contextlib.suppress(OSError):

@@ -20,7 +20,7 @@ from ..version import __version__
 from . import dimensions
 from .packets import frame_bytes, frame_packet, grains_packet
 from .ranges import ranges_of
-from .run_files import PROBLEM, RunBooks, killed_note, run_folder, summary_of
+from .run_files import PROBLEM, RunBooks, find_run_folder, killed_note, summary_of
 from .series import of_frames, of_ledger
 
 FORMAT = 1
@@ -107,7 +107,7 @@ class RunDataset:
             if self.frames.generation != self._generation:
                 self._begin()
 
-    def choose(self, chosen: slice, note: str = "") -> None:
+    def select(self, chosen: slice, note: str = "") -> None:
         """Tell of these frames only; the `note` says why.  Raises BadInput if there are none.
 
         Numbers that count from the end count from that of now, so that the k-th frame told stays the same one.
@@ -274,7 +274,7 @@ def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunD
         there is no run, or no frame yet, or the file is foreign or broken.
     """
     place = Path(path)
-    folder = run_folder(place)
+    folder = find_run_folder(place)
     if folder is None:
         if not place.is_file():
             lacks = f"there is no {files.TRAJECTORY} in it" if place.is_dir() else "there is no such folder or file"

@@ -146,7 +146,7 @@ def fitting(story: RunDataset, most: float) -> int:
     return max(-(-story.size // int(most)), 1)
 
 
-def chosen_frames(frames: slice, every: int) -> slice:
+def frame_slice(frames: slice, every: int) -> slice:
     """Every so many of a slice.  Raises BadInput for less than 1, and for a slice that goes backwards."""
     if every < 1:
         raise BadInput(f"every = {every} must be a whole number of at least 1")

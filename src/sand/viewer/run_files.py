@@ -24,7 +24,7 @@ def killed_note(age: float) -> str:
     return f"no frame for {format_quantity}: it may have been killed; sand resume goes on"
 
 
-def run_folder(place: str | Path) -> Path | None:
+def find_run_folder(place: str | Path) -> Path | None:
     """The folder of the run that a path means: itself, or that of its trajectory.gsd; None for a file by itself."""
     place = Path(place)
     if place.is_dir():

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FieldDescription = tuple[str, Callable[[float], Sequence[float]]]
 
 
-def field_of(forces: Iterable[Any]) -> FieldDescription | None:
+def describe_field(forces: Iterable[Any]) -> FieldDescription | None:
     """Magnetic fields among forces in words, and their flux density together [T] at a time [s]; None without one."""
     fields = [f for f in forces if hasattr(f, "flux_density_at") and f.flux_density_size() > 0.0]
     if not fields:
@@ -29,11 +29,11 @@ def field_of(forces: Iterable[Any]) -> FieldDescription | None:
     return text, lambda time: np.sum([f.flux_density_at(time) for f in fields], axis=0)
 
 
-def field_in(folder: Path) -> FieldDescription | None:
+def read_field(folder: Path) -> FieldDescription | None:
     """The same of the case in a run's folder; None, too, where there is no case, or one that cannot be read."""
     try:
         given = read_toml(folder / CASE).get("forces", {}).get("field")
-        return None if given is None else field_of([Field(**given)])
+        return None if given is None else describe_field([Field(**given)])
     except (BadInput, TypeError, AttributeError):
         return None
 
@@ -57,7 +57,7 @@ def view_simulation(simulation: Simulation, path: str | Path | None) -> Any:
     from .show import show_dataset
     from .snapshot import snapshot_dataset
 
-    record, field = simulation.record, field_of(simulation.forces)
+    record, field = simulation.record, describe_field(simulation.forces)
     folder = None if record is None else record.folder
     if record is not None and (record.folder / TRAJECTORY).exists():
         record.flush()
@@ -72,4 +72,4 @@ def view_folder(folder: Path, path: str | Path | None, instead: Callable[[], Any
     from .dataset import run_dataset
     from .show import show_dataset
 
-    return show_dataset(run_dataset(folder, field_in(folder)), path, folder, instead)
+    return show_dataset(run_dataset(folder, read_field(folder)), path, folder, instead)

@@ -114,7 +114,7 @@ def still_picture(
         one line for each mistake.
     """
     refuse_other(frame, "radius", "pair", "box")
-    towards = check_picture(colour, bonds, view, size)
+    towards = check_picture_options(colour, bonds, view, size)
     outside = None if field is None else np.asarray(field, dtype=np.float64)
     scene = scene_of(frame, frame.pair, frame.box, whole)
     scene, key = _painted(scene, frame, colour, outside, arrows)
@@ -136,7 +136,7 @@ def still_picture(
     return figure
 
 
-def check_picture(
+def check_picture_options(
     colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]
 ) -> np.ndarray | None:
     """The direction to the eye, None for the usual one.  Raises BadInput with a line for each mistake."""
