@@ -6,7 +6,7 @@ import pytest
 
 from sand.analysis.ledger_columns import Books
 from sand.viewer.dataset import run_dataset
-from sand.viewer.series import MOST, of_ledger, thinned
+from sand.viewer.series import MAX_POINTS, evenly_spaced, series_from_ledger
 
 from .reels import reel
 
@@ -37,14 +37,14 @@ def test_long_and_broken_ledgers(looked_at):
     row = dict(looked_at[1].ledger.rows[-1])
     rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
     rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
-    series = of_ledger(Books.of(rows))
-    assert len(series["time"]) == MOST and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
+    series = series_from_ledger(Books.of(rows))
+    assert len(series["time"]) == MAX_POINTS and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
     assert sum(series["events"]["made"]) == 15000 and sum(series["events"]["broken"]) == 2500
-    assert len(series["events"]["time"]) < MOST
+    assert len(series["events"]["time"]) < MAX_POINTS
     values = {plot["id"]: plot["lines"][0]["values"] for plot in series["plots"]}
     assert values["balance"][-1] is None and values["energies"][-1] is None
     json.dumps(series, allow_nan=False)
-    assert thinned(10, 20).tolist() == list(range(10)) and thinned(100, 3).tolist() == [0, 50, 99]
+    assert evenly_spaced(10, 20).tolist() == list(range(10)) and evenly_spaced(100, 3).tolist() == [0, 50, 99]
 
 
 def test_without_a_ledger(tmp_path):

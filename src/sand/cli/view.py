@@ -130,6 +130,8 @@ def _refuse(target: Path, overwrite: bool) -> None:
     """Raises BadInput for a file that is there, or a folder that is not."""
     if target.is_dir():
         raise BadInput(f"{target} is a folder; give --html the name of a file, such as {target / 'view.html'}")
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise BadInput(f"--html {target}: the name of a page must end in .html or .htm, such as {target.stem}.html")
     if target.exists() and not overwrite:
         raise BadInput(f"{target} exists; give another --html, or --overwrite")
     if not target.parent.is_dir():
