@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
 from .run_figure import DPI, RunFigure
-from .style import styled
+from .style import plot_style
 
 COLOURS = {
     "T": "#D55E00",
@@ -44,7 +44,7 @@ class Picture(NamedTuple):
 
 def chain_figure(pictures: Sequence[Picture], maps: Sequence[Map]) -> Figure:
     """Pictures in the upper row, maps in the lower one, with one legend for all maps."""
-    with styled():
+    with plot_style():
         figure = RunFigure(figsize=(3.2 * max(len(maps), len(pictures)), 5.6), dpi=DPI, layout="constrained")
         upper, lower = np.atleast_1d(figure.subfigures(2, 1, height_ratios=(1.0, 1.35)))  # type: ignore[arg-type]
         for axes, picture in zip(np.atleast_1d(upper.subplots(1, len(pictures))), pictures, strict=True):

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .run_figure import DPI, RunFigure
-from .style import styled
+from .style import plot_style
 
 COLOURS = {"stick": "#0072B2", "bounce": "#E69F00", "fragment": "#D55E00", "miss": "#999999"}
 
@@ -21,7 +21,7 @@ def collision_figure(results: list[dict[str, Any]]) -> Figure:
     results : list[dict[str, Any]]
         dictionaries of `experiments.collision.Collision`.
     """
-    with styled():
+    with plot_style():
         figure = RunFigure(figsize=(9.0, 3.6), dpi=DPI, layout="constrained")
         left, right = figure.subplots(1, 2)
         outcomes = np.array([r["outcome"] for r in results])

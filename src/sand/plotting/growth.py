@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from .style import BLUE, FAINT, GREEN, INK, PURPLE, RED, styled, with_prefix
+from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_prefix
 
 COLOURS = (RED, BLUE, GREEN, PURPLE)
 PAPER = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
@@ -27,10 +27,10 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
         name, `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment` [A m²] and
         `unit_radius` [m] of a grain.
     """
-    with styled():
+    with plot_style():
         figure = Figure(figsize=(9.6, 3.3), layout="constrained")
         left, middle, right = figure.subplots(1, 3)
-        size, unit = with_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
+        size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
             _growth(left, name, growth, size, colour)
             _moments(middle, growth, rows, colour)
@@ -49,7 +49,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
             if axes.get_legend_handles_labels()[0]:
                 axes.legend(loc=place)
             else:
-                axes.text(0.5, 0.5, "no aggregates to show", ha="center", color=FAINT, transform=axes.transAxes)
+                axes.text(0.5, 0.5, "no aggregates to show", ha="center", color=MUTED, transform=axes.transAxes)
     return figure
 
 
@@ -59,7 +59,7 @@ def _growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> Non
     later = growth.time > 0.0
     for one in growth.sizes:
         axes.plot(time[later], one[later], color=colour, alpha=0.25, lw=0.6)
-    label = name if growth.z is None else f"{name}: $z = {_spoken(growth.z)}$"
+    label = name if growth.z is None else f"{name}: $z = {_with_error(growth.z)}$"
     axes.plot(time[later], growth.mean[later], color=colour, lw=1.8, label=label)
     if len(growth.sizes) > 1:
         low, high = growth.mean - growth.error, growth.mean + growth.error
@@ -67,14 +67,14 @@ def _growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> Non
     if growth.z is None:
         return
     used = (growth.mean >= growth.window[0]) & (growth.sizes.max(axis=0) <= growth.window[1]) & later
-    axes.plot(time[used], growth.z.at(growth.time[used]), color=INK, lw=0.8, ls="--")
-    axes.axhline(growth.window[1], color=FAINT, lw=0.6, ls=":")
+    axes.plot(time[used], growth.z.at(growth.time[used]), color=TEXT_COLOUR, lw=0.8, ls="--")
+    axes.axhline(growth.window[1], color=MUTED, lw=0.6, ls=":")
     centre = np.exp(np.log(growth.time[used]).mean())
     for text, z in (("2", PAPER["z, Brownian"]), ("3.2", PAPER["z, magnetic"])):
         reach = centre * np.array([0.7, 1.4])
         height = float(growth.z.at(centre)) * (reach / centre) ** z
-        axes.plot(reach / size, height, color=FAINT, lw=0.8)
-        axes.annotate(f"$t^{{{text}}}$", (reach[1] / size, height[1]), color=FAINT, fontsize=7)
+        axes.plot(reach / size, height, color=MUTED, lw=0.8)
+        axes.annotate(f"$t^{{{text}}}$", (reach[1] / size, height[1]), color=MUTED, fontsize=7)
 
 
 def _moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:
@@ -83,13 +83,15 @@ def _moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None
     moment = rows["moment"] / rows["unit_moment"]
     free = rows["rings"] == 0
     axes.plot(rows["grains"][free], moment[free], ".", ms=3, color=colour, alpha=0.5, label="without rings")
-    axes.plot(rows["grains"][~free], moment[~free], "x", ms=3, mew=0.6, color=FAINT, alpha=0.7, label="with rings")
+    axes.plot(rows["grains"][~free], moment[~free], "x", ms=3, mew=0.6, color=MUTED, alpha=0.7, label="with rings")
     n = np.array([2.0, rows["grains"].max()])
-    axes.plot(n, growth.moment.at(n), color=INK, ls="--", lw=0.9, label=f"all: $N^{{{_spoken(growth.moment)}}}$")
+    axes.plot(
+        n, growth.moment.at(n), color=TEXT_COLOUR, ls="--", lw=0.9, label=f"all: $N^{{{_with_error(growth.moment)}}}$"
+    )
     if growth.moment_without_rings is not None:
-        text = f"without rings: $N^{{{_spoken(growth.moment_without_rings)}}}$"
+        text = f"without rings: $N^{{{_with_error(growth.moment_without_rings)}}}$"
         axes.plot(n, growth.moment_without_rings.at(n), color=colour, lw=0.9, label=text)
-    axes.plot(n, n ** PAPER["moment"], color=FAINT, lw=0.9, label="the paper: $N^{0.63}$")
+    axes.plot(n, n ** PAPER["moment"], color=MUTED, lw=0.9, label="the paper: $N^{0.63}$")
     axes.set_ylim(bottom=0.1)
 
 
@@ -101,8 +103,8 @@ def _dimension(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> No
     fit, n = growth.dimension, np.array(growth.dimension.window)
     error = "" if np.isnan(fit.error) else f" ± {fit.error:.2f}"
     text = f"$D_f$ = {fit.value:.2f}{error}"
-    axes.plot((n / fit.prefactor) ** (1.0 / fit.value), n, color=INK, ls="--", lw=0.9, label=text)
+    axes.plot((n / fit.prefactor) ** (1.0 / fit.value), n, color=TEXT_COLOUR, ls="--", lw=0.9, label=text)
 
 
-def _spoken(law: Any) -> str:
+def _with_error(law: Any) -> str:
     return f"{law.exponent:.2f}" + ("" if np.isnan(law.error) else rf" \pm {law.error:.2f}")

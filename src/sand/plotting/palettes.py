@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 
-from .style import BIG, BLUE, GREEN, ORANGE, PURPLE, RED, SINGLE, SKY, SMALL
+from .style import BLUE, GREEN, LARGEST_COLOURS, ORANGE, OTHER_COLOURS, PURPLE, RED, SINGLE_COLOUR, SKY
 
 STEPS = 64
 """Colours of a map that the page gets."""
@@ -19,17 +19,17 @@ DIVERGING: Colormap = LinearSegmentedColormap.from_list(
     "diverging", ["#08519C", "#5FA2D4", "#E9E8E4", "#E48248", "#983100"], 256
 )
 """Cold and warm, as dark on both sides."""
-OTHERS = ("cividis", "viridis")
+STANDARD_MAPS = ("cividis", "viridis")
 """Of matplotlib, for who prefers them."""
-MATERIALS = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
+MATERIAL_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, RED)
 """Of materials, in turn."""
-WITHIN, LIMITS = SINGLE, (RED, BLUE, GREEN, PURPLE)
+WITHIN_LIMITS_COLOUR, MODE_COLOURS = SINGLE_COLOUR, (RED, BLUE, GREEN, PURPLE)
 """Of contacts within their limits, and at the limit of a mode: stretch, slide, roll, twist."""
 
 
 def palettes() -> dict[str, list[list[int]]]:
     """64 × (red, green, blue) from 0 to 255, by name; the first is the usual one, `diverging` is about zero."""
-    maps = [SEQUENTIAL, *(matplotlib.colormaps[name] for name in OTHERS), DIVERGING]
+    maps = [SEQUENTIAL, *(matplotlib.colormaps[name] for name in STANDARD_MAPS), DIVERGING]
     places = np.linspace(0.0, 1.0, STEPS)
     return {each.name: np.rint(255.0 * each(places)[:, :3]).astype(int).tolist() for each in maps}
 
@@ -37,10 +37,10 @@ def palettes() -> dict[str, list[list[int]]]:
 def colours() -> dict[str, list[str] | str]:
     """Of clusters (the largest, all others in turn, single grains), of modes at their limit, and of materials."""
     return {
-        "big": list(BIG),
-        "small": list(SMALL),
-        "single": SINGLE,
-        "modes": list(LIMITS),
-        "within": WITHIN,
-        "materials": list(MATERIALS),
+        "big": list(LARGEST_COLOURS),
+        "small": list(OTHER_COLOURS),
+        "single": SINGLE_COLOUR,
+        "modes": list(MODE_COLOURS),
+        "within": WITHIN_LIMITS_COLOUR,
+        "materials": list(MATERIAL_COLOURS),
     }

@@ -12,12 +12,25 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from ..analysis.ledger_columns import LOSSES
 from ..constants import BOLTZMANN
 from ..state.state import LOST
-from .style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, RED, SKY, YELLOW, legend_above, power_of_ten, with_prefix
+from .style import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    TEXT_COLOUR,
+    YELLOW,
+    format_number,
+    legend_above,
+    si_prefix,
+)
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, INK, FAINT)
-OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, TEXT_COLOUR, MUTED)
+EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
 COUNTS = {"contacts": ("contacts", BLUE), "made": ("made so far", GREEN), "broken": ("broken so far", RED)}
 """Of contacts: columns, what they are called, colours."""
@@ -49,7 +62,7 @@ def peak(values: np.ndarray) -> float:
 
 def time_unit(ledger: Any) -> Unit:
     """Seconds with the prefix that suits the length of the run."""
-    return Unit(*with_prefix(peak(ledger["time"]), "s"))
+    return Unit(*si_prefix(peak(ledger["time"]), "s"))
 
 
 def energy_unit(ledger: Any, temperature: float, grains: int) -> Unit:
@@ -57,7 +70,7 @@ def energy_unit(ledger: Any, temperature: float, grains: int) -> Unit:
     if temperature > 0.0:
         name = r"$N k_\mathrm{B}T_0$" if grains > 1 else r"$k_\mathrm{B}T_0$"
         return Unit(grains * BOLTZMANN * temperature, name)
-    return Unit(*with_prefix(max(map(peak, (*energies(ledger).values(), *losses(ledger).values()))), "J"))
+    return Unit(*si_prefix(max(map(peak, (*energies(ledger).values(), *losses(ledger).values()))), "J"))
 
 
 def energies(ledger: Any) -> dict[str, np.ndarray]:
@@ -77,7 +90,7 @@ def energies_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
     """Energies [J] that ever differ from zero, and their colours."""
     drawn = {name: values for name, values in energies(ledger).items() if peak(values)}
     outside = [name for name in drawn if name not in ENERGY_COLOURS]
-    colour = ENERGY_COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
+    colour = ENERGY_COLOURS | {name: EXTERNAL_COLOURS[k % len(EXTERNAL_COLOURS)] for k, name in enumerate(outside)}
     return {name: (values, colour[name]) for name, values in drawn.items()}
 
 
@@ -95,7 +108,7 @@ def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
     """S (Eq. 17), the largest cluster and the number of clusters; all are numbers from 1 to N."""
     t = ledger["time"] / time.size
     style = _marks(t)
-    axes.plot(t, ledger["clusters"], color=FAINT, linewidth=1.0, label="number of clusters", **style)
+    axes.plot(t, ledger["clusters"], color=MUTED, linewidth=1.0, label="number of clusters", **style)
     axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest (grains)", **style)
     axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$ (grains)", **style)
     top = max(float(ledger[name].max()) for name in ("clusters", "largest_cluster", "mean_cluster_size"))
@@ -112,7 +125,7 @@ def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     drawn = {name: (values / unit.size, colour) for name, (values, colour) in energies_drawn(ledger).items()}
     crowded = len(set(drawn) - set(ENERGY_COLOURS)) > 1
     longer = {} if crowded else {"contacts": "contacts (elastic, adhesion)"}
-    axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
+    axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
     for name, (values, colour) in drawn.items():
         axes.plot(t, values, color=colour, label=longer.get(name, name), **_marks(t))
     if drawn:
@@ -144,7 +157,7 @@ def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     none = ", ".join(name for name, (size, _) in channels.items() if not peak(size) and name not in options)
     tiny = ", ".join(name for name, (size, _) in channels.items() if name not in drawn and peak(size))
     note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)
-    axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=FAINT)
+    axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=MUTED)
 
 
 def draw_contacts(axes: Axes, ledger: Any, time: Unit) -> None:
@@ -165,14 +178,14 @@ def draw_balance(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
     total = column(ledger, "total")
     change = (total - total[0]) / unit.size
     turned_over = (sum(map(peak, losses(ledger).values())) + peak(column(ledger, *KINETIC))) / unit.size
-    axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
-    axes.plot(t, change, color=INK, linewidth=1.0, **_marks(t))
+    axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
+    axes.plot(t, change, color=TEXT_COLOUR, linewidth=1.0, **_marks(t))
     half = max(1.3 * peak(change), FLAT * turned_over) or 1.0
     axes.set_ylim(-half, half)
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
     axes.yaxis.set_major_formatter(FuncFormatter(_short))
     axes.set_ylabel(f"Δ ({unit.name})")
-    drift = f"drift {power_of_ten(ledger.drift)} of the energy turned over"
+    drift = f"drift {format_number(ledger.drift)} of the energy turned over"
     text = f"total − start: {drift if np.isfinite(ledger.drift) else 'not a number at the end'}"
     axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
 
@@ -194,7 +207,7 @@ def _marks(t: np.ndarray) -> dict[str, Any]:
 
 
 def _nothing(axes: Axes, text: str) -> None:
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=7, color=FAINT)
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=7, color=MUTED)
     axes.set_yticks([])
 
 

@@ -29,7 +29,7 @@ from .panels import (
 )
 from .render.colouring import DECADES
 from .run_figure import DPI, RunFigure
-from .style import BLUE, CHALK, INK, MIST, NIGHT, pretty, styled, with_prefix
+from .style import BLUE, DARK_BACKGROUND, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, format_si, plot_style, si_prefix
 
 SIZE = (5.6, 3.5)
 """Inches: a column of a journal and a half."""
@@ -62,12 +62,12 @@ def history_figure(books: Books, name: str, grains: int, temperature: float, dar
     if not books.rows:
         raise BadInput("the ledger has no row yet, so that there is nothing to plot over time")
     try:
-        with styled():
+        with plot_style():
             figure, axes = _figure(SIZE)
             time = time_unit(books)
             _DRAW[name](axes, books, time, energy_unit(books, temperature, grains))
             draw_time([axes], time, books)
-            _darkened(figure, dark)
+            _apply_dark(figure, dark)
     except KeyError as error:
         raise BadInput(f"the ledger has no column {error}: it is of another version of SAND") from None
     return figure
@@ -90,7 +90,7 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     """
     what = quantity(name)
     values = measured(frame, name, field)
-    with styled():
+    with plot_style():
         figure, axes = _figure(SIZE)
         if name == "cluster":
             sizes, numbers = size_distribution(cluster_labels(len(values), frame.pair))
@@ -103,14 +103,14 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
         else:
             _histogram(axes, values[np.isfinite(values)], what.meaning, what.unit)
         axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-        note = f"{len(values)} grains, t = {pretty(frame.time, 's')}"
+        note = f"{len(values)} grains, t = {format_si(frame.time, 's')}"
         axes.text(1.0, 1.02, note, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
-        _darkened(figure, dark)
+        _apply_dark(figure, dark)
     return figure
 
 
 def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
-    one, prefixed = (1.0, "") if unit == "1" else with_prefix(float(np.abs(values).max(initial=0.0)), unit)
+    one, prefixed = (1.0, "") if unit == "1" else si_prefix(float(np.abs(values).max(initial=0.0)), unit)
     shown = values / one
     axes.set(xlabel=f"{meaning} ({prefixed})" if prefixed else meaning, ylabel="grains")
     levels = np.unique(shown)
@@ -141,21 +141,21 @@ def _figure(size: tuple[float, float]) -> tuple[RunFigure, Axes]:
     return figure, figure.subplots()
 
 
-def _darkened(figure: Figure, dark: bool) -> None:
+def _apply_dark(figure: Figure, dark: bool) -> None:
     """Text and frames light, the ground dark."""
     if not dark:
         return
-    figure.set_facecolor(NIGHT)
+    figure.set_facecolor(DARK_BACKGROUND)
     for axes in figure.axes:
-        axes.tick_params(colors=CHALK, which="both")
+        axes.tick_params(colors=TEXT_ON_DARK, which="both")
         for spine in axes.spines.values():
-            spine.set_color(MIST)
+            spine.set_color(MUTED_ON_DARK)
         legend = axes.get_legend()
         for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label, *(legend.get_texts() if legend else ())):
-            text.set_color(CHALK)
+            text.set_color(TEXT_ON_DARK)
         for line in axes.get_lines():
-            if line.get_color() == INK:
-                line.set_color(CHALK)
+            if line.get_color() == TEXT_COLOUR:
+                line.set_color(TEXT_ON_DARK)
 
 
 def figure_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
@@ -175,7 +175,7 @@ def figure_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
         "pdf": {"CreationDate": None, "Creator": "SAND", "Producer": "SAND"},
         "svg": {"Date": None, "Creator": "SAND"},
     }
-    with styled(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
+    with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
         figure.savefig(
             content := io.BytesIO(),
             format=form,

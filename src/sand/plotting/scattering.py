@@ -11,7 +11,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Wedge
 
 from .run_figure import DPI, RunFigure
-from .style import BIG, BLUE, FAINT, INK, ORANGE, RED, letter, pretty, styled, with_prefix
+from .style import (
+    BLUE,
+    LARGEST_COLOURS,
+    MUTED,
+    ORANGE,
+    RED,
+    TEXT_COLOUR,
+    format_si,
+    panel_letter,
+    plot_style,
+    si_prefix,
+)
 
 DOTS = 60
 """Dots along each trajectory, at equal times."""
@@ -36,10 +47,10 @@ def trajectories_figure(
         half the width shown [b_max].
     """
     unit = scales.capture or scales.touch
-    with styled():
+    with plot_style():
         figure = RunFigure(figsize=(4.6 * len(groups) + 0.4, 4.9), dpi=DPI, layout="constrained")
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, len(groups)))):
-            for one, colour in zip(groups[k], (c for _ in range(99) for c in BIG), strict=False):
+            for one, colour in zip(groups[k], (c for _ in range(99) for c in LARGEST_COLOURS), strict=False):
                 _draw_flight(axes, one, colour, unit, window)
             axes.set_xlim(-window, window)
             axes.set_ylim(-window, window)
@@ -48,7 +59,7 @@ def trajectories_figure(
             axes.set_ylabel("$y/b_\\mathrm{max}$" if scales.capture else "$y/(r_1+r_2)$")
             axes.set_title(f"spin: {names[k]}", loc="left", fontsize=8.0)
             axes.legend(loc="upper left", fontsize=6.5)
-            letter(axes, "abcdefgh"[k], -0.12)
+            panel_letter(axes, "abcdefgh"[k], -0.12)
         figure.suptitle(f"{title}; full lines: projectile, thin: target; dots at equal times", x=0.01, ha="left")
     return figure
 
@@ -66,7 +77,7 @@ def _draw_flight(axes: Axes, one: Any, colour: str, unit: float, window: float) 
         axes.plot(dots[:, 0], dots[:, 1], "o", color=colour, markersize=2.4 if mark else 1.6, markeredgewidth=0.0)
     if one.end == "hit":
         x, y = one.projectile[-1, :2] / unit
-        axes.plot([x], [y], "*", color=colour, markersize=9.0, markeredgecolor=INK, markeredgewidth=0.5)
+        axes.plot([x], [y], "*", color=colour, markersize=9.0, markeredgecolor=TEXT_COLOUR, markeredgewidth=0.5)
 
 
 def map_figure(found: Any, title: str) -> Figure:
@@ -77,19 +88,19 @@ def map_figure(found: Any, title: str) -> Figure:
     found
         a `ProbabilityMap`.
     """
-    with styled():
+    with plot_style():
         figure = RunFigure(figsize=(9.6, 4.4), dpi=DPI, layout="constrained")
         left, right = np.asarray(figure.subfigures(1, 2, width_ratios=(1.25, 1.0)))
         axes = left.subplots()
         shades = _draw_map(axes, found)
-        letter(axes, "a", -0.12)
+        panel_letter(axes, "a", -0.12)
         chosen = np.unique(np.linspace(0, found.speeds.size - 1, 4).round().astype(int))
         discs = np.atleast_1d(right.subplots(2, 2) if chosen.size > 1 else right.subplots()).ravel()
         for k, place in enumerate(discs):
             place.axis("off")
             if k < chosen.size:
                 _draw_disc(place, found, int(chosen[k]), shades)
-        letter(discs[0], "b", 0.0)
+        panel_letter(discs[0], "b", 0.0)
         right.colorbar(shades, ax=list(discs), label="probability of a hit", shrink=0.8)
         figure.suptitle(f"{title}; dashed: $b_\\mathrm{{max}}$ (Eq. 14)", x=0.01, ha="left")
     return figure
@@ -127,7 +138,7 @@ def _draw_disc(axes: Axes, found: Any, k: int, shades: Any) -> None:
     axes.set_xlim(-edges[-1], edges[-1])
     axes.set_ylim(-edges[-1], edges[-1])
     axes.set_aspect("equal")
-    axes.set_title(pretty(float(found.speeds[k]), "m/s"), fontsize=8.0)
+    axes.set_title(format_si(float(found.speeds[k]), "m/s"), fontsize=8.0)
 
 
 def sigma_figure(found: Sequence[Any], title: str) -> Figure:
@@ -138,7 +149,7 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
     found : Sequence[Any]
         `CrossSection`s.
     """
-    with styled():
+    with plot_style():
         figure = RunFigure(figsize=(9.0, 3.9), dpi=DPI, layout="constrained")
         left, right = figure.subplots(1, 2)
         _draw_sigma(left, found)
@@ -152,14 +163,14 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
             right.set_ylabel("$c=\\sigma/\\sigma_\\mathrm{Eq.14}$")
         else:
             _draw_profile(right, found[0])
-        letter(left, "a", -0.14)
-        letter(right, "b", -0.14)
+        panel_letter(left, "a", -0.14)
+        panel_letter(right, "b", -0.14)
         figure.suptitle(title, x=0.01, ha="left")
     return figure
 
 
 def _draw_sigma(axes: Axes, found: Sequence[Any]) -> None:
-    one, name = with_prefix(max(c.sigma for c in found) ** 0.5, "m")
+    one, name = si_prefix(max(c.sigma for c in found) ** 0.5, "m")
     speeds = np.array([c.speed for c in found])
     axes.errorbar(
         speeds,
@@ -173,7 +184,7 @@ def _draw_sigma(axes: Axes, found: Sequence[Any]) -> None:
         fine = np.geomspace(0.8 * speeds.min(), 1.25 * speeds.max(), 50)
         line = found[0].analytic * (fine / speeds[0]) ** (-4.0 / 3.0)
         axes.plot(fine, line / one**2, "--", color=RED, label="Eq. 14")
-    axes.axhline(found[0].geometric / one**2, color=FAINT, linewidth=0.9, label="$\\pi(r_1+r_2)^2$")
+    axes.axhline(found[0].geometric / one**2, color=MUTED, linewidth=0.9, label="$\\pi(r_1+r_2)^2$")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("speed $v_\\infty$ [m/s]")

@@ -19,15 +19,15 @@ BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#D9C400",
 )
 """After Okabe & Ito (2008): distinct for the colour-blind too."""
-BIG = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
+LARGEST_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
 """Of the largest clusters, the largest first."""
-SMALL = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
+OTHER_COLOURS = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
 """Of all others, in turn."""
-SINGLE = "#B9BDC3"
+SINGLE_COLOUR = "#B9BDC3"
 """Of grains without a contact."""
-INK, FAINT = "#22262B", "#7A828C"
+TEXT_COLOUR, MUTED = "#22262B", "#7A828C"
 """Of text and frames; of notes."""
-PAPER, NIGHT, CHALK, MIST = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
+LIGHT_BACKGROUND, DARK_BACKGROUND, TEXT_ON_DARK, MUTED_ON_DARK = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
 """Grounds, light and dark; of text and of notes on the dark one."""
 ON_DARK = {
     BLUE: "#5AA9E6",
@@ -37,8 +37,8 @@ ON_DARK = {
     ORANGE: "#F0B94A",
     SKY: "#8FD0F2",
     YELLOW: "#E8DA4F",
-    INK: CHALK,
-    FAINT: MIST,
+    TEXT_COLOUR: TEXT_ON_DARK,
+    MUTED: MUTED_ON_DARK,
 }
 """The same colours where the ground is dark."""
 
@@ -46,10 +46,10 @@ _STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 8.0,
     "mathtext.fontset": "dejavusans",
-    "text.color": INK,
+    "text.color": TEXT_COLOUR,
     "axes.labelsize": 8.0,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": INK,
+    "axes.labelcolor": TEXT_COLOUR,
+    "axes.edgecolor": TEXT_COLOUR,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -63,8 +63,8 @@ _STYLE = {
     "lines.solid_capstyle": "round",
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
-    "xtick.color": INK,
-    "ytick.color": INK,
+    "xtick.color": TEXT_COLOUR,
+    "ytick.color": TEXT_COLOUR,
     "xtick.direction": "out",
     "ytick.direction": "out",
     "xtick.major.width": 0.7,
@@ -82,14 +82,14 @@ _PREFIX = dict(
 )
 
 
-def styled() -> AbstractContextManager[None]:
+def plot_style() -> AbstractContextManager[None]:
     """The shipped style while the context lasts, whatever the user has set; that is there again after it."""
     # Where figures are shown is no matter of style: setting a backend here would start one.
     plain = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith(("backend", "interactive"))}
     return matplotlib.rc_context({**plain, **_STYLE})
 
 
-def with_prefix(size: float, unit: str) -> tuple[float, str]:
+def si_prefix(size: float, unit: str) -> tuple[float, str]:
     """One of the prefixed unit in SI units, and its name: of 3e-7 m, (1e-9, 'nm').
 
     Parameters
@@ -103,13 +103,13 @@ def with_prefix(size: float, unit: str) -> tuple[float, str]:
     return float(f"1e{exponent}"), _PREFIX[exponent] + unit
 
 
-def pretty(size: float, unit: str) -> str:
+def format_si(size: float, unit: str) -> str:
     """A number for people: 1.2e-6 m → '1.2 µm'."""
-    one, name = with_prefix(abs(size), unit)
+    one, name = si_prefix(abs(size), unit)
     return f"{size / one:.3g} {name}"
 
 
-def power_of_ten(number: float) -> str:
+def format_number(number: float) -> str:
     """A pure number with two digits: 6.7e-4 → '6.7×10⁻⁴', 31400 → '3.1×10⁴', 81.9 → '82'."""
     if number == 0.0 or not math.isfinite(number) or 0.01 <= abs(number) < 1e4:
         return f"{number:.3g}" if abs(number) >= 100.0 else f"{number:.2g}"
@@ -130,8 +130,8 @@ def legend_above(axes: Axes) -> None:
     )
 
 
-def letter(axes: Axes, text: str, x: float) -> None:
-    """The panel's letter, `x` in widths of the panel."""
+def panel_letter(axes: Axes, text: str, x: float) -> None:
+    """The panel's panel_letter, `x` in widths of the panel."""
     axes.text(x, 1.0, text, transform=axes.transAxes, weight="bold", size=10.0, va="bottom", ha="left")
 
 

@@ -15,7 +15,7 @@ from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
-from ..plotting.style import BIG
+from ..plotting.style import LARGEST_COLOURS
 from ..version import __version__
 from .dimensions import fit_dimension
 from .packets import frame_bytes, frame_packet, grains_packet
@@ -175,7 +175,7 @@ class RunDataset:
             if len(self.frames) * self.grains_count <= MAX_TRACKED:
                 names, counts = np.unique(self._lineage.names(len(self.frames) - 1), return_counts=True)
                 clusters = names != SINGLE
-                order = np.argsort(-counts[clusters], kind="stable")[: len(BIG)]
+                order = np.argsort(-counts[clusters], kind="stable")[: len(LARGEST_COLOURS)]
                 self._largest = {str(name): rank for rank, name in enumerate(names[clusters][order].tolist())}
         return self._largest
 

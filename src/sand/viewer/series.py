@@ -11,7 +11,7 @@ from ..analysis.ledger_columns import Books
 from ..errors import BadInput
 from ..io.run_folder import plain
 from ..plotting.panels import COUNTS, column, energies_drawn, losses_drawn, peak
-from ..plotting.style import BLUE, FAINT, INK, ON_DARK, SKY
+from ..plotting.style import BLUE, MUTED, ON_DARK, SKY, TEXT_COLOUR
 
 MAX_POINTS = 2000
 """Maximum number of points of a line."""
@@ -69,7 +69,7 @@ def _clusters(ledger: Any) -> dict[str, Any]:
     lines = [
         _line("mean size S", BLUE, ledger["mean_cluster_size"]),
         _line("largest", SKY, ledger["largest_cluster"]),
-        _line("number of clusters", FAINT, ledger["clusters"]),
+        _line("number of clusters", MUTED, ledger["clusters"]),
     ]
     return _plot("clusters", "Clusters", lines, log=True)
 
@@ -91,7 +91,7 @@ def _contacts(ledger: Books) -> dict[str, Any]:
 
 def _balance(ledger: Books) -> dict[str, Any]:
     total = column(ledger, "total")
-    return _plot("balance", "Balance", [_line("total − start", INK, total - total[0])], "J")
+    return _plot("balance", "Balance", [_line("total − start", TEXT_COLOUR, total - total[0])], "J")
 
 
 def _events(ledger: Books) -> dict[str, Any]:
