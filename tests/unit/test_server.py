@@ -231,19 +231,22 @@ def test_one_slow_client_keeps_nobody_waiting(server, capfd):
 
 def test_the_number_of_connections_is_limited(server, monkeypatch):
     """With all connections in use a further one is closed; when they end, requests are answered again."""
-    monkeypatch.setattr(server, "_free_connections", threading.BoundedSemaphore(2))
+    monkeypatch.setattr(servers, "MAX_CONNECTIONS", 2)
+    small = Server(server.dataset)
+    small.start()
     silent = []
     for _ in range(2):
-        silent.append(socket.create_connection(("127.0.0.1", server.port)))
+        silent.append(socket.create_connection(("127.0.0.1", small.port)))
         silent[-1].sendall(b"GET /")
     with pytest.raises((http.client.HTTPException, ConnectionError)):
-        ask(server, "manifest")
+        ask(small, "manifest")
     for line in silent:
         line.close()
     deadline = time.monotonic() + 10.0
-    while server._free_connections._value < 2 and time.monotonic() < deadline:
+    while small._free_connections._value < 2 and time.monotonic() < deadline:
         time.sleep(0.01)
-    assert ask(server, "frame/1")[0] == 200
+    assert ask(small, "frame/1")[0] == 200
+    small.stop()
 
 
 def test_a_frame_that_cannot_be_read(server, monkeypatch):

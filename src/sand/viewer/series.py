@@ -10,7 +10,7 @@ from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import Books
 from ..errors import BadInput
 from ..io.run_folder import plain
-from ..plotting.panels import COUNTS, column, energies_drawn, losses_drawn, peak
+from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
 from ..plotting.style import BLUE, MUTED, ON_DARK, SKY, TEXT_COLOUR
 
 MAX_POINTS = 2000
@@ -80,7 +80,8 @@ def _energies(ledger: Books) -> dict[str, Any]:
 
 
 def _losses(ledger: Books) -> dict[str, Any]:
-    lines = [_line(name, colour, size) for name, (size, colour) in losses_drawn(ledger).items() if peak(size)]
+    drawn = losses_drawn(ledger).items()
+    lines = [_line(CHANNEL_LABELS.get(name, name), colour, size) for name, (size, colour) in drawn if peak(size)]
     return _plot("losses", "Losses", lines, "J", log=True)
 
 
@@ -91,7 +92,7 @@ def _contacts(ledger: Books) -> dict[str, Any]:
 
 def _balance(ledger: Books) -> dict[str, Any]:
     total = column(ledger, "total")
-    return _plot("balance", "Balance", [_line("total − start", TEXT_COLOUR, total - total[0])], "J")
+    return _plot("balance", "Balance", [_line("change of the total", TEXT_COLOUR, total - total[0])], "J")
 
 
 def _events(ledger: Books) -> dict[str, Any]:
