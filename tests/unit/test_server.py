@@ -4,7 +4,6 @@ import http.client
 import inspect
 import json
 import socket
-import threading
 import time
 
 import pytest
