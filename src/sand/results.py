@@ -20,7 +20,7 @@ from .io.trajectory import Frame, Frames
 from .setup.from_frame import from_frame
 from .simulation.simulation import Simulation
 from .units import si
-from .viewer.simulation_view import field_in, view_folder
+from .viewer.simulation_view import read_field, view_folder
 
 if TYPE_CHECKING:
     from .plotting.render.still import Still
@@ -135,8 +135,8 @@ class Run:
 
     @checked
     def flux_density(self, time: Any) -> np.ndarray | None:
-        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `told.field_in`."""
-        now, field = si(time, "s", "time"), field_in(self.folder)
+        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `told.read_field`."""
+        now, field = si(time, "s", "time"), read_field(self.folder)
         return None if field is None else np.asarray(field[1](now))
 
     @checked

@@ -20,6 +20,7 @@ from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
 from sand.io.trajectory import TrajectoryWriter
 from sand.material import IRON, SILICA
 from sand.state.state import LOST
+from sand.viewer.simulation_view import FieldDescription
 
 R = 10e-9
 """Radius of a grain [m]."""
@@ -28,7 +29,7 @@ SIDE = 24.0
 FRAMES, GRAINS, MERGED, PARTED = 8, 12, 4, 6
 STEP = 1e-9
 """Time between frames [s]."""
-FIELD = ("1 mT, constant", lambda time: (0.0, 0.0, 1e-3))
+FIELD = FieldDescription("1 mT, constant", lambda time: (0.0, 0.0, 1e-3))
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting", "magnetic")
 COLUMNS = (
     *("step", "time"),

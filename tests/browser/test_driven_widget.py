@@ -9,7 +9,7 @@ import pytest
 
 from sand.errors import BadInput
 from sand.viewer.dataset import RunDataset, run_dataset
-from sand.viewer.notebook import answered
+from sand.viewer.notebook import answer_message
 
 from .driving import Driven
 from .small_runs import FIELD, FRAMES, SmallRun
@@ -54,7 +54,7 @@ class Kernel:
 
     def __call__(self, content: dict) -> tuple[dict, list[str]]:
         self.asked.append(content)
-        told, buffers = answered(self.story, content)
+        told, buffers = answer_message(self.story, content)
         return told, [base64.b64encode(one).decode() for one in buffers]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sand.analysis.clusters import cluster_labels
-from sand.plotting.render.scene import scene_of
+from sand.plotting.render.scene import make_scene
 
 from .eye import Eye, inside
 from .looking import SOURCES, View, agree, size
@@ -220,8 +220,8 @@ def test_clusters_are_whole_at_first_as_in_still_pictures(page, shows, source):
     assert page.evaluate("() => sandView.state.setting('whole').initial")
     for k in FRAMES["hundred"]:
         frame = view.go(k)
-        places = np.array(page.evaluate("() => [...sandView.picture.positions]")).reshape(-1, 3) * view.shown.unit
-        drawn, side = scene_of(frame, frame.pair, frame.box).position, np.array(frame.drawn)
+        places = np.array(page.evaluate("() => [...sandView.picture.place]")).reshape(-1, 3) * view.shown.unit
+        drawn, side = make_scene(frame, frame.pair, frame.box).position, np.array(frame.drawn)
         boxes = (places - drawn) / side
         assert np.abs(boxes - np.rint(boxes)).max() < 1e-6
         ends = np.rint(boxes)[frame.pair]

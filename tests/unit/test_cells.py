@@ -353,7 +353,9 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
         bond = bond_of(a, law.pairings, i, j)
-        assert near.step[p] == pytest.approx(2 * np.pi / np.sqrt(bond.max_squared_frequency) / law.per_period, rel=1e-14)
+        assert near.step[p] == pytest.approx(
+            2 * np.pi / np.sqrt(bond.max_squared_frequency) / law.per_period, rel=1e-14
+        )
         assert near.length[p] == pytest.approx(bond.break_overlap, rel=1e-14)
 
 

@@ -51,10 +51,11 @@ def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
         (["/nowhere/at/all"], "no such folder"),
         (["RUN", "--html", "/nowhere/at/all.html"], "no folder"),
         (["RUN", "--html", "."], "is a folder"),
+        (["RUN", "--html", "page.txt"], "must end in .html or .htm"),
         (["RUN", "--frames", "a"], "--frames"),
-        (["RUN", "--frames", "70:"], "none of them was chosen"),
-        (["RUN", "--frames", "::-1"], "in order"),
-        (["RUN", "--frames", "::0"], "in order"),
+        (["RUN", "--frames", "70:"], "contains none of them"),
+        (["RUN", "--frames", "::-1"], "plays frames forwards"),
+        (["RUN", "--frames", "::0"], "plays frames forwards"),
         (["RUN", "--every", "0"], "--every"),
         (["RUN", "--port", "70000"], "--port"),
         ([], "DIR"),
@@ -91,7 +92,7 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
     monkeypatch.setattr(view_command, "_wait", wait)
     monkeypatch.setenv("SSH_CONNECTION", "a b c d")
     ended = []
-    monkeypatch.setattr(browser, "forget_pages", lambda: ended.append(True))
+    monkeypatch.setattr(browser, "remove_redirects", lambda: ended.append(True))
     before = threading.active_count()
     assert main(["view", str(looked_at[0]), *form]) == 0
     assert got["manifest"]["grains"] == 6 and ended

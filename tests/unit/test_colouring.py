@@ -5,7 +5,7 @@ import pytest
 
 from sand.plotting.palettes import SEQUENTIAL
 from sand.plotting.render.still import still_picture
-from sand.plotting.style import BIG, SINGLE, rgb
+from sand.plotting.style import LARGEST_COLOURS, SINGLE_COLOUR, rgb
 
 from .stills import R, alike, at_pixel, frame_of
 
@@ -15,10 +15,10 @@ def test_clusters_have_their_colours():
     """At each grain's centre is the hue of its cluster, the largest first; single grains are grey."""
     position = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0], [0, 0, 5], [2, 0, 5], [6, 0, 5]]) * R
     picture = still_picture(frame_of(position, [(0, 1), (1, 2), (3, 4)]), view="front", size=(500, 400))
-    for k, colour in enumerate([BIG[0]] * 3 + [BIG[1]] * 2 + [SINGLE]):
+    for k, colour in enumerate([LARGEST_COLOURS[0]] * 3 + [LARGEST_COLOURS[1]] * 2 + [SINGLE_COLOUR]):
         x, y = at_pixel(picture, position[k])
         patch = picture.grains_only[int(y) - 3 : int(y) + 3, int(x) - 3 : int(x) + 3]
-        if colour == SINGLE:
+        if colour == SINGLE_COLOUR:
             assert np.ptp(patch[..., :3], axis=2).max() < 0.08
         else:
             assert alike(patch, rgb(colour)).all()

@@ -17,8 +17,8 @@ def test_dimensions(tmp_path, monkeypatch):
     story = run_dataset(reel(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))
     assert story.dimension(0, 5)["value"] == pytest.approx(1.0, abs=0.1)
     assert "at least 32" in story.dimension(2, 5)["reason"]
-    assert "touches none" in story.dimension(0, 41)["reason"]
-    with pytest.raises(sand.BadInput, match="no 42"):
+    assert "has no contact" in story.dimension(0, 41)["reason"]
+    with pytest.raises(sand.BadInput, match="no grain 42"):
         story.dimension(0, 42)
     calls = []
     real = dimensions.cluster_dimension

@@ -14,10 +14,10 @@ from sand.analysis.clusters import unwrapped
 from sand.box import Box
 from sand.constants import BOLTZMANN
 from sand.plotting.panels import energy_unit, time_unit
-from sand.plotting.render.scene import camera, scene_of, side_by_side, view_window
-from sand.plotting.render.spheres import FINER, Balls, draw
+from sand.plotting.render.scene import camera_rotation, make_scene, side_by_side, view_window
+from sand.plotting.render.spheres import SUPERSAMPLING, Spheres, render_spheres
 from sand.plotting.run_figure import png, run_figure, save, show
-from sand.plotting.style import pretty, round_length, with_prefix
+from sand.plotting.style import format_si, round_length, si_prefix
 from sand.simulation.ledger import Ledger
 
 
@@ -168,7 +168,7 @@ def test_units_are_natural():
 def test_spheres_stand_where_the_grains_are(grown):
     """Positions are the unwrapped ones, each cluster moved by whole boxes; radii are the true ones."""
     pairs = grown.contacts["pair"]
-    scene = scene_of(grown.grains, pairs, grown.box)
+    scene = make_scene(grown.grains, pairs, grown.box)
     moved = (scene.position - unwrapped(grown.grains.position, pairs, grown.box)) / 2e-7
     np.testing.assert_allclose(moved, np.round(moved), atol=1e-9)
     np.testing.assert_allclose(np.diff(moved[:3], axis=0), 0.0, atol=1e-9)
@@ -178,7 +178,7 @@ def test_spheres_stand_where_the_grains_are(grown):
 
 def test_projection_is_a_rotation():
     """Rows right, up and eye are orthonormal and right-handed, and z shows upwards."""
-    rotation = camera()
+    rotation = camera_rotation()
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(rotation) == pytest.approx(1.0, rel=1e-6, abs=0.0)
     assert rotation[0, 2] == 0.0 and rotation[1, 2] > 0.9
@@ -186,20 +186,20 @@ def test_projection_is_a_rotation():
 
 def test_picture_shows_each_grain_at_its_place(grown):
     """The picture has a grain's colour at its projected centre, its true size, and nothing beside it."""
-    scene = scene_of(grown.grains, grown.contacts["pair"], grown.box)
-    balls = scene.seen(camera())
-    np.testing.assert_allclose(balls.centre[:, 0], scene.position @ camera()[0])
-    bare = Balls(balls.centre, balls.radius, balls.colour, np.zeros_like(balls.arrow))
+    scene = make_scene(grown.grains, grown.contacts["pair"], grown.box)
+    balls = scene.projected(camera_rotation())
+    np.testing.assert_allclose(balls.centre[:, 0], scene.position @ camera_rotation()[0])
+    bare = Spheres(balls.centre, balls.radius, balls.colour, np.zeros_like(balls.arrow))
     window = view_window(scene, 1.0)
-    picture = draw(bare, window, 400, 400)
+    picture = render_spheres(bare, window, 400, 400)
     scale = 400 / (window[1] - window[0])
     for i in range(4):
         column, row = ((balls.centre[i, :2] - np.array([window[0], window[2]])) * scale).astype(int)
         assert picture[row, column, 3] == 1.0
         seen, true = picture[row, column, :3], balls.colour[i]
         assert np.argmax(seen) == np.argmax(true) or np.ptp(true) < 0.1
-    alone = Balls(bare.centre[3:], bare.radius[3:], bare.colour[3:], bare.arrow[3:])
-    area = draw(alone, window, 400, 400)[..., 3].sum()
+    alone = Spheres(bare.centre[3:], bare.radius[3:], bare.colour[3:], bare.arrow[3:])
+    area = render_spheres(alone, window, 400, 400)[..., 3].sum()
     assert area == pytest.approx(np.pi * (5e-9 * scale) ** 2, rel=0.02, abs=0.0)
 
 
@@ -209,14 +209,14 @@ def test_nearer_grains_hide_farther_ones():
     for order in ([0, 1], [1, 0]):
         centre = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])[order]
         colour = np.array([red, blue])[order]
-        picture = draw(Balls(centre, np.ones(2), colour, np.zeros((2, 3))), (-2.0, 2.0, -2.0, 2.0), 40, 40)
+        picture = render_spheres(Spheres(centre, np.ones(2), colour, np.zeros((2, 3))), (-2.0, 2.0, -2.0, 2.0), 40, 40)
         assert picture[20, 20, 0] > picture[20, 20, 2]
 
 
 def test_clusters_can_be_told_apart():
     """Grains of one cluster share a colour, other clusters have another, single grains are grey."""
     chain = [[2.0 * i, 0.0, 0.0] for i in range(6)]
-    scene = scene_of(sand.Grains(np.array(chain), 1.0, "ice"), np.array([(0, 1), (1, 2), (3, 4)]), Box.open())
+    scene = make_scene(sand.Grains(np.array(chain), 1.0, "ice"), np.array([(0, 1), (1, 2), (3, 4)]), Box.open())
     first, second, single = scene.colour[0], scene.colour[3], scene.colour[5]
     assert np.all(scene.colour[:3] == first) and np.all(scene.colour[3:5] == second)
     assert not np.allclose(first, second)
@@ -225,12 +225,17 @@ def test_clusters_can_be_told_apart():
 
 def test_arrows_point_along_moments():
     """An arrow is wider towards its head than at its tail; along the line of sight it is a dot."""
-    bare = Balls(np.zeros((1, 3)), np.ones(1), np.ones((1, 3)), np.zeros((1, 3)))
+    bare = Spheres(np.zeros((1, 3)), np.ones(1), np.ones((1, 3)), np.zeros((1, 3)))
 
     def covered(half):
-        with_arrow = Balls(bare.centre, bare.radius, bare.colour, np.array([half]))
+        with_arrow = Spheres(bare.centre, bare.radius, bare.colour, np.array([half]))
         window = (-1.2, 1.2, -1.2, 1.2)
-        return np.abs(draw(with_arrow, window, 120, 120) - draw(bare, window, 120, 120))[..., :3].max(axis=2) > 0.3
+        return (
+            np.abs(render_spheres(with_arrow, window, 120, 120) - render_spheres(bare, window, 120, 120))[..., :3].max(
+                axis=2
+            )
+            > 0.3
+        )
 
     arrow = covered([0.9, 0.0, 0.0])
     assert arrow[:, 75].sum() > 2 * arrow[:, 45].sum() > 0  # x = ±0.3
@@ -244,7 +249,7 @@ def test_arrows_are_in_proportion(grown):
     """The largest moment has the longest arrow, weak ones stay visible, grains without one have none."""
     moment = np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 0.0, 0.0]]) * 1e-18
     grains = sand.Grains(grown.grains.position, 1e-9, sand.SILICA, moment=moment)
-    size = np.linalg.norm(scene_of(grains, np.empty((0, 2)), grown.box).arrow, axis=1)
+    size = np.linalg.norm(make_scene(grains, np.empty((0, 2)), grown.box).arrow, axis=1)
     assert size[0] == pytest.approx(2 * size[1], rel=1e-6, abs=0.0)
     assert size[0] > size[1] > size[2] > 0.0 == size[3]
 
@@ -253,7 +258,7 @@ def test_largest_clusters_are_moved_as_rigid_bodies(grown):
     """Clusters shown by themselves keep all distances, do not overlap, and come largest first."""
     position = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [9, 9, 9], [9, 9, 11]]
     pairs = np.array([(3, 4), (0, 1), (1, 2)])
-    scene = scene_of(sand.Grains(np.array(position, float), 1.0, "ice"), pairs, Box.open())
+    scene = make_scene(sand.Grains(np.array(position, float), 1.0, "ice"), pairs, Box.open())
     balls, _, sizes = side_by_side(scene, 3)
     assert sizes == [3, 2]
 
@@ -270,7 +275,7 @@ def test_scale_bar_is_as_long_as_it_says(figure):
     axes = figure.axes[4]
     (bar,) = [line for line in axes.get_lines() if line.get_gid() == "scale"]
     length = float(np.ptp(bar.get_xdata()))
-    assert pretty(length, "m") in [text.get_text() for text in axes.texts]
+    assert format_si(length, "m") in [text.get_text() for text in axes.texts]
 
 
 @pytest.mark.slow
@@ -380,15 +385,15 @@ def test_same_run_same_picture(grown):
 )
 def test_pretty_numbers(size, text):
     """Numbers are written with the SI prefix that leaves one to three digits before the point."""
-    assert pretty(size, "m") == text
+    assert format_si(size, "m") == text
 
 
 def test_prefixes_and_round_lengths():
     """Prefixes end where SI's do; round lengths are 1, 2 or 5 and never above what is allowed."""
-    assert with_prefix(np.nan, "s") == (1.0, "s")
-    assert with_prefix(1e-30, "J") == (1e-24, "yJ")
+    assert si_prefix(np.nan, "s") == (1.0, "s")
+    assert si_prefix(1e-30, "J") == (1e-24, "yJ")
     for at_most in (1e-9, 1.99e-9, 2e-9, 4.7e-8, 9.9e-7, 5.0):
         length = round_length(at_most)
         assert at_most / 2.5 < length <= at_most * (1.0 + 1e-6)
         assert f"{length:e}"[0] in "125"
-    assert FINER >= 2
+    assert SUPERSAMPLING >= 2

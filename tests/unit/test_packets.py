@@ -69,7 +69,7 @@ def test_what_is_no_packet():
     """A cut one and a foreign one are refused; a header never holds NaN, which is not JSON."""
     packet = encode({"time": np.nan}, {"a": np.arange(6.0)})
     assert json.loads(packet[12 : 12 + int.from_bytes(packet[8:12], "little")])["time"] is None
-    with pytest.raises(sand.BadInput, match="cut off in 'a'"):
+    with pytest.raises(sand.BadInput, match="truncated in array 'a'"):
         decode(packet[:-8])
     with pytest.raises(sand.BadInput, match="not a packet"):
         decode(b"GSDGSDGSD")

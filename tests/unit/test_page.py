@@ -12,7 +12,7 @@ import pytest
 import sand
 from sand.viewer import html as page
 from sand.viewer.dataset import run_dataset
-from sand.viewer.html import chosen_frames, fitting, write_page
+from sand.viewer.html import frame_slice, frame_stride, write_page
 from sand.viewer.packets import decode
 
 from .pages import blocks, elements
@@ -95,17 +95,17 @@ def test_thinned_files(tmp_path):
     """Every second frame of a slice: times are theirs, names are those that all frames give."""
     frames = [[(0, 1)], [(0, 1), (2, 3), (3, 4)], [(0, 1), (2, 3), (3, 4), (1, 2)], [(0, 1)], [], []]
     story = run_dataset(reel(tmp_path / "a.gsd", frames, 6))
-    story.choose(chosen_frames(slice(0, 5), 2), "every other")
+    story.select(frame_slice(slice(0, 5), 2), "every other")
     write_page(story, tmp_path / "a.html")
     manifest, _, packets = blocks(tmp_path / "a.html")
     assert manifest["steps"] == [0, 20, 40] and manifest["note"] == "every other"
     assert packets[1][1]["cluster"][:5].tolist() == [2] * 5  # 2 3 4 were the larger part, in a frame left out
-    assert fitting(story, story.size / 2.5) == 3 and fitting(story, 1e9) == 1
+    assert frame_stride(story, story.size / 2.5) == 3 and frame_stride(story, 1e9) == 1
     for wrong in (slice(50, 60), slice(3, 3)):
-        with pytest.raises(sand.BadInput, match="none of them was chosen"):
-            story.choose(wrong)
+        with pytest.raises(sand.BadInput, match="contains none of them"):
+            story.select(wrong)
     with pytest.raises(sand.BadInput, match="every"):
-        chosen_frames(slice(None), 0)
+        frame_slice(slice(None), 0)
 
 
 def test_dimensions_in_a_file(tmp_path, monkeypatch):
@@ -115,7 +115,7 @@ def test_dimensions_in_a_file(tmp_path, monkeypatch):
     write_page(run_dataset(path), tmp_path / "a.html")
     found = blocks(tmp_path / "a.html")[0]["dimensions"]
     assert list(found[0]) == ["0"] and found[0]["0"][0] == pytest.approx(1.0, abs=0.1) and found[1] == {}
-    monkeypatch.setattr(page, "MEASURED", 42**1.5)
+    monkeypatch.setattr(page, "DIMENSION_COST", 42**1.5)
     write_page(run_dataset(path), tmp_path / "a.html")
     manifest = blocks(tmp_path / "a.html")[0]
     assert [bool(d) for d in manifest["dimensions"]] == [True, False, False]

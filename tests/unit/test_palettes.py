@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from sand.analysis.quantities import MODES
-from sand.plotting.palettes import DIVERGING, LIMITS, MATERIALS, SEQUENTIAL, WITHIN, colours, palettes
+from sand.plotting.palettes import (
+    DIVERGING,
+    MATERIAL_COLOURS,
+    MODE_COLOURS,
+    SEQUENTIAL,
+    WITHIN_LIMITS_COLOUR,
+    colours,
+    palettes,
+)
 
 
 def lightness(shades):
@@ -39,5 +47,5 @@ def test_the_page_has_the_pictures_colours():
         assert [told[name][0], told[name][-1]] == ends.tolist()
     named = colours()
     assert list(named) == ["big", "small", "single", "modes", "within", "materials"]
-    assert named["modes"] == list(LIMITS) and len(LIMITS) == len(MODES) - 1
-    assert (named["within"], named["materials"]) == (WITHIN, list(MATERIALS))
+    assert named["modes"] == list(MODE_COLOURS) and len(MODE_COLOURS) == len(MODES) - 1
+    assert (named["within"], named["materials"]) == (WITHIN_LIMITS_COLOUR, list(MATERIAL_COLOURS))

@@ -6,14 +6,14 @@ import pytest
 
 from sand.analysis.ledger_columns import LedgerColumns
 from sand.viewer.dataset import run_dataset
-from sand.viewer.series import MOST, of_ledger, thinned
+from sand.viewer.series import MAX_POINTS, evenly_spaced, series_from_ledger
 
 from .reels import reel
 
 
 @pytest.mark.compiled("fields")
 def test_series_are_the_ledgers(looked_at):
-    """Plots hold the ledger's columns; total − start is worked out before numbers are shortened; counts of events."""
+    """Plots hold the ledger's columns; the change of the total is computed before numbers are rounded; event counts."""
     folder, sim = looked_at
     series = run_dataset(folder).series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
@@ -21,10 +21,11 @@ def test_series_are_the_ledgers(looked_at):
     assert plots["clusters"]["mean size S"] == pytest.approx(sim.ledger["mean_cluster_size"].tolist(), rel=1e-6, abs=0)
     assert plots["energies"]["magnetic"] == pytest.approx(sim.ledger["magnetic"].tolist(), rel=1e-6, abs=0)
     change = sim.ledger["total"] - sim.ledger["total"][0]
-    assert plots["balance"]["total − start"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
+    assert plots["balance"]["change of the total"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
     assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
     assert plots["losses"]
-    for name, lost in plots["losses"].items():  # an axis of powers of ten has no place for 0
+    for label, lost in plots["losses"].items():  # a logarithmic axis has no 0
+        name = {"external": "outside"}.get(label, label)
         assert [v is None for v in lost] == [v == 0.0 for v in sim.ledger[f"lost_{name}"]]
     for plot in series["plots"]:
         assert all(len(line["values"]) == len(series["time"]) for line in plot["lines"])
@@ -37,14 +38,14 @@ def test_long_and_broken_ledgers(looked_at):
     row = dict(looked_at[1].ledger.rows[-1])
     rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
     rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
-    series = of_ledger(LedgerColumns.from_rows(rows))
-    assert len(series["time"]) == MOST and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
+    series = series_from_ledger(LedgerColumns.from_rows(rows))
+    assert len(series["time"]) == MAX_POINTS and series["time"][-1] == pytest.approx(5e-6, rel=1e-9, abs=0)
     assert sum(series["events"]["made"]) == 15000 and sum(series["events"]["broken"]) == 2500
-    assert len(series["events"]["time"]) < MOST
+    assert len(series["events"]["time"]) < MAX_POINTS
     values = {plot["id"]: plot["lines"][0]["values"] for plot in series["plots"]}
     assert values["balance"][-1] is None and values["energies"][-1] is None
     json.dumps(series, allow_nan=False)
-    assert thinned(10, 20).tolist() == list(range(10)) and thinned(100, 3).tolist() == [0, 50, 99]
+    assert evenly_spaced(10, 20).tolist() == list(range(10)) and evenly_spaced(100, 3).tolist() == [0, 50, 99]
 
 
 def test_without_a_ledger(tmp_path):

@@ -49,15 +49,15 @@ def test_a_simulation_without_files_shows_its_state(opened):
     manifest, series, packets = blocks(sim.view())
     assert manifest["steps"] == [5] and len(series["time"]) == 2 and not manifest["running"]
     assert packets[0][1]["position"] * manifest["unit"] == pytest.approx(sim.grains.position, abs=1e-14)
-    assert "keeps no files" in manifest["note"]
+    assert "has no run folder" in manifest["note"]
 
 
 @pytest.mark.compiled("fields")
 def test_too_much_is_thinned(looked_at, opened, tmp_path, monkeypatch):
     """Where all frames would take too much room, fewer are in the page, and it says so."""
-    monkeypatch.setattr(show, "LARGEST", 5000.0)
+    monkeypatch.setattr(show, "MAX_BYTES", 5000.0)
     manifest, _, packets = blocks(sand.open(looked_at[0]).view(tmp_path / "a.html"))
-    assert 1 <= len(packets) < 6 and "too much room" in manifest["note"]
+    assert 1 <= len(packets) < 6 and "limit the size" in manifest["note"]
 
 
 @pytest.mark.compiled("contacts")
@@ -85,12 +85,12 @@ def test_no_browser_is_opened_without_leave(monkeypatch):
     assert not browser.open_page("a") and not calls
     monkeypatch.setenv("DISPLAY", ":0")
     assert not browser.open_page("a") and not calls
-    monkeypatch.delenv(browser.NONE)
+    monkeypatch.delenv(browser.NO_BROWSER)
     assert browser.open_page("a") and calls == ["a"]
     monkeypatch.setattr(webbrowser, "open", lambda url: 1 / 0)
     assert not browser.open_page("a")
     monkeypatch.delenv("DISPLAY")
-    assert not browser.has_window()
+    assert not browser.has_display()
 
 
 def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
@@ -101,7 +101,7 @@ def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
     calls = []
     monkeypatch.setattr(webbrowser, "open", lambda url: calls.append(url) or True)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(browser, "has_window", lambda: True)
+    monkeypatch.setattr(browser, "has_display", lambda: True)
     address = "http://127.0.0.1:5000/a-token/"
     assert browser.open_page(address)
     (page,) = tmp_path.glob("*.html")
@@ -110,7 +110,7 @@ def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
     assert f'content="0; url={address}"' in text and f'href="{address}" rel="noreferrer"' in text
     if os.name == "posix":
         assert stat.S_IMODE(page.stat().st_mode) == 0o600
-    browser.forget_pages()
+    browser.remove_redirects()
     assert not page.exists()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))  # nowhere to write: the address is typed by hand
     assert not browser.open_page(address) and len(calls) == 1

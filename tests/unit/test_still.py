@@ -10,7 +10,7 @@ import pytest
 
 import sand
 from sand.errors import BadInput
-from sand.plotting.render.scene import camera
+from sand.plotting.render.scene import camera_rotation
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import rgb
 
@@ -50,7 +50,7 @@ def test_views_are_what_they_are_called():
     for view, right, up in (("front", 0, 2), ("side", 1, 2), ("top", 0, 1)):
         turn = camera_of(view)
         np.testing.assert_allclose(turn[:2], np.eye(3)[[right, up]], atol=1e-15)
-    np.testing.assert_allclose(camera_of("iso"), camera(), atol=1e-15)
+    np.testing.assert_allclose(camera_of("iso"), camera_rotation(), atol=1e-15)
     np.testing.assert_allclose(camera_of("0,0,-2")[2], [0, 0, -1], atol=1e-15)
 
 
@@ -148,22 +148,22 @@ def test_grounds(dark):
 @pytest.mark.slow
 def test_the_same_frame_the_same_bits():
     """Two pictures of a frame agree byte for byte, as PNG, PDF and SVG."""
-    from sand.plotting.plots import picture_bytes
+    from sand.plotting.plots import figure_bytes
 
     frame = frame_of(np.arange(4)[:, None] * [2 * R, 0, 0], [(0, 1)], moment=np.eye(4, 3) * 1e-18)
     for form in ("png", "pdf", "svg"):
-        one, other = (picture_bytes(still_picture(frame, size=(300, 200), bonds="load"), form) for _ in range(2))
+        one, other = (figure_bytes(still_picture(frame, size=(300, 200), bonds="load"), form) for _ in range(2))
         assert one == other
 
 
 @pytest.mark.slow
 def test_scale_bar_and_caption():
     """The bar is as long as it says; time and grains are told; the field's arrow is there if there is a field."""
-    from sand.plotting.style import pretty
+    from sand.plotting.style import format_si
 
     picture = still_picture(frame_of([[0, 0, 0]]), field=(0.0, 0.0, 1e-3))
     (bar,) = [line for line in picture.axes[0].get_lines() if line.get_gid() == "scale"]
-    assert pretty(float(np.ptp(bar.get_xdata())), "m") in [text.get_text() for text in picture.axes[0].texts]
+    assert format_si(float(np.ptp(bar.get_xdata())), "m") in [text.get_text() for text in picture.axes[0].texts]
     told = [text.get_text() for text in picture.texts]
     assert "t = 1 µs" in told and any("1 grain of iron" in text for text in told)
     inside = [text.get_text() for axes in picture.axes for text in axes.texts]

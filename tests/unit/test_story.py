@@ -17,7 +17,7 @@ from sand.io.trajectory import TrajectoryWriter
 from sand.viewer.dataset import run_dataset
 from sand.viewer.packets import decode
 from sand.viewer.ranges import EXTREMES, PERCENTILES
-from sand.viewer.simulation_view import field_in
+from sand.viewer.simulation_view import read_field
 
 from .reels import append, contacts_of, reel
 
@@ -48,7 +48,7 @@ KEYS = [
 def test_the_manifest_of_a_run(looked_at):
     """All keys of the contract, the run's own numbers, nothing that JSON cannot hold."""
     folder, sim = looked_at
-    told = run_dataset(folder, field_in(folder)).manifest()
+    told = run_dataset(folder, read_field(folder)).manifest()
     assert list(told) == KEYS
     json.dumps(told, allow_nan=False)
     assert (told["format"], told["name"], told["grains"], told["materials"]) == (1, "run", 6, ["iron"])
@@ -89,7 +89,7 @@ def test_frames_of_a_run(looked_at):
     assert place == pytest.approx(sim.grains.position, abs=1e-14)
     assert arrays["cluster"].tolist() == [0] * 5 + [SINGLE]
     assert abs(sum(len(story.frame(k)) for k in range(6)) / story.size - 1.0) < 0.25
-    with pytest.raises(sand.BadInput, match="no 6"):
+    with pytest.raises(sand.BadInput, match="no frame 6"):
         story.frame(6)
 
 
@@ -174,9 +174,9 @@ def test_a_run_that_was_killed(tmp_path):
     path = reel(tmp_path / "trajectory.gsd", [[]], 4)
     story = run_dataset(tmp_path)
     assert story.manifest()["note"] is None
-    for age, format_quantity in ((7200, "2 h"), (86400 * 3, "3 days")):
+    for age, duration in ((7200, "2 h"), (86400 * 3, "3 days")):
         os.utime(path, (time.time() - age,) * 2)
-        note = f"no frame for {format_quantity}: it may have been killed; sand resume goes on"
+        note = f"no new frame for {duration}: the run may have been killed; sand resume continues it"
         assert story.manifest()["note"] == note and story.manifest()["running"]
     (tmp_path / "summary.json").write_text('{"steps": 0}')
     story.refresh()
@@ -189,11 +189,11 @@ def test_the_last_frames_stay_the_same_ones(tmp_path):
     writer = TrajectoryWriter(path)
     append(writer, [[]] * 6, 4)
     story = run_dataset(path)
-    story.choose(slice(-2, None))
+    story.select(slice(-2, None))
     append(writer, [[]] * 2, 4, first=6)
     story.refresh()
     assert story.manifest()["steps"] == [40, 50, 60, 70] and decode(story.frame(0))[0]["step"] == 40
-    story.choose(slice(-100, -3, 2))
+    story.select(slice(-100, -3, 2))
     append(writer, [[]], 4, first=8)
     story.refresh()
     assert story.manifest()["steps"] == [0, 20, 40]
@@ -231,7 +231,7 @@ def test_a_torn_end_is_left_out(tmp_path):
         file.seek(int(late["location"]))
         file.write(bytes(60))
     story = run_dataset(path)
-    assert len(story) == 2 and "1 frame at the end left out" in story.manifest()["note"]
+    assert len(story) == 2 and "1 incomplete frame at the end left out" in story.manifest()["note"]
     assert decode(story.frame(1))[1]["pair"].tolist() == [[0, 2]]
     assert ENTRY.itemsize == 32 and place > 0
 
@@ -314,5 +314,5 @@ def test_clusters_that_end_as_the_largest_are_named(tmp_path, monkeypatch):
     bonds = [[(0, 1), (4, 5), (6, 7)], [(0, 1), (1, 2), (2, 3), (6, 7)]]
     path = reel(tmp_path / "a.gsd", bonds, 9)
     assert run_dataset(path).manifest()["colours"]["named"] == {"0": 0, "6": 1}
-    monkeypatch.setattr("sand.viewer.dataset.FOLLOWED", 17)
+    monkeypatch.setattr("sand.viewer.dataset.MAX_TRACKED", 17)
     assert run_dataset(path).manifest()["colours"]["named"] == {}

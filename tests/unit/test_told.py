@@ -5,24 +5,26 @@ import pytest
 
 import sand
 from sand.viewer.dataset import run_dataset
-from sand.viewer.simulation_view import field_in, field_of
+from sand.viewer.simulation_view import describe_field, read_field
 
 
 @pytest.mark.compiled("fields")
 def test_a_field_is_told(looked_at):
     """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
     folder, sim = looked_at
-    told = run_dataset(folder, field_in(folder)).manifest()["field"]
+    told = run_dataset(folder, read_field(folder)).manifest()["field"]
     assert "rotating" in told["text"] and "1 mT" in told["text"]
     expected = [np.array(sim.forces[2].flux_density_at(t)) * 1e3 for t in sim.ledger["time"]]
     assert np.array(told["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
-    steady = run_dataset(folder, field_of([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
+    steady = run_dataset(folder, describe_field([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
     assert steady["direction"] == [0.0, 0.6, 0.8] and "directions" not in steady
-    assert field_of([sand.Field(0.0)]) is None and run_dataset(folder).manifest()["field"] is None
+    assert describe_field([sand.Field(0.0)]) is None and run_dataset(folder).manifest()["field"] is None
     texts = {
-        "constant": field_of([sand.Field("2 mT")])[0],
-        "oscillating at 1 MHz": field_of([sand.Field(0.0, "oscillating", amplitude="1 mT", frequency="1 MHz")])[0],
-        "to 2 mT at 1 us": field_of([sand.Field("1 mT", "ramp", final="2 mT", end="1 us")])[0],
+        "constant": describe_field([sand.Field("2 mT")])[0],
+        "oscillating at 1 MHz": describe_field([sand.Field(0.0, "oscillating", amplitude="1 mT", frequency="1 MHz")])[
+            0
+        ],
+        "to 2 mT at 1 us": describe_field([sand.Field("1 mT", "ramp", final="2 mT", end="1 us")])[0],
     }
     assert all(said in text for said, text in texts.items()), texts
 
@@ -43,7 +45,7 @@ class Homemade:
 
 def test_fields_add_up():
     """Of two, one of them a user's own, the sum is told, and both are named."""
-    text, at = field_of([sand.Field([1e-3, 0.0, 0.0]), sand.Contact(), Homemade()])
+    text, at = describe_field([sand.Field([1e-3, 0.0, 0.0]), sand.Contact(), Homemade()])
     assert text == "1 mT, constant + homemade"
     np.testing.assert_allclose(at(0.5), [1e-3, 1e-3, 0.0])
 
@@ -53,5 +55,5 @@ def test_pictures_and_pages_have_the_same_field(looked_at):
     """`flux_density` of an opened run is the field that the page is told; None where no case says so."""
     folder, sim = looked_at
     for time in sim.ledger["time"]:
-        np.testing.assert_array_equal(sand.open(folder).flux_density(time), field_in(folder)[1](time))
-    assert field_in(folder.parent) is None
+        np.testing.assert_array_equal(sand.open(folder).flux_density(time), read_field(folder)[1](time))
+    assert read_field(folder.parent) is None

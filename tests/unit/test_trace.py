@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sand.plotting.render import ray_casting as trace
-from sand.plotting.render.ray_casting import Canvas, Solids
-from sand.plotting.render.spheres import Balls, Rods, draw
+from sand.plotting.render.ray_casting import DepthBuffer, Solids
+from sand.plotting.render.spheres import Rods, Spheres, render_spheres
 
 
 @pytest.mark.parametrize("w", [0.0, 1 / 300.0])
@@ -20,7 +20,7 @@ def test_the_nearer_of_two_balls_wins_everywhere(w):
     """
     centre, radius = np.array([[-12.0, 3.0, 5.0], [14.0, -2.0, -9.0]]), np.array([40.0, 33.0])
     rods = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2))
-    canvas = Canvas((120, 160), Solids(centre, radius, *rods, np.eye(3)[:2], np.ones(2)), w)
+    canvas = DepthBuffer((120, 160), Solids(centre, radius, *rods, np.eye(3)[:2], np.ones(2)), w)
     rows, columns = np.mgrid[:120, :160]
     x, y = columns + 0.5 - 80, rows + 0.5 - 60
     depth = np.full((2, 120, 160), -np.inf)
@@ -43,7 +43,7 @@ def test_the_nearer_of_two_balls_wins_everywhere(w):
 
 @pytest.mark.parametrize("w", [0.0, 1 / 400.0])
 def test_rods_are_met_where_they_are(w):
-    """Points on a cone and a cylinder fulfil their equations: distance to the axis grows as the girth does.
+    """Points on a cone and a cylinder fulfil their equations: distance to the axis grows as the end_radii does.
 
     Tolerance 0.01 samples: the depth has 24 bits of some hundred samples.
     """
@@ -51,16 +51,16 @@ def test_rods_are_met_where_they_are(w):
         np.array([[-60.0, -30.0, -20.0], [10.0, -20.0, 30.0]]),
         np.array([[40.0, 35.0, 25.0], [60.0, 40.0, -30]]),
     )
-    girth = np.array([[14.0, 0.0], [6.0, 6.0]])
+    end_radii = np.array([[14.0, 0.0], [6.0, 6.0]])
     balls = np.zeros((0, 3)), np.zeros(0)
-    canvas = Canvas((140, 180), Solids(*balls, start, end, girth, np.eye(3)[:2], np.ones(2)), w)
+    canvas = DepthBuffer((140, 180), Solids(*balls, start, end, end_radii, np.eye(3)[:2], np.ones(2)), w)
     which, point, normal = canvas.surface(*np.nonzero(canvas.nearest))
     for k in range(2):
         q, axis = point[which == k] - start[k], end[k] - start[k]
         along = q @ axis / (axis @ axis)
         away = np.linalg.norm(q - along[:, None] * axis, axis=1)
         lids = (np.abs(along) < 1e-3) | (np.abs(along - 1.0) < 1e-3)
-        expected = girth[k, 0] + (girth[k, 1] - girth[k, 0]) * along
+        expected = end_radii[k, 0] + (end_radii[k, 1] - end_radii[k, 0]) * along
         assert len(q) > 300 and (along > -1e-3).all() and (along < 1.0 + 1e-3).all()
         np.testing.assert_allclose(away[~lids], expected[~lids], atol=0.01)
     facing = (normal * np.column_stack([-w * point[:, 0], -w * point[:, 1], np.ones(len(point))])).sum(axis=1)
@@ -75,14 +75,14 @@ def test_chunks_bound_the_memory(monkeypatch):
     bound it is twice as much.  The picture is full in the middle.
     """
     rng = np.random.default_rng(5)
-    grains = Balls(
+    grains = Spheres(
         rng.normal(size=(10_000, 3)), np.full(10_000, 0.03), np.full((10_000, 3), 0.5), np.zeros((10_000, 3))
     )
     peaks, pictures = [], []
     for most in (trace.MOST_SAMPLES, trace.MOST_SAMPLES // 20, 10**9):
         monkeypatch.setattr(trace, "MOST_SAMPLES", most)
         tracemalloc.start()
-        pictures.append(draw(grains, (-3.2, 3.2, -2.0, 2.0), 800, 500))
+        pictures.append(render_spheres(grains, (-3.2, 3.2, -2.0, 2.0), 800, 500))
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[0] < 1.1 * peaks[1] and peaks[2] > 1.5 * peaks[0]
@@ -93,8 +93,8 @@ def test_chunks_bound_the_memory(monkeypatch):
 @pytest.mark.slow
 def test_a_ball_larger_than_the_picture_is_cut_into_squares():
     """A ball that fills the picture is drawn, in pieces that are within what is looked at in one go."""
-    one = Balls(np.zeros((1, 3)), np.ones(1), np.full((1, 3), 0.5), np.zeros((1, 3)))
-    assert (draw(one, (-0.4, 0.4, -0.3, 0.3), 400, 300)[..., 3] == 1.0).all()
+    one = Spheres(np.zeros((1, 3)), np.ones(1), np.full((1, 3), 0.5), np.zeros((1, 3)))
+    assert (render_spheres(one, (-0.4, 0.4, -0.3, 0.3), 400, 300)[..., 3] == 1.0).all()
 
 
 def test_rods_join():

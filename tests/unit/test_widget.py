@@ -7,7 +7,7 @@ import pytest
 import sand
 from sand.viewer import show
 from sand.viewer.dataset import run_dataset
-from sand.viewer.notebook import answered, widget
+from sand.viewer.notebook import answer_message, widget
 from sand.viewer.packets import decode
 
 from .pages import SCRIPT
@@ -17,14 +17,14 @@ pytestmark = pytest.mark.usefixtures("bundle")
 
 @pytest.mark.compiled("fields")
 def test_messages_of_the_widget(looked_at):
-    """Each kind is answered with what the story tells, echoed so that the page knows what it asked for."""
+    """Each kind is answer_message with what the story tells, echoed so that the page knows what it asked for."""
     story = run_dataset(looked_at[0])
-    assert answered(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
-    assert answered(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
-    told, none = answered(story, {"kind": "manifest", "since": 4})
+    assert answer_message(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
+    assert answer_message(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
+    told, none = answer_message(story, {"kind": "manifest", "since": 4})
     assert len(told["manifest"]["times"]) == 2 and none == []
-    assert answered(story, {"kind": "series"})[0]["series"] == json.loads(json.dumps(story.series()))
-    assert "reason" in answered(story, {"kind": "dimension", "k": 5, "grain": 0})[0]
+    assert answer_message(story, {"kind": "series"})[0]["series"] == json.loads(json.dumps(story.series()))
+    assert "reason" in answer_message(story, {"kind": "dimension", "k": 5, "grain": 0})[0]
 
 
 @pytest.mark.compiled("fields")
@@ -45,16 +45,16 @@ def test_messages_of_the_widget(looked_at):
 )
 def test_wrong_messages(looked_at, content):
     """A sentence, whatever comes; nothing is raised in the kernel."""
-    told, buffers = answered(run_dataset(looked_at[0]), content)
+    told, buffers = answer_message(run_dataset(looked_at[0]), content)
     assert isinstance(told["error"], str) and buffers == []
 
 
 @pytest.mark.compiled("fields")
 def test_what_nobody_thought_of(looked_at, monkeypatch):
-    """An error of any kind is answered with a sentence, so that the page does not wait for ever."""
+    """An error of any kind is answer_message with a sentence, so that the page does not wait for ever."""
     story = run_dataset(looked_at[0])
     monkeypatch.setattr(story, "frame", lambda k: 1 / 0)
-    told, buffers = answered(story, {"kind": "frame", "k": 1, "id": 3})
+    told, buffers = answer_message(story, {"kind": "frame", "k": 1, "id": 3})
     assert told["id"] == 3 and "ZeroDivisionError" in told["error"] and buffers == []
 
 

@@ -75,7 +75,7 @@ def _asked(
     """The folder to write to and what to draw; `how` made ready for the picture.  Raises BadInput for all mistakes."""
     from ..analysis.quantities import GRAIN_NAMES
     from ..plotting.plots import HISTORY
-    from ..plotting.render.still import check_picture
+    from ..plotting.render.still import check_picture_options
 
     wrong: list[str] = []
     alone = source.is_file()
@@ -93,7 +93,7 @@ def _asked(
     how["size"], how["whole"] = size or (1600, 1000), not how.pop("cut")
     how["bonds"] = None if how["bonds"] == "none" else how["bonds"]
     try:
-        check_picture(how["colour"], how["bonds"], how["view"], how["size"])
+        check_picture_options(how["colour"], how["bonds"], how["view"], how["size"])
     except BadInput as error:
         wrong += error.problems
     default = source.with_name(f"{source.stem}-{FOLDER}") if alone else source / FOLDER
@@ -131,7 +131,7 @@ def _source(path: Path) -> Source:
 
 def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """All files, in memory, so that none is written unless all can be drawn.  Raises BadInput."""
-    from ..plotting.plots import HISTORY, grains_figure, history_figure, picture_bytes
+    from ..plotting.plots import HISTORY, figure_bytes, grains_figure, history_figure
     from ..plotting.render.still import still_picture
 
     history = _history(source) if any(name in HISTORY for name in names) else None
@@ -147,7 +147,7 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
             return still_picture(one, field=field, **how)
         return grains_figure(one, name, field, dark=how["dark"])
 
-    return [picture_bytes(draw(name), form, how["transparent"]) for name in names]
+    return [figure_bytes(draw(name), form, how["transparent"]) for name in names]
 
 
 def _history(source: Source) -> tuple[Any, int, float]:

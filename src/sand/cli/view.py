@@ -59,16 +59,16 @@ def command(
     A run that is still going is followed; one that is still being compiled is waited for. The page is for this machine
     alone; Ctrl-C ends it.
     """
-    from ..viewer.html import chosen_frames, write_page
+    from ..viewer.html import frame_slice, write_page
 
     target = None if html is None else Path(html)
     if target is not None:
         _refuse(target, overwrite)
-    picked = chosen_frames(chosen(frames), every)
+    picked = frame_slice(chosen(frames), every)
     story = _story(Path(folder), talk=not (quiet or as_json))
     if picked != slice(None, None, 1):
         told = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
-        story.choose(picked, ", ".join(told))
+        story.select(picked, ", ".join(told))
     if target is None:
         return _serve(story, folder, port, not no_browser, as_json, quiet)
     size = write_page(story, target, progress=None if quiet or as_json else _Bar(target))
@@ -85,16 +85,16 @@ def command(
 def _story(place: Path, talk: bool) -> Any:
     """Of the run in a folder, as soon as it has a frame.  Raises BadInput: there is none, or not within WAIT."""
     from ..viewer.dataset import run_dataset
-    from ..viewer.run_files import run_folder
-    from ..viewer.simulation_view import field_in
+    from ..viewer.run_files import find_run_folder
+    from ..viewer.simulation_view import read_field
 
     begun = time.monotonic()
     told = -TOLD_EVERY
     while True:
         waited = time.monotonic() - begun
         try:
-            home = run_folder(place)
-            return run_dataset(place, None if home is None else field_in(home))
+            home = find_run_folder(place)
+            return run_dataset(place, None if home is None else read_field(home))
         except BadInput as error:
             if not _is_beginning(place, watched=waited > 0.1):
                 raise
@@ -130,6 +130,8 @@ def _refuse(target: Path, overwrite: bool) -> None:
     """Raises BadInput for a file that is there, or a folder that is not."""
     if target.is_dir():
         raise BadInput(f"{target} is a folder; give --html the name of a file, such as {target / 'view.html'}")
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise BadInput(f"--html {target}: the name of a page must end in .html or .htm, such as {target.stem}.html")
     if target.exists() and not overwrite:
         raise BadInput(f"{target} exists; give another --html, or --overwrite")
     if not target.parent.is_dir():
@@ -159,7 +161,7 @@ class _Bar:
 
 def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
     """Until Ctrl-C."""
-    from ..viewer.browser import forget_pages, open_page
+    from ..viewer.browser import open_page, remove_redirects
     from ..viewer.server import Server
 
     server = Server(story, port)
@@ -180,7 +182,7 @@ def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, qui
         pass
     finally:
         server.stop()
-        forget_pages()
+        remove_redirects()
     if not quiet and not as_json:
         report.note("ended")
     return DONE

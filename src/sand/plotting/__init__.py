@@ -1,1 +1,1 @@
-"""Figures."""
+"""Figures of runs and experiments, and rendered images of grains."""

@@ -1,4 +1,4 @@
-"""The figure of struck chains: the shapes before and after, and the map of where they arise."""
+"""Figure of impacts on chains: the grains before and after, and maps of the resulting shapes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch
 
 from .run_figure import DPI, RunFigure
-from .style import styled
+from .style import plot_style
 
 COLOURS = {
     "T": "#D55E00",
@@ -26,16 +26,16 @@ COLOURS = {
 
 
 class Map(NamedTuple):
-    """Names of shapes (speeds, places) for one material and law."""
+    """Resulting shapes for one material and contact law."""
 
     title: str
-    speeds: Sequence[float]  # [m/s]
-    places: Sequence[float]  # [r]
-    names: np.ndarray
+    speeds: Sequence[float]  # impact speeds [m/s]
+    places: Sequence[float]  # impact positions along the chain, from the end grain [grain radii]
+    names: np.ndarray  # (speeds, places) names of shapes, keys of COLOURS
 
 
 class Picture(NamedTuple):
-    """Grains seen along z."""
+    """Grains to be drawn, as seen along z."""
 
     title: str
     position: np.ndarray  # (N, 3) [m], the projectile last
@@ -43,15 +43,15 @@ class Picture(NamedTuple):
 
 
 def chain_figure(pictures: Sequence[Picture], maps: Sequence[Map]) -> Figure:
-    """Pictures in the upper row, maps in the lower one, with one legend for all maps."""
-    with styled():
+    """Figure with pictures in the upper row, maps in the lower row, and one legend for all maps."""
+    with plot_style():
         figure = RunFigure(figsize=(3.2 * max(len(maps), len(pictures)), 5.6), dpi=DPI, layout="constrained")
         upper, lower = np.atleast_1d(figure.subfigures(2, 1, height_ratios=(1.0, 1.35)))  # type: ignore[arg-type]
         for axes, picture in zip(np.atleast_1d(upper.subplots(1, len(pictures))), pictures, strict=True):
             _draw_grains(axes, picture)
-        for axes, one in zip(np.atleast_1d(lower.subplots(1, len(maps))), maps, strict=True):
-            _draw_map(axes, one)
-        used = {str(name) for one in maps for name in np.unique(one.names)}
+        for axes, shape_map in zip(np.atleast_1d(lower.subplots(1, len(maps))), maps, strict=True):
+            _draw_map(axes, shape_map)
+        used = {str(name) for shape_map in maps for name in np.unique(shape_map.names)}
         handles = [Patch(color=colour, label=name) for name, colour in COLOURS.items() if name in used]
         lower.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
@@ -70,19 +70,19 @@ def _draw_grains(axes: Axes, picture: Picture) -> None:
     axes.set_title(picture.title, size=8)
 
 
-def _draw_map(axes: Axes, one: Map) -> None:
+def _draw_map(axes: Axes, shape_map: Map) -> None:
     order = list(COLOURS)
-    numbers = np.vectorize(order.index)(one.names)
+    numbers = np.vectorize(order.index)(shape_map.names)
     colours: Any = ListedColormap(list(COLOURS.values()))
     axes.pcolormesh(
-        np.asarray(one.places),
-        np.arange(len(one.speeds)),
+        np.asarray(shape_map.places),
+        np.arange(len(shape_map.speeds)),
         numbers,
         cmap=colours,
         norm=BoundaryNorm(np.arange(len(order) + 1) - 0.5, len(order)),
         shading="nearest",
     )
-    axes.set_yticks(np.arange(len(one.speeds)), [f"{v:g}" for v in one.speeds])
-    axes.set_xlabel("place of impact (radii from the end grain)")
+    axes.set_yticks(np.arange(len(shape_map.speeds)), [f"{v:g}" for v in shape_map.speeds])
+    axes.set_xlabel("impact position (radii from the end grain)")
     axes.set_ylabel("speed (m/s)")
-    axes.set_title(one.title, size=8)
+    axes.set_title(shape_map.title, size=8)

@@ -1,4 +1,4 @@
-"""The figure of an ensemble: S(t), moments and sizes of aggregates, with the paper's lines beside them."""
+"""Figure of an ensemble of growth simulations: S(t), moments and sizes of aggregates, with the paper's power laws."""
 
 from __future__ import annotations
 
@@ -11,89 +11,97 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from .style import BLUE, FAINT, GREEN, INK, PURPLE, RED, styled, with_prefix
+from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_prefix
 
 COLOURS = (RED, BLUE, GREEN, PURPLE)
-PAPER = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
+PAPER_EXPONENTS = {"z, Brownian": 2.0, "z, magnetic": 3.2, "moment": 0.63}
 """Exponents of Dominik & Nübold (2002): growth of S (section 3.3), and μ(N) (Figure 1)."""
+LEGEND_ROW = 0.1
+"""Height of a row of the legend, relative to the range of the data."""
 
 
 def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figure:
-    """S(t), μ(N) and N(r_g) of one or more ensembles.
+    """Figure of S(t), μ(N) and N(r_g) of one or more ensembles.
 
     Parameters
     ----------
-    ensembles : Sequence[tuple[str, Any, dict[str, Any]]]
-        name, `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment` [A m²] and
-        `unit_radius` [m] of a grain.
+    ensembles : Sequence[tuple[str, Growth, dict]]
+        For each ensemble its name, its `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment`
+        [A m²] and `unit_radius` [m], the moment and radius of one grain.
     """
-    with styled():
+    with plot_style():
         figure = Figure(figsize=(9.6, 3.3), layout="constrained")
         left, middle, right = figure.subplots(1, 3)
-        size, unit = with_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
+        size, unit = si_prefix(max(float(growth.time[-1]) for _, growth, _ in ensembles), "s")
         for (name, growth, rows), colour in zip(ensembles, cycle(COLOURS), strict=False):
-            _growth(left, name, growth, size, colour)
-            _moments(middle, growth, rows, colour)
-            _dimension(right, growth, rows, colour)
+            _draw_growth(left, name, growth, size, colour)
+            _draw_moments(middle, growth, rows, colour)
+            _draw_dimension(right, growth, rows, colour)
         for axes in (left, middle, right):
             axes.set(xscale="log", yscale="log")
-            for one in (axes.xaxis, axes.yaxis):
-                one.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-                one.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-                one.set_minor_formatter(NullFormatter())
-        left.set(xlabel=f"time [{unit}]", ylabel="mean size S")
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
+                axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                axis.set_minor_formatter(NullFormatter())
+        left.set(xlabel=f"time [{unit}]", ylabel="mean size $S$ [grains]")
+        low, high = left.get_ylim()
+        left.set_ylim(low, low * (high / low) ** (1.0 + LEGEND_ROW * (len(ensembles) + 1)))  # space for the legend
         left.legend(loc="upper left")
-        middle.set(xlabel="grains N", ylabel="moment, of one grain's")
-        right.set(xlabel="radius of gyration, in grain radii", ylabel="grains N")
-        for axes, place in ((middle, "lower right"), (right, "upper left")):
+        middle.set(xlabel="number of grains $N$", ylabel=r"moment $\mu/\mu_\mathrm{grain}$")
+        right.set(xlabel=r"radius of gyration $r_\mathrm{g}/r_\mathrm{grain}$", ylabel="number of grains $N$")
+        for axes, corner in ((middle, "lower right"), (right, "upper left")):
             if axes.get_legend_handles_labels()[0]:
-                axes.legend(loc=place)
+                axes.legend(loc=corner)
             else:
-                axes.text(0.5, 0.5, "no aggregates to show", ha="center", color=FAINT, transform=axes.transAxes)
+                axes.text(0.5, 0.5, "no aggregates", ha="center", color=MUTED, transform=axes.transAxes)
     return figure
 
 
-def _growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> None:
-    """Each box faint, the mean with its error, the fit, and the paper's slopes through the middle of the fit."""
+def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -> None:
+    """S(t) of each box, the mean with its error, the fit, and the paper's slopes through the centre of the fit."""
     time = growth.time / size
-    later = growth.time > 0.0
-    for one in growth.sizes:
-        axes.plot(time[later], one[later], color=colour, alpha=0.25, lw=0.6)
-    label = name if growth.z is None else f"{name}: $z = {_spoken(growth.z)}$"
-    axes.plot(time[later], growth.mean[later], color=colour, lw=1.8, label=label)
+    positive = growth.time > 0.0
+    for sizes in growth.sizes:
+        axes.plot(time[positive], sizes[positive], color=colour, alpha=0.25, lw=0.6)
+    label = name if growth.z is None else f"{name}: $z = {_with_error(growth.z)}$"
+    axes.plot(time[positive], growth.mean[positive], color=colour, lw=1.8, label=label)
     if len(growth.sizes) > 1:
         low, high = growth.mean - growth.error, growth.mean + growth.error
-        axes.fill_between(time[later], low[later], high[later], color=colour, alpha=0.2, lw=0)
+        axes.fill_between(time[positive], low[positive], high[positive], color=colour, alpha=0.2, lw=0)
     if growth.z is None:
         return
-    used = (growth.mean >= growth.window[0]) & (growth.sizes.max(axis=0) <= growth.window[1]) & later
-    axes.plot(time[used], growth.z.at(growth.time[used]), color=INK, lw=0.8, ls="--")
-    axes.axhline(growth.window[1], color=FAINT, lw=0.6, ls=":")
-    centre = np.exp(np.log(growth.time[used]).mean())
-    for text, z in (("2", PAPER["z, Brownian"]), ("3.2", PAPER["z, magnetic"])):
-        reach = centre * np.array([0.7, 1.4])
-        height = float(growth.z.at(centre)) * (reach / centre) ** z
-        axes.plot(reach / size, height, color=FAINT, lw=0.8)
-        axes.annotate(f"$t^{{{text}}}$", (reach[1] / size, height[1]), color=FAINT, fontsize=7)
+    fitted = (growth.mean >= growth.window[0]) & (growth.sizes.max(axis=0) <= growth.window[1]) & positive
+    axes.plot(time[fitted], growth.z.at(growth.time[fitted]), color=TEXT_COLOUR, lw=0.8, ls="--")
+    axes.axhline(growth.window[1], color=MUTED, lw=0.6, ls=":", zorder=0)
+    centre = np.exp(np.log(growth.time[fitted]).mean())
+    for text, z in (("2", PAPER_EXPONENTS["z, Brownian"]), ("3.2", PAPER_EXPONENTS["z, magnetic"])):
+        ends = centre * np.array([0.7, 1.4])
+        height = float(growth.z.at(centre)) * (ends / centre) ** z
+        axes.plot(ends / size, height, color=MUTED, lw=0.8)
+        axes.annotate(f"$t^{{{text}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=7)
 
 
-def _moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:
+def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:
     if growth.moment is None:
         return
     moment = rows["moment"] / rows["unit_moment"]
-    free = rows["rings"] == 0
-    axes.plot(rows["grains"][free], moment[free], ".", ms=3, color=colour, alpha=0.5, label="without rings")
-    axes.plot(rows["grains"][~free], moment[~free], "x", ms=3, mew=0.6, color=FAINT, alpha=0.7, label="with rings")
+    without_rings = rows["rings"] == 0
+    axes.plot(
+        rows["grains"][without_rings], moment[without_rings], ".", ms=3, color=colour, alpha=0.5, label="without rings"
+    )
+    ring_style = {"ms": 3, "mew": 0.6, "color": MUTED, "alpha": 0.7, "label": "with rings"}
+    axes.plot(rows["grains"][~without_rings], moment[~without_rings], "x", **ring_style)
     n = np.array([2.0, rows["grains"].max()])
-    axes.plot(n, growth.moment.at(n), color=INK, ls="--", lw=0.9, label=f"all: $N^{{{_spoken(growth.moment)}}}$")
+    text = f"all: $N^{{{_with_error(growth.moment)}}}$"
+    axes.plot(n, growth.moment.at(n), color=TEXT_COLOUR, ls="--", lw=0.9, label=text)
     if growth.moment_without_rings is not None:
-        text = f"without rings: $N^{{{_spoken(growth.moment_without_rings)}}}$"
+        text = f"without rings: $N^{{{_with_error(growth.moment_without_rings)}}}$"
         axes.plot(n, growth.moment_without_rings.at(n), color=colour, lw=0.9, label=text)
-    axes.plot(n, n ** PAPER["moment"], color=FAINT, lw=0.9, label="the paper: $N^{0.63}$")
+    axes.plot(n, n ** PAPER_EXPONENTS["moment"], color=MUTED, lw=0.9, label="the paper: $N^{0.63}$")
     axes.set_ylim(bottom=0.1)
 
 
-def _dimension(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:
+def _draw_dimension(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:
     if growth.dimension is None:
         return
     size = rows["gyration_radius"] / rows["unit_radius"]
@@ -101,8 +109,8 @@ def _dimension(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> No
     fit, n = growth.dimension, np.array(growth.dimension.window)
     error = "" if np.isnan(fit.error) else f" ± {fit.error:.2f}"
     text = f"$D_f$ = {fit.value:.2f}{error}"
-    axes.plot((n / fit.prefactor) ** (1.0 / fit.value), n, color=INK, ls="--", lw=0.9, label=text)
+    axes.plot((n / fit.prefactor) ** (1.0 / fit.value), n, color=TEXT_COLOUR, ls="--", lw=0.9, label=text)
 
 
-def _spoken(law: Any) -> str:
+def _with_error(law: Any) -> str:
     return f"{law.exponent:.2f}" + ("" if np.isnan(law.error) else rf" \pm {law.error:.2f}")

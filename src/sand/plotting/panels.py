@@ -1,9 +1,8 @@
-"""What happened over time: clusters, energies, losses, and whether the books balance."""
+"""Panels over time: clusters, contacts, energies, losses, and the balance of the total energy."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,90 +11,106 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from ..analysis.ledger_columns import LOSSES
 from ..constants import BOLTZMANN
 from ..state.state import LOST
-from .style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, RED, SKY, YELLOW, legend_above, power_of_ten, with_prefix
+from .style import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    TEXT_COLOUR,
+    YELLOW,
+    format_number,
+    legend_above,
+    si_prefix,
+)
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, INK, FAINT)
-OUTSIDE_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, TEXT_COLOUR, MUTED)
+EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
-COUNTS = {"contacts": ("contacts", BLUE), "made": ("made so far", GREEN), "broken": ("broken so far", RED)}
-"""Of contacts: columns, what they are called, colours."""
+COUNTS = {"contacts": ("contacts", BLUE), "made": ("formed so far", GREEN), "broken": ("broken so far", RED)}
+"""Ledger columns of contact numbers, with label and colour."""
+CHANNEL_LABELS = {"outside": "external"}
+"""Labels of loss channels that differ from the name of the ledger column."""
+OPTIONAL_CHANNELS = ("damping", "stiffness", "gas", "outside")
+"""Loss channels of forces and options that are off by default; not listed as zero in the figure."""
 
 DECADES = 6
-"""Shown of a quantity that spans many."""
-FLAT = 1e-3
-"""The balance is shown at least within this share of the energy turned over."""
+"""Decades shown of a quantity that spans many."""
+MIN_BALANCE_RANGE = 1e-3
+"""Minimum half range of the balance axis, relative to all losses and the largest kinetic energy."""
 
 
-@dataclass(frozen=True)
-class Unit:
-    """What an axis counts in: `size` in SI units, `name` for its label."""
+class AxisUnit(NamedTuple):
+    """Unit of an axis: its size in SI units, and its name for the label."""
 
     size: float
     name: str
 
 
 def column(ledger: Any, *names: str) -> np.ndarray:
-    """The sum of columns over time; not a number where a run that failed left one that is not finite."""
+    """Sum of ledger columns over time; values that are not finite, as after a failed run, become NaN."""
     total = np.sum([ledger[name] for name in names], axis=0, dtype=np.float64)
     return np.where(np.isfinite(total), total, np.nan)
 
 
 def peak(values: np.ndarray) -> float:
-    """The largest size among finite values; 0 if there is none."""
+    """Largest magnitude among the finite values; 0 if there is none."""
     return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
-def time_unit(ledger: Any) -> Unit:
-    """Seconds with the prefix that suits the length of the run."""
-    return Unit(*with_prefix(peak(ledger["time"]), "s"))
+def time_unit(ledger: Any) -> AxisUnit:
+    """Seconds, with the SI prefix that suits the length of the run."""
+    return AxisUnit(*si_prefix(peak(ledger["time"]), "s"))
 
 
-def energy_unit(ledger: Any, temperature: float, grains: int) -> Unit:
-    """N k_B T of the start, or joules with a prefix where the grains were at rest."""
+def energy_unit(ledger: Any, temperature: float, grains: int) -> AxisUnit:
+    """N k_B T₀ with the initial temperature [K]; joules with an SI prefix if the grains were initially at rest."""
     if temperature > 0.0:
         name = r"$N k_\mathrm{B}T_0$" if grains > 1 else r"$k_\mathrm{B}T_0$"
-        return Unit(grains * BOLTZMANN * temperature, name)
-    return Unit(*with_prefix(max(map(peak, (*energies(ledger).values(), *losses(ledger).values()))), "J"))
+        return AxisUnit(grains * BOLTZMANN * temperature, name)
+    return AxisUnit(*si_prefix(max(map(peak, (*energies(ledger).values(), *losses(ledger).values()))), "J"))
 
 
 def energies(ledger: Any) -> dict[str, np.ndarray]:
-    """Energies over time [J] as they are drawn: kinetic, of all contacts, magnetic, of each outside force."""
+    """Energies over time [J]: kinetic, elastic and adhesive (contacts), magnetic, and of each external force."""
     columns = list(ledger.columns)
-    outside = columns[columns.index("magnetic") + 1 : columns.index(LOSSES[0])]
-    drawn = {"kinetic": KINETIC, "contacts": ELASTIC, "magnetic": ("magnetic",)}
-    return {name: column(ledger, *parts) for name, parts in (drawn | {k: (k,) for k in outside}).items()}
+    external = columns[columns.index("magnetic") + 1 : columns.index(LOSSES[0])]
+    parts = {"kinetic": KINETIC, "contacts": ELASTIC, "magnetic": ("magnetic",)} | {name: (name,) for name in external}
+    return {name: column(ledger, *names) for name, names in parts.items()}
 
 
 def losses(ledger: Any) -> dict[str, np.ndarray]:
-    """Energy lost so far by channel [J]."""
+    """Cumulative energy loss of each channel [J]."""
     return {name: column(ledger, f"lost_{name}") for name in LOST}
 
 
 def energies_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
-    """Energies [J] that ever differ from zero, and their colours."""
+    """Energies [J] that are not always zero, with their colours."""
     drawn = {name: values for name, values in energies(ledger).items() if peak(values)}
-    outside = [name for name in drawn if name not in ENERGY_COLOURS]
-    colour = ENERGY_COLOURS | {name: OUTSIDE_COLOURS[k % len(OUTSIDE_COLOURS)] for k, name in enumerate(outside)}
+    external = [name for name in drawn if name not in ENERGY_COLOURS]
+    colour = ENERGY_COLOURS | {name: EXTERNAL_COLOURS[k % len(EXTERNAL_COLOURS)] for k, name in enumerate(external)}
     return {name: (values, colour[name]) for name, values in drawn.items()}
 
 
 def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
-    """Sizes of all losses [J] for an axis of powers of ten, NaN for 0, and their colours.
+    """Magnitudes of all losses [J] for a logarithmic axis, NaN for 0, with their colours.
 
-    What following stiffnesses, a gas and outside forces take may be negative; its size is drawn.
+    The channels stiffness, gas and external may be negative; their magnitude is drawn.
     """
     sizes = {name: np.abs(values) for name, values in losses(ledger).items()}
     colour = dict(zip(LOST, LOSS_COLOURS, strict=True))
     return {name: (np.where(size > 0.0, size, np.nan), colour[name]) for name, size in sizes.items()}
 
 
-def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
-    """S (Eq. 17), the largest cluster and the number of clusters; all are numbers from 1 to N."""
+def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
+    """Draw the mean cluster size S (Eq. 17), the largest cluster and the number of clusters, all from 1 to N."""
     t = ledger["time"] / time.size
-    style = _marks(t)
-    axes.plot(t, ledger["clusters"], color=FAINT, linewidth=1.0, label="number of clusters", **style)
+    style = _markers(t)
+    axes.plot(t, ledger["clusters"], color=MUTED, linewidth=1.0, label="number of clusters", **style)
     axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest (grains)", **style)
     axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$ (grains)", **style)
     top = max(float(ledger[name].max()) for name in ("clusters", "largest_cluster", "mean_cluster_size"))
@@ -106,51 +121,54 @@ def draw_clusters(axes: Axes, ledger: Any, time: Unit) -> None:
     legend_above(axes)
 
 
-def draw_energies(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
-    """Energies; those that never differ from zero are left out."""
+def draw_energies(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:
+    """Draw all energies that are not always zero."""
     t = ledger["time"] / time.size
     drawn = {name: (values / unit.size, colour) for name, (values, colour) in energies_drawn(ledger).items()}
-    crowded = len(set(drawn) - set(ENERGY_COLOURS)) > 1
-    longer = {} if crowded else {"contacts": "contacts (elastic, adhesion)"}
-    axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
+    has_space = len(set(drawn) - set(ENERGY_COLOURS)) <= 1
+    labels = {"contacts": "contacts (elastic, adhesion)"} if has_space else {}
+    axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
     for name, (values, colour) in drawn.items():
-        axes.plot(t, values, color=colour, label=longer.get(name, name), **_marks(t))
+        axes.plot(t, values, color=colour, label=labels.get(name, name), **_markers(t))
     if drawn:
         _scale(axes, [values for values, _ in drawn.values()])
         legend_above(axes)
     else:
-        _nothing(axes, "no energy at any time")
+        _no_data(axes, "all energies are zero")
     axes.set_ylabel(f"energy ({unit.name})")
 
 
-def draw_losses(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
-    """Losses by channel; channels too small for the frame, or without any loss, are named only."""
+def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:
+    """Draw the losses by channel; channels that are zero or below the axis are listed in a note."""
     t = ledger["time"] / time.size
     channels = {name: (size / unit.size, colour) for name, (size, colour) in losses_drawn(ledger).items()}
-    axes.set_ylabel(f"lost ({unit.name})")
+    axes.set_ylabel(f"losses ({unit.name})")
     top = max(peak(size) for size, _ in channels.values())
     if top == 0.0:
-        _nothing(axes, "nothing lost")
+        _no_data(axes, "no losses")
         return
     drawn = {name: v for name, v in channels.items() if peak(v[0]) > top * 10.0**-DECADES}
     for name, (size, colour) in drawn.items():
-        axes.plot(t, size, color=colour, label=name, **_marks(t))
-    least = min(float(np.nanmin(size)) for size, _ in drawn.values())
+        axes.plot(t, size, color=colour, label=CHANNEL_LABELS.get(name, name), **_markers(t))
+    smallest = min(float(np.nanmin(size)) for size, _ in drawn.values())
     axes.set_yscale("log")
-    axes.set_ylim(max(least / 2.0, top * 10.0**-DECADES), top * 2.5)
+    axes.set_ylim(max(smallest / 2.0, top * 10.0**-DECADES), top * 2.5)
     _log_ticks(axes)
     legend_above(axes)
-    options = ("damping", "stiffness", "gas", "outside")  # off by default: not worth a word
-    none = ", ".join(name for name, (size, _) in channels.items() if not peak(size) and name not in options)
-    tiny = ", ".join(name for name, (size, _) in channels.items() if name not in drawn and peak(size))
-    note = "; ".join(f"{what}: {which}" for what, which in (("none", none), ("tiny", tiny)) if which)
-    axes.text(0.995, 0.03, note, transform=axes.transAxes, ha="right", va="bottom", size=7, color=FAINT)
+    zero = [name for name, (size, _) in channels.items() if not peak(size) and name not in OPTIONAL_CHANNELS]
+    small = [name for name, (size, _) in channels.items() if name not in drawn and peak(size)]
+    notes = [
+        f"{text}: {', '.join(CHANNEL_LABELS.get(name, name) for name in names)}"
+        for text, names in (("none", zero), ("negligible", small))
+        if names
+    ]
+    axes.text(0.995, 0.03, "; ".join(notes), transform=axes.transAxes, ha="right", va="bottom", size=7, color=MUTED)
 
 
-def draw_contacts(axes: Axes, ledger: Any, time: Unit) -> None:
-    """Contacts of the moment, and how many were made and broken since the start."""
+def draw_contacts(axes: Axes, ledger: Any, time: AxisUnit) -> None:
+    """Draw the number of contacts, and how many have formed and broken since the start."""
     t = ledger["time"] / time.size
-    style = _marks(t)
+    style = _markers(t)
     for name, (label, colour) in COUNTS.items():
         axes.plot(t, ledger[name], color=colour, label=label, linewidth=1.9 if name == "contacts" else 1.2, **style)
     axes.set_ylim(0.0, max(1.08 * max(float(ledger[name].max()) for name in COUNTS), 4.0))
@@ -159,26 +177,26 @@ def draw_contacts(axes: Axes, ledger: Any, time: Unit) -> None:
     legend_above(axes)
 
 
-def draw_balance(axes: Axes, ledger: Any, time: Unit, unit: Unit) -> None:
-    """The total, losses included, minus its start: a flat line if the books balance."""
+def draw_balance(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:
+    """Draw the change of the total energy, losses included, which is zero for exact integration."""
     t = ledger["time"] / time.size
     total = column(ledger, "total")
     change = (total - total[0]) / unit.size
-    turned_over = (sum(map(peak, losses(ledger).values())) + peak(column(ledger, *KINETIC))) / unit.size
-    axes.axhline(0.0, color=FAINT, linewidth=0.5, zorder=0)
-    axes.plot(t, change, color=INK, linewidth=1.0, **_marks(t))
-    half = max(1.3 * peak(change), FLAT * turned_over) or 1.0
+    scale = (sum(map(peak, losses(ledger).values())) + peak(column(ledger, *KINETIC))) / unit.size
+    axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
+    axes.plot(t, change, color=TEXT_COLOUR, linewidth=1.0, **_markers(t))
+    half = max(1.3 * peak(change), MIN_BALANCE_RANGE * scale) or 1.0
     axes.set_ylim(-half, half)
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
-    axes.yaxis.set_major_formatter(FuncFormatter(_short))
+    axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
     axes.set_ylabel(f"Δ ({unit.name})")
-    drift = f"drift {power_of_ten(ledger.drift)} of the energy turned over"
-    text = f"total − start: {drift if np.isfinite(ledger.drift) else 'not a number at the end'}"
+    drift = f"relative drift {format_number(ledger.drift)}" if np.isfinite(ledger.drift) else "not finite at the end"
+    text = f"change of the total energy: {drift}"
     axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
 
 
-def draw_time(panels: list[Axes], time: Unit, ledger: Any) -> None:
-    """The common axis of time, with numbers under the lowest panel only."""
+def draw_time(panels: list[Axes], time: AxisUnit, ledger: Any) -> None:
+    """Set the common time axis, with tick labels below the lowest panel only."""
     first, last = ledger["time"][0] / time.size, ledger["time"][-1] / time.size
     margin = 0.0 if last > first else 0.5
     for axes in panels:
@@ -188,26 +206,26 @@ def draw_time(panels: list[Axes], time: Unit, ledger: Any) -> None:
     panels[-1].set_xlabel(f"time ({time.name})")
 
 
-def _marks(t: np.ndarray) -> dict[str, Any]:
-    """A line shows nothing of a single row."""
+def _markers(t: np.ndarray) -> dict[str, Any]:
+    """Markers for one or two rows, of which a line shows little or nothing."""
     return {"marker": "o", "markersize": 3.5} if t.size < 3 else {}
 
 
-def _nothing(axes: Axes, text: str) -> None:
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=7, color=FAINT)
+def _no_data(axes: Axes, text: str) -> None:
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", size=7, color=MUTED)
     axes.set_yticks([])
 
 
 def _scale(axes: Axes, curves: list[np.ndarray]) -> None:
-    """Linear if one glance holds all curves, otherwise logarithmic on both sides of zero."""
+    """Scale the axis linearly if the peaks of all curves are within a factor of 30, otherwise as symlog."""
     peaks = [peak(values) for values in curves]
     top = max(peaks)
     if min(peaks) > top / 30.0:
         axes.margins(y=0.08)
         axes.yaxis.set_major_locator(MaxNLocator(5))
-        axes.yaxis.set_major_formatter(FuncFormatter(_short))
+        axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
         return
-    # Below the smallest peak, or ever so far below the largest, the axis is linear.
+    # The axis is linear below the smallest peak, but at least below 10^-DECADES of the largest.
     linear = 10.0 ** np.floor(np.log10(max(min(peaks), top * 10.0**-DECADES)))
     high = max(2.5 * max(peak(np.maximum(values, 0.0)) for values in curves), 0.3 * linear)
     low = max(2.5 * max(peak(np.minimum(values, 0.0)) for values in curves), 0.3 * linear)
@@ -220,14 +238,14 @@ def _scale(axes: Axes, curves: list[np.ndarray]) -> None:
 
 
 def _log_ticks(axes: Axes, plain: bool = False) -> None:
-    """Powers of ten; 1, 2 and 5 where there are few; `plain` writes 1000 and not 10³."""
+    """Ticks at powers of ten, also at 2 and 5 on short axes; `plain` writes 1000 instead of 10³."""
     low, high = axes.get_ylim()
-    few = high < 250.0 * low
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=5))
-    if plain or few:
-        axes.yaxis.set_major_formatter(FuncFormatter(_short))
+    short = high < 250.0 * low
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if short else LogLocator(numticks=5))
+    if plain or short:
+        axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _short(value: float, _: int) -> str:
+def _tick_label(value: float, _: int) -> str:
     return f"{value:.4g}".replace("-", "−") if value == 0.0 or 1e-3 <= abs(value) < 1e5 else f"{value:.1e}"

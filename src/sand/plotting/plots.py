@@ -1,4 +1,4 @@
-"""One quantity, one figure: what the figure of a run has in panels, contacts over time, and how grains are spread."""
+"""Figures of `sand plot`: one quantity over time, or the distribution of a quantity over the grains of a frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.quantities import material_names, measured, quantity
 from ..errors import BadInput
 from .panels import (
-    Unit,
+    AxisUnit,
     draw_balance,
     draw_clusters,
     draw_contacts,
@@ -29,96 +29,106 @@ from .panels import (
 )
 from .render.colouring import DECADES
 from .run_figure import DPI, RunFigure
-from .style import BLUE, CHALK, INK, MIST, NIGHT, pretty, styled, with_prefix
+from .style import BLUE, DARK_BACKGROUND, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, format_si, plot_style, si_prefix
 
 SIZE = (5.6, 3.5)
-"""Inches: a column of a journal and a half."""
-_DRAW: dict[str, Callable[[Axes, Any, Unit, Unit], None]] = {
-    "size": lambda axes, books, time, _: draw_clusters(axes, books, time),
+"""Width and height [inches]: one and a half journal columns wide."""
+_DRAW: dict[str, Callable[[Axes, Any, AxisUnit, AxisUnit], None]] = {
+    "size": lambda axes, ledger, time, _: draw_clusters(axes, ledger, time),
     "energies": draw_energies,
     "losses": draw_losses,
-    "contacts": lambda axes, books, time, _: draw_contacts(axes, books, time),
+    "contacts": lambda axes, ledger, time, _: draw_contacts(axes, ledger, time),
     "balance": draw_balance,
 }
 HISTORY = tuple(_DRAW)
-"""Figures over time."""
+"""Names of the figures over time."""
 
 
-def history_figure(books: LedgerColumns, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
-    """One figure over time, of those in HISTORY.
+def history_figure(ledger: LedgerColumns, name: str, grains: int, temperature: float, dark: bool = False) -> Figure:
+    """Figure of one quantity over time.
 
     Parameters
     ----------
-    books : LedgerColumns
-        rows of a run's ledger.
+    ledger : LedgerColumns
+        Rows of the ledger of a run.
+    name : str
+        One of HISTORY.
     grains : int
-        their number; temperature: kinetic, of the start [K]: energies are in N k_B T, in joules if it is 0.
+        Number of grains N.
+    temperature : float
+        Initial kinetic temperature [K]. Energies are in N k_B T, or in joules if it is 0.
+    dark : bool, optional
+        Dark background.
 
     Raises
     ------
     BadInput
-        there is no row, or a column is missing.
+        If the ledger has no row, or lacks a column.
     """
-    if not books.rows:
-        raise BadInput("the ledger has no row yet, so that there is nothing to plot over time")
+    if not ledger.rows:
+        raise BadInput("the ledger has no row yet, so there is nothing to plot over time")
     try:
-        with styled():
-            figure, axes = _figure(SIZE)
-            time = time_unit(books)
-            _DRAW[name](axes, books, time, energy_unit(books, temperature, grains))
-            draw_time([axes], time, books)
-            _darkened(figure, dark)
+        with plot_style():
+            figure, axes = _figure()
+            time = time_unit(ledger)
+            _DRAW[name](axes, ledger, time, energy_unit(ledger, temperature, grains))
+            draw_time([axes], time, ledger)
+            _apply_dark(figure, dark)
     except KeyError as error:
-        raise BadInput(f"the ledger has no column {error}: it is of another version of SAND") from None
+        raise BadInput(f"the ledger has no column {error}; it was written by another version of SAND") from None
     return figure
 
 
 def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: bool = False) -> Figure:
-    """How a quantity is spread over the grains of a frame; of clusters, how many there are of each size.
+    """Histogram of a quantity over the grains of a frame; for `cluster`, the number of clusters of each size.
 
     Parameters
     ----------
+    frame : Frame
+        Frame of a trajectory.
     name : str
-        see `analysis.quantities.GRAINS`.
-    field : ndarray or None, optional
-        flux density of outside (3,) [T].
+        Name of a quantity in `analysis.quantities.GRAINS`.
+    field : ndarray, optional
+        (3,) external flux density [T].
+    dark : bool, optional
+        Dark background.
 
     Raises
     ------
     BadInput
-        the frame has no number for it.
+        If the frame does not have the quantity.
     """
     what = quantity(name)
     values = measured(frame, name, field)
-    with styled():
-        figure, axes = _figure(SIZE)
+    with plot_style():
+        figure, axes = _figure()
         if name == "cluster":
             sizes, numbers = size_distribution(cluster_labels(len(values), frame.pair))
             _bars(axes, sizes, numbers)
-            axes.set(xlabel="grains in a cluster", ylabel="clusters")
+            axes.set(xlabel="grains per cluster", ylabel="number of clusters")
         elif what.kind == "categorical":
             names = material_names(frame)
             axes.bar(names, np.bincount(values.astype(int), minlength=len(names)), width=0.6, color=BLUE)
-            axes.set(xlabel=what.meaning, ylabel="grains")
+            axes.set(xlabel=what.meaning, ylabel="number of grains")
         else:
             _histogram(axes, values[np.isfinite(values)], what.meaning, what.unit)
         axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-        note = f"{len(values)} grains, t = {pretty(frame.time, 's')}"
+        note = f"{len(values)} grains, t = {format_si(frame.time, 's')}"
         axes.text(1.0, 1.02, note, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
-        _darkened(figure, dark)
+        _apply_dark(figure, dark)
     return figure
 
 
 def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
-    one, prefixed = (1.0, "") if unit == "1" else with_prefix(float(np.abs(values).max(initial=0.0)), unit)
-    shown = values / one
-    axes.set(xlabel=f"{meaning} ({prefixed})" if prefixed else meaning, ylabel="grains")
+    size, prefixed = (1.0, "") if unit == "1" else si_prefix(float(np.abs(values).max(initial=0.0)), unit)
+    shown = values / size
+    axes.set(xlabel=f"{meaning} ({prefixed})" if prefixed else meaning, ylabel="number of grains")
     levels = np.unique(shown)
     if unit == "1" and len(levels) <= 40 and np.all(levels == np.round(levels)):
         _bars(axes, *np.unique(shown, return_counts=True))
         return
     low, high = float(shown.min()), float(shown.max())
-    if high - low <= 1e-6 * abs(high):  # also where all are 0
+    if high - low <= 1e-6 * abs(high):  # also if all are 0
         half = 0.5 * abs(low) or 0.5
         low, high = low - half, high + half
     bins = int(np.clip(np.sqrt(len(shown)) * 1.5, 5, 60))
@@ -130,57 +140,59 @@ def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
     axes.hist(shown, edges.tolist(), color=BLUE, edgecolor="white", linewidth=0.4)
 
 
-def _bars(axes: Axes, places: np.ndarray, numbers: np.ndarray) -> None:
-    span = float(np.ptp(places)) if len(places) > 1 else 1.0
-    axes.bar(places, numbers, width=max(0.7, span / 120.0), color=BLUE)
+def _bars(axes: Axes, x: np.ndarray, numbers: np.ndarray) -> None:
+    span = float(np.ptp(x)) if len(x) > 1 else 1.0
+    axes.bar(x, numbers, width=max(0.7, span / 120.0), color=BLUE)
     axes.xaxis.set_major_locator(MaxNLocator(10, integer=True))
 
 
-def _figure(size: tuple[float, float]) -> tuple[RunFigure, Axes]:
-    figure = RunFigure(figsize=size, dpi=DPI, layout="constrained")
+def _figure() -> tuple[RunFigure, Axes]:
+    figure = RunFigure(figsize=SIZE, dpi=DPI, layout="constrained")
     return figure, figure.subplots()
 
 
-def _darkened(figure: Figure, dark: bool) -> None:
-    """Text and frames light, the ground dark."""
+def _apply_dark(figure: Figure, dark: bool) -> None:
+    """Set a dark background with light text and axes."""
     if not dark:
         return
-    figure.set_facecolor(NIGHT)
+    figure.set_facecolor(DARK_BACKGROUND)
     for axes in figure.axes:
-        axes.tick_params(colors=CHALK, which="both")
+        axes.tick_params(colors=TEXT_ON_DARK, which="both")
         for spine in axes.spines.values():
-            spine.set_color(MIST)
+            spine.set_color(MUTED_ON_DARK)
         legend = axes.get_legend()
         for text in (*axes.texts, axes.xaxis.label, axes.yaxis.label, *(legend.get_texts() if legend else ())):
-            text.set_color(CHALK)
+            text.set_color(TEXT_ON_DARK)
         for line in axes.get_lines():
-            if line.get_color() == INK:
-                line.set_color(CHALK)
+            if line.get_color() == TEXT_COLOUR:
+                line.set_color(TEXT_ON_DARK)
 
 
-def picture_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
-    """The figure as a file: the same figure gives the same bytes.
+def figure_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
+    """Encode a figure as a file, without time stamps: equal figures give equal bytes.
 
     Parameters
     ----------
+    figure : Figure
+        Figure of matplotlib.
     form : str
         "png", "pdf" or "svg".
     transparent : bool, optional
-        without a ground.
+        Transparent background.
     """
     import matplotlib
 
-    dates: dict[str, dict[str, Any]] = {
+    metadata: dict[str, dict[str, Any]] = {
         "png": {"Software": "SAND"},
         "pdf": {"CreationDate": None, "Creator": "SAND", "Producer": "SAND"},
         "svg": {"Date": None, "Creator": "SAND"},
     }
-    with styled(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
+    with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
         figure.savefig(
             content := io.BytesIO(),
             format=form,
             dpi=DPI,
             facecolor="none" if transparent else "auto",
-            metadata=dates[form],
+            metadata=metadata[form],
         )
     return content.getvalue()

@@ -15,8 +15,8 @@ from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
 from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
-from .render.scene import Scene, draw_largest, draw_scene, scene_of, view_window
-from .style import FAINT, letter, power_of_ten, pretty, styled
+from .render.scene import Scene, draw_largest, draw_scene, make_scene, view_window
+from .style import MUTED, format_number, format_si, panel_letter, plot_style
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
@@ -55,8 +55,8 @@ def run_figure(simulation: Simulation) -> Figure:
 
     A run that has no rows in its ledger yet, or in which no position is a finite number, gets the other half.
     """
-    scene = scene_of(simulation.grains, simulation.contacts["pair"], simulation.box)
-    with styled():
+    scene = make_scene(simulation.grains, simulation.contacts["pair"], simulation.box)
+    with plot_style():
         figure = RunFigure(figsize=(WIDTH, HEIGHT), dpi=DPI)
         _draw_headline(figure, simulation)
         if simulation.ledger.rows:
@@ -80,8 +80,8 @@ def _draw_headline(figure: Figure, simulation: Simulation) -> None:
         f"{int(last['contacts'])} contacts ({int(last['made'])} made, {int(last['broken'])} broken)",
     ]
     if simulation.temperature > 0.0:
-        facts.append(f"$T_0$ = {power_of_ten(simulation.temperature)} K")
-    figure.text(_EDGE, 0.931, "  ·  ".join(facts), size=8.5, color=FAINT, va="center")
+        facts.append(f"$T_0$ = {format_number(simulation.temperature)} K")
+    figure.text(_EDGE, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
 
 
 def _count(number: float) -> str:
@@ -94,7 +94,7 @@ def headline(grains: Any, box: Box, time: float) -> str:
         f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {_materials(grains)}",
         f"r = {_span(grains.radius)}",
         _describe(box),
-        f"t = {pretty(time, 's')}",
+        f"t = {format_si(time, 's')}",
     ]
     return ",  ".join(parts)
 
@@ -107,16 +107,16 @@ def _materials(grains: Any) -> str:
 def _span(radius: np.ndarray) -> str:
     small, large = float(radius.min()), float(radius.max())
     if large < 1.001 * small:
-        return pretty(large, "m")
-    return f"{pretty(small, 'm')} to {pretty(large, 'm')}"
+        return format_si(large, "m")
+    return f"{format_si(small, 'm')} to {format_si(large, 'm')}"
 
 
 def _describe(box: Box) -> str:
     if box.is_open:
         return "open space"
     if len(set(box.lengths)) == 1:
-        return f"periodic cube of {pretty(box.shortest, 'm')}"
-    return "periodic " + " × ".join("open" if v is None else pretty(v, "m") for v in box.lengths)
+        return f"periodic cube of {format_si(box.shortest, 'm')}"
+    return "periodic " + " × ".join("open" if v is None else format_si(v, "m") for v in box.lengths)
 
 
 def _draw_history(figure: Figure, simulation: Simulation) -> None:
@@ -131,7 +131,7 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     draw_time(panels, time, ledger)
     for name, axes in zip("abcd", panels, strict=True):
         axes.yaxis.set_label_coords(-0.138, 0.5)
-        letter(axes, name, -0.185)
+        panel_letter(axes, name, -0.185)
 
 
 def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
@@ -139,31 +139,31 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
     whole = (0.03, 0.85)
     window = view_window(scene, _pixels(whole[1])[0] / _pixels(whole[1])[1])
     grain = float(np.median(scene.radius)) * _pixels(whole[1])[0] / (window[1] - window[0])
-    small = grain < SMALL_GRAIN and bool(scene.largest())
+    small = grain < SMALL_GRAIN and bool(scene.largest_clusters())
     strip = 0.235
     bottom, height = (whole[0] + strip + 0.02, whole[1] - strip - 0.02) if small else whole
     axes = _panel(figure, _RIGHT, bottom, height)
     draw_scene(axes, scene, _pixels(height))
-    letter(axes, "e", 0.0)
+    panel_letter(axes, "e", 0.0)
     axes.text(
         0.04,
         1.004,
         _caption(scene, lost),
         transform=axes.transAxes,
         size=7.5,
-        color=FAINT,
+        color=MUTED,
         va="bottom",
         ha="left",
     )
     if small:
         axes = _panel(figure, _RIGHT, whole[0], strip)
         draw_largest(axes, scene, _pixels(strip))
-        letter(axes, "f", 0.0)
+        panel_letter(axes, "f", 0.0)
 
 
 def _caption(scene: Scene, lost: int) -> str:
     told = []
-    if scene.largest():
+    if scene.largest_clusters():
         told.append("one colour per cluster, single grains grey")
     if scene.arrow.any():
         told.append("arrows: moments")
@@ -193,7 +193,7 @@ def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
 
 def png(figure: Figure) -> bytes:
     """The figure as a PNG."""
-    with styled():
+    with plot_style():
         figure.savefig(content := io.BytesIO(), **_PNG)
     return content.getvalue()
 

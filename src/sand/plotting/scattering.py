@@ -1,145 +1,174 @@
-"""Figures of scattering: trajectories (Fig. 2 of the paper), maps of the probability (Fig. 3), σ against Eq. 14."""
+"""Figures of scattering: trajectories (Fig. 2 of the paper), collision probability (Fig. 3), cross-section (Eq. 14)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle, Wedge
 
 from .run_figure import DPI, RunFigure
-from .style import BIG, BLUE, FAINT, INK, ORANGE, RED, letter, pretty, styled, with_prefix
+from .style import (
+    BLUE,
+    LARGEST_COLOURS,
+    MUTED,
+    ORANGE,
+    RED,
+    TEXT_COLOUR,
+    format_si,
+    panel_letter,
+    plot_style,
+    si_prefix,
+)
 
 DOTS = 60
-"""Dots along each trajectory, at equal times."""
-PATH = 600
-"""Points of its line."""
-SHADES = "cividis"
-"""Of probabilities: even for the eye, and for the colour-blind."""
+"""Dots along each trajectory, at equal time intervals."""
+LINE_POINTS = 600
+"""Points of the line of each trajectory."""
+LAYOUT = ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06)
+"""Paddings [inches] that keep labels with subscripts clear of the edges."""
+PROBABILITY_MAP = "cividis"
+"""Colour map of probabilities: perceptually uniform, also for colour-blind readers."""
 
 
 def trajectories_figure(
     groups: Sequence[Sequence[Any]], names: Sequence[str], scales: Any, title: str, window: float = 2.5
 ) -> Figure:
-    """A panel for each kind of spin: lines of both bodies in the plane of the flight, dots at equal times.
+    """Figure with one panel per initial spin: trajectories of both bodies in the x-y plane.
 
     Parameters
     ----------
-    groups : Sequence[Sequence[Any]]
-        `Trajectory`s of each panel; names: of the panels.
-    scales
-        `Scales`, whose `capture` lengths are told in.
+    groups : Sequence[Sequence[Trajectory]]
+        Trajectories of each panel.
+    names : Sequence[str]
+        Initial spin of each panel.
+    scales : Scales
+        Its `capture`, the impact parameter b_max of Eq. 14 [m], is the unit of length; r₁ + r₂ if it is 0.
+    title : str
+        Description of the two bodies.
     window : float, optional
-        half the width shown [b_max].
+        Half the width of a panel, in the unit of length.
     """
     unit = scales.capture or scales.touch
-    with styled():
-        figure = RunFigure(figsize=(4.6 * len(groups) + 0.4, 4.9), dpi=DPI, layout="constrained")
+    unit_name = "b_\\mathrm{max}" if scales.capture else "(r_1+r_2)"
+    with plot_style():
+        figure = RunFigure(figsize=(4.6 * len(groups) + 0.4, 4.9), dpi=DPI, layout=LAYOUT)
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, len(groups)))):
-            for one, colour in zip(groups[k], (c for _ in range(99) for c in BIG), strict=False):
-                _draw_flight(axes, one, colour, unit, window)
+            for one, colour in zip(groups[k], cycle(LARGEST_COLOURS), strict=False):
+                _draw_trajectory(axes, one, colour, unit, window)
             axes.set_xlim(-window, window)
             axes.set_ylim(-window, window)
             axes.set_aspect("equal")
-            axes.set_xlabel("$x/b_\\mathrm{max}$" if scales.capture else "$x/(r_1+r_2)$")
-            axes.set_ylabel("$y/b_\\mathrm{max}$" if scales.capture else "$y/(r_1+r_2)$")
+            axes.set_xlabel(f"$x/{unit_name}$")
+            axes.set_ylabel(f"$y/{unit_name}$")
             axes.set_title(f"spin: {names[k]}", loc="left", fontsize=8.0)
-            axes.legend(loc="upper left", fontsize=6.5)
-            letter(axes, "abcdefgh"[k], -0.12)
-        figure.suptitle(f"{title}; full lines: projectile, thin: target; dots at equal times", x=0.01, ha="left")
+            axes.legend(loc="upper left", title=f"$b/{unit_name}$", title_fontsize=7.0, fontsize=6.5, alignment="left")
+            panel_letter(axes, "abcdefgh"[k], -0.12)
+        lines = "thick lines: projectile; thin lines: target; dots: equal time intervals"
+        figure.suptitle(f"{title}\n{lines}", x=0.01, ha="left", fontsize=8.0)
     return figure
 
 
-def _draw_flight(axes: Axes, one: Any, colour: str, unit: float, window: float) -> None:
-    """One flight as seen along z; what lies outside the window sets no clock."""
+def _draw_trajectory(axes: Axes, one: Any, colour: str, unit: float, window: float) -> None:
+    """One trajectory projected along z; dots are spaced over the time that it spends in and near the window."""
     near = np.abs(one.projectile[:, :2]).max(axis=1) < 1.4 * window * unit
     near |= np.abs(one.target[:, :2]).max(axis=1) < 1.4 * window * unit
     inside = np.flatnonzero(near)
     first, last = (one.time[inside[0]], one.time[inside[-1]]) if inside.size else (one.time[0], one.time[-1])
-    label = f"b = {one.impact_parameter / unit:.4g}: {one.end}"
-    for which, width, mark in ((0, 1.2, label), (1, 0.6, None)):
-        line, dots = (one.at(np.linspace(first, last, n))[which][:, :2] / unit for n in (PATH, DOTS))
-        axes.plot(line[:, 0], line[:, 1], color=colour, linewidth=width, label=mark)
-        axes.plot(dots[:, 0], dots[:, 1], "o", color=colour, markersize=2.4 if mark else 1.6, markeredgewidth=0.0)
+    label = f"{one.impact_parameter / unit:.4g}: {one.end}"
+    for body, width, text in ((0, 1.2, label), (1, 0.6, None)):
+        line, dots = (one.at(np.linspace(first, last, n))[body][:, :2] / unit for n in (LINE_POINTS, DOTS))
+        axes.plot(line[:, 0], line[:, 1], color=colour, linewidth=width, label=text)
+        axes.plot(dots[:, 0], dots[:, 1], "o", color=colour, markersize=2.4 if text else 1.6, markeredgewidth=0.0)
     if one.end == "hit":
         x, y = one.projectile[-1, :2] / unit
-        axes.plot([x], [y], "*", color=colour, markersize=9.0, markeredgecolor=INK, markeredgewidth=0.5)
+        axes.plot([x], [y], "*", color=colour, markersize=9.0, markeredgecolor=TEXT_COLOUR, markeredgewidth=0.5)
 
 
 def map_figure(found: Any, title: str) -> Figure:
-    """Left the probability over speed and impact parameter, with b_max; right as discs for four speeds, in b_max.
+    """Figure of the collision probability over speed and impact parameter (left), and as discs for four speeds (right).
 
     Parameters
     ----------
-    found
-        a `ProbabilityMap`.
+    found : ProbabilityMap
+        Collision probabilities.
+    title : str
+        Description of the two bodies.
     """
-    with styled():
-        figure = RunFigure(figsize=(9.6, 4.4), dpi=DPI, layout="constrained")
+    with plot_style():
+        figure = RunFigure(figsize=(9.6, 4.4), dpi=DPI, layout=LAYOUT)
         left, right = np.asarray(figure.subfigures(1, 2, width_ratios=(1.25, 1.0)))
         axes = left.subplots()
-        shades = _draw_map(axes, found)
-        letter(axes, "a", -0.12)
+        mesh = _draw_map(axes, found)
+        panel_letter(axes, "a", -0.12)
         chosen = np.unique(np.linspace(0, found.speeds.size - 1, 4).round().astype(int))
         discs = np.atleast_1d(right.subplots(2, 2) if chosen.size > 1 else right.subplots()).ravel()
-        for k, place in enumerate(discs):
-            place.axis("off")
+        for k, disc in enumerate(discs):
+            disc.axis("off")
             if k < chosen.size:
-                _draw_disc(place, found, int(chosen[k]), shades)
-        letter(discs[0], "b", 0.0)
-        right.colorbar(shades, ax=list(discs), label="probability of a hit", shrink=0.8)
-        figure.suptitle(f"{title}; dashed: $b_\\mathrm{{max}}$ (Eq. 14)", x=0.01, ha="left")
+                _draw_disc(disc, found, int(chosen[k]), mesh)
+        panel_letter(discs[0], "b", 0.0)
+        right.colorbar(mesh, ax=list(discs), label="collision probability", shrink=0.8)
+        figure.suptitle(f"{title}; dashed: $b_\\mathrm{{max}}$ (Eq. 14)", x=0.01, ha="left", fontsize=9.0)
     return figure
 
 
 def _draw_map(axes: Axes, found: Any) -> Any:
-    """Cells of speed and impact parameter; each speed has cells of its own."""
+    """Draw one column of cells per speed, each with its own impact parameters, and the line of b_max."""
     speeds, unit = found.speeds, found.geometric
     middle = 0.5 * (speeds[1:] + speeds[:-1])
     first = 1.5 * speeds[0] - 0.5 * speeds[1] if speeds.size > 1 else 0.9 * speeds[0]
     last = 1.5 * speeds[-1] - 0.5 * speeds[-2] if speeds.size > 1 else 1.1 * speeds[0]
     borders = np.concatenate([[max(first, 0.0)], middle, [last]])
-    shades = None
+    mesh = None
     for v in range(speeds.size):
         column = found.probability[v][:, None]
-        shades = axes.pcolormesh(borders[v : v + 2], found.edges[v] / unit, column, cmap=SHADES, vmin=0.0, vmax=1.0)
+        mesh = axes.pcolormesh(
+            borders[v : v + 2], found.edges[v] / unit, column, cmap=PROBABILITY_MAP, vmin=0.0, vmax=1.0
+        )
     if found.capture.any():
         axes.plot(speeds, found.capture / unit, "--", color=RED, linewidth=1.4)
     axes.set_xlim(borders[0], borders[-1])
     axes.set_ylim(0.0, found.edges.max() / unit)
     axes.set_xlabel("speed $v_\\infty$ [m/s]")
     axes.set_ylabel("impact parameter $b/(r_1+r_2)$")
-    return shades
+    return mesh
 
 
-def _draw_disc(axes: Axes, found: Any, k: int, shades: Any) -> None:
-    """Annuli of one speed as the projectile sees the target."""
+def _draw_disc(axes: Axes, found: Any, k: int, mesh: Any) -> None:
+    """Draw the probabilities at one speed as annuli in the plane of impact, in units of b_max."""
     unit = found.capture[k] or found.geometric
     edges = found.edges[k] / unit
     for low, high, p in zip(edges[:-1], edges[1:], found.probability[k], strict=True):
-        colour = shades.cmap(p)
+        colour = mesh.cmap(p)
         ring = Wedge((0.0, 0.0), high, 0.0, 360.0, width=high - low, facecolor=colour, edgecolor=colour, linewidth=0.4)
         axes.add_patch(ring)
     axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linestyle="--", color=RED, linewidth=1.4))
     axes.set_xlim(-edges[-1], edges[-1])
     axes.set_ylim(-edges[-1], edges[-1])
     axes.set_aspect("equal")
-    axes.set_title(pretty(float(found.speeds[k]), "m/s"), fontsize=8.0)
+    axes.set_title(format_si(float(found.speeds[k]), "m/s"), fontsize=8.0)
 
 
 def sigma_figure(found: Sequence[Any], title: str) -> Figure:
-    """Left σ against speed with Eq. 14 and the geometric cross-section, or for one speed P(b); right c = σ/σ_Eq14.
+    """Figure of σ over speed with Eq. 14 and the geometric cross-section (left) and c = σ/σ_Eq14 (right).
+
+    With a single speed, or if Eq. 14 does not apply, the right panel shows the collision probability P(b).
 
     Parameters
     ----------
-    found : Sequence[Any]
-        `CrossSection`s.
+    found : Sequence[CrossSection]
+        Cross-sections.
+    title : str
+        Description of the two bodies.
     """
-    with styled():
-        figure = RunFigure(figsize=(9.0, 3.9), dpi=DPI, layout="constrained")
+    with plot_style():
+        figure = RunFigure(figsize=(9.0, 3.9), dpi=DPI, layout=LAYOUT)
         left, right = figure.subplots(1, 2)
         _draw_sigma(left, found)
         if len(found) > 1 and found[0].analytic > 0.0:
@@ -152,28 +181,28 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
             right.set_ylabel("$c=\\sigma/\\sigma_\\mathrm{Eq.14}$")
         else:
             _draw_profile(right, found[0])
-        letter(left, "a", -0.14)
-        letter(right, "b", -0.14)
-        figure.suptitle(title, x=0.01, ha="left")
+        panel_letter(left, "a", -0.14)
+        panel_letter(right, "b", -0.14)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=9.0)
     return figure
 
 
 def _draw_sigma(axes: Axes, found: Sequence[Any]) -> None:
-    one, name = with_prefix(max(c.sigma for c in found) ** 0.5, "m")
+    size, name = si_prefix(max(c.sigma for c in found) ** 0.5, "m")
     speeds = np.array([c.speed for c in found])
     axes.errorbar(
         speeds,
-        [c.sigma / one**2 for c in found],
-        [c.sigma_error / one**2 for c in found],
+        [c.sigma / size**2 for c in found],
+        [c.sigma_error / size**2 for c in found],
         fmt="o",
         color=BLUE,
-        label="measured",
+        label="simulated",
     )
     if found[0].analytic > 0.0:
         fine = np.geomspace(0.8 * speeds.min(), 1.25 * speeds.max(), 50)
         line = found[0].analytic * (fine / speeds[0]) ** (-4.0 / 3.0)
-        axes.plot(fine, line / one**2, "--", color=RED, label="Eq. 14")
-    axes.axhline(found[0].geometric / one**2, color=FAINT, linewidth=0.9, label="$\\pi(r_1+r_2)^2$")
+        axes.plot(fine, line / size**2, "--", color=RED, label="Eq. 14")
+    axes.axhline(found[0].geometric / size**2, color=MUTED, linewidth=0.9, label="$\\pi(r_1+r_2)^2$")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("speed $v_\\infty$ [m/s]")
@@ -182,7 +211,7 @@ def _draw_sigma(axes: Axes, found: Sequence[Any]) -> None:
 
 
 def _draw_profile(axes: Axes, found: Any) -> None:
-    """Part of the flights that hit, for each annulus."""
+    """Draw the fraction of trajectories that collide, for each annulus of impact parameters."""
     low, high, tries, hits = found.profile.T
     unit = (found.analytic / np.pi) ** 0.5 or (found.geometric / np.pi) ** 0.5
     p = hits / np.maximum(tries, 1)
@@ -194,4 +223,4 @@ def _draw_profile(axes: Axes, found: Any) -> None:
     axes.set_ylim(0.0, 1.05)
     axes.set_xlim(0.0, high[-1] / unit)
     axes.set_xlabel("$b/b_\\mathrm{max}$" if found.analytic > 0.0 else "$b/(r_1+r_2)$")
-    axes.set_ylabel("part of the flights that hit")
+    axes.set_ylabel("collision probability $P(b)$")

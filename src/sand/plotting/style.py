@@ -1,4 +1,4 @@
-"""How every figure of SAND looks: one style, colours everyone can tell apart, units with SI prefixes."""
+"""Style of all figures: matplotlib settings, colours that colour-blind readers can tell apart, SI prefixes."""
 
 from __future__ import annotations
 
@@ -18,17 +18,16 @@ BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#56B4E9",
     "#D9C400",
 )
-"""After Okabe & Ito (2008): distinct for the colour-blind too."""
-BIG = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
-"""Of the largest clusters, the largest first."""
-SMALL = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
-"""Of all others, in turn."""
-SINGLE = "#B9BDC3"
-"""Of grains without a contact."""
-INK, FAINT = "#22262B", "#7A828C"
-"""Of text and frames; of notes."""
-PAPER, NIGHT, CHALK, MIST = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
-"""Grounds, light and dark; of text and of notes on the dark one."""
+"""After Okabe & Ito (2008): distinct for colour-blind readers."""
+LARGEST_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
+"""Colours of the largest clusters, largest first."""
+OTHER_COLOURS = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
+"""Colours of all other clusters, used cyclically."""
+SINGLE_COLOUR = "#B9BDC3"
+"""Colour of grains without a contact."""
+TEXT_COLOUR, MUTED = "#22262B", "#7A828C"
+"""Colours of text and axes, and of notes and guide lines."""
+LIGHT_BACKGROUND, DARK_BACKGROUND, TEXT_ON_DARK, MUTED_ON_DARK = "#FFFFFF", "#101418", "#E9ECEF", "#98A2AD"
 ON_DARK = {
     BLUE: "#5AA9E6",
     RED: "#F08A4B",
@@ -37,19 +36,19 @@ ON_DARK = {
     ORANGE: "#F0B94A",
     SKY: "#8FD0F2",
     YELLOW: "#E8DA4F",
-    INK: CHALK,
-    FAINT: MIST,
+    TEXT_COLOUR: TEXT_ON_DARK,
+    MUTED: MUTED_ON_DARK,
 }
-"""The same colours where the ground is dark."""
+"""Line colours for dark backgrounds, by the colour for light ones."""
 
 _STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 8.0,
     "mathtext.fontset": "dejavusans",
-    "text.color": INK,
+    "text.color": TEXT_COLOUR,
     "axes.labelsize": 8.0,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": INK,
+    "axes.labelcolor": TEXT_COLOUR,
+    "axes.edgecolor": TEXT_COLOUR,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -63,8 +62,8 @@ _STYLE = {
     "lines.solid_capstyle": "round",
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
-    "xtick.color": INK,
-    "ytick.color": INK,
+    "xtick.color": TEXT_COLOUR,
+    "ytick.color": TEXT_COLOUR,
     "xtick.direction": "out",
     "ytick.direction": "out",
     "xtick.major.width": 0.7,
@@ -82,43 +81,50 @@ _PREFIX = dict(
 )
 
 
-def styled() -> AbstractContextManager[None]:
-    """The shipped style while the context lasts, whatever the user has set; that is there again after it."""
-    # Where figures are shown is no matter of style: setting a backend here would start one.
-    plain = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith(("backend", "interactive"))}
-    return matplotlib.rc_context({**plain, **_STYLE})
+def plot_style() -> AbstractContextManager[None]:
+    """Context manager that sets the SAND style and restores the user's settings on exit."""
+    # Without the backend: to set one would start it.
+    defaults = {k: v for k, v in matplotlib.rcParamsDefault.items() if not k.startswith(("backend", "interactive"))}
+    return matplotlib.rc_context({**defaults, **_STYLE})
 
 
-def with_prefix(size: float, unit: str) -> tuple[float, str]:
-    """One of the prefixed unit in SI units, and its name: of 3e-7 m, (1e-9, 'nm').
+def si_prefix(largest: float, unit: str) -> tuple[float, str]:
+    """Choose an SI prefix for a set of values.
 
     Parameters
     ----------
-    size : float
-        the largest number to be shown [SI].
+    largest : float
+        Largest magnitude among the values [SI].
+    unit : str
+        Unit without prefix.
+
+    Returns
+    -------
+    tuple of (float, str)
+        Size of the prefixed unit in SI units, and its name; (1e-9, "nm") for 3e-7 m.
     """
-    if not (math.isfinite(size) and size > 0.0):
+    if not (math.isfinite(largest) and largest > 0.0):
         return 1.0, unit
-    exponent = min(max(3 * math.floor(math.log10(size) / 3 + 1e-9), min(_PREFIX)), max(_PREFIX))
+    exponent = min(max(3 * math.floor(math.log10(largest) / 3 + 1e-9), min(_PREFIX)), max(_PREFIX))
     return float(f"1e{exponent}"), _PREFIX[exponent] + unit
 
 
-def pretty(size: float, unit: str) -> str:
-    """A number for people: 1.2e-6 m → '1.2 µm'."""
-    one, name = with_prefix(abs(size), unit)
-    return f"{size / one:.3g} {name}"
+def format_si(value: float, unit: str) -> str:
+    """Format a value with three digits and an SI prefix: 1.2e-6 m → '1.2 µm'."""
+    size, name = si_prefix(abs(value), unit)
+    return f"{value / size:.3g} {name}"
 
 
-def power_of_ten(number: float) -> str:
-    """A pure number with two digits: 6.7e-4 → '6.7×10⁻⁴', 31400 → '3.1×10⁴', 81.9 → '82'."""
-    if number == 0.0 or not math.isfinite(number) or 0.01 <= abs(number) < 1e4:
-        return f"{number:.3g}" if abs(number) >= 100.0 else f"{number:.2g}"
-    digits, exponent = f"{number:.1e}".split("e")
+def format_number(value: float) -> str:
+    """Format a pure number with two digits: 6.7e-4 → '6.7×10⁻⁴', 31400 → '3.1×10⁴', 81.9 → '82'."""
+    if value == 0.0 or not math.isfinite(value) or 0.01 <= abs(value) < 1e4:
+        return f"{value:.3g}" if abs(value) >= 100.0 else f"{value:.2g}"
+    digits, exponent = f"{value:.1e}".split("e")
     return rf"{digits}$\times 10^{{{int(exponent)}}}$"
 
 
 def legend_above(axes: Axes) -> None:
-    """The legend as one row over the frame, where it hides no data."""
+    """Draw the legend as one row above the axes, where it covers no data."""
     axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.01, 0.97),
@@ -130,17 +136,17 @@ def legend_above(axes: Axes) -> None:
     )
 
 
-def letter(axes: Axes, text: str, x: float) -> None:
-    """The panel's letter, `x` in widths of the panel."""
+def panel_letter(axes: Axes, text: str, x: float) -> None:
+    """Draw the letter of a panel at its top; `x` in units of the panel width."""
     axes.text(x, 1.0, text, transform=axes.transAxes, weight="bold", size=10.0, va="bottom", ha="left")
 
 
 def round_length(at_most: float) -> float:
-    """The largest 1, 2 or 5 times a power of ten that does not exceed `at_most`."""
+    """Largest 1, 2 or 5 times a power of ten that does not exceed `at_most`."""
     power = 10.0 ** math.floor(math.log10(at_most))
     return float(max(m for m in (1.0, 2.0, 5.0) if m * power <= at_most * (1.0 + 1e-9)) * power)
 
 
 def rgb(colour: str) -> np.ndarray:
-    """(3,) red, green, blue from 0 to 1."""
+    """Red, green and blue (3,) from 0 to 1 of a colour '#rrggbb'."""
     return np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0

@@ -126,7 +126,9 @@ def build_engine(
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     state = _new_state(wrapped, box, parameters, spec, capacity, all_pairs=not found.search.listed or None in cutoffs)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
-    search = found.reason + ("; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else "")
+    search = found.reason + (
+        "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
+    )
     engine = Engine(state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, spec)
     given = add_contacts(engine, by_type.contact, contacts)
     if by_type.contact is not None:

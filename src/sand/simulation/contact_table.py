@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
-from ..errors import NoSuchKey, did_you_mean, shown
+from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..state.state import CONTACTS, RECORDED, State
 
 COLUMNS = (

@@ -1,1 +1,1 @@
-"""The interactive viewer: its data, server, pages and notebook widget."""
+"""Interactive viewer: data of a run, HTTP server, single-file page, notebook widget."""

@@ -1,4 +1,4 @@
-"""Pages opened in the user's browser, where there is one."""
+"""Opening pages in the user's web browser, if there is one."""
 
 from __future__ import annotations
 
@@ -11,55 +11,59 @@ from pathlib import Path
 
 from ..io.page_bundle import private_page
 
-NONE = "SAND_NO_BROWSER"
-"""Environment variable: if it is set, no browser is opened."""
+NO_BROWSER = "SAND_NO_BROWSER"
+"""Environment variable that keeps SAND from opening a browser."""
+
+_REDIRECTS: list[Path] = []
+"""Temporary redirect pages to remove at exit."""
 
 
-_PAGES: list[Path] = []
-"""That lead to addresses, and are to be removed."""
-
-
-def has_window() -> bool:
-    """Whether a page can be opened in a window of its own; a browser in the terminal would block it."""
-    if os.environ.get(NONE):
+def has_display() -> bool:
+    """Whether a browser window can be opened; a browser in the terminal would block the terminal."""
+    if os.environ.get(NO_BROWSER):
         return False
-    shown = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
-    return shown or sys.platform in ("darwin", "win32")
+    display = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
+    return display or sys.platform in ("darwin", "win32")
 
 
 def open_page(url: str) -> bool:
-    """Open an address; False if there is no browser, or it cannot be opened.
+    """Open an address in the browser.
 
-    One of the server goes through a page of the user's own: the browser's command line, which other users of the
-    machine can read, then does not tell its token.
+    The address of the server is opened through a redirect page that only this user can read, because other users of the
+    machine can read the command line of the browser, and the address contains the access token.
+
+    Returns
+    -------
+    bool
+        False if there is no browser, or it could not be started.
     """
-    if not has_window():
+    if not has_display():
         return False
     import webbrowser
 
     try:
-        return webbrowser.open(_way_to(url) if url.startswith("http:") else url)
-    except Exception:  # whatever the user's browser does
+        return webbrowser.open(_redirect_page(url) if url.startswith("http:") else url)
+    except Exception:  # any failure of the user's browser: the address is printed instead
         return False
 
 
-def _way_to(url: str) -> str:
-    """A page that leads to an address, until `forget_pages` or the end of the program."""
-    where = html.escape(url, quote=True)
+def _redirect_page(url: str) -> str:
+    """Write a temporary page that redirects to `url`; `remove_redirects` or the end of the program removes it."""
+    target = html.escape(url, quote=True)
     page = private_page(
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="referrer" content="no-referrer">\n'
-        f'<meta http-equiv="refresh" content="0; url={where}">\n<title>SAND</title>\n</head>\n'
-        f'<body><p><a href="{where}" rel="noreferrer">The grains of the run</a></p></body>\n</html>\n'
+        f'<meta http-equiv="refresh" content="0; url={target}">\n<title>SAND</title>\n</head>\n'
+        f'<body><p><a href="{target}" rel="noreferrer">Open the viewer</a></p></body>\n</html>\n'
     )
-    if not _PAGES:
-        atexit.register(forget_pages)
-    _PAGES.append(page)
+    if not _REDIRECTS:
+        atexit.register(remove_redirects)
+    _REDIRECTS.append(page)
     return page.as_uri()
 
 
-def forget_pages() -> None:
-    """Remove pages that lead to addresses."""
-    while _PAGES:
+def remove_redirects() -> None:
+    """Remove the temporary redirect pages."""
+    while _REDIRECTS:
         with contextlib.suppress(OSError):
-            _PAGES.pop().unlink(missing_ok=True)
+            _REDIRECTS.pop().unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""What the page of a run is told: manifest, grains, frames, series, dimensions; see grainview/README.md."""
+"""Data of a run for the viewer page: manifest, grains, frames, time series, dimensions (see grainview/README.md)."""
 
 from __future__ import annotations
 
@@ -15,69 +15,71 @@ from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
-from ..plotting.style import BIG
+from ..plotting.style import LARGEST_COLOURS
 from ..version import __version__
-from . import dimensions
+from .dimensions import fit_dimension
 from .packets import frame_bytes, frame_packet, grains_packet
-from .ranges import ranges_of
-from .run_files import PROBLEM, RunBooks, killed_note, run_folder, summary_of
-from .series import of_frames, of_ledger
+from .ranges import quantity_ranges
+from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, stale_note
+from .series import series_from_frames, series_from_ledger
+from .simulation_view import FieldDescription
 
 FORMAT = 1
-FOLLOWED = 8_000_000
-"""Grains times frames through which clusters are followed before the page opens: about a second."""
-STEADY = 1e-9
-"""Directions of a field that differ by less are one."""
-
-FieldDescription = tuple[str, Callable[[float], Sequence[float]]]
-"""A magnetic field in words, and its flux density [T] at a time [s]."""
+MAX_TRACKED = 8_000_000
+"""Grains × frames up to which clusters are tracked through the whole run before the page opens (about 1 s)."""
+DIRECTION_TOLERANCE = 1e-9
+"""Field directions that differ by less count as constant."""
 
 
 class RunDataset:
-    """A run, told to a page; safe to be asked by several threads.
+    """Data of a run for the viewer page; safe for use by several threads.
 
     Parameters
     ----------
-    frames
-        of a trajectory (`io.live_trajectory.Following`), or what looks like them.
+    frames : LiveTrajectory or Snapshot
+        Frames of the run.
     name : str
-        of the run.
-    place : str
-        its folder, or its file.
-    books : Callable[[], LedgerColumns or None]
-        the ledger so far; None where there is none.
-    summary : Callable[[], Mapping[str, Any] or None]
-        how the run ended; None while it has not, empty where nobody knows.
-    field : FieldDescription or None, optional
-        the magnetic field, if there is one.
-    chosen : slice, optional
-        which frames are told; all by default.
+        Name of the run.
+    source : str
+        Path of the run folder or trajectory, for messages.
+    ledger : callable
+        Returns the present ledger (`LedgerColumns`), or None if there is none.
+    summary : callable
+        Returns the run summary; None while the run goes on, `{}` if it is unavailable.
+    field : FieldDescription, optional
+        External magnetic field.
     compact : bool, optional
-        frames in half precision.
+        Frames in half precision.
+
+    Attributes
+    ----------
+    notes : list of str
+        Notes for the reader of the page.
+    unit : float
+        Unit of positions and radii on the page: the mean grain radius [m].
     """
 
     def __init__(
         self,
         frames: Any,
         name: str,
-        place: str,
+        source: str,
         *,
-        books: Callable[[], LedgerColumns | None],
+        ledger: Callable[[], LedgerColumns | None],
         summary: Callable[[], Mapping[str, Any] | None],
         field: FieldDescription | None = None,
-        chosen: slice = slice(None),
         compact: bool = False,
     ):
-        self.frames, self.name, self.place, self.compact = frames, name, place, compact
+        self.frames, self.name, self.source, self.compact = frames, name, source, compact
         self.notes, self._lock = list[str](), threading.RLock()
-        self._ledger_columns, self._summary, self._field = books, summary, field
-        self._asked = chosen
-        self._begin()
+        self._read_ledger, self._read_summary, self._field = ledger, summary, field
+        self._requested = slice(None)
+        self._initialise()
         self.refresh()
 
-    def _begin(self) -> None:
-        """Of the first frame that is whole: what is the same in all."""
-        first = self._first()
+    def _initialise(self) -> None:
+        """Set what is constant during a run from its first readable frame."""
+        first = self._first_readable()
         self.grains_count, self.materials = len(first), list(first.materials)
         self.unit = float(first.radius.mean())
         self.periodic = [length is not None for length in first.box.lengths]
@@ -87,11 +89,9 @@ class RunDataset:
         self._ranges: tuple[int, dict[str, list[float]]] | None = None
         self._directions: list[list[float]] = []
         self._generation = self.frames.generation
+        self._selection = _absolute_slice(self._requested, len(self.frames))
 
-        self.chosen = _settled(self._asked, len(self.frames))
-
-    def _first(self) -> Any:
-        """Raises BadInput if no frame is whole."""
+    def _first_readable(self) -> Any:
         for number in range(len(self.frames) - 1):
             try:
                 return self.frames[number]
@@ -100,37 +100,48 @@ class RunDataset:
         return self.frames[len(self.frames) - 1]
 
     def refresh(self) -> None:
-        """Take in what has come since."""
+        """Read the summary and look for new frames."""
         with self._lock:
-            self._ended = self._summary()  # before the frames: those that came before the end are all told with it
+            # The summary first: a run counts as ended only when all frames written before its end are known.
+            self._summary = self._read_summary()
             self.frames.refresh()
             if self.frames.generation != self._generation:
-                self._begin()
+                self._initialise()
 
-    def choose(self, chosen: slice, note: str = "") -> None:
-        """Tell of these frames only; the `note` says why.  Raises BadInput if there are none.
+    def select(self, frames: slice, note: str = "") -> None:
+        """Restrict the dataset to some frames.
 
-        Numbers that count from the end count from that of now, so that the k-th frame told stays the same one.
+        Parameters
+        ----------
+        frames : slice
+            Negative bounds count from the present end, so that the selected frames stay the same in a growing run.
+        note : str, optional
+            Description of the selection for the reader of the page.
+
+        Raises
+        ------
+        BadInput
+            If the selection is empty.
         """
-        if not range(len(self.frames))[chosen]:
-            raise BadInput(f"{self.place} has {len(self.frames)} frames; none of them was chosen")
-        self._asked, self.chosen = chosen, _settled(chosen, len(self.frames))
+        if not range(len(self.frames))[frames]:
+            raise BadInput(f"{self.source} has {len(self.frames)} frames; the selection contains none of them")
+        self._requested, self._selection = frames, _absolute_slice(frames, len(self.frames))
         self.notes += [note] if note else []
 
     @property
-    def numbers(self) -> range:
-        """Numbers in the file of the frames that are told."""
-        return range(len(self.frames))[self.chosen]
+    def frame_numbers(self) -> range:
+        """Numbers of the selected frames in the trajectory."""
+        return range(len(self.frames))[self._selection]
 
     def __len__(self) -> int:
-        return len(self.numbers)
+        return len(self.frame_numbers)
 
     def manifest(self, since: int = 0) -> dict[str, Any]:
-        """What the page has to know first; times and steps from a frame on."""
+        """Manifest of the run, with `times` and `steps` from selected frame `since` on."""
         with self._lock:
-            numbers = np.array(self.numbers, dtype=int)
-            summary = self._ended
-            # a run that was resumed goes on although it has ended once
+            numbers = np.array(self.frame_numbers, dtype=int)
+            summary = self._summary
+            # A resumed run has the summary of its first part until it ends again.
             running = summary is None or summary.get("steps", np.inf) < self.frames.steps[-1]
             return {
                 "format": FORMAT,
@@ -143,143 +154,158 @@ class RunDataset:
                 "bytes": self.size,
                 "running": bool(running),
                 "outcome": None if running or summary is None else summary.get("outcome_text"),
-                "note": "; ".join(self._noted()) or None,
+                "note": "; ".join(self._all_notes()) or None,
                 "unit": self.unit,
                 "materials": self.materials,
                 "periodic": self.periodic,
-                "field": self._told_field(numbers),
+                "field": self._field_entry(numbers),
                 "ranges": self.ranges(),
                 "palettes": palettes(),
-                "colours": colours() | {"named": self._named()},
+                "colours": colours() | {"named": self._largest_clusters()},
                 "dimensions": None,
             }
 
-    def _named(self) -> dict[str, int]:
-        """Places in `big` of the clusters that are the largest in the last frame, by name: they are to be told apart.
+    def _largest_clusters(self) -> dict[str, int]:
+        """Colour index (in `big`) of the clusters that are largest in the last frame, by cluster name.
 
-        Empty where it would take long to follow clusters so far. Of a run that goes on, as it was when first asked.
+        Computed once, so that colours stay the same in a growing run; empty beyond MAX_TRACKED.
         """
         if self._largest is None:
             self._largest = {}
-            if len(self.frames) * self.grains_count <= FOLLOWED:
+            if len(self.frames) * self.grains_count <= MAX_TRACKED:
                 names, counts = np.unique(self._lineage.names(len(self.frames) - 1), return_counts=True)
-                known = names != SINGLE
-                order = np.argsort(-counts[known], kind="stable")[: len(BIG)]
-                self._largest = {str(name): place for place, name in enumerate(names[known][order].tolist())}
+                clusters = names != SINGLE
+                order = np.argsort(-counts[clusters], kind="stable")[: len(LARGEST_COLOURS)]
+                self._largest = {str(name): rank for rank, name in enumerate(names[clusters][order].tolist())}
         return self._largest
 
-    def _noted(self) -> list[str]:
+    def _all_notes(self) -> list[str]:
         torn = self.frames.torn
-        left = [f"{torn} frame{'s' if torn > 1 else ''} at the end left out: not whole"] if torn else []
-        silent = killed_note(self.frames.age) if self._ended is None else ""
-        self._ledger_columns()  # looks whether the ledger is as it should be
-        wrong = [getattr(self._ledger_columns, "problem", ""), (self._ended or {}).get(PROBLEM, "")]
-        return [*self.notes, *left, *(text for text in (silent, *wrong) if text)]
+        incomplete = f"{torn} incomplete frame{'s' if torn > 1 else ''} at the end left out" if torn else ""
+        stale = stale_note(self.frames.age) if self._summary is None else ""
+        self._read_ledger()  # updates its `problem`
+        problems = [getattr(self._read_ledger, "problem", ""), (self._summary or {}).get(PROBLEM, "")]
+        return [text for text in (*self.notes, incomplete, stale, *problems) if text]
 
     @property
     def size(self) -> int:
-        """Bytes of all frames told, as sent."""
-        contacts = self.frames.contacts[np.array(self.numbers, dtype=int)]
-        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact) + int(
-            contacts.sum() * (frame_bytes(0, 1, self.compact) - frame_bytes(0, 0, self.compact))
-        )
+        """Approximate size of all selected frames as sent [bytes]."""
+        contacts = self.frames.contacts[np.array(self.frame_numbers, dtype=int)]
+        per_contact = frame_bytes(0, 1, self.compact) - frame_bytes(0, 0, self.compact)
+        return len(contacts) * frame_bytes(self.grains_count, 0, self.compact) + int(contacts.sum() * per_contact)
 
     def grains(self) -> bytes:
-        """The packet of what stays."""
+        """Packet of the grain properties that do not change."""
         return self._grains
 
     def read(self, k: int) -> tuple[Any, np.ndarray]:
-        """The k-th frame told, and names (N,) of the clusters its grains are in.
+        """Read the k-th selected frame.
+
+        Returns
+        -------
+        tuple of (Frame, ndarray)
+            The frame, and the name (N,) of the cluster of each grain.
 
         Raises
         ------
         BadInput
-            there is none, or it is not whole.
+            If there is no such frame, or it is damaged.
         """
         with self._lock:
             if not 0 <= k < len(self):
-                raise BadInput(f"there are {len(self)} frames, from 0 to {len(self) - 1}; there is no {k}")
-            number = self.numbers[k]
+                raise BadInput(f"there is no frame {k}; there are {len(self)} frames, 0 to {len(self) - 1}")
+            number = self.frame_numbers[k]
             frame = self.frames[number]
             if len(frame) != self.grains_count:
-                raise BadInput(f"frame {number} has {len(frame)} grains; the first has {self.grains_count}")
+                raise BadInput(f"frame {number} has {len(frame)} grains; the first frame has {self.grains_count}")
             return frame, self._lineage.names(number)
 
     def frame(self, k: int) -> bytes:
-        """The packet of the k-th frame told.  Raises BadInput for one that is not there or not whole."""
-        return self.packed(k, *self.read(k))
-
-    def packed(self, k: int, frame: Any, names: np.ndarray) -> bytes:
-        """The packet of what `read` gave."""
-        return frame_packet(k, frame, names, self.unit, self.compact)
-
-    def series(self) -> dict[str, Any]:
-        """What happened over time, by the ledger; by the frames where there is none."""
-        with self._lock:
-            books = self._ledger_columns()
-            return of_ledger(books) if books else of_frames(self.frames, self.grains_count)
-
-    def dimension(self, k: int, grain: int) -> dict[str, Any]:
-        """Fractal dimension of the cluster of a grain: `value` and `error`, or the `reason` why there are none.
+        """Packet of the k-th selected frame.
 
         Raises
         ------
         BadInput
-            there is no such frame or grain.
+            If there is no such frame, or it is damaged.
+        """
+        return self.packet(k, *self.read(k))
+
+    def packet(self, k: int, frame: Any, names: np.ndarray) -> bytes:
+        """Packet of the k-th selected frame from the result of `read`."""
+        return frame_packet(k, frame, names, self.unit, self.compact)
+
+    def series(self) -> dict[str, Any]:
+        """Time series from the ledger, or from the frames if there is no ledger."""
+        with self._lock:
+            ledger = self._read_ledger()
+            return series_from_ledger(ledger) if ledger else series_from_frames(self.frames, self.grains_count)
+
+    def dimension(self, k: int, grain: int) -> dict[str, Any]:
+        """Fractal dimension of the cluster of a grain in the k-th selected frame.
+
+        Returns
+        -------
+        dict
+            `value` and `error`, or the `reason` why there is no value.
+
+        Raises
+        ------
+        BadInput
+            If there is no such frame or grain.
         """
         if not 0 <= grain < self.grains_count:
-            raise BadInput(f"there are {self.grains_count} grains, from 0 to {self.grains_count - 1}; no {grain}")
-        return dimensions.answer(*self.read(k), grain)
+            raise BadInput(f"there is no grain {grain}; there are {self.grains_count}, 0 to {self.grains_count - 1}")
+        return fit_dimension(*self.read(k), grain)
 
     def ranges(self) -> dict[str, list[float]]:
-        """Least and most of quantities by name, SI: of all numbers in EXTREMES, nearly all in PERCENTILES."""
+        """Ranges of the colour scales by quantity name, SI; computed again when the run has grown by half."""
         with self._lock:
             count = len(self.frames)
             if self._ranges is None or count > 1.5 * self._ranges[0]:
-                self._ranges = (count, ranges_of(self.frames))
+                self._ranges = (count, quantity_ranges(self.frames))
             return self._ranges[1]
 
-    def _told_field(self, numbers: np.ndarray) -> dict[str, Any] | None:
+    def _field_entry(self, numbers: np.ndarray) -> dict[str, Any] | None:
         if self._field is None or not numbers.size:
             return None
-        text, at = self._field
-        times = self.frames.times
-        self._directions += [_direction(at(float(t))) for t in times[len(self._directions) :]]
-        told = [self._directions[k] for k in numbers.tolist()]
-        steady = np.ptp(np.array(told), axis=0).max() < STEADY
-        return {"text": text, "direction": told[0]} | ({} if steady else {"directions": told})
+        new_times = self.frames.times[len(self._directions) :]
+        self._directions += [_unit_vector(self._field.flux_density(float(t))) for t in new_times]
+        directions = [self._directions[k] for k in numbers.tolist()]
+        constant = np.ptp(np.array(directions), axis=0).max() < DIRECTION_TOLERANCE
+        entry: dict[str, Any] = {"text": self._field.text, "direction": directions[0]}
+        return entry if constant else entry | {"directions": directions}
 
 
-def _settled(chosen: slice, count: int) -> slice:
-    """The same slice of so many frames, with no number that counts from the end."""
-    start, stop = chosen.start, chosen.stop
-    if start is not None and start < 0:
-        start = max(start + count, 0)
-    if stop is not None and stop < 0:
-        stop = max(stop + count, 0)
-    return slice(start, stop, chosen.step)
+def _absolute_slice(selection: slice, count: int) -> slice:
+    """The same slice of `count` frames without negative bounds."""
+    start, stop = (
+        max(bound + count, 0) if bound is not None and bound < 0 else bound
+        for bound in (selection.start, selection.stop)
+    )
+    return slice(start, stop, selection.step)
 
 
-def _direction(vector: Sequence[float]) -> list[float]:
+def _unit_vector(vector: Sequence[float]) -> list[float]:
     size = float(np.linalg.norm(vector))
-    return [float(f"{part / size:.9g}") if size > 0.0 else 0.0 for part in vector]
+    return [float(f"{component / size:.9g}") if size > 0.0 else 0.0 for component in vector]
 
 
 def run_dataset(path: str | Path, field: FieldDescription | None = None) -> RunDataset:
-    """The story of a run in a folder, or of a trajectory of SAND by itself.
+    """Open a run folder, or a trajectory written by SAND, for the viewer.
 
     Raises
     ------
     BadInput
-        there is no run, or no frame yet, or the file is foreign or broken.
+        If there is no run, no frame yet, or the trajectory is damaged or was written by another program.
     """
-    place = Path(path)
-    folder = run_folder(place)
+    source = Path(path)
+    folder = find_run_folder(source)
     if folder is None:
-        if not place.is_file():
-            lacks = f"there is no {files.TRAJECTORY} in it" if place.is_dir() else "there is no such folder or file"
-            raise BadInput(f"{path} is neither the folder of a run nor a trajectory: {lacks}")
-        return RunDataset(LiveTrajectory(place), place.stem, str(path), books=lambda: None, summary=dict, field=field)
+        if not source.is_file():
+            reason = f"there is no {files.TRAJECTORY} in it" if source.is_dir() else "there is no such folder or file"
+            raise BadInput(f"{path} is neither a run folder nor a trajectory: {reason}")
+        frames = LiveTrajectory(source)
+        return RunDataset(frames, source.stem, str(path), ledger=lambda: None, summary=dict, field=field)
     frames = LiveTrajectory(folder / files.TRAJECTORY)
-    name = folder.resolve().name
-    return RunDataset(frames, name, str(path), books=RunBooks(folder), summary=lambda: summary_of(folder), field=field)
+    name, ledger = folder.resolve().name, LedgerReader(folder)
+    return RunDataset(frames, name, str(path), ledger=ledger, summary=lambda: read_summary(folder), field=field)

@@ -1,4 +1,4 @@
-"""Fractal dimension of single clusters of a frame, for the page of a run."""
+"""Fractal dimension of single clusters of a frame, for the viewer page."""
 
 from __future__ import annotations
 
@@ -12,52 +12,75 @@ from ..analysis.tracking import SINGLE
 from ..errors import BadInput
 from ..io.run_folder import plain
 
-LARGEST = 8
-"""Clusters of a frame that a page without a source knows the dimension of, the largest."""
+MAX_CLUSTERS = 8
+"""Number of clusters per frame, largest first, whose dimension is stored in a single-file page."""
 
 
-def cluster_dimension(frame: Any, who: np.ndarray) -> Dimension:
-    """Of the cluster of the grains `who` (S,), in ascending order.  Raises BadInput for too few of them."""
-    chosen = np.zeros(len(frame.position), dtype=bool)
-    chosen[who] = True
-    held = np.searchsorted(who, frame.pair[chosen[frame.pair[:, 0]]])
-    return correlation_dimension(unwrapped(frame.position[who], held, frame.box))
+def cluster_dimension(frame: Any, members: np.ndarray) -> Dimension:
+    """Correlation dimension of one cluster.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame of a trajectory.
+    members : ndarray
+        (S,) indices of the grains of the cluster, ascending.
+
+    Raises
+    ------
+    BadInput
+        If the cluster has too few grains for a fit.
+    """
+    is_member = np.zeros(len(frame.position), dtype=bool)
+    is_member[members] = True
+    pairs = np.searchsorted(members, frame.pair[is_member[frame.pair[:, 0]]])
+    return correlation_dimension(unwrapped(frame.position[members], pairs, frame.box))
 
 
-def answer(frame: Any, names: np.ndarray, grain: int) -> dict[str, Any]:
-    """`value` and `error` of the cluster of a grain, or the `reason` why there are none."""
+def fit_dimension(frame: Any, names: np.ndarray, grain: int) -> dict[str, Any]:
+    """Dimension of the cluster of a grain: `value` and `error`, or the `reason` why there is none.
+
+    Parameters
+    ----------
+    frame : Frame
+        Frame of a trajectory.
+    names : ndarray
+        (N,) name of the cluster of each grain.
+    grain : int
+        Index of the grain.
+    """
     if names[grain] == SINGLE:
-        return {"reason": f"grain {grain} touches none"}
+        return {"reason": f"grain {grain} has no contact"}
     try:
-        found = cluster_dimension(frame, np.flatnonzero(names == names[grain]))
+        fit = cluster_dimension(frame, np.flatnonzero(names == names[grain]))
     except BadInput as error:
         return {"reason": str(error)}
-    return dict(plain({"value": found.value, "error": found.error}))
+    return dict(plain({"value": fit.value, "error": fit.error}))
 
 
 class Dimensions:
-    """Dimensions of the largest clusters, frame after frame; a cluster of the same grains is not measured again."""
+    """Dimensions of the largest clusters, frame by frame; unchanged clusters are not fitted again."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[bytes, list[float | None] | None]] = {}
+        self._previous: dict[int, tuple[bytes, list[float | None] | None]] = {}
 
     def of(self, frame: Any, names: np.ndarray) -> dict[str, list[float | None]]:
-        """D and its error by name, of at most LARGEST clusters of at least 32 grains."""
-        found, sizes = np.unique(names[names != SINGLE], return_counts=True)
-        order = np.argsort(-sizes, kind="stable")[:LARGEST]
-        now: dict[int, tuple[bytes, list[float | None] | None]] = {}
-        for name in found[order[sizes[order] >= FEWEST]].tolist():
-            who = np.flatnonzero(names == name)
-            key = who.astype(np.uint32).tobytes()
-            known = self._known.get(name)
-            now[name] = known if known is not None and known[0] == key else (key, _measured(frame, who))
-        self._known = now
-        return {str(name): pair for name, (_, pair) in now.items() if pair is not None}
+        """Dimension and its error by cluster name, for at most MAX_CLUSTERS clusters of at least 32 grains."""
+        clusters, sizes = np.unique(names[names != SINGLE], return_counts=True)
+        order = np.argsort(-sizes, kind="stable")[:MAX_CLUSTERS]
+        fits: dict[int, tuple[bytes, list[float | None] | None]] = {}
+        for name in clusters[order[sizes[order] >= FEWEST]].tolist():
+            members = np.flatnonzero(names == name)
+            key = members.astype(np.uint32).tobytes()
+            previous = self._previous.get(name)
+            fits[name] = previous if previous is not None and previous[0] == key else (key, _fit(frame, members))
+        self._previous = fits
+        return {str(name): fit for name, (_, fit) in fits.items() if fit is not None}
 
 
-def _measured(frame: Any, who: np.ndarray) -> list[float | None] | None:
+def _fit(frame: Any, members: np.ndarray) -> list[float | None] | None:
     try:
-        found = cluster_dimension(frame, who)
+        fit = cluster_dimension(frame, members)
     except BadInput:
         return None
-    return list(plain([found.value, found.error]))
+    return list(plain([fit.value, fit.error]))

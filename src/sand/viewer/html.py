@@ -1,4 +1,4 @@
-"""The page of a run: as the server hands it out, and as one file that needs nothing else."""
+"""HTML of the viewer page: as served by `sand view`, and as a single file with all data."""
 
 from __future__ import annotations
 
@@ -20,136 +20,145 @@ from ..io.run_folder import plain
 from .dataset import RunDataset
 from .dimensions import Dimensions
 
-CLOSED = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data: blob:; media-src blob:; "
-"""What neither page may do: load anything from elsewhere, or send anything anywhere."""
-SERVED = CLOSED + "script-src 'self'; style-src 'self'; connect-src 'self'; frame-ancestors 'none'"
-"""The policy of the page that the server hands out."""
-LEVEL = 6
-"""Of gzip; a higher one takes longer, and packets of moving grains hardly get smaller."""
-MEASURED = 5e7
-"""Grains to the power 3/2, all frames together, whose clusters' dimensions are worked out for a file: some 20 s."""
+BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data: blob:; media-src blob:; "
+"""Content security policy of both pages: nothing is loaded from or sent to other sites."""
+SERVED_POLICY = BASE_POLICY + "script-src 'self'; style-src 'self'; connect-src 'self'; frame-ancestors 'none'"
+GZIP_LEVEL = 6
+"""Higher levels take longer and hardly reduce the size of packets."""
+DIMENSION_COST = 5e7
+"""Limit of Σ N^(3/2) over the frames whose fractal dimensions are stored in a single file (about 20 s)."""
 
-NO_SCRIPT = "This page draws moving grains; please allow it to run its script."
-
-NOT_WHOLE = "Reading the frames … If this stays, the file is not whole: ask for it again."
-"""What a file says until its script, which is at its end, has run."""
+NO_SCRIPT = "The viewer needs JavaScript; please allow this page to run its script."
+LOADING = "Reading the frames … If this message stays, the file is incomplete; write it again."
+"""Shown until the script at the end of the file runs."""
 
 
-def served(title: str) -> str:
-    """The page of the server."""
-    return _page(
-        title,
-        '<link rel="stylesheet" href="grainview.css">\n',
-        '<script type="module" src="grainview.js"></script>\n',
-    )
+def page_title(dataset: RunDataset) -> str:
+    """Title of the page of a run."""
+    return f"{dataset.name} – SAND"
 
 
-def _page(title: str, head: str, body: str) -> str:
-    return _top(title, head) + body + _BOTTOM
+def served_page(title: str) -> str:
+    """HTML of the page as served by `server.Server`."""
+    styles = '<link rel="stylesheet" href="grainview.css">\n'
+    return _head(title, styles) + '<script type="module" src="grainview.js"></script>\n' + _FOOT
 
 
-def _top(title: str, head: str, within: str = "") -> str:
+def _head(title: str, styles: str, content: str = "") -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="referrer" content="no-referrer">\n'
-        f'<link rel="icon" href="data:,">\n<title>{html.escape(title)}</title>\n{head}</head>\n<body>\n'
-        f'<div id="grainview">{within}</div>\n<noscript>{NO_SCRIPT}</noscript>\n'
+        f'<link rel="icon" href="data:,">\n<title>{html.escape(title)}</title>\n{styles}</head>\n<body>\n'
+        f'<div id="grainview">{content}</div>\n<noscript>{NO_SCRIPT}</noscript>\n'
     )
 
 
-_BOTTOM = "</body>\n</html>\n"
+_FOOT = "</body>\n</html>\n"
 
 
 def write_page(
-    story: RunDataset, path: str | Path, *, progress: Callable[[int, int], None] | None = None, bundle: Any = None
+    dataset: RunDataset,
+    path: str | Path,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    bundle: tuple[str, str] | None = None,
 ) -> int:
-    """One file with all frames of a story, which becomes a `compact` one; returns its bytes.
+    """Write a single-file page with all selected frames of a dataset, in half precision.
 
     Frames are read, packed and written one by one.
 
     Parameters
     ----------
+    dataset : RunDataset
+        Data of the run; its `compact` is set.
     path : str or Path
-        of the file, .html; replaced if it is there.
-    progress : Callable[[int, int], None] or None, optional
-        told how many frames of how many are written.
-    bundle : optional
-        script and sheet of styles, of the package by default.
+        Path of the HTML file; an existing file is replaced.
+    progress : callable, optional
+        Called with the number of frames written so far and in total.
+    bundle : tuple of (str, str), optional
+        Script and style sheet; those of the package by default.
+
+    Returns
+    -------
+    int
+        Size of the file [bytes].
 
     Raises
     ------
     BadInput
-        the bundle is missing; a frame is not whole.
+        If the viewer page is not installed, or a frame is damaged.
     FilesFailed
-        the file cannot be written.
+        If the file cannot be written.
     """
     script, styles = bundle or read_bundle()
-    script = _harmless(f"\n{script}\n")
-    allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    policy = f"{CLOSED}script-src 'sha256-{allowed}'; style-src 'unsafe-inline'"
+    script = _escape_script(f"\n{script}\n")
+    script_hash = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = f"{BASE_POLICY}script-src 'sha256-{script_hash}'; style-src 'unsafe-inline'"
     styles = re.sub("</(?=style)", r"<\\/", styles, flags=re.IGNORECASE)
     head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n<style>\n{styles}\n</style>\n'
-    story.compact = True
-    count, dimensions, measured = len(story), [], _measured(story)
-    measure = Dimensions()
+    dataset.compact = True
+    count, dimensions, stride = len(dataset), [], _dimension_stride(dataset)
+    largest_clusters = Dimensions()
     with Written(path) as file:
-        file.write(_top(_title(story), head, f"<p>{NOT_WHOLE}</p>"))
-        file.write(_block("sand-grains", story.grains()))
+        file.write(_head(page_title(dataset), head, f"<p>{LOADING}</p>"))
+        file.write(_packet_element("sand-grains", dataset.grains()))
         for k in range(count):
-            frame, names = story.read(k)
-            file.write(_block(f"sand-frame-{k}", story.packed(k, frame, names)))
-            dimensions.append(measure.of(frame, names) if k % measured == 0 else {})
+            frame, names = dataset.read(k)
+            file.write(_packet_element(f"sand-frame-{k}", dataset.packet(k, frame, names)))
+            dimensions.append(largest_clusters.of(frame, names) if k % stride == 0 else {})
             if progress:
                 progress(k + 1, count)
-        manifest = story.manifest() | {"running": False, "dimensions": dimensions}
-        if measured > 1 and any(dimensions):
-            said = f"fractal dimensions of one frame of {measured}"
-            manifest["note"] = "; ".join(filter(None, (manifest["note"], said)))
-        file.write(_json("sand-manifest", manifest))
-        file.write(_json("sand-series", story.series()))
-        file.write(f'<script type="module">{script}</script>\n{_BOTTOM}')
+        manifest = dataset.manifest() | {"running": False, "dimensions": dimensions}
+        if stride > 1 and any(dimensions):
+            note = f"fractal dimensions of one frame of {stride}"
+            manifest["note"] = "; ".join(filter(None, (manifest["note"], note)))
+        file.write(_json_element("sand-manifest", manifest))
+        file.write(_json_element("sand-series", dataset.series()))
+        file.write(f'<script type="module">{script}</script>\n{_FOOT}')
     return file.size
 
 
-def _title(story: RunDataset) -> str:
-    return f"{story.name} – SAND"
+def _dimension_stride(dataset: RunDataset) -> int:
+    """Every how many frames fractal dimensions are computed."""
+    if dataset.grains_count < FEWEST:
+        return len(dataset) + 1
+    return max(math.ceil(dataset.grains_count**1.5 * len(dataset) / DIMENSION_COST), 1)
 
 
-def _measured(story: RunDataset) -> int:
-    """Dimensions are worked out for every such frame."""
-    if story.grains_count < FEWEST:
-        return len(story) + 1
-    return max(math.ceil(story.grains_count**1.5 * len(story) / MEASURED), 1)
-
-
-def _block(key: str, packet: bytes) -> bytes:
-    """A packet, zipped; the same bytes whenever it is written."""
-    text = base64.b64encode(gzip.compress(packet, LEVEL, mtime=0))
+def _packet_element(key: str, packet: bytes) -> bytes:
+    """Script element with a compressed packet; without a time stamp, so that equal packets give equal bytes."""
+    text = base64.b64encode(gzip.compress(packet, GZIP_LEVEL, mtime=0))
     return b'<script type="application/octet-stream" id="%s">%s</script>\n' % (key.encode(), text)
 
 
-def _json(key: str, content: dict[str, Any]) -> str:
-    """JSON that cannot end its element."""
+def _json_element(key: str, content: dict[str, Any]) -> str:
+    """Script element with JSON, in which `<` is escaped so that no text can end the element."""
     text = json.dumps(plain(content), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     return f'<script type="application/json" id="{key}">{text}</script>\n'
 
 
-def _harmless(script: str) -> str:
-    """A script that cannot end its element: what would is inside text there, and is written in another way."""
-    lines = script.replace("\r\n", "\n").replace("\r", "\n")  # as a browser reads it, before it takes the hash
+def _escape_script(script: str) -> str:
+    """Script with `</script` and `<!--` in string literals escaped, so that they cannot end its element."""
+    lines = script.replace("\r\n", "\n").replace("\r", "\n")  # as browsers do before they hash the script
     return re.sub("<(?=/script|!--)", r"\\x3c", lines, flags=re.IGNORECASE)
 
 
-def fitting(story: RunDataset, most: float) -> int:
-    """Every which frame is to be told so that all of them take at most so many bytes."""
-    return max(-(-story.size // int(most)), 1)
+def frame_stride(dataset: RunDataset, most: float) -> int:
+    """Smallest stride with which the selected frames take at most `most` bytes."""
+    return max(-(-dataset.size // int(most)), 1)
 
 
-def chosen_frames(frames: slice, every: int) -> slice:
-    """Every so many of a slice.  Raises BadInput for less than 1, and for a slice that goes backwards."""
+def frame_slice(frames: slice, every: int) -> slice:
+    """Every `every`-th frame of a slice.
+
+    Raises
+    ------
+    BadInput
+        If `every` or the step of the slice is less than 1.
+    """
     if every < 1:
-        raise BadInput(f"every = {every} must be a whole number of at least 1")
+        raise BadInput(f"every = {every} must be an integer of at least 1")
     if frames.step is not None and frames.step < 1:
-        raise BadInput(f"frames in steps of {frames.step}: the page tells them in order; give a step of at least 1")
+        raise BadInput(f"frames with step {frames.step}: the viewer plays frames forwards; give a step of at least 1")
     return slice(frames.start, frames.stop, (frames.step or 1) * every)

@@ -1,4 +1,4 @@
-"""The page of a run in a notebook: an anywidget that asks the kernel for frames."""
+"""The viewer page as a notebook widget: an anywidget that requests frames from the kernel."""
 
 from __future__ import annotations
 
@@ -16,76 +16,80 @@ def has_widgets() -> bool:
     return importlib.util.find_spec("anywidget") is not None
 
 
-def widget(story: RunDataset) -> Any:
-    """A widget that shows a story.
+def widget(dataset: RunDataset) -> Any:
+    """Create a widget that shows a dataset.
 
     Raises
     ------
     BadInput
-        anywidget is not installed, or the page is missing.
+        If anywidget or the viewer page is not installed.
     """
     if not has_widgets():
-        raise BadInput("a page in a notebook needs anywidget: pip install anywidget")
-    return _kind(*read_bundle())(story)
+        raise BadInput("the viewer in a notebook needs anywidget: pip install anywidget")
+    return _widget_class(*read_bundle())(dataset)
 
 
-def _kind(script: str, styles: str) -> Any:
-    """The class, made when it is first wanted: anywidget is imported nowhere else."""
+def _widget_class(script: str, styles: str) -> Any:
+    """Define the widget class; in a function, because anywidget is an optional dependency."""
     import anywidget
 
     class GrainWidget(anywidget.AnyWidget):
-        """Grains of a run that move.
+        """Animated view of the grains of a run.
+
+        Messages from the page, such as {"kind": "frame", "k": 3}, are answered by `answer_message`.
 
         Parameters
         ----------
-        story : Story
-            of the run.
-
-        The page sends what it asks for, such as {"kind": "frame", "k": 3}, and gets the same back with the answer, or
-        with `error`, a sentence; packets come as the first buffer.
+        dataset : RunDataset
+            Data of the run.
         """
 
         _esm, _css = script, styles
 
-        def __init__(self, story: RunDataset):
+        def __init__(self, dataset: RunDataset):
             super().__init__()
-            self._story = story
-            self.on_msg(self._asked)
+            self._dataset = dataset
+            self.on_msg(self._on_message)
 
-        def _asked(self, _: Any, content: Any, buffers: Any) -> None:
-            """Answer a message."""
-            self.send(*answered(self._story, content))
+        def _on_message(self, _: Any, content: Any, buffers: Any) -> None:
+            self.send(*answer_message(self._dataset, content))
 
     return GrainWidget
 
 
-def answered(story: RunDataset, content: Any) -> tuple[dict[str, Any], list[bytes]]:
-    """The answer to a message, and its buffers; see grainview/README.md."""
-    asked = content if isinstance(content, dict) else {}
-    kind = asked.get("kind")
-    echo = {key: asked[key] for key in ("kind", "k", "grain", "since", "id") if key in asked}
+def answer_message(dataset: RunDataset, content: Any) -> tuple[dict[str, Any], list[bytes]]:
+    """Answer a message of the widget (format: grainview/README.md).
+
+    Returns
+    -------
+    tuple of (dict, list of bytes)
+        The message with the result or an `error` text added, and the packet as the first buffer, if any.
+    """
+    request = content if isinstance(content, dict) else {}
+    kind = request.get("kind")
+    echo = {key: request[key] for key in ("kind", "k", "grain", "since", "id") if key in request}
     try:
         if kind == "grains":
-            return echo, [story.grains()]
+            return echo, [dataset.grains()]
         if kind == "series":
-            return echo | {"series": plain(story.series())}, []
+            return echo | {"series": plain(dataset.series())}, []
         if kind == "manifest":
-            story.refresh()
-            return echo | {"manifest": plain(story.manifest(_number(asked, "since")))}, []
+            dataset.refresh()
+            return echo | {"manifest": plain(dataset.manifest(_index(request, "since")))}, []
         if kind == "frame":
-            return echo, [story.frame(_number(asked, "k"))]
+            return echo, [dataset.frame(_index(request, "k"))]
         if kind == "dimension":
-            return echo | plain(story.dimension(_number(asked, "k"), _number(asked, "grain"))), []
+            return echo | plain(dataset.dimension(_index(request, "k"), _index(request, "grain"))), []
         raise BadInput(f"kind = {kind!r}; allowed: manifest, series, grains, frame, dimension")
     except BadInput as error:
         return echo | {"error": str(error)}, []
-    except Exception as error:  # the page waits for an answer, whatever it is
+    except Exception as error:  # the page waits for an answer in any case
         return echo | {"error": f"internal error ({type(error).__name__}: {error})"}, []
 
 
-def _number(asked: dict[str, Any], key: str) -> int:
-    """A count from the page.  Raises BadInput."""
-    value = asked.get(key, 0 if key == "since" else None)
+def _index(request: dict[str, Any], key: str) -> int:
+    """A non-negative integer of a message; `since` is optional."""
+    value = request.get(key, 0 if key == "since" else None)
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise BadInput(f"{key} = {value!r} must be a whole number of at least 0")
+        raise BadInput(f"{key} = {value!r} must be an integer of at least 0")
     return value

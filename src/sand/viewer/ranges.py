@@ -1,4 +1,4 @@
-"""Between which numbers the quantities of a run lie: what scales of colours go from and to."""
+"""Ranges of the quantities of a run, for the colour scales of the viewer page."""
 
 from __future__ import annotations
 
@@ -8,42 +8,41 @@ import numpy as np
 
 from ..analysis.quantities import measured
 from ..errors import BadInput
-from .series import thinned
+from .series import evenly_spaced
 
-LOOKED_AT = 12
-"""Frames that ranges are taken from."""
+SAMPLED_FRAMES = 12
+"""Number of frames, spread evenly over the run, from which ranges are computed."""
 PERCENTILES = ("speed", "spin", "kinetic_energy")
-"""Quantities of grains of which few have very large numbers: their ranges leave those out."""
+"""Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
 EXTREMES = ("size", "radius", "coordination", "moment", "load")
-"""Whose ranges hold all; `moment` and `load`: of sizes."""
-RANGE = (1.0, 99.9)
-"""Percentiles between which a range of PERCENTILES goes."""
+"""Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""
+PERCENTILE_LIMITS = (1.0, 99.9)
 
 
-def ranges_of(frames: Any) -> dict[str, list[float]]:
-    """Least and most of quantities by name, SI: of all numbers in EXTREMES, nearly all in PERCENTILES.
+def quantity_ranges(frames: Any) -> dict[str, list[float]]:
+    """Ranges [low, high] of the magnitudes of all quantities in PERCENTILES and EXTREMES, by name, SI.
 
     Parameters
     ----------
-    frames
-        of a trajectory; some, spread through the run, are looked at. Those that are not whole are left out.
+    frames : LiveTrajectory or Snapshot
+        Frames of a run, of which SAMPLED_FRAMES are read; damaged frames are skipped.
     """
-    seen: dict[str, list[np.ndarray]] = {name: [] for name in (*PERCENTILES, *EXTREMES)}
-    for number in thinned(len(frames), LOOKED_AT):
+    samples: dict[str, list[np.ndarray]] = {name: [] for name in (*PERCENTILES, *EXTREMES)}
+    for number in evenly_spaced(len(frames), SAMPLED_FRAMES):
         try:
             frame = frames[int(number)]
         except BadInput:
             continue
-        for name, parts in seen.items():
-            parts.append(_sizes(frame, name))
-    return {name: _range(np.concatenate([*parts, np.zeros(0)]), name) for name, parts in seen.items()}
+        for name, parts in samples.items():
+            parts.append(_magnitudes(frame, name))
+    return {name: _range(np.concatenate([*parts, np.zeros(0)]), name) for name, parts in samples.items()}
 
 
-def _sizes(frame: Any, name: str) -> np.ndarray:
-    """Finite numbers of a quantity in a frame, without their signs."""
+def _magnitudes(frame: Any, name: str) -> np.ndarray:
+    """Finite magnitudes of a quantity in a frame; empty if the frame does not have it."""
     try:
         values = np.linalg.norm(frame.moment, axis=1) if name == "moment" else np.abs(measured(frame, name))
-    except BadInput:  # the frame has none
+    except BadInput:
         return np.zeros(0)
     return np.asarray(values[np.isfinite(values)], dtype=np.float64)
 
@@ -51,6 +50,5 @@ def _sizes(frame: Any, name: str) -> np.ndarray:
 def _range(values: np.ndarray, name: str) -> list[float]:
     if not values.size:
         return [0.0, 0.0]
-    share = RANGE if name in PERCENTILES else (0.0, 100.0)
-    low, high = np.percentile(values, share[0], method="lower"), np.percentile(values, share[1], method="higher")
-    return [float(low), float(high)]
+    low, high = PERCENTILE_LIMITS if name in PERCENTILES else (0.0, 100.0)
+    return [float(np.percentile(values, low, method="lower")), float(np.percentile(values, high, method="higher"))]

@@ -1,4 +1,4 @@
-"""What a story reads besides frames: which folder is meant, how its run ended, its ledger."""
+"""Files of a run that the viewer reads besides the trajectory: the summary and the ledger."""
 
 from __future__ import annotations
 
@@ -11,59 +11,61 @@ from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_rows
 
-STALE = 3600.0
-"""Seconds without a frame after which a run that has not ended may be one that was killed."""
+STALE_AFTER = 3600.0
+"""Seconds without a new frame after which a run without summary is reported as possibly killed."""
+PROBLEM = "problem"
+"""Key of the error message that replaces an unreadable summary."""
 
 
-def killed_note(age: float) -> str:
-    """What to say of a run without an end whose last frame is so old [s]; nothing while it may be going."""
-    if age < STALE:
+def stale_note(age: float) -> str:
+    """Note for an unfinished run whose last frame was written `age` seconds ago; empty for a recent frame."""
+    if age < STALE_AFTER:
         return ""
     hours = age / 3600.0
-    format_quantity = f"{hours:.0f} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
-    return f"no frame for {format_quantity}: it may have been killed; sand resume goes on"
+    duration = f"{hours:.0f} h" if hours < 48.0 else f"{hours / 24.0:.0f} days"
+    return f"no new frame for {duration}: the run may have been killed; sand resume continues it"
 
 
-def run_folder(place: str | Path) -> Path | None:
-    """The folder of the run that a path means: itself, or that of its trajectory.gsd; None for a file by itself."""
-    place = Path(place)
-    if place.is_dir():
-        return place if (place / files.TRAJECTORY).exists() else None
-    return place.parent if place.name == files.TRAJECTORY and (place.parent / files.CASE).exists() else None
+def find_run_folder(path: str | Path) -> Path | None:
+    """Folder of the run at `path`: a run folder, or the trajectory.gsd in one; None for a trajectory without a run."""
+    path = Path(path)
+    if path.is_dir():
+        return path if (path / files.TRAJECTORY).exists() else None
+    return path.parent if path.name == files.TRAJECTORY and (path.parent / files.CASE).exists() else None
 
 
-PROBLEM = "problem"
-"""Key of what is to be said of a summary that cannot be read."""
-
-
-def summary_of(folder: Path) -> Mapping[str, Any] | None:
-    """How a run ended; None while it has not; what is wrong, under PROBLEM, where that cannot be read."""
+def read_summary(folder: Path) -> Mapping[str, Any] | None:
+    """Summary of a run; None before its end, and {PROBLEM: message} if the file cannot be read."""
     try:
         return files.read_json(folder / files.SUMMARY) if (folder / files.SUMMARY).exists() else None
     except BadInput as error:
         return {PROBLEM: str(error)}
 
 
-class RunBooks:
-    """The ledger of a run, read again when it has changed; None while there is none, or none that can be read.
+class LedgerReader:
+    """Ledger of a run folder, read again whenever the file has changed.
 
-    `problem` says what is wrong with it, if anything is.
+    Attributes
+    ----------
+    problem : str
+        Message about missing or unreadable rows; empty if there is none.
     """
 
     def __init__(self, folder: Path):
         self._path, self.problem = folder / files.LEDGER, ""
-        self._known: tuple[tuple[int, int], LedgerColumns | None] = ((0, 0), None)
+        self._cache: tuple[tuple[int, int], LedgerColumns | None] = ((0, 0), None)
 
     def __call__(self) -> LedgerColumns | None:
+        """Return the present ledger; None if there is none, or it cannot be read."""
         try:
-            found = self._path.stat()
-            stamp = (found.st_size, found.st_mtime_ns)
-            if stamp != self._known[0]:
-                self._known = (stamp, None)
+            status = self._path.stat()
+            stamp = (status.st_size, status.st_mtime_ns)
+            if stamp != self._cache[0]:
+                self._cache = (stamp, None)
                 rows, self.problem = read_rows(self._path)
-                self._known = (stamp, LedgerColumns.from_rows(rows))
+                self._cache = (stamp, LedgerColumns.from_rows(rows))
         except OSError:
             return None
         except BadInput as error:
             self.problem = str(error)
-        return self._known[1]
+        return self._cache[1]

@@ -1,4 +1,4 @@
-"""What happened over time, as the page of a run draws it: thinned, SI, colours for light and dark."""
+"""Time series for the plots of the viewer page: thinned, SI, with line colours for light and dark backgrounds."""
 
 from __future__ import annotations
 
@@ -10,45 +10,46 @@ from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import LedgerColumns
 from ..errors import BadInput
 from ..io.run_folder import plain
-from ..plotting.panels import COUNTS, column, energies_drawn, losses_drawn, peak
-from ..plotting.style import BLUE, FAINT, INK, ON_DARK, SKY
+from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
+from ..plotting.style import BLUE, MUTED, ON_DARK, SKY, TEXT_COLOUR
 
-MOST = 2000
-"""Points of a line at most."""
-LOOKED_AT = 20_000_000
-"""Grains, all frames together, whose clusters are counted where there is no ledger."""
+MAX_POINTS = 2000
+"""Maximum number of points of a line."""
+MAX_COUNTED = 20_000_000
+"""Grains × frames whose clusters are counted if there is no ledger."""
 
 
-def thinned(count: int, most: int = MOST) -> np.ndarray:
-    """Numbers of at most so many of `count` rows, evenly spread, first and last among them."""
+def evenly_spaced(count: int, most: int = MAX_POINTS) -> np.ndarray:
+    """At most `most` indices below `count`, evenly spaced, including the first and the last."""
     if count <= most:
         return np.arange(count)
     return np.rint(np.linspace(0, count - 1, most)).astype(int)
 
 
-def of_ledger(whole: LedgerColumns) -> dict[str, Any]:
-    """Plots and events of a ledger; a plot whose columns a ledger lacks is left out."""
-    books = whole.select(thinned(len(whole)))
+def series_from_ledger(ledger: LedgerColumns) -> dict[str, Any]:
+    """Plots and contact events from a ledger; a plot whose columns are missing is left out."""
+    thinned = ledger.select(evenly_spaced(len(ledger)))
     plots = []
     for plot in (_clusters, _energies, _losses, _contacts, _balance):
         try:
-            plots.append(plot(books))
-        except (KeyError, ValueError):  # a ledger of other columns
+            plots.append(plot(thinned))
+        except (KeyError, ValueError):  # a ledger of another version
             continue
-    return {"time": _numbers(books["time"], 10), "plots": [p for p in plots if p["lines"]], "events": _events(whole)}
+    time = _json_numbers(thinned["time"], 10)
+    return {"time": time, "plots": [p for p in plots if p["lines"]], "events": _events(ledger)}
 
 
-def of_frames(frames: Any, grains: int) -> dict[str, Any]:
-    """The same where there are frames of so many grains alone: contacts, and clusters of as many as take little time.
+def series_from_frames(frames: Any, grains: int) -> dict[str, Any]:
+    """Numbers of clusters and contacts from frames of `grains` grains, for runs without a ledger.
 
-    Frames that cannot be read have no clusters.
+    The number of frames is limited by MAX_COUNTED. Damaged frames have no cluster numbers.
     """
-    chosen = thinned(len(frames), max(min(MOST, LOOKED_AT // max(grains, 1)), 2))
+    chosen = evenly_spaced(len(frames), max(min(MAX_POINTS, MAX_COUNTED // max(grains, 1)), 2))
     table: dict[str, list[float]] = {"mean_cluster_size": [], "largest_cluster": [], "clusters": []}
     for number in chosen:
         try:
             labels = cluster_labels(grains, frames.pairs(int(number)))
-        except (BadInput, ValueError):  # not whole, or of other grains
+        except (BadInput, ValueError):  # damaged, or another number of grains
             for values in table.values():
                 values.append(np.nan)
             continue
@@ -61,55 +62,56 @@ def of_frames(frames: Any, grains: int) -> dict[str, Any]:
         _plot("contacts", "Contacts", lines),
     ]
     events: dict[str, list[float]] = {"time": [], "made": [], "broken": []}
-    return {"time": _numbers(frames.times[chosen], 10), "plots": plots, "events": events}
+    return {"time": _json_numbers(frames.times[chosen], 10), "plots": plots, "events": events}
 
 
-def _clusters(books: Any) -> dict[str, Any]:
+def _clusters(ledger: Any) -> dict[str, Any]:
     lines = [
-        _line("mean size S", BLUE, books["mean_cluster_size"]),
-        _line("largest", SKY, books["largest_cluster"]),
-        _line("number of clusters", FAINT, books["clusters"]),
+        _line("mean size S", BLUE, ledger["mean_cluster_size"]),
+        _line("largest", SKY, ledger["largest_cluster"]),
+        _line("number of clusters", MUTED, ledger["clusters"]),
     ]
     return _plot("clusters", "Clusters", lines, log=True)
 
 
-def _energies(books: LedgerColumns) -> dict[str, Any]:
-    lines = [_line(name, colour, values) for name, (values, colour) in energies_drawn(books).items()]
+def _energies(ledger: LedgerColumns) -> dict[str, Any]:
+    lines = [_line(name, colour, values) for name, (values, colour) in energies_drawn(ledger).items()]
     return _plot("energies", "Energies", lines, "J")
 
 
-def _losses(books: LedgerColumns) -> dict[str, Any]:
-    lines = [_line(name, colour, size) for name, (size, colour) in losses_drawn(books).items() if peak(size)]
+def _losses(ledger: LedgerColumns) -> dict[str, Any]:
+    drawn = losses_drawn(ledger).items()
+    lines = [_line(CHANNEL_LABELS.get(name, name), colour, size) for name, (size, colour) in drawn if peak(size)]
     return _plot("losses", "Losses", lines, "J", log=True)
 
 
-def _contacts(books: LedgerColumns) -> dict[str, Any]:
-    lines = [_line(label, colour, books[name]) for name, (label, colour) in COUNTS.items()]
+def _contacts(ledger: LedgerColumns) -> dict[str, Any]:
+    lines = [_line(label, colour, ledger[name]) for name, (label, colour) in COUNTS.items()]
     return _plot("contacts", "Contacts", lines)
 
 
-def _balance(books: LedgerColumns) -> dict[str, Any]:
-    total = column(books, "total")
-    return _plot("balance", "Balance", [_line("total − start", INK, total - total[0])], "J")
+def _balance(ledger: LedgerColumns) -> dict[str, Any]:
+    total = column(ledger, "total")
+    return _plot("balance", "Balance", [_line("change of the total", TEXT_COLOUR, total - total[0])], "J")
 
 
-def _events(books: LedgerColumns) -> dict[str, Any]:
-    """When contacts were made or broken, and how many since the row before."""
-    if not {"made", "broken"} <= set(books.columns):
+def _events(ledger: LedgerColumns) -> dict[str, Any]:
+    """Times of rows in which contacts formed or broke, and their numbers since the row before."""
+    if not {"made", "broken"} <= set(ledger.columns):
         return {"time": [], "made": [], "broken": []}
 
-    def grown(some: LedgerColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        made, broken = (np.maximum(np.diff(some[name]), 0.0) for name in ("made", "broken"))
+    def increments(rows: LedgerColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        made, broken = (np.maximum(np.diff(rows[name]), 0.0) for name in ("made", "broken"))
         return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
 
-    rows, made, broken = grown(books)
-    if len(rows) > MOST:
-        books = books.select(thinned(len(books)))
-        rows, made, broken = grown(books)
+    events, made, broken = increments(ledger)
+    if len(events) > MAX_POINTS:
+        ledger = ledger.select(evenly_spaced(len(ledger)))
+        events, made, broken = increments(ledger)
     return {
-        "time": _numbers(books["time"][1:][rows], 10),
-        "made": made[rows].astype(int).tolist(),
-        "broken": broken[rows].astype(int).tolist(),
+        "time": _json_numbers(ledger["time"][1:][events], 10),
+        "made": made[events].astype(int).tolist(),
+        "broken": broken[events].astype(int).tolist(),
     }
 
 
@@ -118,9 +120,9 @@ def _plot(key: str, title: str, lines: list[dict[str, Any]], unit: str = "", log
 
 
 def _line(label: str, colour: str, values: np.ndarray) -> dict[str, Any]:
-    return {"label": label, "light": colour, "dark": ON_DARK[colour], "values": _numbers(values)}
+    return {"label": label, "light": colour, "dark": ON_DARK[colour], "values": _json_numbers(values)}
 
 
-def _numbers(values: np.ndarray, digits: int = 7) -> list[float | None]:
-    """As JSON has them, with as many digits as can be seen."""
+def _json_numbers(values: np.ndarray, digits: int = 7) -> list[float | None]:
+    """Numbers for JSON, rounded to `digits` significant digits; None for NaN and infinity."""
     return list(plain([float(f"{value:.{digits}g}") for value in np.asarray(values, float).tolist()]))

@@ -1,22 +1,19 @@
-"""The server of `sand view`: loopback only, one run, for those who know its token.
+"""HTTP server of `sand view` for one run, on the loopback address only.
 
-It hands out what is in `Server.ADDRESSES` and nothing else; no file's name is ever made from an address.  The token
-keeps out other users of the machine, and other pages in the browser; `Host` is looked at against names that are made to
-point here.
+Every address begins with a secret token, which keeps out other users of the machine and other pages in the browser. The
+`Host` header must name this machine, which defeats DNS rebinding. No file name is ever made from an address. The length
+of addresses, the number of connections and the time a client may be silent are limited.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hmac
 import json
 import os
 import re
 import secrets
 import threading
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from typing import Any
@@ -25,192 +22,158 @@ from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import plain
 from .dataset import RunDataset
-from .html import SERVED, served
+from .html import SERVED_POLICY, page_title, served_page
 
 LOOPBACK = "127.0.0.1"
-LONGEST = 512
-"""Characters of an address."""
-PATIENCE = 30.0
-"""Seconds that a client may be silent for."""
-USUAL_PORT = 80
-"""Of http: addresses and hosts do not name it."""
-AT_ONCE = 64
-"""Connections; for one more, that which has been silent for longest is closed."""
-BOTH_WAYS = 2
-"""What SHUT_RDWR is everywhere."""
+HOSTS = (LOOPBACK, "localhost")
+"""Accepted host names."""
+MAX_ADDRESS = 512
+"""Maximum number of characters of an address."""
+MAX_CONNECTIONS = 64
+"""Further connections are closed at once."""
+CLIENT_TIMEOUT = 30.0
+"""Seconds after which the connection of a silent client is closed."""
 HEADERS = {
-    "Content-Security-Policy": SERVED,
+    "Content-Security-Policy": SERVED_POLICY,
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Embedder-Policy": "require-corp",
-    "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
 JSON, BINARY = "application/json", "application/octet-stream"
 _NUMBER = "([0-9]{1,9})"
 
 
-class Refused(Exception):
-    """An answer that is none: status and why."""
+class HTTPError(Exception):
+    """An error response with a status code and a message."""
 
-    def __init__(self, status: int, why: str):
-        super().__init__(why)
+    def __init__(self, status: int, message: str):
+        super().__init__(message)
         self.status = status
 
 
-def own_names(port: int) -> set[str]:
-    """Hosts that the server answers to; browsers leave out the port that is the usual one."""
-    bare = (LOOPBACK, "localhost")
-    return {f"{name}:{port}" for name in bare} | (set(bare) if port == USUAL_PORT else set())
-
-
 class Server(ThreadingHTTPServer):
-    """Tells a story to a browser on this machine.
+    """HTTP server of the viewer page and the data of a run.
 
     Parameters
     ----------
-    story : Story
-        of a run.
+    dataset : RunDataset
+        Data of the run.
     port : int, optional
-        a free one by default.
+        Port; 0 chooses a free one.
+
+    Attributes
+    ----------
+    token : str
+        Secret first part of every address.
 
     Raises
     ------
     BadInput
-        the port is taken or forbidden; the page is missing.
+        If the port is not available, or the viewer page is not installed.
     """
 
     daemon_threads = True
     block_on_close = False
-    allow_reuse_address = os.name == "posix"  # elsewhere it would let others take the port over
-    request_queue_size = AT_ONCE
+    allow_reuse_address = os.name == "posix"  # on Windows, this option would let other programs take over the port
+    request_queue_size = MAX_CONNECTIONS
 
-    def __init__(self, story: RunDataset, port: int = 0):
+    def __init__(self, dataset: RunDataset, port: int = 0):
         script, styles = read_bundle()
-        self.story, self.token = story, secrets.token_urlsafe(24)
-        self._lines: dict[int, _Line] = {}
-        self._lock = threading.Lock()
+        self.dataset, self.token = dataset, secrets.token_urlsafe(24)
+        self._free_connections = threading.BoundedSemaphore(MAX_CONNECTIONS)
         self._files = {
-            "": ("text/html; charset=utf-8", served(f"{story.name} – SAND")),
+            "": ("text/html; charset=utf-8", served_page(page_title(dataset))),
             "grainview.js": ("text/javascript; charset=utf-8", script),
             "grainview.css": ("text/css; charset=utf-8", styles),
         }
         try:
             super().__init__((LOOPBACK, port), _Handler)
         except (OSError, OverflowError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise BadInput(f"cannot listen at port {port} ({why}); give another --port, or leave it out") from None
+            reason = getattr(error, "strerror", None) or error
+            raise BadInput(f"cannot listen at port {port} ({reason}); give another --port, or leave it out") from None
         self.port = int(self.server_address[1])
-        self.names = own_names(self.port)
 
     def server_bind(self) -> None:
-        """Without asking anybody for this machine's name."""
+        """Bind without the name lookup of the base class, which can take seconds."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = LOOPBACK, int(self.server_address[1])
 
     @property
     def url(self) -> str:
-        """The address of the page."""
+        """Address of the page."""
         return f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
     def start(self) -> None:
-        """Answer in the background."""
+        """Serve in a background thread."""
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
 
     def stop(self) -> None:
-        """Answer no more."""
+        """Stop serving and close the port."""
         self.shutdown()
         self.server_close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """In a thread of its own; where there are AT_ONCE of them, one that waits for its client is ended first."""
-        with self._lock:
-            if len(self._lines) >= AT_ONCE:
-                silent = [line for line in self._lines.values() if not line.busy]
-                if not silent:  # all are being answered, which is soon over
-                    self.shutdown_request(request)
-                    return
-                self._close(min(silent, key=lambda line: (line.trusted, line.since)))
-            self._lines[id(request)] = _Line(request)
-        super().process_request(request, client_address)
-
-    def _close(self, line: _Line) -> None:
-        """End a connection; its thread wakes up and finds that out."""
-        self._lines.pop(id(line.request), None)
-        with contextlib.suppress(OSError):
-            line.request.shutdown(BOTH_WAYS)
+        """Serve a connection in a thread of its own, up to MAX_CONNECTIONS at a time."""
+        if self._free_connections.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """What the thread does."""
+        """Serve a connection and count it as free again."""
         try:
             super().process_request_thread(request, client_address)
         finally:
-            with self._lock:
-                line = self._lines.get(id(request))
-                if line is not None and line.request is request:
-                    del self._lines[id(request)]
-
-    def note(self, request: Any, *, busy: bool, trusted: bool = False) -> None:
-        """What a connection does from now on.
-
-        Parameters
-        ----------
-        busy : bool
-            an answer is being worked out; otherwise its client is waited for.
-        trusted : bool, optional
-            it has named the token.
-        """
-        line = self._lines.get(id(request))
-        if line is not None and line.request is request:
-            line.busy, line.since, line.trusted = busy, time.monotonic(), line.trusted or trusted
+            self._free_connections.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A client that went away is nobody's trouble."""
+        """Print nothing when a client disconnects."""
 
-    def answer(self, address: str, query: str) -> tuple[str, bytes]:
-        """Type and content of what lies at an address below the token.
+    def respond(self, address: str, query: str) -> tuple[str, bytes]:
+        """Content type and content for an address below the token.
 
         Raises
         ------
-        Refused
-            nothing does, or it cannot be had.
+        HTTPError
+            404 if the address is unknown, 500 if the data cannot be read.
         """
         if address in self._files and not query:
-            kind, text = self._files[address]
-            return kind, text.encode()
-        for pattern, wanted, reply in self.ADDRESSES:
-            found, asked = re.fullmatch(pattern, address), re.fullmatch(wanted, query)
-            if found and asked:
+            content_type, text = self._files[address]
+            return content_type, text.encode()
+        for address_pattern, query_pattern, method in self.ADDRESSES:
+            address_match, query_match = re.fullmatch(address_pattern, address), re.fullmatch(query_pattern, query)
+            if address_match and query_match:
+                numbers = [int(number) for number in address_match.groups() + query_match.groups() if number]
                 try:
-                    return reply(self, *(int(number) for number in found.groups() + asked.groups() if number))
+                    return method(self, *numbers)
                 except BadInput as error:
-                    raise Refused(500, str(error)) from None
-        raise Refused(404, "there is nothing at this address")
+                    raise HTTPError(500, str(error)) from None
+        raise HTTPError(404, "unknown address")
 
     def _manifest(self, since: int = 0) -> tuple[str, bytes]:
-        self.story.refresh()
-        return JSON, _json(self.story.manifest(since))
+        self.dataset.refresh()
+        return JSON, _json(self.dataset.manifest(since))
 
     def _grains(self) -> tuple[str, bytes]:
-        return BINARY, self.story.grains()
+        return BINARY, self.dataset.grains()
 
     def _series(self) -> tuple[str, bytes]:
-        return JSON, _json(self.story.series())
+        return JSON, _json(self.dataset.series())
 
     def _frame(self, k: int) -> tuple[str, bytes]:
-        self._there(k)
-        return BINARY, self.story.frame(k)
+        self._require(k)
+        return BINARY, self.dataset.frame(k)
 
     def _dimension(self, k: int, grain: int) -> tuple[str, bytes]:
-        self._there(k, grain)
-        return JSON, _json(self.story.dimension(k, grain))
+        self._require(k, grain)
+        return JSON, _json(self.dataset.dimension(k, grain))
 
-    def _there(self, k: int, grain: int = 0) -> None:
-        if k >= len(self.story):
-            raise Refused(404, f"there are {len(self.story)} frames; there is no frame {k}")
-        if grain >= self.story.grains_count:
-            raise Refused(404, f"there are {self.story.grains_count} grains; there is no grain {grain}")
+    def _require(self, k: int, grain: int = 0) -> None:
+        frames, grains = len(self.dataset), self.dataset.grains_count
+        if k >= frames:
+            raise HTTPError(404, f"there is no frame {k}; there are {frames} frames")
+        if grain >= grains:
+            raise HTTPError(404, f"there is no grain {grain}; there are {grains} grains")
 
     ADDRESSES: tuple[tuple[str, str, Callable[..., tuple[str, bytes]]], ...] = (
         ("manifest", f"(?:since={_NUMBER})?", _manifest),
@@ -219,69 +182,53 @@ class Server(ThreadingHTTPServer):
         (f"frame/{_NUMBER}", "", _frame),
         (f"dimension/{_NUMBER}/{_NUMBER}", "", _dimension),
     )
+    """Patterns of address and query, and the method that answers them; the numbers are its arguments."""
 
 
 def _json(content: dict[str, Any]) -> bytes:
     return json.dumps(plain(content), allow_nan=False, separators=(",", ":")).encode()
 
 
-@dataclass
-class _Line:
-    """A connection, and since when it does what it does."""
-
-    request: Any
-    since: float = field(default_factory=time.monotonic)
-    busy: bool = False
-    trusted: bool = False
-
-
 class _Handler(BaseHTTPRequestHandler):
     """One connection."""
 
     server: Server
-    timeout = PATIENCE
+    timeout = CLIENT_TIMEOUT
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "SAND", ""
 
     def do_GET(self) -> None:
         try:
-            asked = self._asked()
-            self.server.note(self.request, busy=True, trusted=True)
-            try:
-                kind, content = self.server.answer(*asked)
-            finally:
-                self.server.note(self.request, busy=False)
-            self._send(200, kind, content)
-        except Refused as refused:
-            self._send(refused.status, JSON, _json({"error": str(refused)}))
-        except OSError:  # the client has gone
+            self._send(200, *self.server.respond(*self._checked_address()))
+        except HTTPError as error:
+            self._send(error.status, JSON, _json({"error": str(error)}))
+        except OSError:  # the client has disconnected
             self.close_connection = True
         except Exception as error:
             self._send(500, JSON, _json({"error": f"internal error ({type(error).__name__}: {error})"}))
 
     do_HEAD = do_GET
 
-    def _asked(self) -> tuple[str, str]:
-        """Address below the token, and query, of a request that may be answered.  Raises Refused."""
-        if len(self.path) > LONGEST:
-            raise Refused(414, "this address is too long")
-        if self.headers.get_all("Host", []) not in [[name] for name in self.server.names]:
-            raise Refused(403, "this server is for its own address only")
-        if self.headers.get("Origin") not in (None, *(f"http://{name}" for name in self.server.names)):
-            raise Refused(403, "this server is for its own page only")
+    def _checked_address(self) -> tuple[str, str]:
+        """Address below the token and query of the request; HTTPError if length, host or token are wrong."""
+        if len(self.path) > MAX_ADDRESS:
+            raise HTTPError(414, f"the address is longer than {MAX_ADDRESS} characters")
+        hosts = self.headers.get_all("Host", [])
+        if len(hosts) != 1 or hosts[0].partition(":")[0] not in HOSTS:
+            raise HTTPError(403, f"this server answers requests to {' and '.join(HOSTS)} only")
         path, _, query = self.path.partition("?")
         token, slash, address = path.removeprefix("/").partition("/")
         if not path.startswith("/") or not hmac.compare_digest(token.encode(), self.server.token.encode()):
-            raise Refused(403, "this address lacks the right token: take the one that sand view printed")
+            raise HTTPError(403, "wrong access token: open the address printed by sand view")
         if not slash:
-            raise Refused(404, "there is nothing at this address; it ends with a slash")
+            raise HTTPError(404, "unknown address; the address of the page ends with a slash")
         return address, query
 
-    def _send(self, status: int, kind: str, content: bytes) -> None:
+    def _send(self, status: int, content_type: str, content: bytes) -> None:
         if self.headers is None or "Content-Length" in self.headers or "Transfer-Encoding" in self.headers:
-            self.close_connection = True  # what it sends besides is not read
+            self.close_connection = True  # the body of the request is not read
         self.send_response(status)
-        for name, value in {**HEADERS, "Content-Type": kind, "Content-Length": str(len(content))}.items():
+        for name, value in {**HEADERS, "Content-Type": content_type, "Content-Length": str(len(content))}.items():
             self.send_header(name, value)
         if status == 405:
             self.send_header("Allow", "GET, HEAD")
@@ -292,14 +239,14 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(content)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """What the base class finds wrong."""
+        """Answer an invalid request in JSON and close the connection."""
         self.close_connection = True
         if not hasattr(self, "headers"):
             self.headers = None  # type: ignore[assignment]
         if code == 501:
-            self._send(405, JSON, _json({"error": "GET and HEAD are all that this server knows"}))
+            self._send(405, JSON, _json({"error": "only GET and HEAD are allowed"}))
         else:
-            self._send(int(code), JSON, _json({"error": message or "this is not a request"}))
+            self._send(int(code), JSON, _json({"error": message or "invalid request"}))
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing is printed."""
+        """Print nothing."""

@@ -1,4 +1,4 @@
-"""`view()` of a simulation, and of a run that was opened: a widget in a notebook, a page elsewhere."""
+"""Display of run data by `view()`: a widget in a notebook, otherwise a page that is written and opened."""
 
 from __future__ import annotations
 
@@ -14,49 +14,54 @@ from ..io.run_folder import VIEW
 from ..plotting.run_figure import in_notebook
 from .browser import open_page
 from .dataset import RunDataset
-from .html import fitting, write_page
+from .html import frame_stride, write_page
 from .notebook import has_widgets, widget
 
-LARGEST = 150e6
-"""Bytes of frames in a page that nobody asked to be larger."""
+MAX_BYTES = 150e6
+"""Size of frames in a page [bytes] above which `view()` leaves out frames."""
 
 
-def show_dataset(story: RunDataset, path: str | Path | None, folder: Path | None, instead: Callable[[], Any]) -> Any:
-    """The widget in a notebook with anywidget, unless a `path` is given; else the page, written and opened.
+def show_dataset(dataset: RunDataset, path: str | Path | None, folder: Path | None, fallback: Callable[[], Any]) -> Any:
+    """Show a dataset in a notebook or browser.
 
     Parameters
     ----------
+    dataset : RunDataset
+        Data of a run.
     path : str or Path or None
-        of the page; view.html in the `folder` of the run by default, or in a new temporary folder.
-    instead : Callable[[], Any]
-        shows the figure, where this installation lacks the page.
+        Path of the page. None shows a widget in notebooks that have anywidget; elsewhere it means view.html in
+        `folder`.
+    folder : Path or None
+        Run folder; None means a new temporary folder.
+    fallback : callable
+        Shows the figure of the run, if the viewer page is not installed.
 
     Returns
     -------
-    result
-        The widget, or the path of the page, or the figure.
+    GrainWidget or Path or Figure
+        The widget, the path of the page, or the result of `fallback`.
 
     Raises
     ------
     BadInput, FilesFailed
-        the page cannot be written.
+        If the page cannot be written.
     """
     try:
         read_bundle()
     except BadInput as error:
-        warnings.warn(f"{error}; here is the figure instead", stacklevel=4)
-        return instead()
+        warnings.warn(f"{error}; showing the figure instead", stacklevel=4)
+        return fallback()
     if path is None and in_notebook() and has_widgets():
-        return widget(story)
+        return widget(dataset)
     if path is None:
         path = (folder or Path(tempfile.mkdtemp(prefix="sand-"))) / VIEW
     page = Path(path)
     if not page.parent.is_dir():
-        raise BadInput(f"there is no folder {page.parent}; make it first")
-    story.compact = True
-    if (every := fitting(story, LARGEST)) > 1:
-        story.choose(slice(None, None, every), f"one frame of {every}, because all of them would take too much room")
-    write_page(story, page)
+        raise BadInput(f"there is no folder {page.parent}; create it first")
+    dataset.compact = True
+    if (stride := frame_stride(dataset, MAX_BYTES)) > 1:
+        dataset.select(slice(None, None, stride), f"one frame of {stride}, to limit the size of the page")
+    write_page(dataset, page)
     if not open_page(page.resolve().as_uri()):
-        warnings.warn(f"wrote {page}: open it in a browser; none could be opened from here", stacklevel=4)
+        warnings.warn(f"wrote {page}, but no browser could be opened; open the file in a browser", stacklevel=4)
     return page

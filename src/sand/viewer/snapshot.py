@@ -1,32 +1,32 @@
-"""A simulation that keeps no files, told to a page: its state of now as the only frame, and its ledger."""
+"""Viewer data of a simulation without a run folder: its present state as the only frame, and its ledger."""
 
 from __future__ import annotations
 
-import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..analysis.ledger_columns import LedgerColumns
 from ..io.frame import Frame, stored_frame
-from .dataset import FieldDescription, RunDataset
+from .dataset import RunDataset
+from .simulation_view import FieldDescription
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
 
 class Snapshot:
-    """One frame, as `io.live_trajectory.Following` has many."""
+    """A single frame with the interface of `io.live_trajectory.LiveTrajectory`."""
 
     torn = generation = 0
 
     def __init__(self, frame: Frame):
-        self._frame, self.lock = frame, threading.RLock()
+        self._frame = frame
         self.times, self.steps = np.array([frame.time]), np.array([frame.step])
         self.contacts = np.array([len(frame.pair)])
 
     def refresh(self) -> bool:
-        """Nothing comes after it."""
+        """Return False: there are no new frames."""
         return False
 
     def __len__(self) -> int:
@@ -41,11 +41,11 @@ class Snapshot:
 
 
 def snapshot_dataset(simulation: Simulation, field: FieldDescription | None) -> RunDataset:
-    """The state of a simulation and what happened until then; later steps are not in it."""
+    """Present state of a simulation and its ledger so far; later steps do not change the dataset."""
     state = simulation.state
     stored: Any = stored_frame(state.steps, state.time, state.grains, state.box, simulation.contacts)
-    books = LedgerColumns(simulation.ledger.columns, simulation.ledger.rows)
-    now = Snapshot(Frame(stored))
-    story = RunDataset(now, "simulation", "in memory", books=lambda: books, summary=dict, field=field)
-    story.notes.append("this simulation keeps no files: its state of now, and what its ledger holds")
-    return story
+    ledger = LedgerColumns(simulation.ledger.columns, simulation.ledger.rows)
+    frames = Snapshot(Frame(stored))
+    dataset = RunDataset(frames, "simulation", "in memory", ledger=lambda: ledger, summary=dict, field=field)
+    dataset.notes.append("this simulation has no run folder: only its present state and its ledger are shown")
+    return dataset

@@ -168,17 +168,17 @@ def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
 def _title(flights: list[Flight]) -> str:
     """What is scattered, in a line."""
     one = flights[0]
-    from ...units import format_quantity
+    from ...plotting.style import format_si
 
     def body(grains: Any) -> str:
         names = ", ".join(m.name for m in grains.materials)
-        radius = format_quantity(float(grains.radius.mean()), "m")
+        radius = format_si(float(grains.radius.mean()), "m")
         return f"{names}, r = {radius}" if len(grains) == 1 else f"{len(grains)} grains of {names}, r = {radius}"
 
     parts = [body(one.projectile)]
     if body(one.target) != parts[0]:
         parts.append(body(one.target))
-    heat = f", {format_quantity(one.temperature, 'K')}" if one.temperature > 0.0 else ""
+    heat = f", {format_si(one.temperature, 'K')}" if one.temperature > 0.0 else ""
     shape = "sphere" if one.sphere else "plane"
-    far = [format_quantity(f(each.distance for each in flights), "m") for f in (min, max)]
+    far = [format_si(f(each.distance for each in flights), "m") for f in (min, max)]
     return f"{' on '.join(parts)}{heat}; starts on a {shape}, {' to '.join(dict.fromkeys(far))}"

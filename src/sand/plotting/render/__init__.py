@@ -1,1 +1,1 @@
-"""Still pictures of grains, rendered without a browser."""
+"""Rendered images of grains: ray casting and shading on the CPU, without a browser or graphics card."""

@@ -10,8 +10,8 @@ from matplotlib.colors import Colormap
 
 from ...analysis.clusters import cluster_sizes
 from ...analysis.quantities import MODES, Quantity, material_names
-from ..palettes import DIVERGING, LIMITS, MATERIALS, SEQUENTIAL, WITHIN
-from ..style import BIG, SINGLE, pretty, rgb, with_prefix
+from ..palettes import DIVERGING, MATERIAL_COLOURS, MODE_COLOURS, SEQUENTIAL, WITHIN_LIMITS_COLOUR
+from ..style import LARGEST_COLOURS, SINGLE_COLOUR, format_si, rgb, si_prefix
 from .scene import cluster_colours
 
 FEW = 9
@@ -21,7 +21,7 @@ DECADES = 100.0
 
 
 @dataclass(frozen=True)
-class Key:
+class ColourKey:
     """What colours mean.
 
     Attributes
@@ -47,10 +47,12 @@ class Key:
         with np.errstate(invalid="ignore", divide="ignore"):
             share = ((np.log(values) if self.log else values) - low) / (high - low)
         known = np.isfinite(share)
-        return np.where(known[:, None], (self.map or SEQUENTIAL)(np.where(known, share, 0.0))[:, :3], rgb(SINGLE))
+        return np.where(
+            known[:, None], (self.map or SEQUENTIAL)(np.where(known, share, 0.0))[:, :3], rgb(SINGLE_COLOUR)
+        )
 
 
-def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) -> tuple[np.ndarray, Key]:
+def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) -> tuple[np.ndarray, ColourKey]:
     """Colours (K, 3) of numbers, and their key.
 
     Parameters
@@ -63,32 +65,35 @@ def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) 
         cluster of each grain that is shown, for the quantity `cluster`.
     """
     if what.name == "cluster":  # by rank, not by name as on the page: one picture has no history
-        return cluster_colours(label), Key(what.name, _cluster_swatches(label))
+        return cluster_colours(label), ColourKey(what.name, _cluster_swatches(label))
     if what.kind == "categorical":
-        kinds = {"mode": (MODES, (WITHIN, *LIMITS)), "material": (material_names(frame), MATERIALS)}
+        kinds = {
+            "mode": (MODES, (WITHIN_LIMITS_COLOUR, *MODE_COLOURS)),
+            "material": (material_names(frame), MATERIAL_COLOURS),
+        }
         names, colours = kinds[what.name]
         table = np.array([rgb(colours[k % len(colours)]) for k in range(len(names))])
         there = np.unique(values[np.isfinite(values)]).astype(int)
         shown = table[np.where(np.isfinite(values), values, 0.0).astype(int)]
-        return shown, Key(what.meaning, tuple((names[k], table[k]) for k in there))
+        return shown, ColourKey(what.meaning, tuple((names[k], table[k]) for k in there))
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-    one, unit = (1.0, "") if what.unit == "1" else with_prefix(max(abs(low), abs(high)), what.unit)
+    one, unit = (1.0, "") if what.unit == "1" else si_prefix(max(abs(low), abs(high)), what.unit)
     title = f"{what.meaning} ({unit})" if unit else what.meaning
     if what.kind == "diverging":
         reach = 1.0 if what.unit == "1" else max(abs(low), abs(high)) / one or 1.0
-        key = Key(title, map=DIVERGING, low=-reach, high=reach)
+        key = ColourKey(title, map=DIVERGING, low=-reach, high=reach)
         return key.shades(values / one), key
     levels = np.unique(finite)
     if len(levels) < 2 or high - low < 1e-6 * abs(high):
-        key = Key(title, low=low / one - 1.0, high=high / one + 1.0)
-        text = pretty(high, what.unit) if unit else f"{high:g}"
-        return key.shades(values / one), Key(what.meaning, ((text, key.shades(np.array([high / one]))[0]),))
+        key = ColourKey(title, low=low / one - 1.0, high=high / one + 1.0)
+        text = format_si(high, what.unit) if unit else f"{high:g}"
+        return key.shades(values / one), ColourKey(what.meaning, ((text, key.shades(np.array([high / one]))[0]),))
     log = low > 0.0 and high > DECADES * low
-    key = Key(title, low=low / one, high=high / one, log=log)
+    key = ColourKey(title, low=low / one, high=high / one, log=log)
     if what.unit == "1" and len(levels) <= FEW and np.all(levels == np.round(levels)):
         shades = key.shades(levels)
-        key = Key(title, tuple((f"{v:g}", shade) for v, shade in zip(levels, shades, strict=True)))
+        key = ColourKey(title, tuple((f"{v:g}", shade) for v, shade in zip(levels, shades, strict=True)))
         return shades[np.searchsorted(levels, np.where(np.isfinite(values), values, low))], key
     return key.shades(values / one), key
 
@@ -98,11 +103,11 @@ def _cluster_swatches(label: np.ndarray) -> tuple[tuple[str, np.ndarray], ...]:
     order = np.argsort(-sizes, kind="stable")
     big = [k for k in order if sizes[k] > 1]
     colour = cluster_colours(label)
-    found = [(f"{sizes[k]} grains", colour[np.argmax(label == k)]) for k in big[: len(BIG)]]
-    more = len(big) - len(BIG)
+    found = [(f"{sizes[k]} grains", colour[np.argmax(label == k)]) for k in big[: len(LARGEST_COLOURS)]]
+    more = len(big) - len(LARGEST_COLOURS)
     if more > 0:
         found.append((f"{more} more cluster{'s' if more > 1 else ''}", np.full(3, np.nan)))
     singles = int((sizes == 1).sum())
     if singles:
-        found.append((f"{singles} single grain{'s' if singles > 1 else ''}", rgb(SINGLE)))
+        found.append((f"{singles} single grain{'s' if singles > 1 else ''}", rgb(SINGLE_COLOUR)))
     return tuple(found)

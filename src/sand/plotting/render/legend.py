@@ -10,13 +10,13 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from ..palettes import SEQUENTIAL
 from ..style import BLUE
-from .colouring import Key
+from .colouring import ColourKey
 
 COLUMN = 0.865
 """Left edge of the keys, as a share of the width."""
 
 
-def draw_keys(figure: Figure, keys: list[Key], grow: float, ink: str) -> None:
+def draw_colour_keys(figure: Figure, keys: list[ColourKey], grow: float, ink: str) -> None:
     """Keys above each other on the right: a bar with its range and unit, or a swatch for each kind."""
     top = 0.87
     for key in keys:
@@ -38,7 +38,7 @@ def _wrapped(title: str, wide: int = 18) -> str:
     return "\n".join(lines)
 
 
-def _swatches(figure: Figure, key: Key, top: float, grow: float, ink: str) -> float:
+def _swatches(figure: Figure, key: ColourKey, top: float, grow: float, ink: str) -> float:
     width, height = figure.get_size_inches()
     for k, (text, colour) in enumerate(key.swatches):
         y = top - 0.036 * k - 0.018
@@ -51,7 +51,7 @@ def _swatches(figure: Figure, key: Key, top: float, grow: float, ink: str) -> fl
     return top - 0.036 * len(key.swatches)
 
 
-def _bar(figure: Figure, key: Key, top: float, tall: float, grow: float, ink: str) -> float:
+def _bar(figure: Figure, key: ColourKey, top: float, tall: float, grow: float, ink: str) -> float:
     axes = figure.add_axes((COLUMN, top - tall, 0.013, tall), label="bar")
     norm = (LogNorm if key.log else Normalize)(key.low, key.high)
     bar = figure.colorbar(ScalarMappable(norm, key.map or SEQUENTIAL), cax=axes)

@@ -1,4 +1,4 @@
-"""What each point of a picture shows: balls and rods met by rays, the nearest one wins.
+"""What each point of a picture shows: spheres and rods met by rays, the nearest one wins.
 
 Eye coordinates in samples: x to the right, y up, z towards the eye, the origin in the middle of the picture.  A ray
 through (X, Y, 0) holds the points (X(1 − wz), Y(1 − wz), z); w is one over the distance of the eye, 0 for parallel
@@ -12,25 +12,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-EDGES = (4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
+TILE_EDGES = (4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
 """Samples along an edge of the squares that shapes are cut into."""
-MOST_SAMPLES = 400_000
+MAX_SAMPLES = 400_000
 """Looked at in one go: what bounds the memory."""
 NOTHING = -1
 
 
 @dataclass(frozen=True)
 class Solids:
-    """Balls, then rods: cones cut flat at both ends, cylinders among them.  N balls, M rods, all in samples.
+    """Spheres, then rods: cones cut flat at both ends, cylinders among them.  N spheres, M rods, all in samples.
 
     Attributes
     ----------
     centre, radius : ndarray
-        (N, 3), (N,) of balls.
-    start, end, girth : ndarray
+        (N, 3), (N,) of spheres.
+    start, end, end_radii : ndarray
         (M, 3), (M, 3), (M, 2) of rods: middles of the two ends, and their radii.
     colour : ndarray
-        (N + M, 3), 0 to 1, balls first.
+        (N + M, 3), 0 to 1, spheres first.
     lit : ndarray
         (N + M,) how much light and shade change the colour, 0 to 1.
     """
@@ -39,19 +39,19 @@ class Solids:
     radius: np.ndarray
     start: np.ndarray
     end: np.ndarray
-    girth: np.ndarray
+    end_radii: np.ndarray
     colour: np.ndarray
     lit: np.ndarray
 
     def depths(self) -> tuple[float, float]:
         """Lowest and highest z of anything."""
-        thick = self.girth.max(axis=1) if len(self.girth) else np.zeros(0)
+        thick = self.end_radii.max(axis=1) if len(self.end_radii) else np.zeros(0)
         low = [self.centre[:, 2] - self.radius, np.minimum(self.start, self.end)[:, 2] - thick]
         high = [self.centre[:, 2] + self.radius, np.maximum(self.start, self.end)[:, 2] + thick]
         return float(np.concatenate(low).min(initial=0.0)), float(np.concatenate(high).max(initial=0.0))
 
 
-class Canvas:
+class DepthBuffer:
     """The nearest shape in each sample of a picture, and how deep it lies there.
 
     Parameters
@@ -70,15 +70,15 @@ class Canvas:
         self.range = max(near - self.far, 1.0) * 1.001
         # depth in the upper half, shape + 1 in the lower: the larger of two numbers is the nearer of two shapes
         self.nearest = np.zeros(shape, dtype=np.uint64)
-        for items, tile in _squares(shape, *_ball_windows(self), solids.centre[:, 2]):
-            self._put(items, tile, self._balls, 0)
-        for items, tile in _squares(shape, *_rod_windows(self), solids.start[:, 2]):
-            self._put(_near_the_axis(self, items, tile), tile, self._rods, len(solids.radius))
+        for items, tile in _tiles(shape, *_sphere_windows(self), solids.centre[:, 2]):
+            self._rasterise(items, tile, self._intersect_spheres, 0)
+        for items, tile in _tiles(shape, *_rod_windows(self), solids.start[:, 2]):
+            self._rasterise(_tiles_near_axis(self, items, tile), tile, self._intersect_rods, len(solids.radius))
 
-    def _put(self, items: np.ndarray, tile: int, meet, first: int) -> None:
+    def _rasterise(self, items: np.ndarray, tile: int, meet, first: int) -> None:
         """Squares `items` (K, 3): which shape, lowest column and row."""
         flat, (height, width) = self.nearest.reshape(-1), self.shape
-        step, many = np.arange(tile), max(MOST_SAMPLES // tile**2, 1)
+        step, many = np.arange(tile), max(MAX_SAMPLES // tile**2, 1)
         for begin in range(0, len(items), many):
             which, left, low = items[begin : begin + many][::-1].T
             columns, rows = left[:, None] + step, low[:, None] + step
@@ -98,8 +98,8 @@ class Canvas:
                 flat[place] = key
                 front = key > flat[place]
 
-    def _balls(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """z where rays first meet balls, not a number where they do not."""
+    def _intersect_spheres(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """z where rays first meet spheres, not a number where they do not."""
         cx, cy, cz = self.solids.centre[which].T[:, :, None, None]
         radius, w = self.solids.radius[which][:, None, None], self.w
         ox = ((x * (1.0 - w * cz) - cx) / radius).astype(np.float32)
@@ -113,12 +113,12 @@ class Canvas:
             root = np.sqrt(along * along - long * (ox * ox + oy * oy - 1.0))
             return cz + radius * ((along + root) / long)
 
-    def _rods(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def _intersect_rods(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """z where rays first meet rods, not a number where they do not."""
         s, w = self.solids, self.w
         a, axis = s.start[which], (s.end - s.start)[which]
-        first, second = s.girth[which].T[:, :, None, None]
-        top = np.maximum(a[:, 2], a[:, 2] + axis[:, 2]) + s.girth[which].max(axis=1)  # rays begin in front of all
+        first, second = s.end_radii[which].T[:, :, None, None]
+        top = np.maximum(a[:, 2], a[:, 2] + axis[:, 2]) + s.end_radii[which].max(axis=1)  # rays begin in front of all
         bx, by, bz = axis.T[:, :, None, None]
         m0 = bx * bx + by * by + bz * bz
         scale = (1.0 - w * top)[:, None, None]
@@ -129,7 +129,7 @@ class Canvas:
         m1, m2 = ox * bx + oy * by + oz * bz, dx * bx + dy * by - bz
         m3, m5 = dx * ox + dy * oy - oz, ox * ox + oy * oy + oz * oz
         with np.errstate(invalid="ignore", divide="ignore"):
-            t = _slanted(m0, m1, m2, m3, m5, dd, first, second)
+            t = _intersect_cone(m0, m1, m2, m3, m5, dd, first, second)
             near = -m1 / m2
             disc = (m5 + 2.0 * near * m3 + near * near * dd < first**2) & (m1 < 0.0)
             away = (m0 - m1) / m2
@@ -154,7 +154,7 @@ class Canvas:
 
     def _rod_normals(self, which: np.ndarray, point: np.ndarray) -> np.ndarray:
         s = self.solids
-        axis, (first, second) = (s.end - s.start)[which], s.girth[which].T
+        axis, (first, second) = (s.end - s.start)[which], s.end_radii[which].T
         q, m0 = point - s.start[which], (axis * axis).sum(axis=1)
         along = (q * axis).sum(axis=1) / m0
         out = q - along[:, None] * axis
@@ -165,7 +165,7 @@ class Canvas:
         return np.where(flat[:, None], ends, out + slant)
 
 
-def _slanted(m0, m1, m2, m3, m5, dd, first, second):
+def _intersect_cone(m0, m1, m2, m3, m5, dd, first, second):
     """Where rays meet the side of a cone, from products of axis, ray and way to the first end; NaN: nowhere."""
     narrow = first - second
     h = m0 + narrow * narrow
@@ -177,9 +177,9 @@ def _slanted(m0, m1, m2, m3, m5, dd, first, second):
     return np.where((y >= 0.0) & (y <= m0), t, np.nan)
 
 
-def _ball_windows(canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 2) lowest and highest column and row of balls: exact tangents."""
-    s, w = canvas.solids, canvas.w
+def _sphere_windows(buffer: DepthBuffer) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 2) lowest and highest column and row of spheres: exact tangents."""
+    s, w = buffer.solids, buffer.w
     if w == 0.0:
         return s.centre[:, :2] - s.radius[:, None], s.centre[:, :2] + s.radius[:, None]
     away = (1.0 / w - s.centre[:, 2])[:, None]
@@ -189,31 +189,31 @@ def _ball_windows(canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
     return np.tan(np.clip(middle - half, -limit, limit)) / w, np.tan(np.clip(middle + half, -limit, limit)) / w
 
 
-def _rod_windows(canvas: Canvas) -> tuple[np.ndarray, np.ndarray]:
-    s, w = canvas.solids, canvas.w
+def _rod_windows(buffer: DepthBuffer) -> tuple[np.ndarray, np.ndarray]:
+    s, w = buffer.solids, buffer.w
     ends = []
-    for point, girth in ((s.start, s.girth[:, 0]), (s.end, s.girth[:, 1])):
-        near = np.maximum(1.0 - w * (point[:, 2] + girth), 1e-3)[:, None]
+    for point, end_radii in ((s.start, s.end_radii[:, 0]), (s.end, s.end_radii[:, 1])):
+        near = np.maximum(1.0 - w * (point[:, 2] + end_radii), 1e-3)[:, None]
         flat = point[:, :2] / np.maximum(1.0 - w * point[:, 2], 1e-3)[:, None]
-        wide = girth[:, None] / near * (1.0 + w * np.abs(flat)) + 0.5
+        wide = end_radii[:, None] / near * (1.0 + w * np.abs(flat)) + 0.5
         ends.append((flat - wide, flat + wide))
     return np.minimum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
 
 
-def _near_the_axis(canvas: Canvas, items: np.ndarray, tile: int) -> np.ndarray:
+def _tiles_near_axis(buffer: DepthBuffer, items: np.ndarray, tile: int) -> np.ndarray:
     """Those squares that a rod's projection comes near to: a long one crosses few of those in its window."""
-    s, w = canvas.solids, canvas.w
+    s, w = buffer.solids, buffer.w
     which = items[:, 0]
     a, b = (p[which, :2] / np.maximum(1.0 - w * p[which, 2], 1e-3)[:, None] for p in (s.start, s.end))
-    middle = items[:, 1:] + tile / 2 - np.array(canvas.shape[::-1]) / 2
+    middle = items[:, 1:] + tile / 2 - np.array(buffer.shape[::-1]) / 2
     axis = b - a
     along = np.clip(((middle - a) * axis).sum(axis=1) / np.maximum((axis**2).sum(axis=1), 1e-12), 0.0, 1.0)
     away = np.linalg.norm(middle - a - along[:, None] * axis, axis=1)
-    top = np.maximum(s.start, s.end)[which, 2] + s.girth[which].max(axis=1)
-    return items[away < 0.75 * tile + 1.5 * s.girth[which].max(axis=1) / np.maximum(1.0 - w * top, 1e-3) + 1.0]
+    top = np.maximum(s.start, s.end)[which, 2] + s.end_radii[which].max(axis=1)
+    return items[away < 0.75 * tile + 1.5 * s.end_radii[which].max(axis=1) / np.maximum(1.0 - w * top, 1e-3) + 1.0]
 
 
-def _squares(
+def _tiles(
     shape: tuple[int, int], low: np.ndarray, high: np.ndarray, z: np.ndarray
 ) -> Iterator[tuple[np.ndarray, int]]:
     """Windows cut into squares, those of one edge together: (K, 3) shape, lowest column and row; and the edge."""
@@ -224,7 +224,7 @@ def _squares(
     span = last - first + 1
     there = np.flatnonzero((span > 0).all(axis=1))
     there = there[np.argsort(-z[there], kind="stable")]  # the nearest first: they hide most
-    edge = np.array(EDGES)[np.minimum(np.searchsorted(EDGES, span[there].max(axis=1)), len(EDGES) - 1)]
+    edge = np.array(TILE_EDGES)[np.minimum(np.searchsorted(TILE_EDGES, span[there].max(axis=1)), len(TILE_EDGES) - 1)]
     for tile in np.unique(edge):
         own = there[edge == tile]
         across, along = (-(-span[own] // tile)).T

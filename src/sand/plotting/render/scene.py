@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 
 from ...analysis.clusters import cluster_labels, cluster_sizes, unwrapped
 from ...box import Box
-from ..style import BIG, FAINT, INK, SINGLE, SMALL, pretty, rgb, round_length
-from .spheres import Balls, draw
+from ..style import LARGEST_COLOURS, MUTED, OTHER_COLOURS, SINGLE_COLOUR, TEXT_COLOUR, format_si, rgb, round_length
+from .spheres import Spheres, render_spheres
 
 AZIMUTH, ELEVATION = 32.0, 20.0
 """Where the eye is [degrees], seen from the middle of the box; z is up."""
@@ -20,7 +20,7 @@ LARGEST_SHOWN = 3
 """Clusters shown by themselves."""
 
 
-def camera(towards: np.ndarray | None = None) -> np.ndarray:
+def camera_rotation(towards: np.ndarray | None = None) -> np.ndarray:
     """(3, 3): rows are the directions right, up and towards the eye in the laboratory frame.
 
     Parameters
@@ -66,9 +66,9 @@ class Scene:
     box: Box
     number: np.ndarray
 
-    def seen(self, rotation: np.ndarray, chosen: slice | np.ndarray = slice(None)) -> Balls:
+    def projected(self, rotation: np.ndarray, chosen: slice | np.ndarray = slice(None)) -> Spheres:
         """The chosen grains in screen coordinates; rows of `rotation` are right, up, to the eye."""
-        return Balls(
+        return Spheres(
             self.position[chosen] @ rotation.T,
             self.radius[chosen],
             self.colour[chosen],
@@ -91,7 +91,7 @@ class Scene:
         corners = self.corners()
         if corners is None:
             return []
-        far = np.unravel_index(np.argmin(corners @ camera()[2]), (2, 2, 2))
+        far = np.unravel_index(np.argmin(corners @ camera_rotation()[2]), (2, 2, 2))
         found = []
         for axis, *others in itertools.product(range(3), (0, 1), (0, 1)):
             start = [*others[:axis], 0, *others[axis:]]
@@ -99,14 +99,14 @@ class Scene:
             found.append((corners[tuple(start)], corners[tuple(end)], axis, far in (tuple(start), tuple(end))))
         return found
 
-    def largest(self) -> list[int]:
+    def largest_clusters(self) -> list[int]:
         """Labels of clusters of at least two grains, the largest first."""
         sizes = cluster_sizes(self.label)
         order = np.argsort(-sizes, kind="stable")
         return [int(k) for k in order if sizes[k] > 1]
 
 
-def scene_of(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> Scene:
+def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> Scene:
     """The scene of grains with contacts `pairs` (C, 2); grains whose place is not a number are left out.
 
     Parameters
@@ -149,10 +149,14 @@ def _arrows(moment: np.ndarray) -> np.ndarray:
 def cluster_colours(label: np.ndarray) -> np.ndarray:
     """(N, 3): a colour of its own for each of the largest clusters, grey for single grains."""
     sizes = cluster_sizes(label)
-    of_cluster = np.tile(rgb(SINGLE), (sizes.size, 1))
+    of_cluster = np.tile(rgb(SINGLE_COLOUR), (sizes.size, 1))
     for rank, k in enumerate(np.argsort(-sizes, kind="stable")):
         if sizes[k] > 1:
-            name = BIG[rank] if rank < len(BIG) else SMALL[(rank - len(BIG)) % len(SMALL)]
+            name = (
+                LARGEST_COLOURS[rank]
+                if rank < len(LARGEST_COLOURS)
+                else OTHER_COLOURS[(rank - len(LARGEST_COLOURS)) % len(OTHER_COLOURS)]
+            )
             of_cluster[k] = rgb(name)
     return of_cluster[label]
 
@@ -161,17 +165,17 @@ def view_window(
     scene: Scene, wide: float, margin: float = 0.02, rotation: np.ndarray | None = None
 ) -> tuple[float, float, float, float]:
     """Left, right, bottom, top [m] that hold the grains and the box; `wide` is width over height."""
-    rotation = camera() if rotation is None else rotation
-    left, right, bottom, top = scene.seen(rotation).bounds
+    rotation = camera_rotation() if rotation is None else rotation
+    left, right, bottom, top = scene.projected(rotation).bounds
     corners = scene.corners()
     if corners is not None:
         flat = corners.reshape(-1, 3) @ rotation.T
         left, right = min(left, flat[:, 0].min()), max(right, flat[:, 0].max())
         bottom, top = min(bottom, flat[:, 1].min()), max(top, flat[:, 1].max())
-    return widened((left, right, bottom, top), wide, margin, least=5.0 * float(scene.radius.max()))
+    return fit_window((left, right, bottom, top), wide, margin, least=5.0 * float(scene.radius.max()))
 
 
-def widened(
+def fit_window(
     bounds: tuple[float, float, float, float], wide: float, margin: float, least: float = 0.0
 ) -> tuple[float, float, float, float]:
     """The window of proportions `wide` around `bounds`, at least `least` [m] high."""
@@ -184,15 +188,15 @@ def widened(
 def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     """All grains in their box, with a scale bar and the directions of the axes."""
     window = view_window(scene, pixels[0] / pixels[1])
-    _show(axes, scene.seen(camera()), window, pixels)
+    _show(axes, scene.projected(camera_rotation()), window, pixels)
     _draw_box(axes, scene)
     _draw_directions(axes)
     draw_scale_bar(axes)
 
 
-def _show(axes: Axes, balls: Balls, window: tuple[float, float, float, float], pixels: tuple[int, int]) -> None:
+def _show(axes: Axes, spheres: Spheres, window: tuple[float, float, float, float], pixels: tuple[int, int]) -> None:
     axes.imshow(
-        draw(balls, window, *pixels),
+        render_spheres(spheres, window, *pixels),
         extent=window,
         origin="lower",
         aspect="auto",
@@ -206,11 +210,11 @@ def _show(axes: Axes, balls: Balls, window: tuple[float, float, float, float], p
 def _draw_box(axes: Axes, scene: Scene) -> None:
     """The twelve edges; the three that meet in the farthest corner lie behind the grains."""
     for start, end, axis, behind in scene.edges():
-        line = np.array([start, end]) @ camera().T
+        line = np.array([start, end]) @ camera_rotation().T
         axes.plot(
             line[:, 0],
             line[:, 1],
-            color=FAINT,
+            color=MUTED,
             linewidth=0.6 if behind else 0.8,
             alpha=0.55 if behind else 0.75,
             linestyle="-" if scene.box.lengths[axis] is not None else (0, (1.5, 3)),
@@ -224,12 +228,14 @@ def _draw_directions(axes: Axes) -> None:
     left, (bottom, top) = axes.get_xlim()[0], axes.get_ylim()
     size = 0.042 * (top - bottom)
     x, y = left + 1.6 * size, bottom + 0.9 * size
-    for name, step in zip("xyz", camera()[:2].T * size, strict=True):
-        axes.plot([x, x + step[0]], [y, y + step[1]], color=FAINT, linewidth=0.9, zorder=4)
-        axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=FAINT, size=7, ha="center", va="center")
+    for name, step in zip("xyz", camera_rotation()[:2].T * size, strict=True):
+        axes.plot([x, x + step[0]], [y, y + step[1]], color=MUTED, linewidth=0.9, zorder=4)
+        axes.text(x + 1.5 * step[0], y + 1.5 * step[1], name, color=MUTED, size=7, ha="center", va="center")
 
 
-def draw_scale_bar(axes: Axes, share: float = 0.25, ink: str = INK, margin: float = 0.015, grow: float = 1.0) -> None:
+def draw_scale_bar(
+    axes: Axes, share: float = 0.25, ink: str = TEXT_COLOUR, margin: float = 0.015, grow: float = 1.0
+) -> None:
     """A bar of a round length, at most `share` of the width, in the lower right corner, and its length."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     length = round_length(share * (right - left))
@@ -237,31 +243,31 @@ def draw_scale_bar(axes: Axes, share: float = 0.25, ink: str = INK, margin: floa
     axes.plot([x - length, x], [y, y], color=ink, linewidth=2.0 * grow, solid_capstyle="butt", zorder=4, gid="scale")
     place, above = (x - length / 2, y), (0, 3 * grow)
     axes.annotate(
-        pretty(length, "m"), place, above, textcoords="offset points", ha="center", color=ink, size=7.5 * grow
+        format_si(length, "m"), place, above, textcoords="offset points", ha="center", color=ink, size=7.5 * grow
     )
 
 
-def side_by_side(scene: Scene, count: int) -> tuple[Balls, np.ndarray, list[int]]:
+def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[int]]:
     """The `count` largest clusters next to each other, each turned so that its long axis is across.
 
     Returns
     -------
-    tuple[Balls, ndarray, list[int]]
+    tuple[Spheres, ndarray, list[int]]
         What to draw; (K, 2) the middle of the lower edge of each cluster [m]; their numbers of grains.
     """
     parts, feet, sizes, edge = [], [], [], 0.0
     gap = 3.0 * float(scene.radius.max())
-    for label in scene.largest()[:count]:
+    for label in scene.largest_clusters()[:count]:
         chosen = np.flatnonzero(scene.label == label)
-        balls = scene.seen(_principal(scene.position[chosen]), chosen)
-        left, right, bottom, top = balls.bounds
-        shift = np.array([edge - left, -(bottom + top) / 2, -balls.centre[:, 2].mean()])
-        parts.append(Balls(balls.centre + shift, balls.radius, balls.colour, balls.arrow))
+        spheres = scene.projected(_principal(scene.position[chosen]), chosen)
+        left, right, bottom, top = spheres.bounds
+        shift = np.array([edge - left, -(bottom + top) / 2, -spheres.centre[:, 2].mean()])
+        parts.append(Spheres(spheres.centre + shift, spheres.radius, spheres.colour, spheres.arrow))
         feet.append((edge + (right - left) / 2, -(top - bottom) / 2))
         sizes.append(chosen.size)
         edge += right - left + gap
     fields = zip(*((p.centre, p.radius, p.colour, p.arrow) for p in parts), strict=True)
-    return Balls(*(np.concatenate(each) for each in fields)), np.array(feet), sizes
+    return Spheres(*(np.concatenate(each) for each in fields)), np.array(feet), sizes
 
 
 def _principal(position: np.ndarray) -> np.ndarray:
@@ -275,14 +281,14 @@ def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     """The largest clusters at a scale at which grains, contacts and moments can be told apart."""
     wide = pixels[0] / pixels[1]
     least = 2.0 * float(np.median(scene.radius)) * pixels[1] / 76.0  # a grain is at most 76 pixels across
-    for count in range(min(LARGEST_SHOWN, len(scene.largest())), 0, -1):
-        balls, feet, sizes = side_by_side(scene, count)
-        left, right, bottom, top = balls.bounds
+    for count in range(min(LARGEST_SHOWN, len(scene.largest_clusters())), 0, -1):
+        spheres, feet, sizes = side_by_side(scene, count)
+        left, right, bottom, top = spheres.bounds
         # More clusters only as long as they do not make all of them small.
         if right - left < 1.5 * wide * max(top - bottom, least):
             break
-    window = widened((left, right, bottom - 0.22 * (top - bottom), top), wide, 0.02, least)
-    _show(axes, balls, window, pixels)
+    window = fit_window((left, right, bottom - 0.22 * (top - bottom), top), wide, 0.02, least)
+    _show(axes, spheres, window, pixels)
     for (x, y), size in zip(feet, sizes, strict=True):
         axes.annotate(f"{size} grains", (x, y), (0, -3), textcoords="offset points", ha="center", va="top", size=7.5)
     draw_scale_bar(axes, 0.15)

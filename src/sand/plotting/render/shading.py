@@ -1,4 +1,4 @@
-"""Light and shade on what a canvas holds: a key lamp with shadows, a soft fill, dark clefts, haze over what is far."""
+"""Light and shade on what a buffer holds: a key lamp with shadows, a soft fill, dark clefts, haze over what is far."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from .ray_casting import Canvas, Solids
+from .ray_casting import DepthBuffer, Solids
 
 KEY = np.array([-0.46, 0.62, 0.64])
 """To the lamp: from the upper left, in front."""
 FILL = np.array([0.75, -0.15, 0.45])
 """To the weak second lamp."""
-PATTERN = 4
+OCCLUSION_PATTERN = 4
 """Pixels of a square of this edge look in different directions for what darkens them."""
-LOOKS = 9
+OCCLUSION_SAMPLES = 9
 """Places that each pixel looks at."""
-NO_SHADOW = 0.5
+SHADOW_THRESHOLD = 0.5
 """Rods that are `lit` no more than this throw no shadow."""
-LARGEST_MAP = 3000
+MAX_SHADOW_MAP = 3000
 """Samples along an edge of what the key lamp sees."""
-MOST_ROWS = 400_000
+MAX_SHADED = 400_000
 """Samples that are coloured in one go."""
 
 
 @dataclass(frozen=True)
-class Lamps:
+class Lighting:
     """How bright it is: the sum is the brightness of a surface that faces the key lamp.
 
     Attributes
@@ -34,8 +34,8 @@ class Lamps:
     sky : float
         from everywhere, more from above; clefts and hollows see less of it.
     key, fill : float
-        of the two lamps.
-    glint : float
+        of the two lighting.
+    specular : float
         how bright the key lamp's reflection is.
     haze : float
         share of the background in what is farthest.
@@ -46,88 +46,92 @@ class Lamps:
     sky: float = 0.60
     key: float = 0.54
     fill: float = 0.12
-    glint: float = 0.20
+    specular: float = 0.20
     haze: float = 0.34
     background: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
-def shaded(canvas: Canvas, finer: int, radius: float, lamps: Lamps) -> np.ndarray:
-    """The picture (rows/finer, columns/finer, 4): red, green, blue, opacity from 0 to 1.
+def shade(buffer: DepthBuffer, supersampling: int, radius: float, lighting: Lighting) -> np.ndarray:
+    """The picture (rows/supersampling, columns/supersampling, 4): red, green, blue, opacity from 0 to 1.
 
     Parameters
     ----------
-    finer : int
+    supersampling : int
         samples per pixel and direction, averaged.
     radius : float
         of a typical grain [samples], for the size of clefts.
     """
-    height, width = canvas.shape[0] // finer, canvas.shape[1] // finer
-    dim, lamp = _shade(canvas, finer, radius)
+    height, width = buffer.shape[0] // supersampling, buffer.shape[1] // supersampling
+    dim, lamp = _shade(buffer, supersampling, radius)
     picture = np.zeros((height, width, 4), dtype=np.float32)
-    rows_at_once = max(MOST_ROWS // (canvas.shape[1] * finer), 1)
+    rows_at_once = max(MAX_SHADED // (buffer.shape[1] * supersampling), 1)
     for first in range(0, height, rows_at_once):
         last = min(first + rows_at_once, height)
-        strip = canvas.nearest[first * finer : last * finer]
+        strip = buffer.nearest[first * supersampling : last * supersampling]
         rows, columns = np.nonzero(strip)
         colour = np.zeros((*strip.shape, 4), dtype=np.float32)
-        at = (first + rows // finer, columns // finer)
-        colour[rows, columns, :3] = _coloured(canvas, rows + first * finer, columns, dim[at], lamp[at], radius, lamps)
+        at = (first + rows // supersampling, columns // supersampling)
+        colour[rows, columns, :3] = _coloured(
+            buffer, rows + first * supersampling, columns, dim[at], lamp[at], radius, lighting
+        )
         colour[rows, columns, 3] = 1.0
-        mean = colour.reshape(last - first, finer, width, finer, 4).mean(axis=(1, 3))
+        mean = colour.reshape(last - first, supersampling, width, supersampling, 4).mean(axis=(1, 3))
         mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
         picture[first:last] = mean
     return picture
 
 
 def _coloured(
-    canvas: Canvas,
+    buffer: DepthBuffer,
     rows: np.ndarray,
     columns: np.ndarray,
     dim: np.ndarray,
     lamp: np.ndarray,
     radius: float,
-    lamps: Lamps,
+    lighting: Lighting,
 ) -> np.ndarray:
     """(K, 3) colours of covered samples; `dim`: how much sky each sees, `lamp`: how much of the key lamp."""
-    which, point, normal = canvas.surface(rows, columns)
+    which, point, normal = buffer.surface(rows, columns)
     key, fill = (v.astype(np.float32) / np.float32(np.linalg.norm(v)) for v in (KEY, FILL))
     facing = np.maximum(normal @ key, 0.0)
     soft = np.clip(0.3 + 0.7 * (normal @ key), 0.0, 1.0)  # light creeps round the edge
     half = key + np.array([0.0, 0.0, 1.0], dtype=np.float32)
-    glint = np.maximum(normal @ (half / np.linalg.norm(half)), 0.0) ** 48 * lamp
-    power = lamps.sky * (0.80 + 0.20 * normal[:, 1]) * dim + lamps.fill * np.maximum(normal @ fill, 0.0) * dim
-    power += lamps.key * (0.45 * soft * dim * (0.6 + 0.4 * lamp) + 0.55 * facing * lamp)
-    lit = canvas.solids.lit[which].astype(np.float32)
-    base = canvas.solids.colour[which].astype(np.float32)
+    specular = np.maximum(normal @ (half / np.linalg.norm(half)), 0.0) ** 48 * lamp
+    power = lighting.sky * (0.80 + 0.20 * normal[:, 1]) * dim + lighting.fill * np.maximum(normal @ fill, 0.0) * dim
+    power += lighting.key * (0.45 * soft * dim * (0.6 + 0.4 * lamp) + 0.55 * facing * lamp)
+    lit = buffer.solids.lit[which].astype(np.float32)
+    base = buffer.solids.colour[which].astype(np.float32)
     power *= 0.74 + 0.26 * np.clip(normal[:, 2] / 0.55, 0.0, 1.0)  # a rim parts what has one colour
     power = 1.0 + lit * (power - 1.0)
-    colour = base * power[:, None] + (lamps.glint * lit * glint * dim)[:, None]
-    extent = canvas.range
-    haze = lamps.haze * extent / (extent + 14.0 * radius) * (1.0 - (point[:, 2] - canvas.far) / extent) * lit
-    colour = colour * (1.0 - haze[:, None]) + np.array(lamps.background, dtype=np.float32) * haze[:, None]
+    colour = base * power[:, None] + (lighting.specular * lit * specular * dim)[:, None]
+    extent = buffer.range
+    haze = lighting.haze * extent / (extent + 14.0 * radius) * (1.0 - (point[:, 2] - buffer.far) / extent) * lit
+    colour = colour * (1.0 - haze[:, None]) + np.array(lighting.background, dtype=np.float32) * haze[:, None]
     return np.clip(colour, 0.0, 1.0)
 
 
-def _shade(canvas: Canvas, finer: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _shade(buffer: DepthBuffer, supersampling: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """For each pixel the share of the sky it sees, and of the key lamp, 0 to 1."""
-    few = slice(finer // 2, None, finer)
-    there = canvas.nearest[few, few] > 0
+    few = slice(supersampling // 2, None, supersampling)
+    there = buffer.nearest[few, few] > 0
     rows, columns = np.nonzero(there)
     if not rows.size:
         return np.ones(there.shape, np.float32), np.ones(there.shape, np.float32)
-    _, point, normal = canvas.surface(rows * finer + finer // 2, columns * finer + finer // 2)
+    _, point, normal = buffer.surface(
+        rows * supersampling + supersampling // 2, columns * supersampling + supersampling // 2
+    )
     depth = np.full(there.shape, -np.inf, np.float32)
-    depth[there] = point[:, 2] / finer
+    depth[there] = point[:, 2] / supersampling
     facing = np.zeros((*there.shape, 3), np.float32)
     facing[there] = normal
-    dim = np.exp(-2.3 * _hidden(depth, facing, radius / finer))
+    dim = np.exp(-2.3 * _occlusion(depth, facing, radius / supersampling))
     lamp = np.ones(there.shape, np.float32)
-    lamp[there] = _lamp(canvas.solids, point, normal, finer, radius)
-    weight = np.maximum(uniform_filter(there.astype(np.float32), PATTERN), 1e-3)
-    return tuple(uniform_filter(np.where(there, each, 0.0), PATTERN) / weight for each in (dim, lamp))
+    lamp[there] = _key_light_visibility(buffer.solids, point, normal, supersampling, radius)
+    weight = np.maximum(uniform_filter(there.astype(np.float32), OCCLUSION_PATTERN), 1e-3)
+    return tuple(uniform_filter(np.where(there, each, 0.0), OCCLUSION_PATTERN) / weight for each in (dim, lamp))
 
 
-def _hidden(depth: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
+def _occlusion(depth: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
     """How much of the sky is hidden by what is near, from the depths around each pixel [pixels], 0 to 1.
 
     Each pixel looks at a few places at distances from a pixel to some radii; what rises there above its horizon, by
@@ -136,22 +140,22 @@ def _hidden(depth: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
     """
     near, far = 1.0, float(np.clip(4.0 * radius, 4.0, 90.0))
     reach = int(far) + 2
-    padded = np.pad(depth, reach + PATTERN, constant_values=-np.inf)
+    padded = np.pad(depth, reach + OCCLUSION_PATTERN, constant_values=-np.inf)
     hidden = np.zeros(depth.shape, np.float32)
-    for i in range(PATTERN):
-        for j in range(PATTERN):
-            own = (slice(i, None, PATTERN), slice(j, None, PATTERN))
+    for i in range(OCCLUSION_PATTERN):
+        for j in range(OCCLUSION_PATTERN):
+            own = (slice(i, None, OCCLUSION_PATTERN), slice(j, None, OCCLUSION_PATTERN))
             z, n = depth[own], normal[own]
-            turn = (7 * (i * PATTERN + j)) % PATTERN**2 / PATTERN**2
+            turn = (7 * (i * OCCLUSION_PATTERN + j)) % OCCLUSION_PATTERN**2 / OCCLUSION_PATTERN**2
             total = np.zeros(z.shape, np.float32)
-            for k in range(LOOKS):
-                away = near * (far / near) ** ((k + turn) / LOOKS)
+            for k in range(OCCLUSION_SAMPLES):
+                away = near * (far / near) ** ((k + turn) / OCCLUSION_SAMPLES)
                 angle = 2.0 * np.pi * (k * 0.618034 + turn)
                 dx, dy = round(away * np.cos(angle)), round(away * np.sin(angle))
                 if dx == dy == 0:
                     dx = 1
-                top, left = reach + PATTERN + i + dy, reach + PATTERN + j + dx
-                seen = padded[top::PATTERN, left::PATTERN][: z.shape[0], : z.shape[1]]
+                top, left = reach + OCCLUSION_PATTERN + i + dy, reach + OCCLUSION_PATTERN + j + dx
+                seen = padded[top::OCCLUSION_PATTERN, left::OCCLUSION_PATTERN][: z.shape[0], : z.shape[1]]
                 with np.errstate(invalid="ignore"):
                     dz = np.where(np.isfinite(z), seen - z, -np.inf)
                 flat = np.float32(dx * dx + dy * dy)
@@ -159,27 +163,29 @@ def _hidden(depth: np.ndarray, normal: np.ndarray, radius: float) -> np.ndarray:
                 long = flat + dz * dz
                 rise = (n[..., 0] * dx + n[..., 1] * dy + n[..., 2] * dz) / np.sqrt(long)
                 total += np.maximum(rise - 0.08, 0.0) / (1.0 + (long / (5.0 * flat)) ** 2)
-            hidden[own] = total / LOOKS
+            hidden[own] = total / OCCLUSION_SAMPLES
     return hidden
 
 
-def _lamp(solids: Solids, point: np.ndarray, normal: np.ndarray, finer: int, radius: float) -> np.ndarray:
+def _key_light_visibility(
+    solids: Solids, point: np.ndarray, normal: np.ndarray, supersampling: int, radius: float
+) -> np.ndarray:
     """How much of the key lamp points see (K,), 0 to 1: from the depths that the lamp sees."""
     forward = KEY / np.linalg.norm(KEY)
     right = np.cross([0.0, 1.0, 0.0], forward)
     right /= np.linalg.norm(right)
     frame = np.array([right, np.cross(forward, right), forward])
-    shown = solids.lit[len(solids.radius) :] > NO_SHADOW
+    shown = solids.lit[len(solids.radius) :] > SHADOW_THRESHOLD
     turned = [p @ frame.T for p in (solids.centre, solids.start[shown], solids.end[shown])]
     reach = 2.0 * (
         max(float(np.abs(p[:, :2]).max(initial=0.0)) for p in turned) + float(solids.radius.max(initial=0.0))
     )
-    scale = min(1.0 / finer, LARGEST_MAP / (reach + 1.0))
+    scale = min(1.0 / supersampling, MAX_SHADOW_MAP / (reach + 1.0))
     size = int(reach * scale) + 8
-    girth = solids.girth[shown] * scale
+    end_radii = solids.end_radii[shown] * scale
     blank = np.zeros((0, 3)), np.zeros(0)
     centre, start, end = (p * scale for p in turned)
-    lamp = Canvas((size, size), Solids(centre, solids.radius * scale, start, end, girth, *blank))
+    lamp = DepthBuffer((size, size), Solids(centre, solids.radius * scale, start, end, end_radii, *blank))
     grazing = 1.0 - np.clip(normal @ forward.astype(np.float32), 0.0, 1.0)
     lifted = (point + normal * (0.02 * radius + (1.0 + 2.0 * grazing[:, None]) / scale)) @ (frame.T * scale).astype(
         np.float32

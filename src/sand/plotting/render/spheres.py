@@ -9,18 +9,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..style import INK, rgb
-from .ray_casting import Canvas, Solids
-from .shading import NO_SHADOW, Lamps, shaded
+from ..style import TEXT_COLOUR, rgb
+from .ray_casting import DepthBuffer, Solids
+from .shading import SHADOW_THRESHOLD, Lighting, shade
 
-FINER = 2
+SUPERSAMPLING = 2
 """Samples per pixel and direction, averaged at the end."""
 SHAFT, HEAD_WIDTH, HEAD_LENGTH = 0.11, 0.34, 0.75
 """Half widths and length of an arrow's parts, in radii of its grain."""
 
 
 @dataclass(frozen=True)
-class Balls:
+class Spheres:
     """Spheres to be drawn, all lengths [m].
 
     Attributes
@@ -56,7 +56,7 @@ class Rods:
     ----------
     start, end : ndarray
         (M, 3) middles of the ends.
-    girth : ndarray
+    end_radii : ndarray
         (M, 2) radii of the ends.
     colour : ndarray
         (M, 3), 0 to 1.
@@ -66,19 +66,19 @@ class Rods:
 
     start: np.ndarray
     end: np.ndarray
-    girth: np.ndarray
+    end_radii: np.ndarray
     colour: np.ndarray
     lit: np.ndarray
 
     @classmethod
     def joined(cls, *parts: Rods) -> Rods:
         """All rods of several."""
-        names = ("start", "end", "girth", "colour", "lit")
+        names = ("start", "end", "end_radii", "colour", "lit")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def draw(
-    balls: Balls,
+def render_spheres(
+    spheres: Spheres,
     window: tuple[float, float, float, float],
     width: int,
     height: int,
@@ -86,8 +86,8 @@ def draw(
     rods: Rods | None = None,
     arrows: tuple[float, float, float] | None = None,
     eye: float | None = None,
-    lamps: Lamps | None = None,
-    finer: int = FINER,
+    lighting: Lighting | None = None,
+    supersampling: int = SUPERSAMPLING,
 ) -> np.ndarray:
     """The picture, (height, width, 4) red, green, blue, opacity from 0 to 1; its first row is the lowest.
 
@@ -101,36 +101,36 @@ def draw(
         their colour; that of text by default.
     eye : float or None, optional
         its distance from the plane z = 0 [m]; parallel rays by default.
-    finer : int, optional
+    supersampling : int, optional
         samples per pixel and direction.
     """
     left, right, bottom, top = window
-    scale = width * finer / (right - left)  # samples per metre
+    scale = width * supersampling / (right - left)  # samples per metre
     w = 0.0 if eye is None else 1.0 / eye
     middle = np.array([(left + right) / 2, (bottom + top) / 2, 0.0])
-    found = [_arrows(balls, middle, w, rgb(INK) if arrows is None else np.array(arrows))]
+    found = [_arrows(spheres, middle, w, rgb(TEXT_COLOUR) if arrows is None else np.array(arrows))]
     every = Rods.joined(*found, *([rods] if rods is not None else []))
     solids = Solids(
-        (balls.centre - middle) * scale,
-        np.maximum(balls.radius * scale, 1.0 * finer),  # no grain vanishes between samples
+        (spheres.centre - middle) * scale,
+        np.maximum(spheres.radius * scale, 1.0 * supersampling),  # no grain vanishes between samples
         (every.start - middle) * scale,
         (every.end - middle) * scale,
-        every.girth * scale,
-        np.concatenate([balls.colour, every.colour]),
-        np.concatenate([np.ones(len(balls.radius)), every.lit]),
+        every.end_radii * scale,
+        np.concatenate([spheres.colour, every.colour]),
+        np.concatenate([np.ones(len(spheres.radius)), every.lit]),
     )
-    canvas = Canvas((height * finer, width * finer), solids, w / scale)
-    return shaded(canvas, finer, float(np.median(solids.radius)), lamps or Lamps())
+    buffer = DepthBuffer((height * supersampling, width * supersampling), solids, w / scale)
+    return shade(buffer, supersampling, float(np.median(solids.radius)), lighting or Lighting())
 
 
-def _arrows(balls: Balls, middle: np.ndarray, w: float, colour: np.ndarray) -> Rods:
+def _arrows(spheres: Spheres, middle: np.ndarray, w: float, colour: np.ndarray) -> Rods:
     """Arrows, each laid on the front of its grain: grains nearer to the eye still hide it."""
-    which = np.flatnonzero(np.any(balls.arrow != 0.0, axis=1))
-    radius, half = balls.radius[which, None], balls.arrow[which] * balls.radius[which, None]
+    which = np.flatnonzero(np.any(spheres.arrow != 0.0, axis=1))
+    radius, half = spheres.radius[which, None], spheres.arrow[which] * spheres.radius[which, None]
     size = np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-300)
-    forward = np.array([0.0, 0.0, 1.0]) - w * (balls.centre[which] - middle)  # to the eye
+    forward = np.array([0.0, 0.0, 1.0]) - w * (spheres.centre[which] - middle)  # to the eye
     forward /= np.linalg.norm(forward, axis=1, keepdims=True)
-    place = balls.centre[which] + forward * (1.05 * radius + np.abs((half * forward).sum(axis=1, keepdims=True)))
+    place = spheres.centre[which] + forward * (1.05 * radius + np.abs((half * forward).sum(axis=1, keepdims=True)))
     neck = place + half * (1.0 - np.minimum(HEAD_LENGTH * radius, 1.2 * size) / size)
     narrow, wide, point = SHAFT * radius, HEAD_WIDTH * radius, 0.0 * radius
     return Rods(
@@ -138,5 +138,5 @@ def _arrows(balls: Balls, middle: np.ndarray, w: float, colour: np.ndarray) -> R
         np.concatenate([neck, place + half]),
         np.concatenate([np.hstack([narrow, narrow]), np.hstack([wide, point])]),
         np.tile(colour, (2 * len(which), 1)),
-        np.full(2 * len(which), NO_SHADOW),
+        np.full(2 * len(which), SHADOW_THRESHOLD),
     )

@@ -15,12 +15,12 @@ from ...arguments import checked
 from ...box import Box
 from ...errors import BadInput, did_you_mean, refuse_other
 from ..run_figure import DPI, RunFigure, headline
-from ..style import CHALK, FAINT, INK, MIST, NIGHT, PAPER, rgb, styled
-from .colouring import Key, coloured
-from .legend import draw_directions, draw_keys
-from .scene import Scene, camera, draw_scale_bar, scene_of, view_window
-from .shading import Lamps
-from .spheres import Rods, draw
+from ..style import DARK_BACKGROUND, LIGHT_BACKGROUND, MUTED, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, plot_style, rgb
+from .colouring import ColourKey, coloured
+from .legend import draw_colour_keys, draw_directions
+from .scene import Scene, camera_rotation, draw_scale_bar, make_scene, view_window
+from .shading import Lighting
+from .spheres import Rods, render_spheres
 
 VIEWS: dict[str, tuple[float, float, float] | None] = {
     "iso": None,
@@ -31,8 +31,8 @@ VIEWS: dict[str, tuple[float, float, float] | None] = {
 """Directions to the eye."""
 LEAST_SIZE, MOST_SIZE = 200, 8000
 """Pixels along an edge."""
-DAY_LAMPS = Lamps(haze=0.26)
-NIGHT_LAMPS = Lamps(sky=0.64, key=0.66, glint=0.24, haze=0.45, background=tuple(rgb(NIGHT)))
+LIGHTING_ON_LIGHT = Lighting(haze=0.26)
+LIGHTING_ON_DARK = Lighting(sky=0.64, key=0.66, specular=0.24, haze=0.45, background=tuple(rgb(DARK_BACKGROUND)))
 COLLAR = 0.52
 """Radius of what marks a contact, in radii of the smaller grain; half its length is 0.4 of that."""
 FEW_GRAINS = 3000
@@ -55,7 +55,7 @@ class Still(RunFigure):
 
     def image(self) -> Image.Image:
         """The picture with all that is written on it, for Pillow."""
-        with styled():
+        with plot_style():
             self.savefig(content := io.BytesIO(), format="png", dpi=DPI, facecolor="auto")
         return Image.open(content)
 
@@ -114,29 +114,29 @@ def still_picture(
         one line for each mistake.
     """
     refuse_other(frame, "radius", "pair", "box")
-    towards = check_picture(colour, bonds, view, size)
+    towards = check_picture_options(colour, bonds, view, size)
     outside = None if field is None else np.asarray(field, dtype=np.float64)
-    scene = scene_of(frame, frame.pair, frame.box, whole)
-    scene, key = _painted(scene, frame, colour, outside, arrows)
+    scene = make_scene(frame, frame.pair, frame.box, whole)
+    scene, key = _coloured_scene(scene, frame, colour, outside, arrows)
     if cluster is not None:
-        scene = _alone(scene, cluster)
+        scene = _single_cluster(scene, cluster)
         if colour == "cluster":
-            key = Key("cluster", ((f"{len(scene.radius)} of {len(frame)} grains", scene.colour[0]),))
+            key = ColourKey("cluster", ((f"{len(scene.radius)} of {len(frame)} grains", scene.colour[0]),))
     if not len(scene.radius):
         raise BadInput("there is no grain with a finite position to be drawn")
-    joints, bond_key = _joints(scene, frame, bonds)
-    rotation = camera(towards)
+    joints, bond_key = _contact_rods(scene, frame, bonds)
+    rotation = camera_rotation(towards)
     keys = [each for each in (key, bond_key) if each is not None]
-    with styled():
+    with plot_style():
         figure = Still(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
         figure.scene, figure.rotation = scene, rotation
         _draw(figure, joints, size, dark, perspective)
-        _ground(figure, dark, transparent)
+        _draw_background(figure, dark, transparent)
         _write(figure, frame, keys, outside, dark)
     return figure
 
 
-def check_picture(
+def check_picture_options(
     colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]
 ) -> np.ndarray | None:
     """The direction to the eye, None for the usual one.  Raises BadInput with a line for each mistake."""
@@ -166,7 +166,9 @@ def check_picture(
     return None if towards is None else np.asarray(towards, dtype=np.float64)
 
 
-def _painted(scene: Scene, frame: Any, name: str, field: np.ndarray | None, arrows: bool) -> tuple[Scene, Key | None]:
+def _coloured_scene(
+    scene: Scene, frame: Any, name: str, field: np.ndarray | None, arrows: bool
+) -> tuple[Scene, ColourKey | None]:
     """The scene with grains of the quantity's colours, and the key to them."""
     values = measured(frame, name, field)[scene.number]
     colours, key = coloured(values, quantity(name), frame, scene.label)
@@ -174,9 +176,9 @@ def _painted(scene: Scene, frame: Any, name: str, field: np.ndarray | None, arro
     return dataclasses.replace(scene, colour=colours, arrow=shown), key
 
 
-def _alone(scene: Scene, rank: int) -> Scene:
+def _single_cluster(scene: Scene, rank: int) -> Scene:
     """One cluster in open space.  Raises BadInput."""
-    clusters = scene.largest()
+    clusters = scene.largest_clusters()
     if not 1 <= rank <= len(clusters):
         raise BadInput(f"cluster {rank}: there are {len(clusters)} of two grains or more, the largest is 1")
     chosen = scene.label == clusters[rank - 1]
@@ -184,7 +186,7 @@ def _alone(scene: Scene, rank: int) -> Scene:
     return dataclasses.replace(scene, **one, label=np.zeros(chosen.sum(), int), box=Box.open())
 
 
-def _joints(scene: Scene, frame: Any, name: str | None) -> tuple[Rods, Key | None]:
+def _contact_rods(scene: Scene, frame: Any, name: str | None) -> tuple[Rods, ColourKey | None]:
     """A collar round every contact [m], laboratory frame; where faces of the box part two grains, one at each."""
     place = np.full(len(frame.radius), -1)
     place[scene.number] = np.arange(len(scene.number))
@@ -217,11 +219,11 @@ def _draw(figure: Still, joints: Rods, size: tuple[int, int], dark: bool, perspe
     left, right, bottom, top = _INNER
     wide = size[0] * (right - left) / (size[1] * (top - bottom))
     x0, x1, y0, y1 = view_window(scene, wide, 0.03, turn)
-    balls = scene.seen(turn)
-    depth = float(balls.centre[:, 2].min() + balls.centre[:, 2].max()) / 2
-    eye = 2.6 * float(np.hypot(x1 - x0, np.ptp(balls.centre[:, 2]))) if perspective else None
+    spheres = scene.projected(turn)
+    depth = float(spheres.centre[:, 2].min() + spheres.centre[:, 2].max()) / 2
+    eye = 2.6 * float(np.hypot(x1 - x0, np.ptp(spheres.centre[:, 2]))) if perspective else None
     if eye is not None:  # what comes nearer needs more room
-        room = 1.0 / (1.0 - (float((balls.centre[:, 2] + balls.radius).max()) - depth) / eye)
+        room = 1.0 / (1.0 - (float((spheres.centre[:, 2] + spheres.radius).max()) - depth) / eye)
         x0, x1 = (x0 + x1) / 2 - room * (x1 - x0) / 2, (x0 + x1) / 2 + room * (x1 - x0) / 2
         y0, y1 = (y0 + y1) / 2 - room * (y1 - y0) / 2, (y0 + y1) / 2 + room * (y1 - y0) / 2
     pixel = (x1 - x0) / ((right - left) * size[0])
@@ -230,23 +232,23 @@ def _draw(figure: Still, joints: Rods, size: tuple[int, int], dark: bool, perspe
     down = np.array([0.0, 0.0, depth])
     edges = [(a, b) for a, b, _, _ in scene.edges()]
     ends = np.array(edges).reshape(-1, 2, 3)
-    line = rgb(MIST if dark else FAINT)
+    line = rgb(MUTED_ON_DARK if dark else MUTED)
     frame = _rods(ends[:, 0], ends[:, 1], np.full(len(ends), 0.75 * pixel), np.tile(line, (len(ends), 1)), 0.0)
     every = Rods.joined(joints, frame)
-    figure.grains_only = draw(
-        dataclasses.replace(balls, centre=balls.centre - down),
+    figure.grains_only = render_spheres(
+        dataclasses.replace(spheres, centre=spheres.centre - down),
         figure.window,
         *size,
         rods=dataclasses.replace(every, start=every.start @ turn.T - down, end=every.end @ turn.T - down),
         eye=eye,
-        lamps=NIGHT_LAMPS if dark else DAY_LAMPS,
-        finer=3 if len(balls.radius) <= FEW_GRAINS else 2,
+        lighting=LIGHTING_ON_DARK if dark else LIGHTING_ON_LIGHT,
+        supersampling=3 if len(spheres.radius) <= FEW_GRAINS else 2,
     )
 
 
-def _ground(figure: Still, dark: bool, transparent: bool) -> None:
+def _draw_background(figure: Still, dark: bool, transparent: bool) -> None:
     """The background, and the picture on it, pixel for pixel."""
-    figure.patch.set_facecolor(NIGHT if dark else PAPER)
+    figure.patch.set_facecolor(DARK_BACKGROUND if dark else LIGHT_BACKGROUND)
     figure.patch.set_alpha(0.0 if transparent else 1.0)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.imshow(figure.grains_only, extent=figure.window, origin="lower", aspect="auto", interpolation="none")
@@ -254,15 +256,15 @@ def _ground(figure: Still, dark: bool, transparent: bool) -> None:
     axes.set_axis_off()
 
 
-def _write(figure: Still, frame: Any, keys: list[Key], field: np.ndarray | None, dark: bool) -> None:
+def _write(figure: Still, frame: Any, keys: list[ColourKey], field: np.ndarray | None, dark: bool) -> None:
     """Caption, keys, scale bar and directions; letters grow with the picture."""
-    ink, faint = (CHALK, MIST) if dark else (INK, FAINT)
+    ink, faint = (TEXT_ON_DARK, MUTED_ON_DARK) if dark else (TEXT_COLOUR, MUTED)
     width, height = figure.get_size_inches() * DPI
     grow = float(min(width / 1600.0, height / 1000.0))
     axes = figure.axes[0]
     caption = headline(frame, frame.box, frame.time).split(",  ")
     figure.text(0.022, 0.962, caption[-1], size=13.0 * grow, weight="bold", color=ink, va="center")
     figure.text(0.022, 0.922, ",  ".join(caption[:-1]), size=8.5 * grow, color=faint, va="center")
-    draw_keys(figure, keys, grow, ink)
+    draw_colour_keys(figure, keys, grow, ink)
     draw_directions(figure, figure.rotation, field, grow, faint, ink)
     draw_scale_bar(axes, 0.16, ink, 0.03, 1.2 * grow)
