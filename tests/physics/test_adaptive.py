@@ -170,7 +170,7 @@ def test_a_grazing_pass_is_seen_and_a_miss_is_none():
         sim.run(until="200 ns")
         assert sim.state.count[MADE] == made
         if not made:
-            longest = sim._engine.rules.criteria.longest
+            longest = sim._engine.parameters.criteria.longest
             assert sim.state.clock[FLIGHT] == longest > 10 * 2.7e-8 / SPEED
 
 
@@ -201,7 +201,7 @@ def test_a_contact_that_breaks_gives_the_world_back():
     sim.run(until="100 ns")
     row = sim.ledger.rows[-1]
     assert (row["made"], row["broken"], row["contacts"]) == (1, 1, 0)
-    assert sim.state.clock[FLIGHT] == sim._engine.rules.criteria.longest
+    assert sim.state.clock[FLIGHT] == sim._engine.parameters.criteria.longest
     assert sim.ledger.drift < 1e-3
 
 

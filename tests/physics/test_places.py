@@ -220,7 +220,7 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
     sim.run(steps=EVERY)
     listed = sim.state.count[REBUILT]
     sim._engine.advance(np.inf, 1)
-    w, reach = sim._engine._state, sim._engine.rules.criteria.reach
+    w, reach = sim._engine._state, sim._engine.parameters.criteria.reach
     assert w.count[ORDERED] == EVERY and w.count[REBUILT] == listed
     i, j = w.pair_list.pair[:, : w.count[PAIRS]].astype(int)
     apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)
@@ -315,7 +315,7 @@ def test_who_gets_an_order_of_its_own():
     """ "auto" means ten thousand grains or more; the settled word stands in the choices; a wrong word is refused."""
     assert sand.Neighbours().uses_spatial_sort(4000) and not sand.Neighbours().uses_spatial_sort(3999)
     assert not sand.Neighbours(order="as given").uses_spatial_sort(10**6)
-    assert stirred().neighbours.order == "curve" and "along a curve" in stirred().choices["neighbours"]
+    assert stirred().neighbours.order == "curve" and "space-filling curve" in stirred().choices["neighbours"]
     assert stirred("auto").neighbours.order == "as given" and "curve" not in stirred("auto").choices["neighbours"]
     with pytest.raises(sand.BadInput, match=r"order = 'curves'.*curve"):
         sand.Neighbours(order="curves")

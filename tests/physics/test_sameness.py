@@ -84,7 +84,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 
     whole, cramped = start(), start()
     cramped.state.long_range = cramped.state.long_range._replace(neighbour=np.zeros(16, np.uint32))
-    assert whole._engine.rules.search.listed
+    assert whole._engine.parameters.search.listed
     whole.run(steps=3000)
     saved = {name: array.copy() for name, array in whole.state.to_arrays().items()}
     lists = whole.state.count[LISTED]
@@ -109,8 +109,8 @@ def test_growing_arrays_changes_nothing():
         n = len(sim.grains)
         sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), uniform_contacts=alike)
         sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=alike), alike
-        rules = sim._engine.rules
-        sim._engine.rules = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
+        rules = sim._engine.parameters
+        sim._engine.parameters = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
         sim.run(until=1e-9)
         ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in UNIFORM_ARRAYS})
     assert sim.state.count[CONTACTS] > 16

@@ -98,7 +98,7 @@ def test_gravity_does_not_shorten_the_step():
     """A uniform load costs Verlet no energy, however weak the long-range force beside it: the same step without it."""
     grains = sand.Grains([[0, 0, 0], [1e-5, 0, 0]], R, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Attraction()])
-    world, control = sim.state, sim._engine.rules.criteria
+    world, control = sim.state, sim._engine.parameters.criteria
     assert control.energy_scale > 0.0
     steps = []
     for pull in (0.0, 9.81):

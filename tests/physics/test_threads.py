@@ -112,7 +112,7 @@ def test_a_helper_that_comes_too_late_touches_nothing():
     before, world = state(sim), sim.state
     crew = new_task_queue(len(world.grains), world.contacts.flag.size)
     crew.words[WORD] = QUIT << TASK
-    rules = sim._engine.rules._replace(queue=crew)
+    rules = sim._engine.parameters._replace(queue=crew)
     worker_loops(sim._engine._kernel_spec)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
     assert crew.words[ACTIVE] == 0
     assert state(sim) == before

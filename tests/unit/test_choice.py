@@ -39,7 +39,7 @@ def test_ranks_are_ordered_as_numbers():
 def test_choices_are_the_least_of_all():
     """The loops that vectorise give the least of what grains and pairs allow one by one in Python, to rounding."""
     sim = crowd()
-    w, rules = sim.state, sim._engine.rules
+    w, rules = sim.state, sim._engine.parameters
     arrays, span, control = w.grains.arrays, rules.span, rules.criteria
 
     def look(grains, far, start, near, count, span, control):
@@ -65,12 +65,12 @@ def test_what_may_touch_soon_is_what_is_close():
     Where they have no room (an array has one place more than that), all near pairs are looked at.
     """
     sim = crowd()
-    w, reach = sim.state, sim._engine.rules.criteria.reach
+    w, reach = sim.state, sim._engine.parameters.criteria.reach
     gap = 2.0 * INNER_SKIN_FRACTION * reach
 
     def picked(room):
         near = w.pair_list._replace(inner=np.zeros(room, np.uint32), skin=w.pair_list.skin.copy())
-        build_inner_list(w.grains.arrays, near, w.count, sim._engine.rules.span, gap)
+        build_inner_list(w.grains.arrays, near, w.count, sim._engine.parameters.span, gap)
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
         if inner_list_overflowed(near, w.count):
             return {tuple(sorted(pair)) for pair in near.pair[:, : w.count[PAIRS]].T.tolist()}

@@ -18,7 +18,8 @@ import click
 import pytest
 
 import sand
-from sand.config.case import INTEGRATORS, Case, MaterialSection
+from sand.config.case import Case, MaterialSection
+from sand.config.sections import INTEGRATORS
 from sand.experiments.collision_case import CollisionCase
 from sand.experiments.growth_case import GrowthCase
 from sand.experiments.scattering import flight

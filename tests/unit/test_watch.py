@@ -64,7 +64,7 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
     """
     monkeypatch.setattr(translate, "uses_task_queue", lambda grains: blocks)
     sim = crowd(margin="5 nm")
-    control, search = sim._engine.rules.criteria, sim._engine.rules.search
+    control, search = sim._engine.parameters.criteria, sim._engine.parameters.search
     limits = {
         LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
         PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.reach),
@@ -92,7 +92,7 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     pick in each.
     """
     sim, twin = crowd(), crowd()
-    limit, span = INNER_SKIN_FRACTION * sim._engine.rules.criteria.reach, sim._engine.rules.span
+    limit, span = INNER_SKIN_FRACTION * sim._engine.parameters.criteria.reach, sim._engine.parameters.span
     for each in (sim, twin):
         each.run(steps=1)
     looked_at = 0

@@ -49,7 +49,7 @@ def _serial_pass(grains, contacts, long_range, clock, count, lost, parameters):
     last = np.uint64(count[CONTACTS])
     passed = contact_pass(grains, contacts, np.uint64(0), last, parameters.span, parameters.contact, clock[STEP])
     log_slip_sums(count, lost, passed)
-    return passed.waiting > 0.0
+    return passed.pending > 0.0
 
 
 @loop
@@ -89,7 +89,7 @@ def _shared_loops(spec: KernelSpec) -> LargeLoops:
         waiting = False
         for b in range(blocks):
             passed = load_slip_sums(parameters.queue.passed, b)
-            waiting |= passed.waiting > 0.0
+            waiting |= passed.pending > 0.0
             log_slip_sums(count, lost, passed)
         return waiting
 
