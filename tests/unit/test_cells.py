@@ -33,7 +33,7 @@ def rows(position, box, reach):
     far = empty_long_range_arrays(count, 8)
     far.anchor[...] = position.T
     while cells.rebuild_verlet_list(far, box.span, reach) == cells.FULL:
-        far = far._replace(mate=np.zeros(2 * far.neighbour.size, np.uint32))
+        far = far._replace(neighbour=np.zeros(2 * far.neighbour.size, np.uint32))
     found = np.zeros((count, count), int)
     for place in range(count):
         mates = far.order[far.neighbour[far.start[place] : far.start[place + 1]]]
@@ -382,10 +382,10 @@ def test_ringing_does_not_make_lists():
     ("count", "box", "how", "said"),
     [
         (120, "1 um", {}, "cells and a list of pairs closer than 220 nm (cut-off 200 nm, margin 20 nm)"),
-        (120, "0.45 um", {}, "all pairs: a grain has 0.49 of the others within 220 nm, more than 0.4"),
+        (120, "0.45 um", {}, "all pairs: 0.49 of the other grains are within 220 nm, more than 0.4"),
         (120, "0.45 um", {"search": "cells"}, "cells and a list of pairs closer than 220 nm"),
         (20, "1 um", {}, "all pairs: fewer than 64 grains"),
-        (120, "1 um", {"search": "all pairs"}, "all pairs, asked for"),
+        (120, "1 um", {"search": "all pairs"}, "all pairs, as requested"),
     ],
 )
 def test_the_search_is_stated(count, box, how, said):
@@ -402,7 +402,7 @@ def test_an_aggregate_within_reach_of_itself_has_no_list(box):
     grains = sand.Grains(block.position, 1e-8, sand.IRON, moment="20 A m^2/kg")
     box = None if box is None else sand.Box(box) if isinstance(box, tuple) else box
     sim = sand.Simulation(grains, [sand.Dipoles(cutoff="0.3 um")], box=box)
-    assert sim.choices["neighbours"] == "all pairs: a grain has 1 of the others within 330 nm, more than 0.4"
+    assert sim.choices["neighbours"] == "all pairs: 1 of the other grains are within 330 nm, more than 0.4"
 
 
 def test_a_margin_of_contacts_alone():

@@ -65,7 +65,7 @@ class LongRangeArrays(NamedTuple):
     start: np.ndarray  # (N+1,) uint32: where each place's row of `mate` begins
     neighbour: np.ndarray  # (P,) uint32: places of the neighbours
     cell_of: np.ndarray  # (N,) uint32: cell of each grain
-    cell: np.ndarray  # (M+1,) uint32: first place of each cell
+    cell_start: np.ndarray  # (M+1,) uint32: first place of each cell
     packed_position: np.ndarray  # (3, V) positions by place [m]; by grain in sums over all pairs
     source: np.ndarray  # (3, V) moments, or charges in the first row; (1, P) where no force needs it
     force: np.ndarray  # (3, N) far forces [N]; (3, 0) without any
@@ -91,7 +91,7 @@ class StageArrays(NamedTuple):
 SAVED_LONG_RANGE = ("anchor", "force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
 """The far arrays that a checkpoint holds; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
-CELL_ARRAYS = ("order", "cell_of", "cell", "source")
+CELL_ARRAYS = ("order", "cell_of", "cell_start", "source")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
 RESPA_ARRAYS = ("slow_force", "slow_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
@@ -133,7 +133,7 @@ def empty_long_range_arrays(
     source = np.zeros((1, p) if "force" in needless else (3, v))
     vectors |= {"packed_position": np.zeros((3, v)), "source": source, "block_sums": np.zeros((2 * blocks, 3, v))}
     sizes = {"order": grains, "start": grains + 1, "neighbour": p, "cell_of": grains}
-    sizes["cell"] = CELLS_PER_GRAIN * grains + 28
+    sizes["cell_start"] = CELLS_PER_GRAIN * grains + 28
     arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
     return LongRangeArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in needless}))
 
