@@ -169,7 +169,7 @@ class Neighbours:
                 return ChosenSearch(all_pairs, f"all pairs: fewer than {LIST_FROM} grains")
             share = share_within(grains.position, box, list_reach)
             if share > LIST_UP_TO:
-                reason = f"all pairs: {share:.2g} of the other grains are within {distance}, more than {LIST_UP_TO}"
+                reason = f"all pairs: a fraction {share:.2g} of the grains is within {distance}, more than {LIST_UP_TO}"
                 return ChosenSearch(all_pairs, reason)
         if celled:
             reason = f"cells, for pairs closer than {distance} (contacts)"

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..numerics.simd import all_aligned, whole
+from ..numerics.simd import all_aligned, padded_size
 
 ALWAYS_RECORDED = 4
 """The first records are kept in every contact law, the others only with damping or stiffnesses that change."""
@@ -128,7 +128,7 @@ def empty_long_range_arrays(
     """
     vectors = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
-    v, p = whole(grains), max(int(capacity), 16)
+    v, p = padded_size(grains), max(int(capacity), 16)
     # without forces, cells keep one number there for each neighbour of a grain
     source = np.zeros((1, p) if "force" in needless else (3, v))
     vectors |= {"packed_position": np.zeros((3, v)), "source": source, "block_sums": np.zeros((2 * blocks, 3, v))}
@@ -142,7 +142,7 @@ def empty_contact_arrays(
     grains: int, room: int, constants: int, *, uniform_contacts: bool = False, channels: int = 6
 ) -> ContactArrays:
     """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
-    c = whole(max(int(room), 16))
+    c = padded_size(max(int(room), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
     numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS_RECORDED else 0)}
     return ContactArrays(
@@ -160,7 +160,7 @@ def empty_contact_arrays(
 
 def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = False) -> PairList:
     """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
-    p, nowhere = whole(max(int(capacity), 16)), np.full((3, grains), np.inf)
+    p, nowhere = padded_size(max(int(capacity), 16)), np.full((3, grains), np.inf)
     pair, touching, inner = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p // PAIRS_PER_SOON, np.uint32)
     kind = np.zeros((2, 1 if uniform_contacts else p))
     return PairList(pair, touching, kind[0], kind[1], nowhere, inner, np.full(7, -1.0))
@@ -174,7 +174,7 @@ def stage_arrays(grains: int) -> StageArrays:
 def grown(arrays: Any, others: Collection[str], least: int) -> Any:
     """The same columns in longer arrays, with room for `least` pairs at least; `others` have none for each pair."""
     columns = arrays.pair.shape[1]
-    more, longer = whole(max(int(GROWTH * columns) + 1, least)), {}
+    more, longer = padded_size(max(int(GROWTH * columns) + 1, least)), {}
     for name, old in arrays._asdict().items():
         if name in others:
             longer[name] = old
