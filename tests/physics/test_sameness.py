@@ -107,10 +107,10 @@ def test_growing_arrays_changes_nothing():
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), alike=alike)
-        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, alike=alike), alike
+        sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), uniform_contacts=alike)
+        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=alike), alike
         rules = sim._engine.rules
-        sim._engine.rules = rules._replace(contact=rules.contact._replace(alike=alike))
+        sim._engine.rules = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
         sim.run(until=1e-9)
         ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in UNIFORM_ARRAYS})
     assert sim.state.count[CONTACTS] > 16

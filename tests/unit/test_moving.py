@@ -10,7 +10,7 @@ from sand.compiler.jit import kernel
 from sand.contact.events import update_flagged_contacts
 from sand.contact.law import Bond, bond_between, displacements_of
 from sand.contact.model import Contact
-from sand.contact.slip import contact_pass, log_slip_sums, displacements_before
+from sand.contact.slip import contact_pass, displacements_before, log_slip_sums
 from sand.contact.tangential import pointers_for
 from sand.contact.update import BROKEN_FLAG, PENDING_FLAG, SLIPPED_FLAG, contact_loop, pose_at, twist_increment
 from sand.grains import GrainArrays, Grains

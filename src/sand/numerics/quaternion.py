@@ -1,6 +1,7 @@
-"""Unit quaternions ϱ (vector part 1–3, scalar part 4) for orientations: Eqs. 30–32 of the paper, initially (0, 0, 0, 1).
+"""Unit quaternions ϱ (vector part 1–3, scalar part 4) for orientations: Eqs. 30–32 of the paper.
 
-R(ϱ) rotates body vectors into the laboratory frame (active rotation).  ω is given in the laboratory frame.
+R(ϱ) rotates body vectors into the laboratory frame (active rotation); initially ϱ = (0, 0, 0, 1).  ω is given in the
+laboratory frame.
 """
 
 import math
@@ -44,7 +45,7 @@ def _renormalised(q):
 
 @formula
 def turn(q, angle):
-    """Quaternion after a further rotation by the vector `angle` = ω dt [rad] in the laboratory frame, renormalised (Eq. 32)."""
+    """Quaternion after a rotation by the vector `angle` = ω dt [rad] in the laboratory frame, renormalised (Eq. 32)."""
     x, y, z, cosine = rotation_by(angle)
     return _renormalised(
         (

@@ -192,7 +192,7 @@ def _world(grains: Grains, box: Box, rules: StepParameters, plan: KernelSpec, ro
             count,
             MATES * count if listed else IN_REACH if rules.search.celled else 0,
             blocks,
-            needless={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
+            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
         stages=stage_arrays(count if plan.adaptive else 0),
         uniform_contacts=uniform_contacts,
