@@ -20,7 +20,8 @@ async function build(parent: HTMLElement, source: Source, ownsAddress: boolean):
   state.offer("palette", palettes.map((p) => [p, p]));
   offerChoices(state, dataset, series);
   state.setting("grain").to = manifest.grains - 1;
-  if (manifest.running) state.set("frame", manifest.times.length - 1); // a run that continues: start at the newest frame
+  // a run that continues: start at the newest frame
+  if (manifest.running) state.set("frame", manifest.times.length - 1);
   if (ownsAddress && location.hash.length > 1) state.fromAddress(location.hash);
   const stage = new Stage(page.canvas);
   const app = new App(source, state, stage, dataset, series, page, ownsAddress);

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.numerics.simd import LINE, SIMD_WIDTH, aligned, whole
+from sand.numerics.simd import CACHE_LINE, SIMD_WIDTH, aligned, padded_size
 
 
 def begins(array):
-    return array.ctypes.data % LINE == 0
+    return array.ctypes.data % CACHE_LINE == 0
 
 
 def test_what_is_aligned_stays_and_what_is_not_is_copied():
@@ -33,4 +33,4 @@ def test_all_arrays_of_a_world_begin_with_a_line():
         groups = (one.grains.arrays, one.contacts, one.pair_list, one.long_range, one.stages)
         assert all(begins(array) or array.size == 0 for group in groups for array in group)
         assert one.contacts.flag.size % SIMD_WIDTH == one.pair_list.touching.size % SIMD_WIDTH == 0
-    assert [whole(number) for number in (0, 1, 8, 9)] == [0, 8, 8, 16]
+    assert [padded_size(number) for number in (0, 1, 8, 9)] == [0, 8, 8, 16]

@@ -353,9 +353,8 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
         bond = bond_of(a, law.pairings, i, j)
-        assert near.step[p] == pytest.approx(
-            2 * np.pi / np.sqrt(bond.max_squared_frequency) / law.per_period, rel=1e-14
-        )
+        period = 2 * np.pi / np.sqrt(bond.max_squared_frequency)
+        assert near.step[p] == pytest.approx(period / law.per_period, rel=1e-14)
         assert near.length[p] == pytest.approx(bond.break_overlap, rel=1e-14)
 
 
@@ -384,10 +383,10 @@ def test_ringing_does_not_make_lists():
     ("count", "box", "how", "said"),
     [
         (120, "1 um", {}, "cells and a list of pairs closer than 220 nm (cut-off 200 nm, margin 20 nm)"),
-        (120, "0.45 um", {}, "all pairs: a grain has 0.49 of the others within 220 nm, more than 0.4"),
+        (120, "0.45 um", {}, "all pairs: a fraction 0.49 of the grains is within 220 nm, more than 0.4"),
         (120, "0.45 um", {"search": "cells"}, "cells and a list of pairs closer than 220 nm"),
         (20, "1 um", {}, "all pairs: fewer than 64 grains"),
-        (120, "1 um", {"search": "all pairs"}, "all pairs, asked for"),
+        (120, "1 um", {"search": "all pairs"}, "all pairs, as requested"),
     ],
 )
 def test_the_search_is_stated(count, box, how, said):
@@ -404,7 +403,7 @@ def test_an_aggregate_within_reach_of_itself_has_no_list(box):
     grains = sand.Grains(block.position, 1e-8, sand.IRON, moment="20 A m^2/kg")
     box = None if box is None else sand.Box(box) if isinstance(box, tuple) else box
     sim = sand.Simulation(grains, [sand.Dipoles(cutoff="0.3 um")], box=box)
-    assert sim.choices["neighbours"] == "all pairs: a grain has 1 of the others within 330 nm, more than 0.4"
+    assert sim.choices["neighbours"] == "all pairs: a fraction 1 of the grains is within 330 nm, more than 0.4"
 
 
 def test_a_margin_of_contacts_alone():

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from sand.compiler.jit import COMPILED, kernel
-from sand.numerics.random import LOW, normal_vector, philox, random_words, uniform
+from sand.numerics.random import LOW_WORD, normal_vector, philox, random_words, uniform
 
 # Random123's kat_vectors, philox4x32 with 10 rounds: counter, key, result
 KNOWN = (
@@ -84,7 +84,7 @@ def test_the_compiler_and_the_type_of_an_address_change_nothing():
             plain = random_words(*(int(a) for a in address))
             assert plain == tuple(words[:, i])
             assert plain == random_words(*(t(a) for a, t in zip(address, types, strict=True)))
-            assert all(isinstance(w, np.uint64) and w <= LOW for w in plain)
+            assert all(isinstance(w, np.uint64) and w <= LOW_WORD for w in plain)
             assert normal_vector(*(int(a) for a in address)) == pytest.approx(deviates[:, i], rel=0, abs=6e-15)
     for address in ADDRESSES:
         plain = [int(w) for w in random_words(*address)]
@@ -96,7 +96,7 @@ def test_the_compiler_and_the_type_of_an_address_change_nothing():
 def test_a_uniform_is_never_0_or_1():
     """u = (w + ½)/2³² is exact: ½/2³² and 1 − ½/2³² at the ends, so log u is finite and below 0."""
     assert uniform(np.uint64(0)) == 2.0**-33
-    assert uniform(LOW) == 1.0 - 2.0**-33
+    assert uniform(LOW_WORD) == 1.0 - 2.0**-33
     assert uniform(np.uint64(2**31)) == 0.5 + 2.0**-33
     assert math.sqrt(-2.0 * math.log(uniform(np.uint64(0)))) < 6.8
 

@@ -1,8 +1,8 @@
 """Contact forces, second pass: a loop over grains that sums the loads of their contacts in a fixed order.
 
-The inner loop has one iteration per contact of a grain.  Its branch predictor entries learn the contact numbers of a
-thousand grains, but not of ten thousand.  Above `GATHER_ORDER_FROM` grains, each block of grains is therefore sorted
-by contact number, so that grains with equally many contacts follow each other.
+The inner loop has one iteration per contact of a grain.  The branch predictor of a processor learns the contact counts
+of a thousand grains, but not of ten thousand.  From `GATHER_ORDER_FROM` grains on, each block of grains is therefore
+sorted by contact count.
 """
 
 import math
@@ -104,7 +104,7 @@ def _set_gather_order(contacts, n, total):
         for g in range(first, last):
             order[g] = g
         if total < DENSE_FROM * n:
-            # counting sort: the last GATHER_CLASSES entries count the grains per class, then hold the next index of each
+            # counting sort: the last GATHER_CLASSES entries count grains per class, then hold the next index of each
             for k in range(GATHER_CLASSES):
                 order[n + k] = 0
             for g in range(first, last):

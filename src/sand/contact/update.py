@@ -32,7 +32,7 @@ this step in the pass over contacts.
 def uniform_contacts(contacts):
     """Whether one set of constants serves all contacts.
 
-    Where exactly BLOCK contacts are allocated, columns and contacts cannot be told apart, and either answer is correct.
+    With exactly BLOCK contacts allocated the answer is False, which is harmless: all columns are then equal.
     """
     return contacts.bond.shape[1] != contacts.flag.size
 

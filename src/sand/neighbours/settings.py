@@ -1,4 +1,4 @@
-"""How neighbours are looked for: the user's choice and what becomes of it."""
+"""Settings of the neighbour search, and the choice of a method for given grains."""
 
 from __future__ import annotations
 
@@ -18,38 +18,48 @@ from .cell_list import Search
 SEARCHES = ("auto", "cells", "all pairs")
 ORDERS = ("auto", "curve", "as given")
 MARGIN = 0.1
-"""Margin of the list over the cut-off, Δr/r_c; the paper has 0.3–0.4."""
-MARGIN_OF_FLIGHTS = 0.35
-"""The same where steps are as long as the margin lets them be."""
+"""Skin of the Verlet list relative to the cut-off, Δr/r_c; the paper uses 0.3–0.4."""
+ADAPTIVE_MARGIN = 0.35
+"""The same for adaptive (Runge–Kutta) steps, whose length the skin limits."""
 LIST_FROM = 64
-"""Fewest grains for which "auto" makes a list."""
+"""Fewest grains for which "auto" uses cells or a Verlet list."""
 LIST_UP_TO = 0.4
-"""Largest part of the other grains within the list's reach for which "auto" makes one: each pair is in two rows."""
-CURVE_FROM = 4000
-"""Fewest grains for which "auto" keeps an order of its own: fewer fit into the caches, however they are numbered.
+"""Largest fraction of the other grains within reach for which "auto" uses a list, which contains each pair twice."""
+SORT_FROM = 4000
+"""Fewest grains for which "auto" sorts grains in memory.
 
-Of 4000 it saves a tenth of a step, and from there on helpers find in their caches what they need.
+The arrays of fewer grains fit into the caches in any order.  At 4000 grains sorting saves a tenth of the time, and each
+worker thread finds the grains it needs in its own cache.
 """
 SAMPLES = 64, 4096
-"""Grains, and others, that are looked at for it."""
+"""Largest numbers of grains, and of other grains, in the sample that `share_within` examines."""
 
 
 def share_within(position: np.ndarray, box: Box, reach: float) -> float:
-    """Which part of the other grains is closer than `reach` [m] to a grain, on average; from a sample of them.
+    """Mean fraction of the other grains closer than `reach` [m] to a grain, estimated from a sample.
 
     Parameters
     ----------
     position : ndarray
         (N, 3) [m], N ≥ 2.
+    box : Box
+        The box.
+    reach : float
+        Distance [m].
+
+    Returns
+    -------
+    float
+        Fraction, 0 … 1.
     """
-    some, others = (np.unique(np.linspace(0, len(position) - 1, most).astype(int)) for most in SAMPLES)
-    apart = box.nearest(position[some][:, None] - position[others])
-    another = some[:, None] != others
-    return float(((apart**2).sum(axis=-1) < reach**2)[another].mean())
+    sample, others = (np.unique(np.linspace(0, len(position) - 1, most).astype(int)) for most in SAMPLES)
+    separation = box.nearest(position[sample][:, None] - position[others])
+    distinct = sample[:, None] != others
+    return float(((separation**2).sum(axis=-1) < reach**2)[distinct].mean())
 
 
 class ChosenSearch(NamedTuple):
-    """The search in force, and why."""
+    """The search method, and the reason for the choice."""
 
     search: Search
     reason: str
@@ -58,30 +68,32 @@ class ChosenSearch(NamedTuple):
 @checked
 @dataclass(frozen=True)
 class Neighbours:
-    """How pairs within reach are found, for contacts and for long-range forces alike.
+    """Settings of the neighbour search for contacts and long-range forces.
 
     Parameters
     ----------
     search : str, optional
-        "cells" sorts the grains into cells and lists the pairs closer than the cut-off plus a margin;
-        "all pairs" looks at every pair in every step; "auto" takes cells from 64 grains on, if at the start no
-        more than 0.4 of the others are within reach of a grain, on average.
-    margin : optional
-        how much farther than the cut-off the list reaches, Δr [m], or "auto": 0.1 of the cut-off, 0.35 where
-        the list limits the steps (Runge–Kutta). The list is made anew when a grain is more than Δr/2 from where
-        it was; a wide margin makes long but lasting lists. Where no force has a cut-off, "auto" makes none but
-        that of the pairs that may touch soon, straight from the cells.
+        "cells": a cell list, and a Verlet list of the pairs closer than the cut-off plus a margin.  "all pairs": every
+        pair is examined in every step.  "auto": cells from 64 grains on, if initially at most 0.4 of the other grains
+        are within reach of a grain, on average.
+    margin : float or str, optional
+        Skin of the Verlet list Δr [m] > 0, or "auto": 0.1 of the cut-off, or 0.35 with adaptive (Runge–Kutta) steps,
+        whose length the skin limits.  The list is rebuilt when a grain has moved by more than Δr/2; a large margin
+        makes lists longer, but rebuilds rarer.  If no force has a cut-off, "auto" builds no Verlet list: candidate
+        pairs for contacts are found with the cells.
     order : str, optional
-        where grains stand in memory while steps are taken; "curve": along one that fills space, made anew every
-        2000 steps, so that neighbours are close; "as given": by their numbers; "auto": along a curve from
-        4000 grains on. All that is looked at or written has the numbers of the start.
-
-    No choice changes a result by more than rounding.
+        Order of grains in memory while stepping.  "curve": Morton order, renewed every 2000 steps, so that neighbours
+        in space are neighbours in memory; "as given": the user's order; "auto": "curve" from 4000 grains on.  Input and
+        output always use the user's indices.
 
     Raises
     ------
     BadInput
-        an unknown word, or a margin that is not a length above 0.
+        If a word is unknown, or the margin is not a length above 0.
+
+    Notes
+    -----
+    No choice changes results by more than rounding errors.
     """
 
     search: str = "auto"
@@ -93,9 +105,9 @@ class Neighbours:
     def __post_init__(self) -> None:
         problems = []
         for name, allowed in (("search", SEARCHES), ("order", ORDERS)):
-            said = getattr(self, name)
-            if said not in allowed:
-                problems.append(f"neighbours: {name} = {said!r}; {did_you_mean(str(said), allowed)}")
+            value = getattr(self, name)
+            if value not in allowed:
+                problems.append(f"neighbours: {name} = {value!r}; {did_you_mean(str(value), allowed)}")
         if not is_word(self.margin, "auto"):
             try:
                 object.__setattr__(self, "margin", si(self.margin, "m", "neighbours: margin", above=0.0))
@@ -105,58 +117,64 @@ class Neighbours:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
-        """Its settings in SI."""
+        """Settings in SI units."""
         return {"search": self.search, "margin": self.margin, "order": self.order}
 
     def uses_spatial_sort(self, count: int) -> bool:
-        """True if so many grains are kept in an order of their own."""
-        return self.order == "curve" or (self.order == "auto" and count >= CURVE_FROM)
+        """Whether `count` grains are sorted in memory."""
+        return self.order == "curve" or (self.order == "auto" and count >= SORT_FROM)
 
     def settled(self, search: Search, count: int) -> Neighbours:
-        """What was chosen, so that a run that goes on from elsewhere chooses the same."""
+        """Settings without "auto", as chosen by `choose`, so that a resumed run uses the same."""
         order = "curve" if self.uses_spatial_sort(count) else "as given"
-        how = "cells" if search.listed or search.celled else "all pairs"
-        return Neighbours(how, search.margin or "auto", order)  # any margin would ask for a list
+        method = "cells" if search.listed or search.celled else "all pairs"
+        return Neighbours(method, search.margin or "auto", order)  # a margin would request a Verlet list
 
     def choose(
         self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, adaptive_steps: bool = False
     ) -> ChosenSearch:
-        """The search for these grains.
+        """Choose the search method for these grains.
 
         Parameters
         ----------
+        grains : Grains
+            The grains.
+        box : Box
+            The box.
         reach : float
-            gap [m] up to which pairs count as near a contact.
+            Gap [m] up to which pairs are candidates for contacts.
         cutoffs : Sequence[float]
-            radii [m] of the long-range forces that have one.
+            Cut-off radii [m] of the long-range forces that have one.
         adaptive_steps : bool, optional
-            whether steps may be as long as the list lasts.
+            Whether the skin of the list limits the length of steps.
+
+        Returns
+        -------
+        ChosenSearch
+            The method and the reason for it.
         """
-        touch = 2.0 * float(grains.radius.max()) + reach
+        contact_reach = 2.0 * float(grains.radius.max()) + reach
         widest = max(cutoffs, default=0.0)
-        # near pairs come straight from cells, or out of a list; their own margin is half their reach
+        # candidate pairs are found with cells, or in the Verlet list; without a cut-off the skin is half their reach
         celled = widest == 0.0 and self.margin == "auto" and not adaptive_steps
         margin = 0.0 if celled else self.margin
         if margin == "auto":
-            margin = (MARGIN_OF_FLIGHTS if adaptive_steps else MARGIN) * widest if widest > 0.0 else 0.5 * reach
-        whole = max(widest, touch) + margin
-        nothing = Search(False, whole, margin)
+            margin = (ADAPTIVE_MARGIN if adaptive_steps else MARGIN) * widest if widest > 0.0 else 0.5 * reach
+        list_reach = max(widest, contact_reach) + margin
+        all_pairs, distance = Search(False, list_reach, margin), format_quantity(list_reach, "m")
         if self.search == "all pairs":
-            return ChosenSearch(nothing, "all pairs, asked for")
+            return ChosenSearch(all_pairs, "all pairs, as requested")
         if self.search == "auto":
             if len(grains) < LIST_FROM:
-                return ChosenSearch(nothing, f"all pairs: fewer than {LIST_FROM} grains")
-            share = share_within(grains.position, box, whole)
+                return ChosenSearch(all_pairs, f"all pairs: fewer than {LIST_FROM} grains")
+            share = share_within(grains.position, box, list_reach)
             if share > LIST_UP_TO:
-                held = f"a grain has {share:.2g} of the others within {format_quantity(whole, 'm')}, more than {LIST_UP_TO}"
-                return ChosenSearch(nothing, f"all pairs: {held}")
+                reason = f"all pairs: a fraction {share:.2g} of the grains is within {distance}, more than {LIST_UP_TO}"
+                return ChosenSearch(all_pairs, reason)
         if celled:
-            near = format_quantity(whole, "m")
-            return ChosenSearch(Search(False, whole, margin, True), f"cells, for pairs closer than {near} (contacts)")
-        purpose = (
-            f"cut-off {format_quantity(widest, 'm')}" if widest > touch else f"contacts {format_quantity(touch, 'm')}"
-        )
-        return ChosenSearch(
-            Search(True, whole, margin),
-            f"cells and a list of pairs closer than {format_quantity(whole, 'm')} ({purpose}, margin {format_quantity(margin, 'm')})",
-        )
+            reason = f"cells, for pairs closer than {distance} (contacts)"
+            return ChosenSearch(Search(False, list_reach, margin, True), reason)
+        cause, length = ("cut-off", widest) if widest > contact_reach else ("contacts", contact_reach)
+        parts = f"{cause} {format_quantity(length, 'm')}, margin {format_quantity(margin, 'm')}"
+        reason = f"cells and a list of pairs closer than {distance} ({parts})"
+        return ChosenSearch(Search(True, list_reach, margin), reason)

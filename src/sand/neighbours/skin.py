@@ -1,9 +1,13 @@
-"""How fast grains are, and how far they can have flown: what spares looking at each of them in every step.
+"""Skins of neighbour lists: how far grains may still move before a list must be rebuilt.
 
-A list is sound as long as no grain is farther than some limit from where it was when the list was made.  Its leeway is
-how far grains may still fly before one of them can be: the fastest grain spends it, and all are looked at only when
-it is spent.  So lists are made anew in the very steps in which they would be if all were looked at in each.  What
-may touch soon is picked anew without a look, which would save few picks and need positions of its own.
+A list is valid as long as no grain is farther than a limit from its anchor, its position when the list was built.  The
+remaining skin is a lower bound of the distance that any grain may still move before this limit can be exceeded.  Each
+step reduces it by the displacement of the fastest grain.  Only when it is used up are the displacements of all grains
+computed: the list is rebuilt if one exceeds the limit, else the remaining skin is set to the difference.  Lists are
+therefore rebuilt in the same steps as if all displacements were computed in every step.
+
+The inner list is rebuilt as soon as its skin is used up: checking displacements would avoid few rebuilds and need
+anchors of its own.
 """
 
 import math
@@ -16,35 +20,35 @@ from ..numerics.vec import dot, load, sub
 from ..state.state import INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED
 
 UNKNOWN = -1.0
-"""What stands for a speed that must be looked up, or a leeway that is spent."""
+"""Marks a speed that must be recomputed, and a skin that is used up."""
 SKIN_SAFETY = 0.999
-"""Part of a limit that is leeway: positions are rounded in every step, and what is left is far more than that."""
+"""Fraction of a limit that is used as skin; the rest exceeds accumulated rounding errors of positions by far."""
 
 
 @loop
 def invalidate_speeds(pair_list):
-    """Grains were kicked by something that keeps no watch."""
+    """Mark the largest speeds as unknown, after velocities were changed without updating them."""
     pair_list.skin[LARGEST_SPEED] = pair_list.skin[LARGEST_SPIN] = UNKNOWN
 
 
 @loop
 def invalidate_skins(pair_list):
-    """Grains were moved by something that keeps no watch."""
+    """Mark all skins as used up, after grains were moved without reducing them."""
     pair_list.skin[LONG_RANGE_SKIN] = pair_list.skin[PAIR_LIST_SKIN] = pair_list.skin[INNER_SKIN] = UNKNOWN
 
 
 @loop
 def update_safe_speed(pair_list, count):
-    """The speed [m/s] that is δ_c in the step of a contact, for the pair of the list for which it is least."""
-    harmless = math.inf
+    """Speed [m/s] at which a pair moves by δ_c in one contact step; the smallest over all candidate pairs."""
+    safe_speed = math.inf
     for k in range(pair_type_count(pair_list, count)):
-        harmless = min(harmless, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)
-    pair_list.skin[SAFE_SPEED] = harmless
+        safe_speed = min(safe_speed, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)
+    pair_list.skin[SAFE_SPEED] = safe_speed
 
 
 @loop
 def reset_skins(pair_list, count):
-    """At the start of a call of the driver: grains may be elsewhere, and lists have been read from a file."""
+    """Invalidate all speeds and skins, at the start of a call of the driver: positions and lists may have changed."""
     invalidate_speeds(pair_list)
     invalidate_skins(pair_list)
     update_safe_speed(pair_list, count)
@@ -61,40 +65,43 @@ def largest_speeds(grains):
 
 
 @loop
-def consume_skins(pair_list, way):
-    """No grain flew farther than this [m]."""
-    pair_list.skin[LONG_RANGE_SKIN] -= way
-    pair_list.skin[PAIR_LIST_SKIN] -= way
-    pair_list.skin[INNER_SKIN] -= way
+def consume_skins(pair_list, displacement):
+    """Reduce all skins by an upper bound of the displacement of any grain [m]."""
+    pair_list.skin[LONG_RANGE_SKIN] -= displacement
+    pair_list.skin[PAIR_LIST_SKIN] -= displacement
+    pair_list.skin[INNER_SKIN] -= displacement
 
 
 @loop
 def update_speeds(grains, pair_list):
-    """See to it that the largest speeds are known."""
+    """Recompute the largest speeds if they are unknown."""
     if pair_list.skin[LARGEST_SPEED] < 0.0:
         pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN] = largest_speeds(grains)
 
 
 @loop
 def largest_displacement(grains, anchor, span):
-    """Largest displacement [m] of a grain from its anchor; not a number for an anchor at infinity.
+    """Largest distance [m] of a grain from its anchor; NaN for an anchor at infinity.
 
-    What counts is the displacement, not the way: a grain that rings in its cluster moves as the cluster does, to
-    within its amplitude, and does not make a list stale.
+    The displacement counts, not the length of the path: a grain that oscillates in an aggregate does not invalidate a
+    list.
     """
-    most = float_bits(0.0)
+    largest = float_bits(0.0)
     for i in range(grains.mass.size):
-        moved = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
-        most = max(most, magnitude_bits(dot(moved, moved)))
-    return math.sqrt(float_from_bits(most))
+        displacement = nearest_image(sub(load(grains.position, i), load(anchor, i)), span)
+        largest = max(largest, magnitude_bits(dot(displacement, displacement)))
+    return math.sqrt(float_from_bits(largest))
 
 
 @loop
 def list_is_stale(grains, anchor, span, limit, skin, skin_index):
-    """True once a grain is farther than `limit` [m] from its anchor; `leeway` is the place of this list's."""
+    """Whether a grain is farther than `limit` [m] from its anchor, so that the list must be rebuilt.
+
+    `skin_index` is the index of this list's remaining skin, which is updated.
+    """
     if skin[skin_index] > 0.0:
         return False
-    strayed = largest_displacement(grains, anchor, span)
-    skin[skin_index] = SKIN_SAFETY * limit - strayed
-    # written so that an anchor at infinity (no list yet) counts as strayed
-    return not strayed <= limit
+    displacement = largest_displacement(grains, anchor, span)
+    skin[skin_index] = SKIN_SAFETY * limit - displacement
+    # true also for NaN, from anchors at infinity (no list yet)
+    return not displacement <= limit

@@ -1,7 +1,8 @@
-"""Where grains stand in memory: in large worlds along a curve through space, while all who look find their own order.
+"""Spatial sorting: grains in Morton order in memory.
 
-A step of many grains waits for memory, and for less of it where grains that touch stand close together.  The order is
-made anew as they move, at steps that depend on nothing but how many were taken.
+The step of a large system is limited by memory access, which is faster if grains that touch are close in memory.  From
+4000 grains on, arrays are kept in Morton order while stepping; the public API always uses the user's indices.  The
+order is renewed at fixed step counts, so that it is reproducible.
 """
 
 from __future__ import annotations
@@ -15,19 +16,25 @@ from ..state.arrays import NOT_SAVED, RATE_ARRAYS, SAVED_LONG_RANGE, UNIFORM_ARR
 from ..state.state import CONTACTS, GRAIN1, GRAIN2, PAIRS, State
 
 BITS = 21
-"""Of each coordinate: three of them fill 63 bits."""
+"""Bits per coordinate; three coordinates fill 63 bits."""
+SORT_INTERVAL = 2000
+"""Steps between two sorts.  Even fast grains pass few others in this time; a sort costs as much as 10 to 20 steps."""
+PER_GRAIN_ARRAYS = (*SAVED_LONG_RANGE, *RATE_ARRAYS[:2])
+"""Long-range arrays with a column per grain that persist between summations."""
+NOT_PER_PAIR = ("side", "start", "anchor", *NOT_SAVED)
+"""Arrays of contacts and candidate pairs without a column per contact or pair."""
 
 
 def morton_keys(position: np.ndarray) -> np.ndarray:
-    """Place of each point (N, 3) on Morton's curve, (N,) uint64: the bits of its three coordinates in turns."""
+    """Position of each point (N, 3) on the Morton curve, (N,) uint64: the interleaved bits of its coordinates."""
     low = position.min(axis=0)
     longest = float((position.max(axis=0) - low).max())
     scaled = (position - low) / longest if longest > 0.0 else np.zeros_like(position)
     cell = (scaled * (2**BITS - 1)).astype(np.uint64)
-    place = np.zeros(len(position), np.uint64)
+    keys = np.zeros(len(position), np.uint64)
     for axis in range(3):
         bits = cell[:, axis]
-        # each step moves the upper half of the bits away from the lower: 21 bits end three apart
+        # each step separates the upper half of the bits from the lower, until neighbouring bits are three apart
         for shift, mask in (
             (32, 0x1F00000000FFFF),
             (16, 0x1F0000FF0000FF),
@@ -36,72 +43,64 @@ def morton_keys(position: np.ndarray) -> np.ndarray:
             (2, 0x1249249249249249),
         ):
             bits = (bits | (bits << np.uint64(shift))) & np.uint64(mask)
-        place |= bits << np.uint64(axis)
-    return place
-
-
-SORT_INTERVAL = 2000
-"""Steps after which the order is made anew: even fast grains pass few others meanwhile; it takes 10 to 20 of them."""
-OF_GRAINS = (*SAVED_LONG_RANGE, *RATE_ARRAYS[:2])
-"""The far arrays with a column for each grain that outlast a sum."""
-NOT_OF_PAIRS = ("side", "start", "anchor", *NOT_SAVED)
-"""What contacts and near pairs have no column of."""
+        keys |= bits << np.uint64(axis)
+    return keys
 
 
 def spatial_order(state: State) -> np.ndarray:
-    """The grain at each place of the curve, (N,) uint32."""
+    """Grains in Morton order, (N,) uint32."""
     return np.argsort(morton_keys(state.grains.position), kind="stable").astype(np.uint32)
 
 
 def inverse(order: np.ndarray) -> np.ndarray:
-    """The place of each grain, where `order` has the grain at each place; or the other way round."""
-    place = np.empty_like(order)
-    place[order] = np.arange(order.size, dtype=order.dtype)
-    return place
+    """Inverse permutation."""
+    inverted = np.empty_like(order)
+    inverted[order] = np.arange(order.size, dtype=order.dtype)
+    return inverted
 
 
 def reorder_grains(state: State, rows: np.ndarray) -> None:
-    """Let grain k become what grain rows[k] was, wherever it is named; contacts and pairs stay where they stand."""
-    number = inverse(rows)  # the new one of each
+    """Permute the grains: grain k becomes the former grain rows[k].  Contacts and candidate pairs stay in order."""
+    new_index = inverse(rows)
     pair_list, long_range, contacts, count = state.pair_list, state.long_range, state.contacts, state.count
-    for array in [*state.grains.arrays, pair_list.anchor, *(getattr(long_range, name) for name in OF_GRAINS)]:
+    for array in [*state.grains.arrays, pair_list.anchor, *(getattr(long_range, name) for name in PER_GRAIN_ARRAYS)]:
         if array.shape[-1]:
             array[...] = array[..., rows]
     for array in [contacts.pair[:, : count[CONTACTS]], pair_list.pair[:, : count[PAIRS]], long_range.order]:
-        array[...] = number[array]
-    for place in (GRAIN1, GRAIN2):
-        if count[place] >= 0:
-            count[place] = number[count[place]]
+        array[...] = new_index[array]
+    for index in (GRAIN1, GRAIN2):
+        if count[index] >= 0:
+            count[index] = new_index[count[index]]
     resort_contacts_by_grain(contacts, count, rows.size)
 
 
 def sort_contacts_and_pairs(state: State) -> None:
-    """Contacts and near pairs in the order of their grains."""
+    """Sort contacts and candidate pairs by their grains."""
     for arrays, used in (state.contacts, CONTACTS), (state.pair_list, PAIRS):
         pair = arrays.pair[:, : state.count[used]]
-        by = np.lexsort((pair[1], pair[0]))
+        order = np.lexsort((pair[1], pair[0]))
         for name, columns in arrays._asdict().items():
-            if columns.size and name not in NOT_OF_PAIRS and not (state.uniform_contacts and name in UNIFORM_ARRAYS):
-                columns[..., : by.size] = columns[..., by]
+            if columns.size and name not in NOT_PER_PAIR and not (state.uniform_contacts and name in UNIFORM_ARRAYS):
+                columns[..., : order.size] = columns[..., order]
     resort_contacts_by_grain(state.contacts, state.count, len(state.grains))
 
 
 @checked
 def in_space_order(grains: Grains) -> Grains:
-    """The same grains, numbered along a curve that fills space (Morton 1966).
+    """Renumber grains in Morton order (Morton 1966), so that neighbours in space are neighbours in memory.
 
-    Where numbers come at random, grains that touch lie far apart in memory; along the curve they lie close. Large
-    simulations do so by themselves (`Neighbours.order`), and keep the numbers. Nothing else changes.
+    Large simulations sort grains internally (`Neighbours.order`) and keep the user's indices.  Nothing but the indices
+    changes.
 
     Parameters
     ----------
     grains : Grains
-        at their places.
+        The grains.
 
     Returns
     -------
     Grains
-        A copy; grain k of it is `order[k]` of the old ones, order = argsort of `morton_keys`.
+        A copy, of which grain k is `order[k]` of the original, order = argsort of `morton_keys`.
     """
     order = np.argsort(morton_keys(grains.position), kind="stable")
     ordered = grains.copy()

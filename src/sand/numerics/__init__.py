@@ -1,1 +1,1 @@
-"""Small numerical tools: vectors, quaternions, random numbers, roots, alignment and vectorisation."""
+"""Numerical tools: vectors, quaternions, random numbers, inverse square roots, SIMD alignment and padding."""

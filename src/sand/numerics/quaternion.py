@@ -1,6 +1,7 @@
-"""Rotation parameters ϱ (vector 1..3, scalar 4): Eqs. 30–32 of the paper, start (0, 0, 0, 1).
+"""Unit quaternions ϱ (vector part 1–3, scalar part 4) for orientations: Eqs. 30–32 of the paper.
 
-R(ϱ) turns body vectors into the laboratory frame (active), and ω is in the laboratory frame.
+R(ϱ) rotates body vectors into the laboratory frame (active rotation); initially ϱ = (0, 0, 0, 1).  ω is given in the
+laboratory frame.
 """
 
 import math
@@ -11,7 +12,7 @@ from .vec import add, axpy, cross, scale
 
 @formula
 def turned(q, v):
-    """R(ϱ) v: a body vector in the laboratory frame (Eq. 30, |ϱ| = 1)."""
+    """R(ϱ) v: body vector rotated into the laboratory frame (Eq. 30, |ϱ| = 1)."""
     u = (q[0], q[1], q[2])
     t = scale(2.0, cross(u, v))
     return add(axpy(q[3], t, v), cross(u, t))
@@ -19,15 +20,15 @@ def turned(q, v):
 
 @formula
 def turned_back(q, v):
-    """R(ϱ)ᵀ v: a laboratory vector in the body frame."""
+    """R(ϱ)ᵀ v: laboratory vector rotated into the body frame."""
     return turned((-q[0], -q[1], -q[2], q[3]), v)
 
 
 @formula
 def rotation_by(angle):
-    """ϱ of a rotation by the vector `angle` [rad], |ϱ| = 1 to 1e-7.
+    """Quaternion of a rotation by the vector `angle` [rad], |ϱ| = 1 to 1e-7.
 
-    sin and cos of the half angle h are series to h⁵ and h⁴; the angle errs by h⁷/420, 2e-12 for 0.1 rad.
+    sin and cos of half the angle, h, are series to h⁵ and h⁴; the error of the angle is h⁷/420, 2e-12 for 0.1 rad.
     """
     h = scale(0.5, angle)
     s = h[0] * h[0] + h[1] * h[1] + h[2] * h[2]
@@ -37,14 +38,14 @@ def rotation_by(angle):
 
 @formula
 def _renormalised(q):
-    """ϱ/|ϱ| by one Newton step of 1/√n² from 1, for n² that is 1 to 1e-7 already."""
+    """ϱ/|ϱ| by one Newton step of 1/√n² from 1, for n² = 1 to within 1e-7."""
     c = 1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return c * q[0], c * q[1], c * q[2], c * q[3]
 
 
 @formula
 def turn(q, angle):
-    """ϱ after a rotation by the vector `angle` = ω dt [rad] in the laboratory frame, renormalised (Eq. 32)."""
+    """Quaternion after a rotation by the vector `angle` = ω dt [rad] in the laboratory frame, renormalised (Eq. 32)."""
     x, y, z, cosine = rotation_by(angle)
     return _renormalised(
         (
@@ -58,20 +59,20 @@ def turn(q, angle):
 
 @formula
 def turned_by(angle, v):
-    """A laboratory vector after a rotation by the vector `angle` [rad]: what `turn` does to body vectors."""
+    """Laboratory vector rotated by the vector `angle` [rad], consistent with `turn`."""
     return turned(_renormalised(rotation_by(angle)), v)
 
 
 @formula
 def normalised(q):
-    """ϱ/|ϱ|"""
+    """ϱ/|ϱ|."""
     c = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return c * q[0], c * q[1], c * q[2], c * q[3]
 
 
 @formula
 def turning_rate(q, w):
-    """ϱ̇ = ½ ω∘ϱ (Eq. 31), ω in the laboratory frame: what `turn` does in a short time, over that time."""
+    """Rate of change ϱ̇ = ½ ω∘ϱ (Eq. 31), ω in the laboratory frame."""
     x, y, z = scale(0.5, w)
     return (
         x * q[3] + y * q[2] - z * q[1],

@@ -1,4 +1,8 @@
-"""Arrays that begin with a line of the cache: the longest vectors fill one, and cost two where they straddle."""
+"""SIMD: alignment of arrays, padding of loops, and minima of floats in loops that vectorise.
+
+Arrays begin at a cache line, because the longest SIMD vectors fill one line and cost two memory accesses where they
+cross a boundary.  Loop lengths are padded to whole vectors, because remaining iterations are executed one by one.
+"""
 
 from __future__ import annotations
 
@@ -8,53 +12,56 @@ import numpy as np
 
 from ..compiler.jit import formula, loop
 
-LINE = 64
-"""Bytes of a line."""
+CACHE_LINE = 64
+"""Length of a cache line in bytes."""
 SIMD_WIDTH = 8
-"""Numbers in the longest vectors of a processor; some rows have room for whole ones, V = N rounded up."""
+"""Float64 numbers in the longest SIMD vector; the rows of some arrays are padded to a multiple of it."""
 
 
-def whole(number: int) -> int:
-    """So many columns, rounded up to whole vectors."""
+def padded_size(number: int) -> int:
+    """Number of columns, rounded up to whole SIMD vectors."""
     return (number + SIMD_WIDTH - 1) // SIMD_WIDTH * SIMD_WIDTH
 
 
 def aligned(array: np.ndarray) -> np.ndarray:
-    """The array, or a contiguous copy of it that begins with a line; an empty one as it is."""
-    if array.size == 0 or (array.ctypes.data % LINE == 0 and array.flags.c_contiguous):
+    """The array itself if it is contiguous and begins at a cache line or is empty, else such a copy."""
+    if array.size == 0 or (array.ctypes.data % CACHE_LINE == 0 and array.flags.c_contiguous):
         return array
-    raw = np.empty(array.nbytes + LINE, np.uint8)
-    first = -raw.ctypes.data % LINE
+    raw = np.empty(array.nbytes + CACHE_LINE, np.uint8)
+    first = -raw.ctypes.data % CACHE_LINE
     copy = raw[first : first + array.nbytes].view(array.dtype).reshape(array.shape)
     copy[...] = array
     return copy
 
 
 def all_aligned(arrays: Any) -> Any:
-    """The same for each field of a NamedTuple of arrays."""
+    """Aligned arrays for each field of a NamedTuple of arrays."""
     return type(arrays)(*map(aligned, arrays))
 
 
 @loop
-def round_up_to_simd_width(number, few):
-    """A row's length (uint64), rounded up to whole vectors where `few` or more are left over (uint64)."""
+def round_up_to_simd_width(number, min_remainder):
+    """Loop length (uint64), padded to whole SIMD vectors if `min_remainder` (uint64) or more iterations would remain."""
     lanes = np.uint64(SIMD_WIDTH)
-    return (number + lanes - np.uint64(1)) // lanes * lanes if number % lanes >= few else number
+    return (number + lanes - np.uint64(1)) // lanes * lanes if number % lanes >= min_remainder else number
 
 
 @formula
 def float_bits(x):
-    """The bits of x ≥ 0 as an integer; ranks are ordered as the numbers are, and NaN comes last (or below 0)."""
+    """Bits of x ≥ 0 as an integer, which has the order of the numbers; NaN is above all others (or below 0).
+
+    Minima and maxima of integers vectorise, those of floats do not.
+    """
     return np.float64(x).view(np.int64)
 
 
 @formula
 def magnitude_bits(x):
-    """The float_bits of x ≥ 0 in a search for the largest: NaN comes last, whatever its sign."""
+    """Bits of |x|, for maxima in which NaN is above all numbers whatever its sign."""
     return float_bits(abs(x))
 
 
 @formula
 def float_from_bits(bits):
-    """The number of this float_bits."""
+    """Inverse of `float_bits`."""
     return np.int64(bits).view(np.float64)

@@ -1,6 +1,6 @@
-"""Three-vectors and rotation parameters as plain tuples: as fast as scalars, and readable.
+"""Vectors as tuples of three scalars: as fast as scalars in compiled code, and readable.
 
-Rotation parameters ϱ are (vector 1..3, scalar 4), as in Eq. 30 of Dominik & Nübold (2002).
+Quaternions ϱ are tuples (vector part 1–3, scalar part 4), as in Eq. 30 of Dominik & Nübold (2002).
 """
 
 import math
@@ -16,7 +16,7 @@ def load(array, i):
 
 @formula
 def put(array, i, v):
-    """Overwrite column i of a (3, N) array."""
+    """Set column i of a (3, N) array."""
     array[0, i] = v[0]
     array[1, i] = v[1]
     array[2, i] = v[2]
@@ -38,7 +38,7 @@ def load4(array, i):
 
 @formula
 def put4(array, i, v):
-    """Overwrite column i of a (4, N) array."""
+    """Set column i of a (4, N) array."""
     array[0, i] = v[0]
     array[1, i] = v[1]
     array[2, i] = v[2]
@@ -62,7 +62,7 @@ def scale(s, v):
 
 @formula
 def axpy(s, u, v):
-    """s u + v"""
+    """s u + v."""
     return s * u[0] + v[0], s * u[1] + v[1], s * u[2] + v[2]
 
 
@@ -87,6 +87,6 @@ def norm(v):
 
 @formula
 def across(v, n):
-    """The part of v perpendicular to the unit vector n."""
+    """Component of v perpendicular to the unit vector n."""
     along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
     return v[0] - along * n[0], v[1] - along * n[1], v[2] - along * n[2]

@@ -198,7 +198,7 @@ def _new_state(
             count,
             NEIGHBOURS_PER_GRAIN * count if search.listed else CELL_NEIGHBOURS if search.celled else 0,
             blocks,
-            needless={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
+            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
         stages=stage_arrays(count if spec.adaptive else 0),
         uniform_contacts=uniform_contacts,

@@ -1,1 +1,1 @@
-"""The state of a simulation: time, grains, contacts and box as arrays."""
+"""State of a simulation: time, grains, contacts and box as arrays."""

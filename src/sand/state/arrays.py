@@ -1,4 +1,4 @@
-"""What kernels read and write of contacts, near pairs and long-range sums: the arrays, and how much room they get."""
+"""Arrays of contacts, candidate pairs and long-range forces that kernels read and write, and their allocation."""
 
 from __future__ import annotations
 
@@ -7,142 +7,159 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..numerics.simd import all_aligned, whole
+from ..numerics.simd import all_aligned, padded_size
 
 ALWAYS_RECORDED = 4
-"""The first records are kept in every contact law, the others only with damping or stiffnesses that change."""
+"""Loss channels recorded per contact with every contact law; the others only with damping or variable stiffnesses."""
 
 
 class ContactArrays(NamedTuple):
-    """One column per contact; the first count[CONTACTS] columns are in use.
+    """Contacts, one column each; the first count[CONTACTS] columns are in use.
 
-    They are in the order they formed, or in that of their grains where an order is kept.
+    They are in order of formation or, with spatial sorting, in the order of their grains.  `side` and `start` list the
+    contacts per grain in compressed sparse row form: the entries of grain g are side[start[g] : start[g + 1]].
     """
 
     pair: np.ndarray  # (2, C) uint32: grains 1 and 2
-    pointer1: np.ndarray  # (3, C) unit vector to the contact, body frame of grain 1
-    pointer2: np.ndarray  # (3, C) the same for grain 2
+    pointer1: np.ndarray  # (3, C) contact pointer of grain 1: unit vector to the contact, body frame
+    pointer2: np.ndarray  # (3, C) contact pointer of grain 2
     twist: np.ndarray  # (C,) φ [rad]
-    formed: np.ndarray  # (C,) time of first touch [s]; the start for contacts that were there
-    bond: np.ndarray  # (K, C) constants of the contact law; where all contacts are alike (K, BLOCK), all the same
-    lost: np.ndarray  # (L, C) energy it dissipated so far [J], the first 4 or all 6 of world.RECORDED
-    damped: np.ndarray  # (C,) damping force in this step [N], along n on grain 1; (0,) in the plain law
+    formed: np.ndarray  # (C,) time of formation [s]; the start time for initial contacts
+    bond: np.ndarray  # (K, C) constants of the contact law; (K, BLOCK) identical columns if they are uniform
+    lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 channels of state.RECORDED
+    damped: np.ndarray  # (C,) damping force in the last step [N], along n on grain 1; (0,) without damping
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
-    flag: np.ndarray  # (C,) uint8: 0, or what became of it where a limit was passed in this step: contact.update
-    bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts every step
-    side: np.ndarray  # (2C,) uint32: 2 × contact + 0 or 1, sorted by grain
-    start: np.ndarray  # (N+1,) uint32: where each grain's entries of `side` begin
-    gather_order: (
-        np.ndarray
-    )  # (N + GATHER_CLASSES,) uint32: the grains as contact.gather takes them; (0,) for as they are numbered
+    flag: np.ndarray  # (C,) uint8: 0 within all limits, else one of the flags of contact.update
+    bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts in every step
+    side: np.ndarray  # (2C,) uint32: 2 × contact, plus 1 for grain 2; sorted by grain
+    start: np.ndarray  # (N+1,) uint32: first entry of each grain in `side`
+    # (N + GATHER_CLASSES,) uint32: grains in the order of contact.gather; (0,) for the order of their indices
+    gather_order: np.ndarray
 
 
 class PairList(NamedTuple):
-    """Pairs close enough to touch soon; the first count[PAIRS] columns are in use."""
+    """Candidate pairs for contacts: pairs that may touch soon; the first count[PAIRS] columns are in use."""
 
-    pair: np.ndarray  # (2, P) uint32
+    pair: np.ndarray  # (2, P) uint32: grains
     touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
-    step: np.ndarray  # (P,) the step their contact needs [s]; (1,) where all are alike
-    length: np.ndarray  # (P,) δ_c of their contact [m]; (1,) likewise
-    anchor: np.ndarray  # (3, N) positions when the list was made [m]; scratch while cells make it
-    inner: (
-        np.ndarray
-    )  # (P/8,) uint32: the pairs that may touch next, the first watch[INNER_COUNT]; all if there are too many
-    skin: np.ndarray  # (7,) what spares looking at all grains or pairs in every step: neighbours.skin
+    step: np.ndarray  # (P,) time step that the contact needs [s]; (1,) if uniform
+    length: np.ndarray  # (P,) δ_c of the contact [m]; (1,) if uniform
+    anchor: np.ndarray  # (3, N) positions when the list was built [m]; a buffer while it is built from cells
+    # (P/8,) uint32: inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
+    inner: np.ndarray
+    skin: np.ndarray  # (7,) remaining skins, largest speeds: indices in state.state, explained in neighbours.skin
 
 
 class LongRangeArrays(NamedTuple):
-    """What long-range forces need: the list of pairs within reach, and the loads of their last summation.
+    """Verlet list for long-range forces, and the loads of their last summation.
 
-    The list is one-sided, each pair stands in the rows of both its grains, and is kept in the order of cells:
-    grain order[s] has place s.  It is a function of the anchors alone.
+    The list is a full neighbour list in compressed sparse row form, sorted by cell (see neighbours.cell_list): grain
+    order[s] has the sorted index s.
     """
 
-    anchor: np.ndarray  # (3, N) positions when the list was made [m]
-    order: np.ndarray  # (N,) uint32: the grain at each place
-    start: np.ndarray  # (N+1,) uint32: where each place's row of `mate` begins
-    neighbour: np.ndarray  # (P,) uint32: places of the neighbours
+    anchor: np.ndarray  # (3, N) positions when the list was built [m]
+    order: np.ndarray  # (N,) uint32: grain of each sorted index
+    start: np.ndarray  # (N+1,) uint32: first entry of each row in `neighbour`
+    neighbour: np.ndarray  # (P,) uint32: sorted indices of the neighbours
     cell_of: np.ndarray  # (N,) uint32: cell of each grain
-    cell: np.ndarray  # (M+1,) uint32: first place of each cell
-    packed_position: np.ndarray  # (3, V) positions by place [m]; by grain in sums over all pairs
-    source: np.ndarray  # (3, V) moments, or charges in the first row; (1, P) where no force needs it
-    force: np.ndarray  # (3, N) far forces [N]; (3, 0) without any
-    torque: np.ndarray  # (3, N) far torques [N m]; likewise
-    slow_force: np.ndarray  # (3, N) the part of them that acts in every step of a cycle [N]
+    cell_start: np.ndarray  # (M+1,) uint32: first sorted index of each cell
+    packed_position: np.ndarray  # (3, V) positions by sorted index [m]; by grain in sums over all pairs
+    source: np.ndarray  # (3, V) moments, or charges in the first row; (1, P) if no force needs them
+    force: np.ndarray  # (3, N) long-range forces [N]; (3, 0) if there are none
+    torque: np.ndarray  # (3, N) long-range torques [N m]; likewise
+    slow_force: np.ndarray  # (3, N) slow force: the part that acts in every step of an r-RESPA cycle [N]
     slow_torque: np.ndarray  # (3, N) [N m]
-    force_rate: np.ndarray  # (3, N) their rates of change [N/s]
+    force_rate: np.ndarray  # (3, N) time derivatives of the loads (Taylor scheme) [N/s]
     torque_rate: np.ndarray  # (3, N) [N m/s]
-    past_position: np.ndarray  # (3, N) at the last summation, or the one before [m]
+    past_position: np.ndarray  # (3, N) positions at the last summation, or the one before [m]
     past_moment: np.ndarray  # (3, N) [A m²]
-    path: np.ndarray  # (3, N) displacement since the last summation, summed over time [m s]
+    path: np.ndarray  # (3, N) time integral of the displacement since the last summation [m s]
     block_sums: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
 class StageArrays(NamedTuple):
-    """Room for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Never saved."""
+    """Buffers for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Not saved."""
 
-    start: np.ndarray  # (13, N) the state that a step begins with
-    rate: np.ndarray  # (7, 13, N) its rates of change at each stage
-    power: np.ndarray  # (7,) of the outside forces at each stage [W]
+    start: np.ndarray  # (13, N) state at the start of the step
+    rate: np.ndarray  # (7, 13, N) rates of change at each stage
+    power: np.ndarray  # (7,) power of the external forces at each stage [W]
 
 
 SAVED_LONG_RANGE = ("anchor", "force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
-"""The far arrays that a checkpoint holds; the others follow from them."""
+"""Long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
-CELL_ARRAYS = ("order", "cell_of", "cell", "source")
+CELL_ARRAYS = ("order", "cell_of", "cell_start", "source")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
 RESPA_ARRAYS = ("slow_force", "slow_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
-"""The far arrays that only long-range forces, cells, a list, or cycles of either kind, read and write."""
+"""Long-range arrays needed only with long-range forces, cells, a Verlet list, r-RESPA cycles or Taylor series."""
 UNIFORM_ARRAYS = ("bond", "step", "length")
-"""Numbers of contacts and near pairs that are the same for all where grains are equal."""
+"""Arrays of contacts and candidate pairs with identical columns if all grains are equal."""
 NOT_SAVED = ("inner", "skin", "gather_order")
-"""Of contacts and near pairs, what it leaves out: it is picked or worked out anew."""
+"""Arrays of contacts and candidate pairs that are not in a checkpoint, but recomputed."""
 GATHER_CLASSES = 64
-"""Places behind all grains that sorting them by their contacts needs."""
+"""Classes of grains by contact count; as many entries of `gather_order`, behind those of the grains, are counters."""
 GATHER_ORDER_FROM = 4000
-"""Fewest grains for which the gathering has an order of its own; what fewer have, the branch predictor learns."""
+"""Fewest grains for which contact.gather sorts grains by contact count; branch predictors learn the counts of fewer."""
 BLOCK = 128
-"""Contacts that are passed over together, whole vectors of them."""
+"""Contacts per block of the pass over contacts, a multiple of the SIMD width."""
 OVER_ALLOCATION, GROWTH = 1.1, 1.25
-"""Room for what is known to come, contacts at the start or pairs of a list; what is full grows by the second factor."""
-PAIRS_PER_SOON = 8
-"""Near pairs for each of those that may touch soon and have room; where more are that close, all are looked at."""
+"""Initial over-allocation (×1.1), and growth factor on overflow (×1.25)."""
+PAIRS_PER_INNER_ENTRY = 8
+"""Candidate pairs per entry of the inner list; if the inner list is too short, all candidate pairs are searched."""
 CELLS_PER_GRAIN = 4
-"""Most cells per grain; where grains are sparse, cells are larger than they need be."""
+"""Largest number of cells per grain; in dilute systems cells are larger than the reach."""
 
 
 def empty_long_range_arrays(
-    grains: int, capacity: int, blocks: int = 1, *, needless: Collection[str] = ()
+    grains: int, capacity: int, blocks: int = 1, *, unused: Collection[str] = ()
 ) -> LongRangeArrays:
-    """Room for `capacity` entries of rows; the anchors are infinitely far, so that the first step makes the list.
+    """Allocate long-range arrays.  The anchors are at infinity, so that the first step builds the list.
 
     Parameters
     ----------
+    grains : int
+        Number of grains.
+    capacity : int
+        Allocated length of the Verlet list.
     blocks : int, optional
-        of a sum over all pairs; 0 where there is none.
-    needless : Collection[str], optional
-        arrays that get no columns, since nothing will touch them.
+        Blocks of a sum over all pairs; 0 without such a sum.
+    unused : Collection[str], optional
+        Arrays that no kernel of this simulation accesses; they get no columns.
     """
     vectors = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
     vectors["anchor"] = np.full((3, grains), np.inf)
-    v, p = whole(grains), max(int(capacity), 16)
-    # without forces, cells keep one number there for each neighbour of a grain
-    source = np.zeros((1, p) if "force" in needless else (3, v))
+    v, p = padded_size(grains), max(int(capacity), 16)
+    # without forces, `source` is the buffer for squared distances of neighbours
+    source = np.zeros((1, p) if "force" in unused else (3, v))
     vectors |= {"packed_position": np.zeros((3, v)), "source": source, "block_sums": np.zeros((2 * blocks, 3, v))}
     sizes = {"order": grains, "start": grains + 1, "neighbour": p, "cell_of": grains}
-    sizes["cell"] = CELLS_PER_GRAIN * grains + 28
+    sizes["cell_start"] = CELLS_PER_GRAIN * grains + 28
     arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
-    return LongRangeArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in needless}))
+    return LongRangeArrays(**(arrays | {name: arrays[name][..., :0].copy() for name in unused}))
 
 
 def empty_contact_arrays(
-    grains: int, room: int, constants: int, *, uniform_contacts: bool = False, channels: int = 6
+    grains: int, capacity: int, constants: int, *, uniform_contacts: bool = False, channels: int = 6
 ) -> ContactArrays:
-    """Room for so many contacts, with `constants` numbers each or for all if `alike`, and `channels` of losses."""
-    c = whole(max(int(room), 16))
+    """Allocate contact arrays.
+
+    Parameters
+    ----------
+    grains : int
+        Number of grains.
+    capacity : int
+        Number of contacts to allocate.
+    constants : int
+        Constants of the contact law per contact.
+    uniform_contacts : bool, optional
+        Whether one set of constants serves all contacts.
+    channels : int, optional
+        Number of loss channels recorded per contact.
+    """
+    c = padded_size(max(int(capacity), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
     numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS_RECORDED else 0)}
     return ContactArrays(
@@ -159,27 +176,28 @@ def empty_contact_arrays(
 
 
 def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = False) -> PairList:
-    """Room for `capacity` pairs; the anchors are infinitely far, so that the first step makes the list."""
-    p, nowhere = whole(max(int(capacity), 16)), np.full((3, grains), np.inf)
-    pair, touching, inner = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8), np.zeros(p // PAIRS_PER_SOON, np.uint32)
-    kind = np.zeros((2, 1 if uniform_contacts else p))
-    return PairList(pair, touching, kind[0], kind[1], nowhere, inner, np.full(7, -1.0))
+    """Allocate a pair list.  The anchors are at infinity, so that the first step builds the list."""
+    p, anchor = padded_size(max(int(capacity), 16)), np.full((3, grains), np.inf)
+    pair, touching = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8)
+    inner = np.zeros(p // PAIRS_PER_INNER_ENTRY, np.uint32)
+    types = np.zeros((2, 1 if uniform_contacts else p))
+    return PairList(pair, touching, types[0], types[1], anchor, inner, np.full(7, -1.0))
 
 
 def stage_arrays(grains: int) -> StageArrays:
-    """Room for so many grains; 0 where no Runge–Kutta step is taken."""
+    """Allocate the buffers of the Runge–Kutta integrator; `grains` is 0 if it is not used."""
     return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
-def grown(arrays: Any, others: Collection[str], least: int) -> Any:
-    """The same columns in longer arrays, with room for `least` pairs at least; `others` have none for each pair."""
+def grown(arrays: Any, unchanged: Collection[str], minimum: int) -> Any:
+    """Arrays with more columns, for at least `minimum` contacts or pairs; the `unchanged` ones keep theirs."""
     columns = arrays.pair.shape[1]
-    more, longer = whole(max(int(GROWTH * columns) + 1, least)), {}
+    capacity, longer = padded_size(max(int(GROWTH * columns) + 1, minimum)), {}
     for name, old in arrays._asdict().items():
-        if name in others:
+        if name in unchanged:
             longer[name] = old
             continue
-        new = np.zeros((*old.shape[:-1], more * old.shape[-1] // columns), old.dtype)
+        new = np.zeros((*old.shape[:-1], capacity * old.shape[-1] // columns), old.dtype)
         new[..., : old.shape[-1]] = old
         longer[name] = new
     return all_aligned(type(arrays)(**longer))

@@ -1,4 +1,4 @@
-"""The state of a simulation: copying it is a snapshot, writing it is a checkpoint."""
+"""State of a simulation.  A copy is a snapshot; its arrays are the content of a checkpoint."""
 
 from __future__ import annotations
 
@@ -25,32 +25,55 @@ from .arrays import (
 )
 
 # --- indices of State.clock (float64) ---------------------------------------------------------------
-TIME, STEP, LEVEL, CONTACT_STEP, CYCLE, LEFT, LONG_RANGE_LEVEL, CALM, KICKED, FLIGHT = range(10)
+TIME = 0  # simulated time [s]
+STEP = 1  # present time step [s]
+LEVEL = 2  # longest step allowed by free grains and closing pairs, quantised to a power of two [s]
+CONTACT_STEP = 3  # longest step allowed by contacts [s]
+CYCLE = 4  # length of the present r-RESPA cycle [s]
+LEFT = 5  # part of the cycle that remains [s]; 0 between cycles
+LONG_RANGE_LEVEL = 6  # longest cycle allowed by long-range forces, quantised [s]
+CALM = 7  # longest step allowed by free grains [s]
+KICKED = 8  # time of the last kick by the gas [s]
+FLIGHT = 9  # next step of the adaptive integrator [s]
 CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight")
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
-_NAMES = (
-    "steps stage contacts pairs made broken slipped rebuilt grain1 grain2 listed long_range_sums "
-    "checked step_increases rejected needed ordered"
+STEPS = 0  # steps taken
+STAGE = 1  # 1 in the middle of a step, after the drift; 0 between steps
+CONTACTS = 2  # contacts in use
+PAIRS = 3  # candidate pairs in use
+MADE = 4  # contacts formed
+BROKEN = 5  # contacts broken
+SLIPPED = 6  # slip events
+REBUILT = 7  # builds of the pair list
+GRAIN1 = 8  # grains that caused the driver to stop, or −1
+GRAIN2 = 9
+LISTED = 10  # builds of the Verlet list
+LONG_RANGE_SUMS = 11  # summations of long-range forces
+CHECKED = 12  # step at which the time step was last chosen
+STEP_INCREASES = 13  # step at which the time step was last allowed to increase
+REJECTED = 14  # rejected steps of the adaptive integrator
+NEEDED = 15  # step at which a time step as short as LEVEL was last needed
+ORDERED = 16  # step of the last spatial sort
+COUNT = (
+    *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
+    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered"),
 )
-COUNT = tuple(_NAMES.split())
-(STEPS, STAGE, CONTACTS, PAIRS, MADE, BROKEN, SLIPPED, REBUILT, GRAIN1, GRAIN2, LISTED, LONG_RANGE_SUMS) = range(12)
-CHECKED, STEP_INCREASES, REJECTED, NEEDED, ORDERED = range(12, 17)
 
-# --- indices of PairList.skin (float64) -----------------------------------------------------------------
+# --- indices of PairList.skin (float64), see neighbours.skin ------------------------------------------------
 LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, SAFE_SPEED, INNER_COUNT = range(7)
 
-# --- indices of State.lost (float64): energy that left the grains, per channel [J] -----------------------
+# --- indices of State.lost (float64): energy dissipated or transferred, per channel [J] ---------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
 LOST_IN_CONTACTS = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
 LOST = (*LOST_IN_CONTACTS, "gas", "outside")
 RECORDED = tuple(name for name in LOST_IN_CONTACTS if name != "breaking")
-"""What contacts keep a record of, in this order: none that is there has lost anything by breaking."""
+"""Loss channels recorded per contact, in this order; an existing contact has lost nothing by breaking."""
 
 
 @dataclass
 class State:
-    """Time, grains, contacts, box and the counters of a run; everything a restart needs."""
+    """Time, grains, contacts, box and counters of a simulation: everything that a restart needs."""
 
     grains: Grains
     box: Box
@@ -61,12 +84,10 @@ class State:
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     stages: StageArrays = field(default_factory=lambda: stage_arrays(0))
-    order: np.ndarray = field(
-        default_factory=lambda: np.zeros(0, np.uint32)
-    )  # the grain at each place, neighbours.spatial_sort
-    uniform_contacts: bool = (
-        False  # radii, masses, materials are equal and stay so: one set of constants for all contacts
-    )
+    # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
+    order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
+    # equal radii, masses and materials, so that one set of constants serves all contacts
+    uniform_contacts: bool = False
 
     def __post_init__(self) -> None:
         self.grains.arrays = all_aligned(self.grains.arrays)
@@ -75,46 +96,46 @@ class State:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """Simulated time [s]."""
         return float(self.clock[TIME])
 
     @property
     def steps(self) -> int:
+        """Number of steps taken."""
         return int(self.count[STEPS])
 
     def copy(self) -> State:
-        """An independent copy: a snapshot."""
-        return replace(copy.deepcopy(self))  # made anew, so that its arrays begin with a line
+        """Independent copy (snapshot)."""
+        return replace(copy.deepcopy(self))  # __post_init__ aligns the arrays
 
-    def _for_all(self) -> tuple[str, ...]:
+    def _uniform_arrays(self) -> tuple[str, ...]:
+        """Names of arrays with identical columns."""
         return UNIFORM_ARRAYS if self.uniform_contacts else ()
 
     def _columns(self, group: str, name: str) -> int | None:
-        """How many columns of an array of contacts or near pairs a checkpoint holds; None: all."""
+        """Number of columns of an array of contacts or candidate pairs in a checkpoint; None for all."""
         used = int(self.count[CONTACTS if group == "contacts" else PAIRS])
-        n = 1 if name in self._for_all() else 2 * used if name == "side" else used
+        n = 1 if name in self._uniform_arrays() else 2 * used if name == "side" else used
         return None if name in ("start", "anchor") else n
 
-    def grow_contacts(self, least: int = 0) -> None:
-        """More room for contacts, for `least` of them at least."""
-        self.contacts = grown(self.contacts, ("start", "gather_order", *self._for_all()), least)
+    def grow_contacts(self, minimum: int = 0) -> None:
+        """Allocate more contacts, at least `minimum`."""
+        self.contacts = grown(self.contacts, ("start", "gather_order", *self._uniform_arrays()), minimum)
 
-    def grow_pairs(self, least: int = 0) -> None:
-        """More room for near pairs, for `least` of them at least."""
-        self.pair_list = grown(self.pair_list, ("anchor", "skin", *self._for_all()), least)
+    def grow_pairs(self, minimum: int = 0) -> None:
+        """Allocate more candidate pairs, at least `minimum`."""
+        self.pair_list = grown(self.pair_list, ("anchor", "skin", *self._uniform_arrays()), minimum)
 
     def grow_rows(self) -> None:
-        """More room for neighbours within the reach of long-range forces; what is there is not kept."""
-        more = int(GROWTH * self.long_range.neighbour.size) + 1
-        source = (
-            np.zeros((1, more))
-            if self.long_range.source.shape == (1, self.long_range.neighbour.size)
-            else self.long_range.source
-        )
-        self.long_range = all_aligned(self.long_range._replace(neighbour=np.zeros(more, np.uint32), source=source))
+        """Allocate a longer Verlet list; its content is discarded."""
+        capacity = int(GROWTH * self.long_range.neighbour.size) + 1
+        source = self.long_range.source
+        if source.shape == (1, self.long_range.neighbour.size):
+            source = np.zeros((1, capacity))
+        self.long_range = all_aligned(self.long_range._replace(neighbour=np.zeros(capacity, np.uint32), source=source))
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Every number of the state by name, for a checkpoint; unused columns are left out."""
+        """All arrays of the state by name, for a checkpoint; unused columns are omitted."""
         out = {"clock": self.clock, "count": self.count, "lost": self.lost}
         out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
         for group in ("contacts", "pair_list"):
@@ -125,38 +146,39 @@ class State:
         return out | ({"order": self.order} if self.order.size else {})
 
     def from_arrays(self, saved: dict[str, np.ndarray]) -> None:
-        """Take over the numbers of `to_arrays`; the grains' number and materials are this world's own.
+        """Load the arrays of `to_arrays`.  The number of grains and their materials must be those of this state.
 
         Raises
         ------
         BadInput
-            a missing array, or one of another shape.
+            If an array is missing or has another shape.
         """
         for name in ("clock", "count", "lost"):
-            _take(getattr(self, name), saved, name)
+            _copy_into(getattr(self, name), saved, name)
         if "order" in saved:
             self.order = np.zeros(len(self.grains), np.uint32)
-            _take(self.order, saved, "order")
+            _copy_into(self.order, saved, "order")
         if self.contacts.pair.shape[1] < self.count[CONTACTS]:
             self.grow_contacts(int(self.count[CONTACTS]))
         if self.pair_list.pair.shape[1] < self.count[PAIRS]:
             self.grow_pairs(int(self.count[PAIRS]))
         for name in GrainArrays._fields:
-            _take(getattr(self.grains.arrays, name), saved, f"grains/{name}")
+            _copy_into(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "pair_list"):
             for name, array in getattr(self, group)._asdict().items():
                 if name in NOT_SAVED or (name == "damped" and not array.size):
                     continue
                 key, n = f"{group}/{name}", self._columns(group, name)
-                if name in self._for_all() and key in saved:  # one stored column stands for all
+                if name in self._uniform_arrays() and key in saved:  # one column is stored for all
                     saved = saved | {key: np.repeat(saved[key][..., :1], array.shape[-1], axis=-1)}
                     n = array.shape[-1]
-                _take(array[..., :n], saved, key)
+                _copy_into(array[..., :n], saved, key)
         for name in SAVED_LONG_RANGE:
-            _take(getattr(self.long_range, name), saved, f"long_range/{name}")
+            _copy_into(getattr(self.long_range, name), saved, f"long_range/{name}")
 
 
-def _take(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
+def _copy_into(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
+    """Copy the saved array `name` into `target`."""
     if name not in saved:
         raise BadInput(f"the saved state has no '{name}'")
     if saved[name].shape != target.shape:
