@@ -12,7 +12,8 @@ from ..state.state import LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
 ROUNDING = 4.0 * np.finfo(float).eps
-"""Relative change of the total energy attributed to rounding; bodies at rest of up to 64,000 grains change by one unit in the last place."""
+"""Relative change of the total energy that is attributed to rounding. Bodies at rest of up to 64,000 grains change by
+one unit in the last place."""
 
 
 def dissipated_in(row: Mapping[str, float]) -> float:

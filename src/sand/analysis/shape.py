@@ -152,12 +152,12 @@ def projected_area(
     area, error : float
         Mean and standard error [m²].
     """
-    x, _ = _centred(position, None)
-    size = np.broadcast_to(np.asarray(radius, float), len(x)).copy()
+    centred, _ = _centred(position, None)
+    size = np.broadcast_to(np.asarray(radius, float), len(centred)).copy()
     views = directions_of_view(directions) if isinstance(directions, int) else np.asarray(directions, float)
     areas = []
     for axis in views:
-        flat = x @ _across(axis)
+        flat = centred @ _across(axis)
         order = np.argsort(flat[:, 0], kind="stable")  # sorted by x, so that only neighbours are compared
         x, y = np.ascontiguousarray(flat[order].T)
         areas.append(area_of_union(x, y, size[order], float(size.max())))
