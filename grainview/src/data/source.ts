@@ -98,6 +98,6 @@ export class EmbeddedSource implements Source {
     const name = (await this.frame(k)).cluster[grain];
     const stored = this.parsed?.dimensions?.[k]?.[String(name)];
     if (stored) return { value: stored[0], error: stored[1] };
-    return { reason: "not in this file, which has it for the largest clusters of each frame only, with 32 grains and more" };
+    return { reason: "not in this file: only the largest clusters of each frame, with 32 grains and more, have one" };
   }
 }
