@@ -169,7 +169,7 @@ class RunDataset:
         return self._largest
 
     def _noted(self) -> list[str]:
-        torn = self.frames.torn
+        torn = self.frames.incomplete
         left = [f"{torn} frame{'s' if torn > 1 else ''} at the end left out: not whole"] if torn else []
         silent = killed_note(self.frames.age) if self._ended is None else ""
         self._ledger_columns()  # looks whether the ledger is as it should be

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Snapshot:
     """One frame, as `io.live_trajectory.Following` has many."""
 
-    torn = generation = 0
+    incomplete = generation = 0
 
     def __init__(self, frame: Frame):
         self._frame, self.lock = frame, threading.RLock()
