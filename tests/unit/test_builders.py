@@ -301,7 +301,7 @@ PLACES = ["0 0 0", "1.9995 0 0", "3.999 0 0"]
         (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "1.9995 0 0", "5 0 0"))], "grain 2 has no contact .* to grain 1"),
         (["3", HEAD, *(f"Si {p} 1" for p in ("0 0 0", "nan 0 0", "3 0 0"))], "position of grain 1 is .* finite"),
         (["3", HEAD, *(f"Si {p} -1" for p in PLACES)], "radius of grain 0 is -1.* above 0"),
-        (["3", HEAD, *(f"Si {p}" for p in PLACES)], "line 3: 4 columns, not the 5"),
+        (["3", HEAD, *(f"Si {p}" for p in PLACES)], "line 3: 4 columns, but line 2 names 5"),
         (["4", HEAD, *(f"Si {p} 1" for p in PLACES)], "line 1: '4' is not the number of grains"),
         (["3", HEAD, *(f"Si x{p} 1" for p in PLACES)], "line 3: .* has no numbers for pos"),
         (["3", "Properties=species:S:1", "Si", "Si", "Si"], "has no positions"),

@@ -94,7 +94,7 @@ def test_a_run_that_goes_on_is_checked_by_its_rows(tmp_path):
         (lambda: [*parts[:2], str(2 * float(parts[2])), *parts[3:]], "total = .*columns add up to"),
         (lambda: ["60", *parts[1:]], "steps and times must grow"),
         (lambda: [*parts[:-1], parts[-1] + ".0"], "contacts = "),
-        (lambda: [*parts[:2], parts[2].replace("e", "E"), *parts[3:]], "no run writes"),
+        (lambda: [*parts[:2], parts[2].replace("e", "E"), *parts[3:]], "SAND does not write"),
         (lambda: [*parts, "1"], "has 9 columns, not 8"),
         (lambda: [*parts[:2], "nan", *parts[3:]], "not finite"),
         (lambda: [*parts[:2], "x", *parts[3:]], "not a number"),
@@ -127,7 +127,7 @@ def test_a_ledger_that_ends_early_and_one_that_goes_on(tmp_path):
     path.write_text(
         "".join(lines).replace("1.9000000000000002e-24", "1.9000000000000001e-24").replace(",1.9e-24", ",1.8e-24")
     )
-    with pytest.raises(sand.BadInput, match=r"as the digest in summary\.json tells"):
+    with pytest.raises(sand.BadInput, match=r"do not match the digest in summary\.json"):
         read_ledger(path)
 
 
@@ -191,7 +191,7 @@ def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
     bad[len(bad) // 2] ^= 1
     new.write_bytes(bad)
     with pytest.warns(
-        UserWarning, match=f"{new.name} is .*now {new.name}.damaged, and the run goes on from {old.name}"
+        UserWarning, match=f"{new.name} is .*now {new.name}.damaged, and the run continues from {old.name}"
     ):
         assert sand.resume(run).steps == int(old.stem.split("-")[1])
     assert not new.exists() and new.with_name(f"{new.name}.damaged").read_bytes() == bytes(bad)
@@ -226,10 +226,10 @@ def test_every_entry_of_an_index_that_is_damaged(tmp_path):
             kept = list(path.parent.glob("*.damaged*"))
             assert len(caught) == len(kept) == (lost > 0)
             if not steps:
-                assert "beyond mending; it is now trajectory.gsd.damaged" in str(caught[0].message)
+                assert "cannot be repaired; it is now trajectory.gsd.damaged" in str(caught[0].message)
                 assert kept[0].read_bytes() == bytes(content)
             elif lost:
-                assert f"{lost} of its 30 frames are lost; as it was it is now trajectory.gsd.damaged" in str(
+                assert f"{lost} of its 30 frames are lost; a copy of it is trajectory.gsd.damaged" in str(
                     caught[0].message
                 )
                 assert kept[0].read_bytes() == bytes(content)
@@ -249,7 +249,7 @@ def test_data_without_a_frame(tmp_path):
     for read in (read_frames, LiveTrajectory, Frames):
         with pytest.raises(sand.BadInput, match="holds data but no frame"):
             read(path)
-    with pytest.warns(UserWarning, match=r"beyond mending; it is now trajectory\.gsd\.damaged"):
+    with pytest.warns(UserWarning, match=r"cannot be repaired; it is now trajectory\.gsd\.damaged"):
         TrajectoryWriter(path, 40, [0, 10, 20, 30, 40]).close()
     assert read_frames(path) == []
     empty = tmp_path / "empty.gsd"

@@ -58,7 +58,7 @@ def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage
     path.write_bytes(cut)
     with pytest.raises(sand.BadInput, match=re.escape(str(path))):
         read_checkpoint(path)
-    with pytest.warns(UserWarning, match=rf"{path.name}.*now {path.name}.damaged.*goes on from .*0001.npz"):
+    with pytest.warns(UserWarning, match=rf"{path.name}.*now {path.name}.damaged.*continues from .*0001.npz"):
         assert newest_checkpoint(tmp_path)[1]["steps"] == 1
     assert path.with_name(f"{path.name}.damaged").read_bytes() == cut
 
@@ -271,7 +271,7 @@ def test_a_trajectory_beyond_mending_is_moved_aside(tmp_path):
     sim.run(until="0.3 ns")
     sim.writer._trajectory.close()
     (tmp_path / "run" / "trajectory.gsd").write_bytes(b"rubbish" * 1000)
-    with pytest.warns(UserWarning, match="beyond mending"):
+    with pytest.warns(UserWarning, match="cannot be repaired"):
         sand.resume(tmp_path / "run").run(until="0.5 ns")
     assert (tmp_path / "run" / "trajectory.gsd.damaged").read_bytes().startswith(b"rubbish")
     assert len(read_frames(tmp_path / "run" / "trajectory.gsd")) == 2

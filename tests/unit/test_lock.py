@@ -112,7 +112,7 @@ def test_without_locks_a_run_goes_on_with_a_warning(tmp_path, monkeypatch):
             with pytest.raises(FilesFailed, match="cannot write"):
                 FolderLock(tmp_path)
         else:
-            with pytest.warns(UserWarning, match="has no locks: see that no other process"):
+            with pytest.warns(UserWarning, match="has no locks: make sure that no other process"):
                 FolderLock(tmp_path).release()
 
 

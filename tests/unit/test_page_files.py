@@ -22,7 +22,7 @@ def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
         (tmp_path / name).write_text("x")
     with pytest.raises(BadInput) as told:
         page.read_bundle(tmp_path)
-    assert "It was not made when SAND was built." in str(told.value)
+    assert "It was not built when SAND was installed." in str(told.value)
     (tmp_path / "missing.txt").write_text("npm failed: no network.\n")
     with pytest.raises(BadInput) as told:
         page.read_bundle(tmp_path)

@@ -10,7 +10,7 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.io.state_arrays import GOALS, NUMBERS, STORED, check_state
+from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
 from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
 
 REFERENCE = Path(__file__).parents[1] / "reference"
@@ -27,7 +27,7 @@ def refused(folder, arrays, meta=META):
     with pytest.raises(sand.BadInput) as error:
         newest_checkpoint(folder)
     said, last = error.value.problems
-    assert said.startswith(f"{path} cannot be gone on from: ") and "no checkpoint to go on from" in last
+    assert said.startswith(f"{path} cannot be resumed: ") and "no checkpoint to continue from" in last
     assert path.exists()
     return said
 
@@ -72,7 +72,7 @@ def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
             "pair_list/pair",
         )  # then others do not fit
         assert sizing or f"'{name}'" in said, (what, said)
-    if STORED[name].needed:
+    if STORED[name].required:
         without = {other: array for other, array in WITH_ORDER.items() if other != name}
         assert re.search(f"there is no array '{name}'", refused(tmp_path, without))
 
@@ -106,14 +106,14 @@ def test_lists_that_do_not_fit(tmp_path):
     assert "contacts of each grain" in refused(tmp_path, {**ARRAYS, "contacts/side": turned})
 
 
-@pytest.mark.parametrize("name", [*NUMBERS, *GOALS, "choices", "case", "ledger"])
+@pytest.mark.parametrize("name", [*NUMBERS, *PLANNED_END, "choices", "case", "ledger"])
 def test_meta_that_is_none(name):
     """Text, a list, not a number, endless, below 0, or missing: one line that names it."""
     strange = ["", 3] if name in ("choices", "case", "ledger") else ["", [1], -1, np.nan, np.inf, 10**400, True]
     for value in strange:
         with pytest.raises(sand.BadInput, match=f"meta.json has {name} = "):
             check_state(ARRAYS, {**META, "version": VERSION, name: value})
-    if name in (*NUMBERS, *GOALS):
+    if name in (*NUMBERS, *PLANNED_END):
         with pytest.raises(sand.BadInput, match=f"meta.json has {name} = None"):
             check_state(ARRAYS, {key: value for key, value in META.items() if key != name} | {"version": VERSION})
 

@@ -53,10 +53,10 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -
     fractal               cluster-cluster, of a chosen dimension and prefactor
     rbd                   compact sphere cut from a random ballistic deposit
     """
-    from ..io.bodies import refuse_place, write_body
+    from ..io.bodies import refuse_target, write_body
 
     place = Path(out)
-    refuse_place(place, overwrite=overwrite)
+    refuse_target(place, overwrite=overwrite)
     from ..setup.aggregates import build
 
     with report.compiling(as_json):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
 from ..io.lock import LOCK, refuse_locked
-from ..io.run_folder import OURS, SUMMARY, is_used, read_json, read_toml
+from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..units import format_quantity
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
@@ -169,7 +169,7 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         if report.can_go_on(folder):
             told += f"; or go on with what is in it: {report.resume_line(folder)}"
         raise BadInput(f"folder {folder} exists and is not empty; {told}")
-    if any((folder / name).exists() and (folder / name).samefile(case) for name in OURS):
+    if any((folder / name).exists() and (folder / name).samefile(case) for name in OWN_FILES):
         raise BadInput(
             f"--overwrite would replace the case file {case} itself; copy it to another folder first, "
             "or give another --out"
@@ -177,5 +177,5 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
     content = read_toml(case)
     for body in sorted(BODIES & content.keys()):
         path = Path(content[body].get("path", case))
-        if any((folder / name).exists() and path.exists() and (folder / name).samefile(path) for name in OURS):
+        if any((folder / name).exists() and path.exists() and (folder / name).samefile(path) for name in OWN_FILES):
             raise BadInput(f"--overwrite would replace {path}, the {body} of {case}; give another --out")

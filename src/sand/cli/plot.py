@@ -124,7 +124,7 @@ def _source(path: Path) -> Source:
         run = Run(path)
         return Source(path, run.frames, run)
     frames = Frames(path)
-    if not frames.is_ours:
+    if not frames.written_by_sand:
         raise BadInput(f"{path} is not a trajectory of SAND, or has no frame")
     return Source(path, frames, None)
 

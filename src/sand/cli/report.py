@@ -17,7 +17,7 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput
-from ..io.run_folder import CASE, ONE_COLLISION, OURS, plain, read_toml
+from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, plain, read_toml
 
 T = TypeVar("T")
 Rows = list[tuple[str, str]]
@@ -125,7 +125,7 @@ def checkpoints(folder: Path) -> list[Path]:
 
 def files_of(folder: Path) -> list[str]:
     """Names of the run's files that are there."""
-    return [name for name in OURS if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
+    return [name for name in OWN_FILES if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
 
 
 def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:

@@ -20,9 +20,9 @@ from .run_folder import read_text, replace_file
 from .trajectory import Frames, TrajectoryWriter
 
 MOST_GRAINS = 1_000_000
-TOLD = 10
-"""Grains that are named one by one."""
-ENDINGS = (".xyz", ".extxyz", ".gsd")
+NAMED = 10
+"""Grains or lines that are named one by one in a message."""
+SUFFIXES = (".xyz", ".extxyz", ".gsd")
 
 
 def read_body(
@@ -33,45 +33,52 @@ def read_body(
     materials: Mapping[str, Material] = PRESETS,
     otherwise: Material | None = None,
 ) -> Grains:
-    """Grains at rest, centred on their centre of mass.
+    """Read a body: grains at rest, with the centre of mass at the origin.
 
     Parameters
     ----------
     path : str or Path
-        extended XYZ, whose last frame is taken; a `.gsd`, of SAND or of others, whose last frame is taken; or
-        text with one grain a line, `x y z` or `x y z r`, blank lines and `#` comments allowed.
+        Extended XYZ or `.gsd` (of SAND or of other programs), of which the last frame is read; or text with one grain
+        per line, `x y z` or `x y z r`, with blank lines and `#` comments allowed.
     material : Material or None, optional
-        of all grains; None: those that the file names.
-    radius : optional
-        [m] of all grains of a file without radii.
+        Material of all grains; by default those named in the file.
+    radius : float or str, optional
+        Radius [m] of all grains, for a file without radii.
     length : str or None, optional
-        what one unit of the file's numbers is, "1 nm" for example; by default 1 Å in extended XYZ (or what
-        its `length_unit` says), 1 m in columns and in GSD that is not SAND's.
+        Unit of length of the file, "1 nm" for example; by default 1 Å in extended XYZ (or its `length_unit`), 1 m in
+        columns and in GSD of other programs.
     materials : Mapping[str, Material], optional
-        those that the file may name; otherwise: of all grains of a file that names none.
+        Materials that the file may name.
+    otherwise : Material or None, optional
+        Material of all grains if the file names none.
+
+    Returns
+    -------
+    Grains
+        The body.
 
     Raises
     ------
     BadInput
-        a missing or foreign file, lines that are not numbers, grains without a place (the first ten by
-        number), no radii, or materials that are not known.
+        If the file is missing or foreign, has lines that are not numbers, grains with impossible numbers (the first
+        ten are named), no radii, or unknown materials.
     """
     place = Path(path)
-    found = _of_gsd(place) if place.suffix == ".gsd" else _of_text(path)
+    found = _read_gsd(place) if place.suffix == ".gsd" else _read_lines(path)
     unit = found.unit if length is None else _unit(length)
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
     size = radius if found.radius is None else found.radius * unit
     _refuse_numbers(path, found)
-    kinds = _materials(path, found, material or (otherwise if found.names is None else None), materials)
-    body = Grains(found.position * unit, size, kinds, moment=found.moment)
-    middle = np.average(body.position, axis=0, weights=body.mass)
-    body.arrays.position[...] -= middle[:, None]
+    own = _materials(path, found, material or (otherwise if found.names is None else None), materials)
+    body = Grains(found.position * unit, size, own, moment=found.moment)
+    centre = np.average(body.position, axis=0, weights=body.mass)
+    body.arrays.position[...] -= centre[:, None]
     return body
 
 
 def _refuse_numbers(path: str | Path, found: Columns) -> None:
-    """Raises BadInput naming the first ten grains whose numbers cannot be."""
+    """Raise BadInput with the first ten grains that have impossible numbers."""
     parts = {"position": found.position, "radius": found.radius, "moment": found.moment}
     problems = []
     for name, values in parts.items():
@@ -81,14 +88,10 @@ def _refuse_numbers(path: str | Path, found: Columns) -> None:
         wrong = ~np.isfinite(rows).all(axis=1) | ((rows <= 0.0).any(axis=1) if name == "radius" else False)
         want = "a number above 0" if name == "radius" else "finite"
         problems += [f"{path}: {name} of grain {k} is {values[k]}; it must be {want}" for k in np.flatnonzero(wrong)]
+    if len(problems) > NAMED:
+        problems[NAMED:] = [f"… and {len(problems) - NAMED} more"]
     if problems:
-        raise BadInput(first_ten(problems))
-
-
-def first_ten(problems: list[str]) -> list[str]:
-    """The first ten lines, and how many there are more."""
-    more = len(problems) - TOLD
-    return problems if more <= 0 else [*problems[:TOLD], f"… and {more} more"]
+        raise BadInput(problems)
 
 
 def _materials(
@@ -97,7 +100,7 @@ def _materials(
     if material is not None:
         return material
     if found.names is None:
-        raise BadInput(f"{path} does not say what its grains are made of; give a material")
+        raise BadInput(f"{path} does not name the materials of its grains; give a material")
     if unknown := [name for name in dict.fromkeys(found.names) if name not in known]:
         raise BadInput(f"{path}: unknown material '{unknown[0]}'; {did_you_mean(unknown[0], list(known))}")
     return [known[name] for name in found.names]
@@ -110,13 +113,13 @@ def _unit(length: str) -> float:
     return float(factor)
 
 
-def _of_gsd(path: Path) -> Columns:
-    """The last frame, of a trajectory of SAND or of another program.  Raises BadInput."""
+def _read_gsd(path: Path) -> Columns:
+    """Read the last frame of a trajectory of SAND or of another program.  Raises BadInput."""
     frames = Frames(path)
     try:
         if not len(frames):
             raise BadInput(f"{path} holds no frame")
-        if frames.is_ours:
+        if frames.written_by_sand:
             frame = frames[-1]
             names = [frame.materials[k] for k in frame.material]
             return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0)
@@ -127,13 +130,13 @@ def _of_gsd(path: Path) -> Columns:
         frames.close()
 
 
-def _of_text(path: str | Path) -> Columns:
+def _read_lines(path: str | Path) -> Columns:
     lines = read_text(path).splitlines()
-    return read_xyz(path, lines) if is_xyz(lines) else _of_columns(path, lines)
+    return read_xyz(path, lines) if is_xyz(lines) else _read_columns(path, lines)
 
 
-def _of_columns(path: str | Path, lines: list[str]) -> Columns:
-    """Columns x y z or x y z r.  Raises BadInput."""
+def _read_columns(path: str | Path, lines: list[str]) -> Columns:
+    """Read columns x y z or x y z r.  Raises BadInput."""
     rows: list[list[float]] = []
     problems: list[str] = []
     for number, line in enumerate(lines, start=1):
@@ -145,9 +148,9 @@ def _of_columns(path: str | Path, lines: list[str]) -> Columns:
         except ValueError:
             row = []
         if len(row) not in (3, 4) or not np.isfinite(row).all() or (rows and len(row) != len(rows[0])):
-            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} is not x y z or x y z r, alike in all lines")
+            problems.append(f"{path}, line {number}: {line.strip()[:40]!r} is not x y z or x y z r, as in all lines")
         rows.append(row)
-        if len(problems) == TOLD or len(rows) > MOST_GRAINS:
+        if len(problems) == NAMED or len(rows) > MOST_GRAINS:
             break
     if problems or not rows:
         raise BadInput(problems or f"{path} holds no grain")
@@ -155,31 +158,31 @@ def _of_columns(path: str | Path, lines: list[str]) -> Columns:
     return Columns(table[:, :3], table[:, 3] if table.shape[1] == 4 else None, None, None, 1.0)
 
 
-def refuse_place(place: Path, *, overwrite: bool) -> None:
-    """Raises BadInput where no body can be written, before one is made."""
-    if place.suffix not in ENDINGS:
-        raise BadInput(f"{place}: the ending says in which form a body is written; allowed: {', '.join(ENDINGS)}")
-    if not place.parent.is_dir():
-        raise BadInput(f"there is no folder {place.parent}; make it first")
-    if place.is_dir() or (place.exists() and not overwrite):
-        raise BadInput(f"{place} exists; give another name, or say that it may be overwritten (--overwrite)")
+def refuse_target(path: Path, *, overwrite: bool) -> None:
+    """Raise BadInput if a body cannot be written to `path`; called before the body is built."""
+    if path.suffix not in SUFFIXES:
+        raise BadInput(f"{path}: the suffix selects the format of a body; allowed: {', '.join(SUFFIXES)}")
+    if not path.parent.is_dir():
+        raise BadInput(f"there is no folder {path.parent}; make it first")
+    if path.is_dir() or (path.exists() and not overwrite):
+        raise BadInput(f"{path} exists; give another name, or allow overwriting (--overwrite)")
 
 
 def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> Path:
     """Write a body: extended XYZ for `.xyz` and `.extxyz`, a trajectory of one frame for `.gsd`.
 
-    Places are written to rounding, so that contacts at rest stay so; `read_body`, `sand collide`, `sand run`,
-    OVITO and ASE read both.
+    Positions are written to full precision, so that contacts stay at rest. `read_body`, `sand collide`, `sand run`,
+    OVITO and ASE read both formats.
 
     Raises
     ------
     BadInput
-        another ending, no such folder, or a file that is there already.
+        If the suffix is unknown, the folder does not exist, or the file exists already.
     FilesFailed
-        the disk is full, …
+        If the file cannot be written.
     """
     place = Path(path)
-    refuse_place(place, overwrite=overwrite)
+    refuse_target(place, overwrite=overwrite)
     if place.suffix != ".gsd":
         replace_file(place, xyz_text(grains).encode())
         return place
@@ -199,11 +202,11 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
 
 
 def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
-    """The unstrained contacts of grains in open space as a table, by column: what a frame wants to know of them."""
+    """Table of the unstrained contacts of grains in open space, by column, as `TrajectoryWriter.write` takes it."""
     pair = Box.open().close_pairs(grains.position, 2.0 * float(grains.radius.max()) * (1.0 + ROUNDING))
     overlap = grains.overlaps(pair, Box.open())
-    near = overlap >= -ROUNDING * grains.radius[pair].sum(axis=1)
-    pair, overlap = pair[near], np.maximum(overlap[near], 0.0)
+    touching = overlap >= -ROUNDING * grains.radius[pair].sum(axis=1)
+    pair, overlap = pair[touching], np.maximum(overlap[touching], 0.0)
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)

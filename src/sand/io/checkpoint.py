@@ -1,24 +1,23 @@
-"""checkpoint-*.npz: the whole state in float64, versioned and checksummed; two are kept.
+"""Checkpoints checkpoint-*.npz: the complete state in float64, versioned and with a checksum; the newest two are kept.
 
-A NumPy archive of plain arrays, without pickles, written beside, synced and renamed.
+A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomically.
 
 | array | meaning |
 |---|---|
-| meta.json | JSON as bytes: `format`, `version`, `sha256` over all else, step, time, planned end, case, choices |
-| clock | time, steps and what is left of the cycle [s]; meta.json names the places of this and of the next two |
+| meta.json | JSON as bytes: `format`, `version`, `sha256` of all arrays, step, time, planned end, case, choices |
+| clock | time, steps and the rest of the r-RESPA cycle [s]; meta.json names the entries of this and of the next two |
 | count | numbers of steps, contacts, pairs, made, broken, moved; counters of lists |
 | lost | energy lost per channel [J] |
 | ledger | all rows so far, (K, columns of ledger.csv) |
 | grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
-| contacts/… | pairs, pointers in body frames, twist, time of touch, constants, losses, loads, contacts per grain |
-| near/… | the list of pairs that may touch, and the positions when it was made |
-| order | the grain at each place in memory, (N,), where an order is kept; all else is in the order of the grains |
-| far/… | loads of the last long-range summation, what their cycle has used up, positions when the list was made |
+| contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
+| pair_list/… | the list of candidate pairs, and the positions at its last rebuild |
+| order | grain index at each array position, (N,), with spatial sorting; all other arrays are in the user's order |
+| long_range/… | loads of the last long-range summation, state of the cycle, positions at the last rebuild of the list |
 
-`io.state_arrays` says what each array must be like.
+`io.state_arrays` checks each array.
 
-Random numbers are functions of the seed, the grain and the number of the kick, so that there is no state of a generator
-to be kept.
+Random numbers are functions of the seed, the grain and the index of the kick, so there is no generator state to save.
 """
 
 from __future__ import annotations
@@ -41,8 +40,9 @@ from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
 VERSION = 5
-"""Version of the file format; files of other versions are refused.  Versions before 5 were never released."""
+"""Version of the file format; other versions are refused. Versions before 5 were never released."""
 KEPT = 2
+"""Checkpoints kept in a folder."""
 _META = "meta.json"
 
 
@@ -56,24 +56,24 @@ def _checksum(arrays: dict[str, np.ndarray]) -> str:
 
 
 def checkpoint_name(steps: int) -> str:
-    """Name of the file of the state after so many steps; in the order of the names later ones come later."""
+    """File name of the checkpoint after `steps` steps; alphabetical order is the order of steps."""
     return f"checkpoint-{int(steps):015d}.npz"
 
 
 def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Path:
-    """Write one checkpoint, then drop all but the newest two.
+    """Write one checkpoint, then delete all but the newest two.
 
     Parameters
     ----------
     arrays : dict[str, ndarray]
-        the state by name.
+        Arrays of the state by name.
     meta : dict[str, Any]
-        plain numbers and text that go with it; must hold `steps`.
+        Metadata: numbers and text, among them `steps`.
 
     Raises
     ------
     FilesFailed
-        nothing is lost, the older checkpoints stay.
+        If it cannot be written; older checkpoints stay.
     """
     header = {"format": "SAND checkpoint", "version": VERSION, "sha256": _checksum(arrays), **meta}
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
@@ -82,31 +82,31 @@ def write_checkpoint(folder: Path, arrays: dict[str, np.ndarray], meta: dict[str
     path = folder / checkpoint_name(meta["steps"])
     replace_file(path, memory.getvalue())
     for old in sorted(folder.glob("checkpoint-*.npz"))[:-KEPT]:
-        with contextlib.suppress(OSError):  # Windows removes no file that somebody reads; the next time it goes, too
+        with contextlib.suppress(OSError):  # Windows cannot remove an open file; the next call tries again
             old.unlink(missing_ok=True)
     return path
 
 
 def _refuse_impossible_sizes(path: Path) -> None:
-    """Look at the sizes in the archive before memory is taken: ours are stored as they are, so none exceeds the file.
+    """Check array sizes before memory is allocated; arrays are not compressed, so none can exceed the file.
 
     Raises
     ------
     ValueError
-        an array larger than the file, or than its part of it.
+        If an array is larger than the file, or than its part of it.
     """
     refuse_devices(path)
     size = path.stat().st_size
     with zipfile.ZipFile(path) as archive:
         for part in archive.infolist():
             if part.compress_type != zipfile.ZIP_STORED or part.file_size > size:
-                raise ValueError(f"{part.filename} is not what SAND writes")
+                raise ValueError(f"{part.filename} was not written by SAND")
             with archive.open(part) as file:
                 version = np.lib.format.read_magic(file)
                 read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
                 shape, _, kind = read(file)
                 if math.prod(shape) * kind.itemsize > part.file_size:
-                    raise ValueError(f"{part.filename} says that it is larger than the file")
+                    raise ValueError(f"{part.filename} claims to be larger than the file")
 
 
 class OtherFormat(BadInput):
@@ -114,24 +114,29 @@ class OtherFormat(BadInput):
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Arrays and meta of one checkpoint, fit to go on from.
+    """Read and check one checkpoint.
+
+    Returns
+    -------
+    tuple[dict[str, ndarray], dict[str, Any]]
+        Arrays of the state by name, and the metadata.
 
     Raises
     ------
     OtherFormat
-        another version of the format.
+        If it has another version of the format.
     BadInput
-        not a checkpoint, damaged, or with numbers that a state cannot have.
+        If it is not a checkpoint, is damaged, or has numbers that a state cannot have.
     """
     try:
         _refuse_impossible_sizes(path)
         with np.load(path, allow_pickle=False) as saved:
             arrays = {name: saved[name] for name in saved.files}
         meta = json.loads(arrays.pop(_META).tobytes())
-        whole = isinstance(meta, dict)
-    except Exception as error:  # whatever a broken file makes the readers do
+        is_dictionary = isinstance(meta, dict)
+    except Exception as error:  # numpy and zipfile raise various exceptions for broken files
         raise BadInput(f"{path} is not a readable checkpoint ({type(error).__name__})") from error
-    if not whole or meta.get("format") != "SAND checkpoint" or not isinstance(meta.get("version"), int):
+    if not is_dictionary or meta.get("format") != "SAND checkpoint" or not isinstance(meta.get("version"), int):
         raise BadInput(f"{path} is not a checkpoint of SAND")
     if meta["version"] != VERSION:
         advice = "update SAND" if meta["version"] > VERSION else "resume it with the development version that wrote it"
@@ -141,21 +146,26 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     try:
         check_state(arrays, meta)
     except BadInput as error:
-        raise BadInput(f"{path} cannot be gone on from: {error}") from None
+        raise BadInput(f"{path} cannot be resumed: {error}") from None
     return arrays, meta
 
 
 def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """The newest checkpoint that is whole; newer ones that are not are renamed, with a warning that says so.
+    """Read the newest intact checkpoint of a folder; damaged newer ones are renamed, with a warning.
+
+    Returns
+    -------
+    tuple[dict[str, ndarray], dict[str, Any]]
+        Arrays of the state by name, and the metadata.
 
     Raises
     ------
     OtherFormat
-        the newest readable file has another version of the format.
+        If the newest readable file has another version of the format.
     BadInput
-        there is none; no file is renamed then.
+        If there is no intact checkpoint; no file is renamed then.
     FilesFailed
-        a damaged one cannot be renamed.
+        If a damaged one cannot be renamed.
     """
     problems: list[tuple[Path, str]] = []
     for path in sorted(folder.glob("checkpoint-*.npz"), reverse=True):
@@ -166,11 +176,11 @@ def newest_checkpoint(folder: Path) -> tuple[dict[str, np.ndarray], dict[str, An
         except BadInput as error:
             problems.append((path, str(error)))
             continue
-        for damaged, said in problems:
+        for damaged, message in problems:
             try:
                 aside = set_aside(damaged)
             except OSError as error:
                 raise FilesFailed(f"cannot rename {damaged}, which is damaged: {error.strerror}") from error
-            warnings.warn(f"{said}; it is now {aside.name}, and the run goes on from {path.name}", stacklevel=2)
+            warnings.warn(f"{message}; it is now {aside.name}, and the run continues from {path.name}", stacklevel=2)
         return arrays, meta
-    raise BadInput([*(said for _, said in problems), f"{folder} holds no checkpoint to go on from"])
+    raise BadInput([*(message for _, message in problems), f"{folder} holds no checkpoint to continue from"])

@@ -1,4 +1,4 @@
-"""Files that were found damaged: digests that tell a change, and the names under which such files are kept."""
+"""Damaged files: digests that detect a change, and the names under which damaged files are kept."""
 
 from __future__ import annotations
 
@@ -9,29 +9,34 @@ from pathlib import Path
 from typing import Any
 
 DAMAGED = ".damaged"
-"""Ending of the names of files that were found damaged, kept for the user to look at."""
+"""Suffix of damaged files, which are kept for inspection."""
 DIGEST = "sha256"
-"""The key of a JSON file under which the digest of all else in it stands."""
+"""Key of a JSON file with the digest of all other content."""
 
 
 def sealed(content: dict[str, Any]) -> dict[str, Any]:
-    """Plain content to be written as JSON, and with it its digest."""
+    """Add the digest to content that is to be written as JSON."""
     return {**content, DIGEST: digest_of(content)}
 
 
 def digest_of(content: dict[str, Any]) -> str:
-    """SHA-256 of plain content but for its own digest, whatever the order of its keys and the spaces between them."""
+    """SHA-256 of JSON content without its own digest, independent of the order of keys and of white space."""
     rest = {key: value for key, value in content.items() if key != DIGEST}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def set_aside(path: Path, *, copy: bool = False) -> Path:
-    """Rename a damaged file to a free name that nothing reads, or copy it to one; returns that.
+    """Rename a damaged file to an unused name, or copy it.
+
+    Returns
+    -------
+    Path
+        The new name.
 
     Raises
     ------
     OSError
-        it cannot be renamed or copied.
+        If it cannot be renamed or copied.
     """
     aside, number = path.with_name(path.name + DAMAGED), 1
     while aside.exists():
@@ -45,5 +50,5 @@ def set_aside(path: Path, *, copy: bool = False) -> Path:
 
 
 def set_aside_in(folder: Path, names: tuple[str, ...]) -> list[Path]:
-    """The files that `set_aside` has left of files with these names or patterns."""
+    """Files renamed by `set_aside` whose original names match these names or patterns."""
     return [path for name in names for path in folder.glob(f"{name}{DAMAGED}*")]

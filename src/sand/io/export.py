@@ -1,7 +1,7 @@
-"""Frames for other programs: extended XYZ, LAMMPS data and dump, VTK (.vtp with .pvd).
+"""Export of frames to other programs: extended XYZ, LAMMPS data and dump, VTK (.vtp with .pvd).
 
-Everything is SI, but extended XYZ, whose readers expect ångström: there lengths are in Å and a comment says so.  LAMMPS
-files are those of `units si` and `atom_style hybrid sphere dipole` (data) or a custom dump.
+All quantities are SI, except lengths in extended XYZ: its readers expect ångström, and a comment in the file says so.
+LAMMPS files are for `units si` and `atom_style hybrid sphere dipole` (data), or a custom dump.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ Writer = Callable[[Sequence[Frame], Path, Clusters], list[Path]]
 
 ANGSTROM = 1e-10
 SYMBOLS = {"iron": "Fe", "silica": "Si", "ice": "O", "graphite": "C", "forsterite": "Mg", "magnetite": "Fe"}
-"""Chemical symbols by which readers tell materials apart; X for others."""
+"""Chemical symbols that distinguish materials; X for others."""
 
 
 def _lines(columns: Sequence[np.ndarray], form: str) -> str:
-    """A line for each row of the columns, which are (N,) or (N, k)."""
+    """Format one line for each row of the columns (N,) or (N, k)."""
     table = np.column_stack(columns)
     return "".join(form % tuple(row) for row in table.tolist())
 
 
 def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
-    """One frame of extended XYZ: species, position [Å], radius [Å], velocity, moment, spin, cluster (SI)."""
+    """Format a frame as extended XYZ: species, position [Å], radius [Å], velocity, moment, spin, cluster (SI)."""
     periodic = " ".join("T" if v is not None else "F" for v in frame.box.lengths)
     x, y, z = (v / ANGSTROM for v in frame.drawn)
     head = (
@@ -52,9 +52,9 @@ def _bounds(frame: Frame) -> list[tuple[float, float]]:
 
 
 def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
-    """One snapshot of a custom dump: id, type, place, radius, velocity, spin, moment, cluster.
+    """Format a frame as a snapshot of a custom dump: id, type, position, radius, velocity, spin, moment, cluster.
 
-    It has steps, no times, because not all readers take `ITEM: TIME`.
+    It has step numbers but no times, because some readers do not accept `ITEM: TIME`.
     """
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
     box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in _bounds(frame))
@@ -70,9 +70,9 @@ def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
 
 
 def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
-    """A data file of `atom_style hybrid sphere dipole`: grains, velocities and spins.
+    """Format a frame as a data file of `atom_style hybrid sphere dipole`: grains, velocities and spins.
 
-    Atoms # hybrid sphere dipole: id type x y z diameter density q mux muy muz.
+    Columns of an atom: id type x y z diameter density q mux muy muz.
     """
     box = "".join(
         f"{low:.17g} {high:.17g} {axis}lo {axis}hi\n" for (low, high), axis in zip(_bounds(frame), "xyz", strict=True)
@@ -90,7 +90,7 @@ def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """A DataArray of a VTK file, as text to the last bit of what it is."""
+    """Format a DataArray of a VTK file, as text to full precision."""
     flat = np.asarray(values)
     parts = f' NumberOfComponents="{flat.shape[1]}"' if flat.ndim == 2 else ""
     whole = np.issubdtype(flat.dtype, np.integer)
@@ -100,10 +100,10 @@ def _array(name: str, values: np.ndarray) -> str:
 
 
 def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
-    """Grains as points, contacts as lines with overlap and force; a contact across a periodic face has no line.
+    """Format a frame as VTK: grains as points, contacts as lines with overlap and force.
 
-    Point data: radius [m], moment [A m²], velocity, spin, material, cluster; cell data (vertices first, zeros there):
-    overlap [m], force [N].
+    Contacts across a periodic face have no line. Point data: radius [m], moment [A m²], velocity, spin, material,
+    cluster; cell data (zero for the vertices, which come first): overlap [m], force [N].
     """
     n = len(frame)
     span = np.array([np.inf if v is None else 0.5 * v for v in frame.box.lengths])
@@ -137,7 +137,7 @@ def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
 
 
 def _one_file(text_of: Text, ending: str) -> Writer:
-    """A writer that puts all frames into one file."""
+    """Writer of one file with all frames."""
 
     def write(frames: Sequence[Frame], stem: Path, clusters: Clusters) -> list[Path]:
         path = stem.with_name(stem.name + ending)
@@ -148,7 +148,7 @@ def _one_file(text_of: Text, ending: str) -> Writer:
 
 
 def _numbered(text_of: Text, ending: str) -> Writer:
-    """A writer with a file for each frame."""
+    """Writer of one file per frame."""
 
     def write(frames: Sequence[Frame], stem: Path, clusters: Clusters) -> list[Path]:
         paths = []
@@ -161,7 +161,7 @@ def _numbered(text_of: Text, ending: str) -> Writer:
 
 
 def _with_index(frames: Sequence[Frame], stem: Path, clusters: Clusters) -> list[Path]:
-    """A .vtp for each frame, and the .pvd that gives their times."""
+    """Write a .vtp for each frame, and the .pvd with their times."""
     paths = _numbered(to_vtp, ".vtp")(frames, stem, clusters)
     times = [frame.time for frame in frames]
     sets = "".join(
@@ -179,27 +179,33 @@ FORMATS: dict[str, Writer] = {
     "lammps-data": _numbered(to_lammps_data, ".data"),
     "vtk": _with_index,
 }
-"""Writers by name: (frames, path without ending, numbering of clusters) -> the files written."""
+"""Writers by name: (frames, path without suffix, cluster labels) → the files written."""
 
 
 def export_frames(frames: Sequence[Frame], stem: str | Path, form: str, clusters: Clusters) -> list[Path]:
-    """Write frames for another program; returns the files.
+    """Write frames for another program.
 
     Parameters
     ----------
     stem : str or Path
-        path without ending; "run/pictures" makes run/pictures.xyz, or run/pictures-000000000100.vtp and so on.
+        Path without suffix; "run/pictures" gives run/pictures.xyz, or run/pictures-000000000100.vtp and so on.
     form : str
         "xyz", "lammps-dump", "lammps-data" or "vtk".
-    clusters : Clusters
-        numbers the clusters of so many grains (N,) by their contacts (C, 2), `analysis.cluster_labels`.
+    clusters : Callable
+        Function of the number of grains and the contacts (C, 2) that returns cluster labels (N,), such as
+        `analysis.cluster_labels`.
+
+    Returns
+    -------
+    list[Path]
+        The files written.
 
     Raises
     ------
     BadInput
-        an unknown format, no frames, or no such folder.
+        If the format is unknown, there is no frame, or the folder does not exist.
     FilesFailed
-        the disk is full, …
+        If a file cannot be written.
     """
     if form not in FORMATS:
         raise BadInput(f"format = {form!r}; allowed: {', '.join(FORMATS)}")

@@ -1,4 +1,4 @@
-"""Extended XYZ of bodies: one line a grain, columns named in the second line, lengths in ångström."""
+"""Bodies in extended XYZ: one line per grain, columns named in the second line, lengths in ångström."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from ..grains import Grains
 from ..units import in_unit
 from .export import ANGSTROM, SYMBOLS
 
-PLACES, SIZES, MOMENTS = ("pos", "position", "positions"), ("radius", "radii"), ("moment", "moments", "dipole")
-"""Names of columns that are understood, by what they hold."""
+POSITIONS, RADII, MOMENTS = ("pos", "position", "positions"), ("radius", "radii"), ("moment", "moments", "dipole")
+"""Accepted names of columns, by quantity."""
 
 
 class Columns(NamedTuple):
-    """What a file says of grains, in its own unit of length."""
+    """Quantities of grains from a file, in its own unit of length."""
 
     position: np.ndarray  # (N, 3)
     radius: np.ndarray | None  # (N,)
     moment: np.ndarray | None  # (N, 3) [A m²]
     names: list[str] | None  # N names of materials
-    unit: float  # [m], unless the reader of the file knows better
+    unit: float  # unit of length [m], unless the caller gives another
 
 
 def xyz_text(grains: Grains) -> str:
-    """Grains as extended XYZ: species, position and radius [Å], moment [A m²], material; to rounding.
+    """Format grains as extended XYZ: species, position and radius [Å], moment [A m²], material; full precision.
 
-    Materials are numbers, whose names stand in the second line.
+    Materials are indices; their names are in the second line.
     """
     names = [m.name for m in grains.materials]
     symbols = [SYMBOLS.get(name, "X") for name in names]
@@ -46,17 +46,17 @@ def xyz_text(grains: Grains) -> str:
 
 
 def is_xyz(lines: list[str]) -> bool:
-    """Whether this text is extended XYZ, not columns alone."""
+    """Whether a text is extended XYZ, as opposed to plain columns."""
     return len(lines) > 1 and lines[0].strip().isdecimal() and "Properties=" in lines[1]
 
 
 def read_xyz(path: Any, lines: list[str]) -> Columns:
-    """The last frame of extended XYZ.
+    """Read the last frame of extended XYZ.
 
     Raises
     ------
     BadInput
-        a frame that is cut off, no positions, or lines that are not numbers (the first ten).
+        If the frame is incomplete, has no positions, or has lines that are not numbers (the first ten are named).
     """
     first, count = _last_frame(path, lines)
     head = dict(re.findall(r'(\w+)=("[^"]*"|\S+)', lines[first + 1]))
@@ -66,22 +66,22 @@ def read_xyz(path: Any, lines: list[str]) -> Columns:
     for number in range(first + 2, first + 2 + count):
         words = lines[number].split()
         if len(words) != width:
-            problems.append(f"{path}, line {number + 1}: {len(words)} columns, not the {width} that line 2 names")
+            problems.append(f"{path}, line {number + 1}: {len(words)} columns, but line 2 names {width}")
         rows.append(words)
     if problems:
         raise BadInput(problems[:10])
-    position = _numbers(path, rows, layout, PLACES, 3, first)
+    position = _numbers(path, rows, layout, POSITIONS, 3, first)
     if position is None:
         raise BadInput(f"{path} has no positions; its Properties must have pos:R:3")
-    size, moment = (_numbers(path, rows, layout, n, w, first) for n, w in ((SIZES, 1), (MOMENTS, 3)))
+    size, moment = (_numbers(path, rows, layout, n, w, first) for n, w in ((RADII, 1), (MOMENTS, 3)))
     unit = in_unit(f"1 {head.get('length_unit', 'angstrom')}", "m")
     if unit is None:
-        raise BadInput(f"{path}, line 2: length_unit={head['length_unit']!r} is no unit of length")
+        raise BadInput(f"{path}, line 2: length_unit={head['length_unit']!r} is not a unit of length")
     return Columns(position, None if size is None else size[:, 0], moment, _names(path, rows, layout, head), unit)
 
 
 def _last_frame(path: Any, lines: list[str]) -> tuple[int, int]:
-    """Line and number of grains of the last frame.  Raises BadInput."""
+    """First line and number of grains of the last frame.  Raises BadInput."""
     at, found = 0, (0, 0)
     while at < len(lines) and lines[at].strip():
         text = lines[at].strip()
@@ -93,7 +93,7 @@ def _last_frame(path: Any, lines: list[str]) -> tuple[int, int]:
 
 
 def _layout(path: Any, text: str) -> tuple[dict[str, tuple[int, int]], int]:
-    """First column and number of columns by name, and how many there are.  Raises BadInput."""
+    """First column and number of columns of each name, and the total number of columns.  Raises BadInput."""
     parts, layout, at = text.split(":"), {}, 0
     if len(parts) % 3 or not all(width.isdecimal() for width in parts[2::3]):
         raise BadInput(f"{path}, line 2: Properties={text[:60]!r} is not made of name:type:number")
@@ -106,7 +106,7 @@ def _layout(path: Any, text: str) -> tuple[dict[str, tuple[int, int]], int]:
 def _numbers(
     path: Any, rows: list[list[str]], layout: dict[str, tuple[int, int]], names: tuple[str, ...], width: int, first: int
 ) -> np.ndarray | None:
-    """Columns (N, width) of the first of these names that the file has; None if it has none.  Raises BadInput."""
+    """Columns (N, width) of the first of `names` that the file has, None if it has none.  Raises BadInput."""
     at = next((layout[name] for name in names if name in layout), None)
     if at is None or at[1] != width:
         return None
@@ -126,7 +126,7 @@ def _numbers(
 def _names(
     path: Any, rows: list[list[str]], layout: dict[str, tuple[int, int]], head: dict[str, str]
 ) -> list[str] | None:
-    """Names of materials; None where the file has none.  Raises BadInput."""
+    """Names of materials, None if the file has none.  Raises BadInput."""
     if "material" not in layout:
         return None
     words = [row[layout["material"][0]] for row in rows]
@@ -134,4 +134,4 @@ def _names(
     try:
         return [known[int(word)] for word in words] if "materials" in head else words
     except (ValueError, IndexError):
-        raise BadInput(f"{path}: the column 'material' does not count in materials=\"{head['materials']}\"") from None
+        raise BadInput(f"{path}: the column 'material' has no index into materials=\"{head['materials']}\"") from None

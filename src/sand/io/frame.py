@@ -1,29 +1,29 @@
-"""One frame of trajectory.gsd: what it holds, and back in SI; frames in a row.
+"""Frames of trajectory.gsd: content of the chunks, conversion to and from SI, and sequences of frames.
 
-Positions, diameters and box are in units of a reference radius (float32 would not do in metres); the rest is
-SI.  Orientations are scalar first, as GSD has them.
+Positions, diameters and box are in units of a reference radius (in metres they would exceed the range of float32); all
+other quantities are SI. Orientations are scalar first, as in GSD.
 
 | chunk | meaning |
 |---|---|
 | configuration/step, log/time | step number; true time of the frame [s] |
 | log/scale/length | the reference radius [m] |
-| log/periodic | 1 for each periodic axis, 0 for an open one, whose length in the box is only for drawing |
-| log/lengths | lengths of the box to the last bit, as drawn [m] |
+| log/periodic | 1 for each periodic axis, 0 for an open one, whose length in the box serves drawing only |
+| log/lengths | side lengths of the box as drawn, to full precision [m] |
 | particles/position, diameter; configuration/box | in reference radii |
 | particles/velocity, mass, charge | m/s, kg, C |
 | particles/orientation | rotation parameters, scalar first |
 | particles/typeid, types | materials |
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
-| log/particles/position, radius | to the last bit [m]; in bodies, not in runs |
+| log/particles/position, radius | to full precision [m]; only in files of bodies |
 | bonds/group | grains in contact |
-| log/bonds/overlap, formed | δ [m] and time of first touch [s] |
+| log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
-| log/bonds/share | stretch, slide, roll and twist as shares of what the contact can bear |
-| log/crc32 | check sum over all numbers of a frame but its step; a second one over step, names of materials and these |
+| log/bonds/share | stretch, slide, roll and twist as shares of their limits |
+| log/crc32 | checksum of all numbers of a frame but its step; a second one also covers step and material names |
 
-Vectors are in the laboratory frame.  Files of development versions lack some of the last rows, and the second check
-sum; they are read all the same.
+Vectors are in the laboratory frame. Files of development versions lack some of the last rows and the second checksum;
+they can be read as well.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from ..errors import BadInput, shown
 from ..grains import Grains
 
 OPEN_MARGIN = 4.0
-"""An open axis is drawn this much longer than the cloud of grains, because the format needs a box."""
+"""Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
 LOGGED = (
     "time",
     "scale/length",
@@ -59,7 +59,7 @@ LOGGED = (
     "particles/position",
     "particles/radius",
 )
-"""Logged arrays that the check sum is over, in its order."""
+"""Logged arrays covered by the checksum, in its order."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 
@@ -67,7 +67,7 @@ MODES = ("stretch", "slide", "roll", "twist")
 def stored_frame(
     step: int, time: float, grains: Grains, box: Box, contacts: Mapping[str, np.ndarray], *, exact: bool = False
 ) -> Any:
-    """A GSD frame of these grains and contacts (a `ContactTable`, by column); lengths to the last bit if `exact`."""
+    """GSD frame of grains and contacts (columns as in `ContactTable`); `exact`: also positions and radii in float64."""
     import gsd.hoomd
 
     scale = float(grains.radius.mean())
@@ -111,41 +111,41 @@ def stored_frame(
 
 
 def code_of(stored: Any) -> int:
-    """The check sum over the numbers of a frame that it was stored with.  Raises KeyError if there is none."""
+    """The stored checksum of the numbers of a frame.  Raises KeyError if there is none."""
     return int(stored.log["crc32"][0])
 
 
 def _refuse_changed(stored: Any) -> None:
-    """Raises ValueError if a check sum tells that a frame is not as it was written; the first files have none."""
+    """Raise ValueError if a checksum does not match; files of the first development versions have none."""
     codes = stored.log.get("crc32", ())
     if any(int(code) != _crc32(stored, head) for code, head in zip(codes, (b"", _head_of(stored)), strict=False)):
         raise ValueError("its check sum is wrong")
 
 
 def _head_of(stored: Any) -> bytes:
-    """Step and names of materials."""
+    """Step and material names."""
     return f"{int(stored.configuration.step)} {list(stored.particles.types)}".encode()
 
 
 def _crc32(stored: Any, head: bytes) -> int:
-    """CRC-32 over what stands at the head of a frame, and all its numbers as the file holds them."""
+    """CRC-32 of `head` and of all numbers of a frame as stored."""
     p, code = stored.particles, zlib.crc32(head)
     single = (p.position, p.diameter, p.velocity, p.mass, p.charge, p.orientation)
     parts = [np.asarray(part, np.float32) for part in single]
     parts += [np.asarray(part, np.uint32) for part in (p.typeid, stored.bonds.group)]
     for part in [*parts, *(stored.log[name] for name in LOGGED if name in stored.log)]:
-        # + 0 makes −0 and 0 the same, which GSD takes for no change
-        with np.errstate(invalid="ignore"):  # a damaged file may hold anything
+        # + 0 makes −0 and 0 equal, which GSD does not distinguish
+        with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
             code = zlib.crc32((np.ascontiguousarray(part) + np.zeros(1, part.dtype)).tobytes(), code)
     return code
 
 
 class Frame:
-    """One stored frame, back in SI: arrays (N, …) named as in the field table.
+    """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
-    `material` (N,) counts in `materials`, their names.  Of the contacts: `pair` (C, 2), `overlap` [m], `formed` [s],
-    `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3) and `share` (C, 4) as in MODES; NaN where the file has
-    none.
+    `material` (N,) holds indices into the names `materials`. Arrays of contacts: `pair` (C, 2), `overlap` [m],
+    `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`;
+    NaN where the file lacks them.
     """
 
     def __init__(self, stored: Any):
@@ -154,8 +154,8 @@ class Frame:
         self.time = float(stored.log["time"][0])
         scale = float(stored.log["scale/length"][0])
         p = stored.particles
-        rounded_places = np.asarray(p.position, dtype=np.float64) * scale
-        self.position = np.array(stored.log.get("particles/position", rounded_places))
+        single_precision = np.asarray(p.position, dtype=np.float64) * scale
+        self.position = np.array(stored.log.get("particles/position", single_precision))
         self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
@@ -178,7 +178,7 @@ class Frame:
         x, y, z = (float(v) if on else None for v, on in zip(lengths, periodic, strict=True))
         self.box = Box((x, y, z))
         self.drawn = tuple(float(v) for v in lengths)
-        """Lengths of the box as drawn [m], open axes too."""
+        """Side lengths of the box as drawn [m], open axes included."""
 
     def __len__(self) -> int:
         """Number of grains."""
@@ -186,17 +186,17 @@ class Frame:
 
 
 class NoSuchFrame(BadInput, IndexError):
-    """There is no frame of this number; an IndexError, so that loops over frames end."""
+    """The requested frame does not exist; an IndexError, so that loops over frames end."""
 
 
 class FrameSequence(Sequence[Frame]):
-    """Frames of a file at `path`, by number or slice; a subclass says how many (`__len__`) and reads one (`_frame`)."""
+    """Frames of a file at `path`, by index or slice; subclasses define `__len__` and `_frame`."""
 
     path: Path
 
     @abstractmethod
     def _frame(self, number: int) -> Frame:
-        """A frame from 0 to the last.  Raises BadInput for one that is not whole."""
+        """Read a frame, from 0 to the last.  Raises BadInput if it is incomplete."""
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...

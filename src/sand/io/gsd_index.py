@@ -1,4 +1,4 @@
-"""The index of a GSD file, looked at before anything in it is believed, and mended after a full disk."""
+"""The index of a GSD file: checked before reading, repaired after a full disk or a power failure."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ ENTRY = np.dtype(
         ("flags", "u1"),
     ]
 )
-"""An entry of a GSD file's index (gsd.readthedocs.io, file layer)."""
+"""Entry of the index of a GSD file (gsd.readthedocs.io, file layer)."""
 SPARE = 65536
-"""Bytes that GSD may want besides data and index."""
+"""Bytes that GSD may need besides data and index."""
 CHUNKS = 40
-"""More than a frame of ours has."""
+"""Upper bound of the index entries of one frame."""
 MAGIC = np.uint64(0x65DF65DF65DF65DF).tobytes()
-"""What every GSD file begins with."""
+"""First bytes of every GSD file."""
 HEADER, NAME = 256, 64
-"""Bytes of the head of a GSD file, and of each name in its list of them."""
+"""Bytes of the header of a GSD file, and of each entry in its list of names."""
 WIDTHS = np.array([0, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8, 1] + [10**9] * 244, np.float64)
-"""Bytes of a number by its type there; impossible for types that are none."""
+"""Bytes of a number by its type code; impossibly large for invalid codes."""
 
 
 def read_index(path: Path) -> tuple[int, np.ndarray]:
-    """Place of the index in the file and its entries, those in use being the first; a damaged one may be among them.
+    """Read the offset of the index and its used entries, which may include damaged ones.
 
     Raises
     ------
     BadInput
-        it lies outside the file.
+        If the index lies outside the file, or the file is not GSD.
     """
     size = path.stat().st_size
     with open(path, "rb") as file:
         begin = file.read(16 * 8)
         if begin[:8] != MAGIC[: len(begin)]:
-            raise BadInput(f"{path} is not a trajectory of SAND (it is no GSD file)")
+            raise BadInput(f"{path} is not a trajectory of SAND (it is not a GSD file)")
         place, count = (int(number) for number in np.frombuffer(begin.ljust(16 * 8, b"\0"), np.uint64)[1:3])
         if not 0 < place <= place + count * ENTRY.itemsize <= size:
             raise BadInput(
-                f"{path} is a trajectory that was cut off, its index is missing: copy it again, or go on with "
-                "'sand resume', which begins a new one"
+                f"{path} is a trajectory that was cut off, its index is missing: copy it again, or continue the run "
+                "with 'sand resume', which begins a new one"
             )
         file.seek(place)
         entries = np.frombuffer(file.read(count * ENTRY.itemsize), ENTRY)
@@ -65,26 +65,28 @@ def read_index(path: Path) -> tuple[int, np.ndarray]:
 
 
 def holds_data(path: Path) -> bool:
-    """True if there is more in a GSD file than its head, its index and its list of names."""
+    """Whether a GSD file holds more than header, index and list of names."""
     with open(path, "rb") as file:
         head = np.frombuffer(file.read(5 * 8), np.uint64).astype(float)
     return path.stat().st_size > HEADER + head[2] * ENTRY.itemsize + head[4] * NAME
 
 
 def make_room(path: Path, wanted: int, pending: int) -> None:
-    """See that the disk has room for what GSD is about to write: data, and an index that holds it.
+    """Make sure that the disk can hold what GSD is about to write: data, and an index for it.
 
-    GSD (up to 5.0 at least) goes on after it failed to lengthen its index, and writes entries over the first frames.
+    GSD (up to 5.0 at least) does not stop if it cannot extend its index, and overwrites the first frames with entries.
 
     Parameters
     ----------
     wanted : int
-        entries that the index is to hold, at most; pending: bytes [B] of data that wait to be written.
+        Upper bound of the entries that the index is to hold.
+    pending : int
+        Size of the data that wait to be written [B].
 
     Raises
     ------
     OSError
-        there is no room.
+        If there is not enough space.
     """
     with open(path, "r+b") as file:
         allocated = int(np.frombuffer(file.read(24), np.uint64)[2])
@@ -98,12 +100,12 @@ def make_room(path: Path, wanted: int, pending: int) -> None:
                 os.posix_fallocate(file.fileno(), size, needed)
             finally:
                 os.ftruncate(file.fileno(), size)
-        elif shutil.disk_usage(path.parent).free < needed:  # quotas are not seen this way
+        elif shutil.disk_usage(path.parent).free < needed:  # ignores quotas
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _impossible(path: Path, entries: np.ndarray) -> np.ndarray:
-    """True for entries whose data lie outside the file, or of a frame before that of an earlier entry."""
+    """Mask of entries whose data lie outside the file, or whose frame precedes that of an earlier entry."""
     length = entries["rows"].astype(np.float64) * entries["columns"] * WIDTHS[entries["type"]]
     outside = (entries["location"] <= 0) | (entries["location"].astype(np.float64) + length > path.stat().st_size)
     frame = entries["frame"]
@@ -113,12 +115,12 @@ def _impossible(path: Path, entries: np.ndarray) -> np.ndarray:
 
 
 def refuse_impossible_sizes(path: Path) -> None:
-    """A broken index may ask for petabytes.
+    """Refuse a broken index, which may request petabytes of memory.
 
     Raises
     ------
     BadInput
-        an entry lies outside the file.
+        If an entry lies outside the file.
     """
     _, entries = read_index(path)
     if _impossible(path, entries).any():
@@ -126,19 +128,19 @@ def refuse_impossible_sizes(path: Path) -> None:
 
 
 def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
-    """Drop the first frame after `step` that is not whole, and all that follow; whole ones stay.
+    """Delete the first incomplete frame after `step` and all that follow; complete ones stay.
 
-    A disk that fills up, or a power cut, can leave an index that promises more than there is.
+    After a full disk or a power failure, the index may list more data than exist.
 
     Returns
     -------
     dict[int, tuple[int, int]]
-        Number and check sum of each whole frame after `step`, by its step.
+        Index and checksum of each complete frame after `step`, by its step.
 
     Raises
     ------
     BadInput
-        it is no trajectory.
+        If the file is not a trajectory.
     """
     import gsd.hoomd
 
@@ -154,7 +156,7 @@ def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
             try:
                 stored = file[number]
                 whole[Frame(stored).step] = (number, code_of(stored))
-            except Exception:  # whatever a broken file makes the reader do
+            except Exception:  # gsd raises various exceptions for broken files
                 break
         else:
             return whole
@@ -163,53 +165,51 @@ def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
 
 
 def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[int, tuple[int, int]], str]:
-    """The same, of a file whose run has written frames of these steps; if it lacks some, it is kept as it was.
+    """As `mend`, for a run that has written frames of the steps `written`; a copy is kept if frames are lost.
 
-    What was written before the first frame that is there, to a file that has gone since, is not missed.
+    Frames before the first one in the file are not missed: they were written to a file that has been removed.
 
     Returns
     -------
     tuple[dict[int, tuple[int, int]], str]
-        What `mend` gives, and what is to be said, empty if no frame up to `step` is lost.
+        The result of `mend`, and a warning, which is empty if no frame up to `step` is lost.
 
     Raises
     ------
     BadInput
-        it is no trajectory, or holds data but no frame; it is as it was then.
+        If the file is not a trajectory, or holds data but no frame; it is unchanged then.
     OSError
-        it cannot be copied or mended.
+        If it cannot be copied or repaired.
     """
     import gsd.hoomd
 
     _, entries = read_index(path)
     bad = bool(_impossible(path, entries).any())
-    kept = any(path.parent.glob(f"{path.name}{DAMAGED}*"))  # of an earlier loss, which has been told
+    kept = any(path.parent.glob(f"{path.name}{DAMAGED}*"))  # of an earlier loss, which was reported
     aside = set_aside(path, copy=True) if bad else None
     try:
         whole = mend(path, step)
         with gsd.hoomd.open(str(path), "r") as file:
-            there = _frames_until(file, step)
-            first = _step(file, 0) if there else step + 1
+            present = _frames_until(file, step)
+            first = _step(file, 0) if present else step + 1
             if not len(file) and holds_data(path):
-                raise BadInput(f"{path} has no frame that is whole")
+                raise BadInput(f"{path} has no complete frame")
     except (BadInput, RuntimeError):
         if aside is not None:
             aside.replace(path)
         raise
     frames = sum(first <= one <= step for one in written)
-    if there >= frames or (kept and not bad):
+    if present >= frames or (kept and not bad):
         if aside is not None:
             aside.unlink()
         return whole, ""
     aside = aside or set_aside(path, copy=True)
-    return (
-        whole,
-        f"{path} is damaged: {frames - there} of its {frames} frames are lost; as it was it is now {aside.name}",
-    )
+    lost = f"{path} is damaged: {frames - present} of its {frames} frames are lost; a copy of it is {aside.name}"
+    return whole, lost
 
 
 def _frames_until(file: Any, step: int) -> int:
-    """Number of frames up to a step, looked for from the end."""
+    """Number of frames up to a step."""
     number = len(file)
     while number > 0 and _step(file, number - 1) > step:
         number -= 1
@@ -223,7 +223,7 @@ def _step(file: Any, number: int) -> int:
 
 
 def cut(path: Path, frame: int) -> None:
-    """Let a file end before a frame: its entries, and those after them, become unused ones."""
+    """Truncate a file before a frame: its entries and all later ones become unused."""
     place, entries = read_index(path)
     late = np.flatnonzero((entries["frame"] >= frame) | _impossible(path, entries))
     if not late.size:

@@ -1,4 +1,4 @@
-"""ledger.csv: one row per entry, written to the last bit, and checked when it is read."""
+"""ledger.csv: one row per entry, written to full precision and checked on reading."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from .damage import set_aside
 from .run_folder import LEDGER, SUMMARY, read_json, read_text, replace_file
 
 ROUNDING = 1e-14
-"""Difference of a total from the sum of its columns, as a part of the sum of their sizes, that is rounding."""
+"""Difference between a total and the sum of its columns, relative to the sum of their magnitudes, due to rounding."""
 ROWS, ROWS_DIGEST = "ledger_rows", "ledger_sha256"
-"""Keys of summary.json: how many rows ledger.csv has, and the digest of its text down to the last of them."""
+"""Keys of summary.json: number of rows of ledger.csv, and the digest of its text up to the last of them."""
 
 Row = dict[str, float]
 
 
 class LedgerFile:
-    """ledger.csv: one row per entry, numbers to the last bit; opened anew for each row, so nothing is held.
+    """Writer of ledger.csv: one row per entry, numbers to full precision; opens the file for each row.
 
     Parameters
     ----------
     path : Path
-        of the file; what it held before is replaced.
+        The file; replaced if it exists.
     columns : Sequence[str]
-        names, the first being `step`.
-    rows : Iterable[Row], optional
-        that it begins with.
+        Names of the columns, the first being `step`.
+    rows : Iterable[dict[str, float]], optional
+        Initial rows.
     """
 
     def __init__(self, path: Path, columns: Sequence[str], rows: Iterable[Row] = ()):
@@ -41,7 +41,7 @@ class LedgerFile:
         self._rows, self._digest = len(given), hashlib.sha256(text)
 
     def append(self, row: Row) -> None:
-        """Raises FilesFailed."""
+        """Append a row.  Raises FilesFailed."""
         line = _line(self.columns, row)
         try:
             with open(self.path, "ab") as file:
@@ -52,7 +52,7 @@ class LedgerFile:
         self._digest.update(line)
 
     def described(self) -> dict[str, int | str]:
-        """Number of rows and digest of what was written, for summary.json."""
+        """Number of rows and digest of the text written, for summary.json."""
         return {ROWS: self._rows, ROWS_DIGEST: self._digest.hexdigest()}
 
 
@@ -65,39 +65,39 @@ def _text(columns: Sequence[str], rows: Iterable[Row]) -> bytes:
 
 
 def keep_if_damaged(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> None:
-    """Before a ledger is written anew from these rows: if it holds others, it is renamed, with a warning.
+    """Rename a ledger that holds rows other than `rows`, with a warning, before it is rewritten from `rows`.
 
-    A file that is missing, or has only some of the rows, or more of them, is no reason.
+    A missing file is accepted, and so is one with only some of the rows, or with further ones.
 
     Raises
     ------
     OSError
-        it cannot be renamed.
+        If it cannot be renamed.
     """
     if not path.exists():
         return
-    right = _text(columns, rows)
+    expected = _text(columns, rows)
     try:
-        there = read_text(path).encode()
+        found = read_text(path).encode()
     except BadInput:
-        there = b"\0\n"
-    if there.startswith(right) or right.startswith(there[: there.rfind(b"\n") + 1]):
+        found = b"\0\n"
+    if found.startswith(expected) or expected.startswith(found[: found.rfind(b"\n") + 1]):
         return
     aside = set_aside(path)
     warnings.warn(
-        f"{path} did not hold what the run had written; it is now {aside.name}, a new one is made", stacklevel=2
+        f"{path} did not hold what the run had written; it is now {aside.name}, replaced by a new one", stacklevel=2
     )
 
 
 def read_ledger(path: Path) -> list[Row]:
-    """The rows of ledger.csv as numbers; a last one that a kill tore in two is left out.
+    """Read the rows of ledger.csv; an incomplete last row, left by a kill, is dropped.
 
-    A warning is given where there are fewer rows than the run has written.
+    A warning is issued if there are fewer rows than the run has written.
 
     Raises
     ------
     BadInput
-        no ledger, or one whose numbers are not those that were written.
+        If there is no ledger, or its numbers have been changed.
     """
     rows, note = read_rows(path)
     if note:
@@ -106,20 +106,20 @@ def read_ledger(path: Path) -> list[Row]:
 
 
 def read_rows(path: Path) -> tuple[list[Row], str]:
-    """The same, and in place of a warning its text, empty where all rows are there."""
+    """As `read_ledger`, but returns the text of the warning, empty where all rows exist."""
     lines = read_text(path).split("\n")[:-1]
     columns = lines[0].split(",") if lines else []
     if "step" not in columns or len(set(columns)) < len(columns):
         raise BadInput(f"{path} is not a ledger of SAND")
     rows = [_row(path, number, columns, line) for number, line in enumerate(lines[1:], 1)]
     for number, row in enumerate(rows, 1):
-        if said := _wrong(row, rows[number - 2] if number > 1 else None, last=number == len(rows)):
-            raise BadInput(f"{path} is damaged: row {number} {said}")
-    return rows, _fewer(path, lines)
+        if message := _row_error(row, rows[number - 2] if number > 1 else None, last=number == len(rows)):
+            raise BadInput(f"{path} is damaged: row {number} {message}")
+    return rows, _missing_rows(path, lines)
 
 
 def _row(path: Path, number: int, columns: Sequence[str], line: str) -> Row:
-    """One line as numbers.  Raises BadInput."""
+    """Convert one line to numbers.  Raises BadInput."""
     texts = line.split(",")
     if len(texts) != len(columns):
         raise BadInput(f"{path} is damaged: row {number} has {len(texts)} columns, not {len(columns)}")
@@ -129,22 +129,24 @@ def _row(path: Path, number: int, columns: Sequence[str], line: str) -> Row:
         raise BadInput(f"{path} is damaged: row {number} holds something that is not a number") from None
     for name, text, value in zip(columns, texts, values, strict=True):
         if repr(value) != text:
-            raise BadInput(f"{path} is damaged: row {number} has {name} = {text[:40]!r}, which no run writes like that")
+            raise BadInput(
+                f"{path} is damaged: row {number} has {name} = {text[:40]!r}, a form that SAND does not write"
+            )
     return dict(zip(columns, values, strict=True))
 
 
-def _wrong(row: Row, before: Row | None, *, last: bool) -> str:
-    """What is wrong with a row beside the one before it; nothing if it is right."""
+def _row_error(row: Row, before: Row | None, *, last: bool) -> str:
+    """What is wrong with a row, given the row before it; empty if nothing is."""
     if not all(map(math.isfinite, row.values())):
-        # the physics may stop a run because numbers are no longer finite: its last row says so
+        # a run may have been stopped because numbers are no longer finite, which its last row shows
         return "" if last else "holds numbers that are not finite"
     if not isinstance(row["step"], int) or row["step"] < 0:
         return f"has step {row['step']}"
     if before is not None:
         if row["step"] <= before["step"] or row.get("time", 0.0) < before.get("time", 0.0):
             return f"is of step {row['step']}, after step {before['step']}: steps and times must grow"
-        if strange := [name for name in row if type(row[name]) is not type(before[name])]:
-            return f"has {strange[0]} = {row[strange[0]]!r}, the row before {before[strange[0]]!r}"
+        if changed := [name for name in row if type(row[name]) is not type(before[name])]:
+            return f"has {changed[0]} = {row[changed[0]]!r}, the row before {before[changed[0]]!r}"
     names = list(row)
     if "total" in names and "time" in names:
         parts = [row[name] for name in names[names.index("time") + 1 : names.index("total")]]
@@ -153,28 +155,26 @@ def _wrong(row: Row, before: Row | None, *, last: bool) -> str:
     return ""
 
 
-def _fewer(path: Path, lines: Sequence[str]) -> str:
-    """What is to be said of a ledger beside the summary of its run, if there is one that has ended.
+def _missing_rows(path: Path, lines: Sequence[str]) -> str:
+    """Warning if a ledger has fewer rows than the summary of its run states; empty if not, or if the run has not ended.
 
     Raises
     ------
     BadInput
-        its rows are not those that the summary's digest was taken of.
+        If the digest in the summary does not match the rows.
     """
     place = path.with_name(SUMMARY)
     if path.name != LEDGER or not place.exists():
         return ""
     try:
         summary = read_json(place)
-    except BadInput:  # whoever asks for the summary is told
+    except BadInput:  # reported when the summary itself is read
         return ""
     count, digest = summary.get(ROWS), summary.get(ROWS_DIGEST)
-    if not isinstance(count, int) or digest is None:  # of an earlier version
+    if not isinstance(count, int) or digest is None:  # written by an earlier version
         return ""
     if len(lines) - 1 < count:
         return f"{path} has {len(lines) - 1} of the {count} rows that the run had written"
     if hashlib.sha256(("\n".join(lines[: count + 1]) + "\n").encode()).hexdigest() != digest:
-        raise BadInput(
-            f"{path} is damaged: its numbers are not those that were written, as the digest in {SUMMARY} tells"
-        )
+        raise BadInput(f"{path} is damaged: its numbers do not match the digest in {SUMMARY}")
     return ""

@@ -1,4 +1,4 @@
-"""The frames of a run that may still be going: what has come since is found when asked for."""
+"""The trajectory of a run that may still be going; new frames are found on request."""
 
 from __future__ import annotations
 
@@ -13,50 +13,56 @@ from ..errors import BadInput
 from .frame import Frame, FrameSequence
 from .trajectory import Frames
 
-TORN_AT_MOST = 64
-"""Frames at the end of a file that are looked at before it is said to be broken."""
+INCOMPLETE_AT_MOST = 64
+"""Incomplete frames at the end of a file above which the file counts as broken."""
 
 
 class LiveTrajectory(FrameSequence):
-    """Frames of a trajectory that grows; safe to be read from several threads.
+    """Frames of a growing trajectory; can be read from several threads.
 
     Parameters
     ----------
     path : str or Path
-        of the file.
+        The trajectory.
+
+    Attributes
+    ----------
+    times : ndarray
+        Time of each frame [s], (K,).
+    steps, contacts : ndarray
+        Step and number of contacts of each frame, (K,).
+    incomplete : int
+        Number of incomplete frames at the end, which are left out.
+    generation : int
+        Counts how often the file was replaced by another trajectory.
 
     Raises
     ------
     BadInput
-        a missing, foreign or broken file, or one without a frame.
-
-    `times` (K,) [s], `steps` (K,) and `contacts` (K,), numbers, of all frames are kept; `torn` counts frames at the end
-    that are not whole, and are not among them; `generation` goes up when the file has become another one.
+        If the file is missing, foreign or broken, or has no frame.
     """
 
     def __init__(self, path: str | Path):
         self.path, self.lock = Path(path), threading.RLock()
         self.times, self.steps, self.contacts = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.torn = self.generation = 0
+        self.incomplete = self.generation = 0
         self._seen = self._stamp()
-        self._frames = self._opened()
-        self._read_on()
+        self._frames = self._open()
+        self._read_new()
         if not len(self):
             self.close()
-            torn = "no whole frame" if self.torn else "no frame yet"
-            raise BadInput(f"{path} holds {torn}: look again when the run has written one, or start it again")
+            state = "no complete frame" if self.incomplete else "no frame yet"
+            raise BadInput(f"{path} holds {state}: try again when the run has written one, or start it again")
 
-    def _opened(self) -> Frames:
+    def _open(self) -> Frames:
         frames = Frames(self.path)
-        if len(frames) and not frames.is_ours:
+        if len(frames) and not frames.written_by_sand:
             frames.close()
-            raise BadInput(
-                f"{self.path} was not written by SAND: it does not say how long its unit is; give one that was"
-            )
+            raise BadInput(f"{self.path} was not written by SAND and does not state its unit of length")
         return frames
 
     def _stamp(self) -> tuple[int, int, int]:
-        """Changes when the file does."""
+        """File identity, size and modification time."""
         try:
             found = self.path.stat()
         except OSError:
@@ -64,29 +70,34 @@ class LiveTrajectory(FrameSequence):
         return found.st_ino, found.st_size, found.st_mtime_ns
 
     def refresh(self) -> bool:
-        """Look for new frames, at no cost if the file is as it was; True if there are any, or others.
+        """Find new frames; costs nothing if the file is unchanged.
 
-        A file that is just being written to, and cannot be read, is left for the next time; so is one that has been
-        begun anew and has no frame yet.
+        A file that cannot be read because it is being written, or that was replaced and has no frame yet, is tried
+        again at the next call.
+
+        Returns
+        -------
+        bool
+            Whether there are new or different frames.
         """
         with self.lock:
             stamp = self._stamp()
             if stamp == self._seen:
                 return False
             try:
-                frames = self._opened()
+                frames = self._open()
             except BadInput:
                 return False
             old, before = self._frames, (len(self), self.generation)
-            known = self.times, self.steps, self.contacts, self.torn
+            known = self.times, self.steps, self.contacts, self.incomplete
             self._frames = frames
-            if len(self) and not self._goes_on(len(self) - 1):
+            if len(self) and not self._continues(len(self) - 1):
                 self.generation += 1
                 self.times, self.steps, self.contacts = self.times[:0], self.steps[:0], self.contacts[:0]
-            self._read_on()
-            if before[0] and not len(self):  # begun anew, without a frame so far: the old ones stay until there is one
+            self._read_new()
+            if before[0] and not len(self):  # replaced by a file without a frame: keep the old frames until it has one
                 self._frames, self.generation = old, before[1]
-                self.times, self.steps, self.contacts, self.torn = known
+                self.times, self.steps, self.contacts, self.incomplete = known
                 frames.close()
                 return False
             self._seen = stamp
@@ -96,29 +107,29 @@ class LiveTrajectory(FrameSequence):
 
     @property
     def age(self) -> float:
-        """Seconds since the file was last written to; 0 if it has gone."""
+        """Time since the file was last written to [s]; 0 if it no longer exists."""
         try:
             return max(time.time() - self.path.stat().st_mtime, 0.0)
         except OSError:
             return 0.0
 
-    def _goes_on(self, last: int) -> bool:
-        """True if the last frame known is still the one that the file has in its place."""
+    def _continues(self, last: int) -> bool:
+        """Whether the last known frame is still in the file."""
         head = self._head(last) if last < len(self._frames) else None
         return head is not None and head[:2] == (self.times[last], self.steps[last])
 
     def _head(self, number: int) -> tuple[float, int, int] | None:
-        """Time, step and number of contacts of a frame; None if it is not whole."""
+        """Time, step and number of contacts of a frame; None if it is incomplete."""
         try:
             return self._frames.head(number)
         except BadInput:
             return None
 
-    def _read_on(self) -> None:
-        """Times and steps of new frames, up to the last whole one."""
+    def _read_new(self) -> None:
+        """Read times and steps of new frames, up to the last complete one."""
         count = len(self._frames)
         whole = count
-        while whole > len(self) and count - whole < TORN_AT_MOST and not self._is_whole(whole - 1):
+        while whole > len(self) and count - whole < INCOMPLETE_AT_MOST and not self._is_complete(whole - 1):
             whole -= 1
         new = []
         for number in range(len(self), whole):
@@ -130,9 +141,9 @@ class LiveTrajectory(FrameSequence):
             self.times = np.concatenate([self.times, times])
             self.steps = np.concatenate([self.steps, steps]).astype(np.int64)
             self.contacts = np.concatenate([self.contacts, contacts]).astype(np.int64)
-        self.torn = count - len(self)
+        self.incomplete = count - len(self)
 
-    def _is_whole(self, number: int) -> bool:
+    def _is_complete(self, number: int) -> bool:
         try:
             return len(self._frames[number]) > 0
         except BadInput:
@@ -146,11 +157,11 @@ class LiveTrajectory(FrameSequence):
             return self._frames[number]
 
     def pairs(self, index: int) -> np.ndarray:
-        """Grains in contact (C, 2) in a frame ≥ 0.  Raises BadInput for one that is not whole."""
+        """Grain indices (C, 2) of the contacts in a frame ≥ 0.  Raises BadInput if the frame is incomplete."""
         with self.lock:
             return self._frames.pairs(index)
 
     def close(self) -> None:
-        """Let the file go."""
+        """Close the file."""
         with self.lock:
             self._frames.close()

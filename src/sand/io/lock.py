@@ -1,7 +1,7 @@
-"""One writer for a folder: a lock that the system releases when the process ends, however it ends.
+"""A lock that gives one process the right to write to a folder; the system releases it when the process ends.
 
-The lock file stays in the folder. Removing it would let two processes hold locks of two files of one name; it holds
-the number of the process that had the lock last, which is looked at only while the lock is held. Reading needs no lock.
+The lock file stays in the folder: removing it would let two processes lock two files of the same name. It holds the pid
+of the process that had the lock last, which is valid only while the lock is held. Reading needs no lock.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from ..errors import BadInput, FilesFailed
 
 LOCK = ".lock"
 """The lock file in a folder."""
-LOOKS, LOOKING = 5, 0.1
-"""How often the number of a process is looked for, and within which time [s]."""
+READ_ATTEMPTS, READ_SECONDS = 5, 0.1
+"""Attempts to read the pid in a lock file, and the time [s] for all of them."""
 
 
 class FolderLock:
-    """The right to write to a folder, held from now to `release` or to the end of the process.
+    """The exclusive right to write to a folder, until `release` or the end of the process.
+
+    Where the file system has no locks (some network file systems), the right is granted with a warning.
 
     Parameters
     ----------
     folder : Path
-        there already.
-    told : bool, optional
-        whether the number of this process is written to the lock file, for those who are refused.
+        An existing folder.
+    write_pid : bool, optional
+        Whether the pid of this process is written to the lock file, for the messages of other processes.
 
     Raises
     ------
     BadInput
-        another process holds it, or another simulation of this one.
+        If another process, or another simulation of this process, holds the lock.
     FilesFailed
-        the folder has vanished, or nothing can be written there.
-
-    Where the file system knows no locks (some network file systems), it is granted with a warning.
+        If the folder does not exist, or nothing can be written to it.
     """
 
-    def __init__(self, folder: Path, *, told: bool = True):
+    def __init__(self, folder: Path, *, write_pid: bool = True):
         from filelock import FileLock, Timeout
 
         path = folder / LOCK
         self._lock: Any = None
-        if not folder.is_dir():  # the library would make it
+        if not folder.is_dir():  # filelock would create it
             raise FilesFailed(f"cannot write to folder {folder}: there is no such folder")
         lock = FileLock(path, timeout=0, thread_local=False, fallback_to_soft=False)
         try:
@@ -60,26 +60,26 @@ class FolderLock:
             if _is_full(error):
                 raise FilesFailed(f"cannot write to folder {folder}: {os.strerror(error.errno)}") from error  # type: ignore[union-attr,arg-type]
             warnings.warn(
-                f"the file system of {folder} has no locks: see that no other process writes to that folder",
+                f"the file system of {folder} has no locks: make sure that no other process writes to that folder",
                 stacklevel=3,
             )
             return
         self._lock, self._process = lock, os.getpid()
-        if not told:
+        if not write_pid:
             return
-        with contextlib.suppress(OSError), open(path, "r+b", buffering=0) as file:  # on a full disk it does without
-            file.seek(1)  # the first byte is what is locked; Windows lets nobody else read or write it
+        with contextlib.suppress(OSError), open(path, "r+b", buffering=0) as file:  # a full disk does no harm
+            file.seek(1)  # the first byte is locked; on Windows other processes can neither read nor write it
             file.write(f"{os.getpid():<20}\n".encode())
 
     def release(self) -> None:
-        """Let others write to the folder; a second time, and in a process that was forked off, it does nothing."""
+        """Release the lock; has no effect a second time, or in a forked process."""
         lock, self._lock = self._lock, None
         if lock is not None and self._process == os.getpid():
             lock.release()
 
 
 def _is_full(error: BaseException) -> bool:
-    """True where a file could not be made, rather than locked."""
+    """Whether the lock file could not be created, as opposed to locked."""
     import errno
 
     full = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.ENOENT, errno.ENOTDIR)
@@ -87,28 +87,27 @@ def _is_full(error: BaseException) -> bool:
 
 
 def _holder(folder: Path) -> int | None:
-    """The number of the process in a lock file; None where it cannot be read, also a moment later."""
-    for _ in range(LOOKS):
+    """The pid in a lock file; None if it cannot be read."""
+    for _ in range(READ_ATTEMPTS):
         with contextlib.suppress(OSError, ValueError), open(folder / LOCK, "rb", buffering=0) as file:
             file.seek(1)
             return int(file.read(32))
-        time.sleep(LOOKING / LOOKS)  # it may just be being written
+        time.sleep(READ_SECONDS / READ_ATTEMPTS)  # the holder may be writing it
     return None
 
 
 def _in_use(folder: Path) -> str:
-    """What to say of a folder whose lock another one holds."""
+    """Error message for a folder whose lock is held."""
     number = _holder(folder)
-    if number is None:
-        return f"another process writes to {folder}; wait until it has ended, or give another folder"
     if number == os.getpid():
         return f"another simulation of this process (pid {number}) writes to {folder}; give each a folder of its own"
-    return f"another process (pid {number}) writes to {folder}; wait until it has ended, or give another folder"
+    pid = "" if number is None else f" (pid {number})"
+    return f"another process{pid} writes to {folder}; wait until it has ended, or give another folder"
 
 
 @contextlib.contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """The lock of a folder for the block; see `FolderLock` for what is raised."""
+    """Hold the lock of a folder during the block; raises as `FolderLock`."""
     lock = FolderLock(folder)
     try:
         yield
@@ -117,6 +116,6 @@ def writing(folder: Path) -> Iterator[None]:
 
 
 def refuse_locked(folder: Path) -> None:
-    """Raises BadInput if another process, or another simulation of this one, writes to a folder with a lock file."""
+    """Raise BadInput if another process, or another simulation of this process, writes to a folder."""
     with contextlib.suppress(FilesFailed):
-        FolderLock(folder, told=False).release()
+        FolderLock(folder, write_pid=False).release()

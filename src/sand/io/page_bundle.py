@@ -1,4 +1,4 @@
-"""The bundle of the page that shows a run, which may be missing where it could not be built; pages written as files."""
+"""The bundle of the viewer page, which is missing if it could not be built, and pages written as files."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from typing import Any
 from ..errors import BadInput, FilesFailed
 
 PAGE = Path(__file__).parents[1] / "viewer" / "page"
-"""Where `hatch_build.py` puts the bundle, or `missing.txt` with the reason why there is none."""
+"""Folder in which `hatch_build.py` puts the bundle, or `missing.txt` with the reason why there is none."""
 
 
 def read_bundle(folder: Path | None = None) -> tuple[str, str]:
-    """Script and style sheet of the page, as text.
+    """Read script and style sheet of the page.
 
     Parameters
     ----------
     folder : Path or None, optional
-        where they lie; PAGE by default.
+        Folder of the bundle; PAGE by default.
 
     Raises
     ------
     BadInput
-        they are not there; says why, and what to do.
+        If they are missing; the message says why, and what to do.
     """
     folder = PAGE if folder is None else folder
     try:
@@ -40,11 +40,11 @@ def _why(folder: Path) -> str:
     try:
         return (folder / "missing.txt").read_text("utf-8").strip()
     except (OSError, UnicodeDecodeError):
-        return "It was not made when SAND was built."
+        return "It was not built when SAND was installed."
 
 
 def _remedy(folder: Path) -> str:
-    """A clone has the sources of the page beside `src`."""
+    """How to build the page; a clone of the repository has its sources."""
     clone = PAGE.parents[3]
     if (clone / "grainview" / "package.json").is_file():
         return f"With node: cd {clone / 'grainview'} && npm ci && npm run build; without: pip install -e {clone}"
@@ -52,12 +52,12 @@ def _remedy(folder: Path) -> str:
 
 
 def private_page(text: str) -> Path:
-    """A new temporary page that nobody but this user can read; whoever asks for it removes it.
+    """Write a new temporary page that only this user can read; the caller removes it.
 
     Raises
     ------
     FilesFailed
-        it cannot be written.
+        If it cannot be written.
     """
     try:
         handle, name = tempfile.mkstemp(prefix="sand-", suffix=".html")  # of mode 0600
@@ -69,17 +69,17 @@ def private_page(text: str) -> Path:
 
 
 class Written:
-    """A large text file written bit by bit: beside, and renamed when it is whole.
+    """A large text file written piece by piece to a temporary file, which is renamed when complete.
 
     Parameters
     ----------
     path : str or Path
-        of the file; what is there is replaced, but only when the new one is whole.
+        The file; an existing one is replaced only when the new one is complete.
 
     Raises
     ------
     FilesFailed
-        it cannot be written; also later.
+        If it cannot be written; also from `write` and at the end.
     """
 
     def __init__(self, path: str | Path):
@@ -91,10 +91,10 @@ class Written:
             raise self._failed(error) from error
 
     def _failed(self, error: OSError) -> FilesFailed:
-        return FilesFailed(f"cannot write {self.path}: {error.strerror}; what was there is untouched")
+        return FilesFailed(f"cannot write {self.path}: {error.strerror}; the old content is untouched")
 
     def write(self, text: str | bytes) -> None:
-        """Raises FilesFailed."""
+        """Append text.  Raises FilesFailed."""
         part = text.encode() if isinstance(text, str) else text
         try:
             self._file.write(part)

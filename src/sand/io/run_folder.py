@@ -1,4 +1,4 @@
-"""A run's folder: what lies where, and how small files are written without ever being half there."""
+"""The folder of a run: names of its files, atomic writing of small files, and reading of text, JSON and TOML."""
 
 from __future__ import annotations
 
@@ -31,29 +31,32 @@ CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGH
     "growth.json",
 )
 _NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
-"""Errors by which systems say that they cannot sync a folder."""
+"""Errors by which systems report that they cannot sync a folder."""
 ONE_COLLISION = "collision.toml"
-"""The case of a collision with one seed, in whose folder case.toml is that of the simulation."""
+"""The case of a collision with one seed, whose folder has the case of the simulation in case.toml."""
 OUTCOMES = "collisions.jsonl"
-"""Outcomes of the collisions that are finished, while others of the same job are not."""
-OURS = (
+"""Outcomes of the finished collisions of a job that is not finished."""
+OWN_FILES = (
     CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS, FLIGHTS, GROWTH,
     VIEW,
 )  # fmt: skip
+"""Names of all files that SAND writes to a folder, checkpoints excepted."""
 
 
 def checked_name(text: str, name: str) -> str:
-    """The name of a file or folder as a user gives it.
+    """Check the name of a file or folder.
 
     Parameters
     ----------
+    text : str
+        The name as the user gave it.
     name : str
-        of the option or setting, for the message.
+        Name of the option or setting, for the message.
 
     Raises
     ------
     BadInput
-        it is empty, or no system takes it.
+        If it is empty, or not valid on any system.
     """
     if not text.strip() or "\0" in text:
         raise BadInput(f"{name} = {text!r} is not the name of a file or folder")
@@ -64,20 +67,21 @@ def checked_name(text: str, name: str) -> str:
 
 
 def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = False) -> Path:
-    """Make the folder of a new run.
+    """Create the folder of a new run.
 
     Parameters
     ----------
+    overwrite : bool, optional
+        Whether the files of an earlier run may be removed; other files stay.
     shared : bool, optional
-        the folder may hold other things, which stay.
+        Whether the folder may hold other files.
 
     Raises
     ------
     BadInput
-        it exists and is not empty (unless `overwrite`, which removes an earlier run's own files and
-        nothing else); or another process writes to it.
+        If the folder is not empty, or another process writes to it.
     FilesFailed
-        it cannot be made or written to.
+        If it cannot be created or written to.
     """
     folder = Path(path)
     try:
@@ -92,9 +96,9 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
             with writing(folder):
-                damaged = set_aside_in(folder, (*OURS, "checkpoint-*.npz"))
-                ours = [*(folder / name for name in OURS), *folder.glob("checkpoint-*.npz"), *damaged]
-                # first the one file that others keep open: where that forbids removing it (Windows), nothing is removed
+                damaged = set_aside_in(folder, (*OWN_FILES, "checkpoint-*.npz"))
+                ours = [*(folder / name for name in OWN_FILES), *folder.glob("checkpoint-*.npz"), *damaged]
+                # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
                 for old in [folder / TRAJECTORY, *ours]:
                     old.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
@@ -109,17 +113,17 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
 
 
 def is_used(folder: Path) -> bool:
-    """True if a folder is there and holds more than what a lock left."""
+    """Whether a folder exists and holds more than a lock file."""
     return folder.is_dir() and any(one.name != LOCK for one in folder.iterdir())
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write beside, sync, rename: the file is the old one or the new one, never half of it.
+    """Replace a file atomically: write a temporary file, sync, rename.
 
     Raises
     ------
     FilesFailed
-        the disk is full, the folder has vanished, …
+        If the file cannot be written; the old one is untouched then.
     """
     beside = path.with_name(f".{path.name}.new")
     try:
@@ -132,14 +136,14 @@ def replace_file(path: Path, content: bytes) -> None:
     except OSError as error:
         with contextlib.suppress(OSError):
             beside.unlink(missing_ok=True)
-        left = "what was there is untouched" if path.parent.is_dir() else "its folder has vanished"
+        left = "the old content is untouched" if path.parent.is_dir() else "its folder has been removed"
         raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error
 
 
 def _sync_names(folder: Path) -> None:
-    """Write the names in a folder to the disk, so that a power cut does not undo a renaming.
+    """Sync the entries of a folder, so that a power failure does not undo a renaming.
 
-    Windows opens no folder, and some file systems cannot sync one: there the system decides when names are written.
+    Windows does not open folders, and some file systems cannot sync them: there the system decides when.
     """
     try:
         handle = os.open(folder, os.O_RDONLY)
@@ -155,12 +159,12 @@ def _sync_names(folder: Path) -> None:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Readable JSON; NaN and infinities become null."""
+    """Write readable JSON; NaN and infinities become null."""
     replace_file(path, (json.dumps(plain(content), indent=2, allow_nan=False) + "\n").encode())
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold: NumPy arrays and numbers become lists and numbers, NaN and infinities null."""
+    """Convert to JSON types: NumPy arrays become lists, NumPy scalars become numbers, NaN and infinities null."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -173,47 +177,47 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """What a JSON file holds.
+    """Read a JSON file that holds an object.
 
     Raises
     ------
     BadInput
-        it is missing, broken, or not what was written: the digest in it is wrong.
+        If it is missing or broken, or its digest does not match its content.
     """
     text = read_text(path)
     try:
         content = json.loads(text)
-    except (ValueError, RecursionError):  # also numbers of more than 4300 digits, and lists in lists without end
+    except (ValueError, RecursionError):  # also numbers of more than 4300 digits, and deeply nested lists
         raise BadInput(f"{path} is not JSON") from None
     if not isinstance(content, dict):
         raise BadInput(f"{path} is not a summary of SAND")
     if content.get(DIGEST, digest_of(content)) != digest_of(content):
-        raise BadInput(f"{path} is damaged: its numbers are not those that were written, as its digest tells")
+        raise BadInput(f"{path} is damaged: its content does not match its digest")
     return content
 
 
 def refuse_devices(path: str | Path) -> None:
-    """Raises BadInput for what may have no end: a device, a pipe."""
+    """Raise BadInput for devices and pipes, which may have no end."""
     try:
         kind = os.stat(path).st_mode
     except (OSError, ValueError):
-        return  # whoever opens it says so
+        return  # reported when the file is opened
     if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
         raise BadInput(f"{path} is a device or a pipe; give an ordinary file")
 
 
 def read_text(path: str | Path, most: int | None = None) -> str:
-    """The text of a UTF-8 file, with or without a byte-order mark, lines ending with "\\n".
+    """Read the text of a UTF-8 file, with or without a byte-order mark; lines end with "\\n".
 
     Parameters
     ----------
     most : int or None, optional
-        bytes that are read at most, from a file of any kind; by default all of an ordinary file.
+        Largest accepted size in bytes, for files of any type; by default all of an ordinary file is read.
 
     Raises
     ------
     BadInput
-        a missing, unreadable or larger file, or none of text.
+        If the file is missing, unreadable, too large, or not text.
     """
     if most is None:
         refuse_devices(path)
@@ -237,45 +241,45 @@ def read_text(path: str | Path, most: int | None = None) -> str:
 
 
 MOST_TOML = 4 * 2**20
-"""Bytes of a case file."""
+"""Largest size of a case file in bytes."""
 DEEPEST = 16
-"""Tables and lists within each other in a case file."""
+"""Largest nesting depth of tables and lists in a case file."""
 LONGEST_STRING = 4096
-"""Characters of a text in a case file."""
+"""Largest number of characters of a text in a case file."""
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """Raises BadInput for a missing file, one that is no case file, or with the line of a slip in its grammar."""
+    """Read a TOML file.  Raises BadInput for a missing file, or with the line of a syntax error."""
     text = read_text(path, MOST_TOML)
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise BadInput(f"{path} is not TOML: {error}") from None
     except RecursionError:
-        raise BadInput(f"{path}: tables and lists lie more than {DEEPEST} deep in each other") from None
-    except ValueError as error:  # whole numbers of more than 4300 digits, dates that are none
+        raise BadInput(f"{path}: tables and lists are nested more than {DEEPEST} deep") from None
+    except ValueError as error:  # integers of more than 4300 digits, invalid dates
         raise BadInput(f"{path} is not TOML: {str(error).split(':')[0]}") from None
     _refuse_extremes(path, content)
     return content
 
 
 def _refuse_extremes(path: str | Path, content: dict[str, Any]) -> None:
-    """Raises BadInput for what no case file needs, and what could not be computed with or printed."""
-    layer: list[tuple[str, Any]] = list(content.items())
+    """Raise BadInput for values that no case file needs and that could not be processed or printed."""
+    level: list[tuple[str, Any]] = list(content.items())
     for _ in range(DEEPEST):
         deeper: list[tuple[str, Any]] = []
-        for name, value in layer:
+        for name, value in level:
             if isinstance(value, int) and not -(2**63) <= value < 2**63:
-                raise BadInput(f"{path}: {name[:80]} is a whole number beyond 2^63; that is more than TOML allows")
+                raise BadInput(f"{path}: {name[:80]} is a whole number beyond 2^63, more than TOML allows")
             if (isinstance(value, str) and len(value) > LONGEST_STRING) or len(name) > LONGEST_STRING:
                 raise BadInput(f"{path}: {name[:80]} holds more than {LONGEST_STRING} characters")
             if isinstance(value, dict):
                 deeper += [(f"{name}.{key}", inner) for key, inner in value.items()]
             elif isinstance(value, list):
                 deeper += [(name, inner) for inner in value]
-        layer = deeper
-    if layer:
-        raise BadInput(f"{path}: tables and lists lie more than {DEEPEST} deep in each other")
+        level = deeper
+    if level:
+        raise BadInput(f"{path}: tables and lists are nested more than {DEEPEST} deep")
 
 
 def was_written_by_sand(path: Path) -> bool:
@@ -288,7 +292,7 @@ def was_written_by_sand(path: Path) -> bool:
 
 
 def write_toml(path: Path, content: dict[str, Any], comment: str) -> None:
-    """A case file, with a comment on top."""
+    """Write a case file with a comment at its top."""
     import tomli_w
 
     text = "".join(f"# {line}\n" for line in comment.splitlines()) + "\n" + tomli_w.dumps(content)

@@ -1,7 +1,7 @@
-"""What the arrays and numbers of a checkpoint must be: checked before compiled code, which checks no index, sees them.
+"""Checks of the arrays and numbers of a checkpoint, before they reach compiled code, which checks no index.
 
-One table names every array, its type of number, its shape and what its numbers may be. A check sum only tells that a
-file is as it was written, not that a program of ours wrote it.
+One table has the name, data type, shape and allowed values of every array. A matching checksum does not suffice: it
+shows that a file is unchanged, not that SAND wrote it.
 """
 
 from __future__ import annotations
@@ -30,103 +30,103 @@ from ..state.state import (
 )
 
 
-class Stored(NamedTuple):
-    """One array of a checkpoint."""
+class ArraySpec(NamedTuple):
+    """Data type, shape and allowed values of one array of a checkpoint."""
 
-    kind: str  # type of number
-    shape: tuple[Any, ...]  # sizes: a number, N grains, C contacts, P pairs; a tuple: one of these; None: any
-    rule: str = "finite"  # which numbers are allowed: a name in RULES
-    needed: bool = True
+    dtype: str
+    shape: tuple[Any, ...]  # sizes: an integer, N grains, C contacts, P pairs; a tuple: one of these; None: any
+    rule: str = "finite"  # allowed values: a name in RULES
+    required: bool = True
 
 
-def _grains() -> dict[str, Stored]:
-    above = ("radius", "mass", "inertia")
-    found = {
-        f"grains/{f.name}": Stored(
-            "f8", ("N",) if f.width == 1 else (f.width, "N"), "above 0" if f.name in above else "finite"
+def _grain_arrays() -> dict[str, ArraySpec]:
+    positive = ("radius", "mass", "inertia")
+    specs = {
+        f"grains/{f.name}": ArraySpec(
+            "f8", ("N",) if f.width == 1 else (f.width, "N"), "above 0" if f.name in positive else "finite"
         )
         for f in FIELDS
     }
-    return found | {"grains/material": Stored("u4", ("N",), "any"), "grains/id": Stored("u4", ("N",), "order")}
+    return specs | {"grains/material": ArraySpec("u4", ("N",), "any"), "grains/id": ArraySpec("u4", ("N",), "order")}
 
 
 STORED = {
-    "clock": Stored("f8", (len(CLOCK),), "no nan"),
-    "count": Stored("i8", (len(COUNT),), "any"),
-    "lost": Stored("f8", (len(LOST),)),
-    "order": Stored("u4", ("N",), "order", needed=False),
-    "ledger": Stored("f8", (None, None)),
-    **_grains(),
-    "contacts/pair": Stored("u4", (2, "C"), "grains"),
-    "contacts/pointer1": Stored("f8", (3, "C")),
-    "contacts/pointer2": Stored("f8", (3, "C")),
-    "contacts/twist": Stored("f8", ("C",)),
-    "contacts/formed": Stored("f8", ("C",)),
-    "contacts/bond": Stored("f8", (None, (1, "C"))),
-    "contacts/lost": Stored("f8", ((4, 6), "C")),
-    "contacts/damped": Stored("f8", ((0, "C"),)),
-    "contacts/push": Stored("f8", (3, "C")),
-    "contacts/torque1": Stored("f8", (3, "C")),
-    "contacts/torque2": Stored("f8", (3, "C")),
-    "contacts/flag": Stored("u1", ("C",), "any"),
-    "contacts/bonded": Stored("u1", ("C",), "yes or no"),
-    "contacts/side": Stored("u4", ("2C",), "order"),
-    "contacts/start": Stored("u4", ("N+1",), "starts"),
-    "pair_list/pair": Stored("u4", (2, "P"), "grains"),
-    "pair_list/touching": Stored("u1", ("P",), "yes or no"),
-    "pair_list/step": Stored("f8", ((1, "P"),), "no nan"),
-    "pair_list/length": Stored("f8", ((1, "P"),)),
-    "pair_list/anchor": Stored("f8", (3, "N"), "no nan"),
-    "long_range/anchor": Stored("f8", (3, (0, "N")), "no nan"),
+    "clock": ArraySpec("f8", (len(CLOCK),), "no nan"),
+    "count": ArraySpec("i8", (len(COUNT),), "any"),
+    "lost": ArraySpec("f8", (len(LOST),)),
+    "order": ArraySpec("u4", ("N",), "order", required=False),
+    "ledger": ArraySpec("f8", (None, None)),
+    **_grain_arrays(),
+    "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
+    "contacts/pointer1": ArraySpec("f8", (3, "C")),
+    "contacts/pointer2": ArraySpec("f8", (3, "C")),
+    "contacts/twist": ArraySpec("f8", ("C",)),
+    "contacts/formed": ArraySpec("f8", ("C",)),
+    "contacts/bond": ArraySpec("f8", (None, (1, "C"))),
+    "contacts/lost": ArraySpec("f8", ((4, 6), "C")),
+    "contacts/damped": ArraySpec("f8", ((0, "C"),)),
+    "contacts/push": ArraySpec("f8", (3, "C")),
+    "contacts/torque1": ArraySpec("f8", (3, "C")),
+    "contacts/torque2": ArraySpec("f8", (3, "C")),
+    "contacts/flag": ArraySpec("u1", ("C",), "any"),
+    "contacts/bonded": ArraySpec("u1", ("C",), "boolean"),
+    "contacts/side": ArraySpec("u4", ("2C",), "order"),
+    "contacts/start": ArraySpec("u4", ("N+1",), "starts"),
+    "pair_list/pair": ArraySpec("u4", (2, "P"), "grains"),
+    "pair_list/touching": ArraySpec("u1", ("P",), "boolean"),
+    "pair_list/step": ArraySpec("f8", ((1, "P"),), "no nan"),
+    "pair_list/length": ArraySpec("f8", ((1, "P"),)),
+    "pair_list/anchor": ArraySpec("f8", (3, "N"), "no nan"),
+    "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
     **{
-        f"long_range/{name}": Stored("f8", (3, (0, "N")))
+        f"long_range/{name}": ArraySpec("f8", (3, (0, "N")))
         for name in ("force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
     },
 }
-"""Every array of a checkpoint."""
+"""All arrays of a checkpoint."""
 NUMBERS = {"steps": int, "time": float, "wall_seconds": float, "temperature": float}
-"""What `meta.json` must say besides, and its type; a whole number does for any."""
-GOALS = {"until": float, "last_step": int}
-"""The same for numbers that may be missing, as null."""
+"""Required numbers of `meta.json` with their types; an integer is accepted for either."""
+PLANNED_END = {"until": float, "last_step": int}
+"""Numbers of `meta.json` that may be null."""
 TABLES = {"choices": dict, "case": dict, "ledger": list}
 """Tables of `meta.json`."""
 
 
 def check_state(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
-    """See that a state can be gone on from: every array is there, of the right type and shape, every index in range.
+    """Check that a state can be resumed: every array exists with the right type and shape, every index is in range.
 
     Parameters
     ----------
     arrays : Mapping[str, ndarray]
-        of a checkpoint, by name.
+        Arrays of a checkpoint, by name.
     meta : Mapping[str, Any]
-        what goes with it.
+        Its metadata.
 
     Raises
     ------
     BadInput
-        the first thing that is wrong, in one line.
+        For the first error found, in one line.
     """
     _check_meta(meta)
     sizes = _sizes(arrays)
-    for name, right in STORED.items():
+    for name, spec in STORED.items():
         if name in arrays:
-            _check_array(name, arrays[name], right, sizes)
-        elif right.needed:
+            _check_array(name, arrays[name], spec, sizes)
+        elif spec.required:
             raise BadInput(f"there is no array {name!r}")
     _check_counters(arrays, meta)
     _check_lists(arrays["contacts/pair"], arrays["contacts/side"], arrays["contacts/start"], sizes)
     if arrays["ledger"].shape[1] != len(meta.get("ledger", ())):
-        raise BadInput(f"'ledger' has {arrays['ledger'].shape[1]} columns, but meta.json names another number of them")
+        raise BadInput(f"'ledger' has {arrays['ledger'].shape[1]} columns, but meta.json names a different number")
 
 
 def _check_meta(meta: Mapping[str, Any]) -> None:
-    for name, kind in {**NUMBERS, **GOALS}.items():
+    for name, kind in {**NUMBERS, **PLANNED_END}.items():
         value: Any = meta.get(name)
-        if value is None and name in GOALS and name in meta:
+        if value is None and name in PLANNED_END and name in meta:
             continue
-        right = isinstance(value, (int, kind)) and not isinstance(value, bool)
-        if not (right and 0 <= value < 1e300):
+        is_number = isinstance(value, (int, kind)) and not isinstance(value, bool)
+        if not (is_number and 0 <= value < 1e300):
             raise BadInput(
                 f"its meta.json has {name} = {value!r}, which is no {'number of steps' if kind is int else 'number'}"
             )
@@ -136,7 +136,7 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
 
 
 def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
-    """N, C and P as the arrays themselves say."""
+    """Values of N, C and P according to the arrays themselves."""
 
     def columns(name: str) -> int:
         if name not in arrays or arrays[name].ndim == 0:
@@ -149,23 +149,21 @@ def _sizes(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
     return {"N": n, "N+1": n + 1, "C": c, "2C": 2 * c, "P": p}
 
 
-def _check_array(name: str, array: np.ndarray, right: Stored, sizes: Mapping[str, int]) -> None:
-    if array.dtype != np.dtype(right.kind):
-        raise BadInput(f"{name!r} holds numbers of type {array.dtype}, not {np.dtype(right.kind)}")
+def _check_array(name: str, array: np.ndarray, spec: ArraySpec, sizes: Mapping[str, int]) -> None:
+    if array.dtype != np.dtype(spec.dtype):
+        raise BadInput(f"{name!r} holds numbers of type {array.dtype}, not {np.dtype(spec.dtype)}")
 
     def allowed(size: Any) -> tuple[int, ...]:
         return tuple(sizes.get(one, one) for one in (size if isinstance(size, tuple) else (size,)))
 
-    fits = len(array.shape) == len(right.shape) and all(
-        size is None or there in allowed(size) for there, size in zip(array.shape, right.shape, strict=True)
+    fits = len(array.shape) == len(spec.shape) and all(
+        size is None or actual in allowed(size) for actual, size in zip(array.shape, spec.shape, strict=True)
     )
     if not fits:
-        wanted = ", ".join(
-            "any" if s is None else " or ".join(map(str, dict.fromkeys(allowed(s)))) for s in right.shape
-        )
+        wanted = ", ".join("any" if s is None else " or ".join(map(str, dict.fromkeys(allowed(s)))) for s in spec.shape)
         raise BadInput(f"{name!r} has shape {array.shape}, not ({wanted})")
-    if said := RULES[right.rule](array, sizes):
-        raise BadInput(f"{name!r} {said}")
+    if message := RULES[spec.rule](array, sizes):
+        raise BadInput(f"{name!r} {message}")
 
 
 def _finite(array: np.ndarray, sizes: Mapping[str, int]) -> str:
@@ -173,7 +171,7 @@ def _finite(array: np.ndarray, sizes: Mapping[str, int]) -> str:
 
 
 def _no_nan(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    """Infinite are steps without a limit, and places of grains before the first list is made."""
+    """Infinities are allowed: steps without a limit, and reference positions before the first list."""
     return "holds something that is not a number" if np.isnan(array).any() else ""
 
 
@@ -200,7 +198,7 @@ def _starts(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     return "" if good else f"does not grow from 0 to {sizes['2C']}"
 
 
-def _yes_or_no(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+def _boolean(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     return "" if (array <= 1).all() else f"holds {int(array.max())}: it must be 0 or 1"
 
 
@@ -212,13 +210,13 @@ RULES = {
     "grains": _pairs,
     "order": _order,
     "starts": _starts,
-    "yes or no": _yes_or_no,
+    "boolean": _boolean,
 }
-"""What is wrong with the numbers of an array; nothing if they are right."""
+"""Functions that return what is wrong with the values of an array, or an empty string."""
 
 
 def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -> None:
-    """The numbers of contacts and pairs are those of the arrays, and time and step those of meta.json."""
+    """Check counts of contacts and pairs against the arrays, time and step against meta.json."""
     count, clock = arrays["count"], arrays["clock"]
     n = arrays["grains/radius"].size
     wanted = {
@@ -227,21 +225,21 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
         CONTACTS: arrays["contacts/pair"].shape[1],
         PAIRS: arrays["pair_list/pair"].shape[1],
     }
-    for place, value in wanted.items():
-        if count[place] != value:
-            raise BadInput(f"'count' says {COUNT[place]} = {count[place]}, but it must be {value}")
-    for place in (MADE, BROKEN, LONG_RANGE_SUMS):
-        if count[place] < 0:
-            raise BadInput(f"'count' says {COUNT[place]} = {count[place]}: it must not be below 0")
-    for place in (GRAIN1, GRAIN2):
-        if not -1 <= count[place] < n:
-            raise BadInput(f"'count' says {COUNT[place]} = {count[place]}, but the grains are 0 to {n - 1}")
+    for index, value in wanted.items():
+        if count[index] != value:
+            raise BadInput(f"'count' says {COUNT[index]} = {count[index]}, but it must be {value}")
+    for index in (MADE, BROKEN, LONG_RANGE_SUMS):
+        if count[index] < 0:
+            raise BadInput(f"'count' says {COUNT[index]} = {count[index]}: it must not be below 0")
+    for index in (GRAIN1, GRAIN2):
+        if not -1 <= count[index] < n:
+            raise BadInput(f"'count' says {COUNT[index]} = {count[index]}, but the grains are 0 to {n - 1}")
     if clock[TIME] != meta["time"]:
         raise BadInput(f"'clock' says time = {float(clock[TIME])!r} s, but its meta.json {meta['time']!r} s")
 
 
 def _check_lists(pair: np.ndarray, side: np.ndarray, start: np.ndarray, sizes: Mapping[str, int]) -> None:
-    """The contacts of each grain, as the loops gather them, are those that name it."""
+    """Check that the list of contacts of each grain names exactly the contacts in which the grain takes part."""
     owner = pair[side & 1, side >> 1]
     if not (owner == np.repeat(np.arange(sizes["N"], dtype=np.uint32), np.diff(start))).all():
         raise BadInput("'contacts/side' and 'contacts/start' do not list the contacts of each grain")

@@ -1,4 +1,4 @@
-"""Tables of numbers as CSV: whole ones, and ones that grow while a long job runs."""
+"""Tables of numbers as CSV: written at once, or row by row while a long job runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .run_folder import read_text, replace_file
 
 
 def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """A header and a line per row, numbers to the last bit.  Raises FilesFailed."""
+    """Write a header and one line per row, numbers to full precision.  Raises FilesFailed."""
     out = io.StringIO()
     writer = csv.DictWriter(out, list(rows[0]) if rows else [], lineterminator="\n")
     writer.writeheader()
@@ -24,23 +24,23 @@ def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 
 class GrowingTable:
-    """Rows of numbers that are added piece by piece; a row that a kill tore in two is dropped when it is read again.
+    """A CSV table to which rows are appended; an incomplete last row, left by a kill, is dropped on reading.
 
     Parameters
     ----------
     path : Path
-        of the file; made anew unless `resume`.
+        The file; created anew unless `resume`.
     columns : Sequence[str]
-        names.
+        Names of the columns.
     resume : bool, optional
-        keep what is there.
+        Whether existing rows are kept.
 
     Raises
     ------
     BadInput
-        the file has other columns, or is no table.
+        If the file has other columns, or is not a table.
     FilesFailed
-        it cannot be written.
+        If it cannot be written.
     """
 
     def __init__(self, path: Path, columns: Sequence[str], *, resume: bool = False):
@@ -59,8 +59,8 @@ class GrowingTable:
         replace_file(path, ("\n".join([head, *lines]) + "\n").encode())
 
     def add(self, rows: Iterable[Sequence[float]]) -> None:
-        """Append them; whole numbers are written without a point.  Raises FilesFailed."""
-        text = "".join(",".join(_told(value) for value in row) + "\n" for row in rows)
+        """Append rows; integers are written without a decimal point.  Raises FilesFailed."""
+        text = "".join(",".join(_shortest(value) for value in row) + "\n" for row in rows)
         try:
             with open(self.path, "a", encoding="utf-8", newline="") as file:
                 file.write(text)
@@ -68,30 +68,30 @@ class GrowingTable:
             raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
 
     def sort(self) -> None:
-        """Put the lines into the order of their numbers, so that the file is the same however they came."""
+        """Sort the lines by their numbers, so that the file does not depend on the order of completion."""
         head, *lines = read_text(self.path).split("\n")[:-1]
         lines.sort(key=lambda line: [float(part) for part in line.split(",")])
         replace_file(self.path, ("\n".join([head, *lines]) + "\n").encode())
 
 
 class GrowingOutcomes:
-    """Outcomes of the parts of a job, one JSON object a line; a line that a kill tore in two is dropped.
+    """Outcomes of the parts of a job, one JSON object a line; an incomplete last line is dropped on reading.
 
     Parameters
     ----------
     path : Path
-        of the file; made anew unless `resume`.
+        The file; created anew unless `resume`.
     case : dict[str, Any]
-        what the outcomes are of, the first line of the file.
+        The case of the outcomes, written to the first line.
     resume : bool, optional
-        keep what is there.
+        Whether existing outcomes are kept.
 
     Raises
     ------
     BadInput
-        the file is no such list, or one of another case.
+        If the file is not a list of outcomes, or belongs to another case.
     FilesFailed
-        it cannot be written.
+        If it cannot be written.
     """
 
     def __init__(self, path: Path, case: dict[str, Any], *, resume: bool = False):
@@ -99,18 +99,18 @@ class GrowingOutcomes:
         head = json.dumps({"case": case}, sort_keys=True)
         lines = read_text(path).split("\n")[:-1] if resume and path.exists() else []
         if lines and lines[0] != head:
-            raise BadInput(f"{path} holds outcomes of another case; put the case back, or begin anew elsewhere")
+            raise BadInput(f"{path} holds outcomes of another case; restore the case, or use another folder")
         self.found: dict[int, dict[str, Any]] = {}
         for line in lines[1:]:
             try:
                 entry = json.loads(line)
                 self.found[int(entry["seed"])] = dict(entry["outcome"])
             except (ValueError, TypeError, KeyError, RecursionError):
-                raise BadInput(f"{path} is not a list of outcomes; remove it, they are then computed again") from None
+                raise BadInput(f"{path} is not a list of outcomes; remove it, and they are computed again") from None
         replace_file(path, "".join(line + "\n" for line in [head, *lines[1:]]).encode())
 
     def add(self, seed: int, outcome: dict[str, Any]) -> None:
-        """Keep one outcome; its numbers are read back to the last bit.  Raises FilesFailed."""
+        """Append one outcome; its numbers are stored to full precision.  Raises FilesFailed."""
         try:
             with open(self.path, "a", encoding="utf-8", newline="") as file:
                 file.write(json.dumps({"seed": seed, "outcome": outcome}) + "\n")
@@ -118,6 +118,6 @@ class GrowingOutcomes:
             raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
 
 
-def _told(value: float) -> str:
+def _shortest(value: float) -> str:
     number = float(value)
     return str(int(number)) if number.is_integer() and abs(number) < 2**53 else repr(number)

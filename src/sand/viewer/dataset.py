@@ -180,7 +180,7 @@ class RunDataset:
         return self._largest
 
     def _all_notes(self) -> list[str]:
-        torn = self.frames.torn
+        torn = self.frames.incomplete
         incomplete = f"{torn} incomplete frame{'s' if torn > 1 else ''} at the end left out" if torn else ""
         stale = stale_note(self.frames.age) if self._summary is None else ""
         self._read_ledger()  # updates its `problem`

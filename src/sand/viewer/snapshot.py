@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Snapshot:
     """A single frame with the interface of `io.live_trajectory.LiveTrajectory`."""
 
-    torn = generation = 0
+    incomplete = generation = 0
 
     def __init__(self, frame: Frame):
         self._frame = frame
