@@ -21,7 +21,7 @@ import sand
 from sand.config.case import Case, MaterialSection
 from sand.config.sections import INTEGRATORS
 from sand.experiments.collision_case import CollisionCase
-from sand.experiments.growth_case import GrowthCase
+from sand.experiments.growth_case import GrowSection
 from sand.experiments.scattering import flight
 from sand.experiments.scattering.case import FlightSection, ScatterCase
 
@@ -127,7 +127,8 @@ def descriptions(model) -> set[str]:
 
 def sections():
     """Heading and class of every section of every case file."""
-    for case in (Case, GrowthCase, CollisionCase, ScatterCase):
+    yield "[grow]", GrowSection
+    for case in (Case, CollisionCase, ScatterCase):
         for name, field in case.model_fields.items():
             kind = field.annotation
             kinds = [t for t in typing.get_args(kind) if isinstance(t, type) and t is not type(None) and t is not str]
