@@ -56,7 +56,7 @@ def compare(revision: str, rounds: int) -> list[dict[str, Any]]:
     Parameters
     ----------
     revision : str
-        Anything that git understands.
+        Anything that git understands, or the folder of another working tree.
     rounds : int
         Runs of each of both.
 
@@ -66,8 +66,10 @@ def compare(revision: str, rounds: int) -> list[dict[str, Any]]:
         `name`, `unit`, `before` and `now` (least of all rounds), `ratio`, `low`, `high`.
     """
     with tempfile.TemporaryDirectory() as folder:
-        other = Path(folder) / "before"
-        subprocess.run(["git", "-C", str(TOP), "worktree", "add", "--detach", str(other), revision], check=True)
+        given = Path(revision)
+        other = given.absolute() if given.is_dir() else Path(folder) / "before"
+        if not given.is_dir():
+            subprocess.run(["git", "-C", str(TOP), "worktree", "add", "--detach", str(other), revision], check=True)
         try:
             (Path(folder) / "lammps.py").write_text('raise ImportError("no peers here")\n', "utf-8")
             found: dict[str, list[dict[str, dict[str, Any]]]] = {"before": [], "now": []}
@@ -77,7 +79,8 @@ def compare(revision: str, rounds: int) -> list[dict[str, Any]]:
                     found[name].append(_rows(trees[name], Path(folder)))
                     print(f"round {number + 1} of {rounds}: {name}", file=sys.stderr, flush=True)
         finally:
-            subprocess.run(["git", "-C", str(TOP), "worktree", "remove", "--force", str(other)], check=True)
+            if not given.is_dir():
+                subprocess.run(["git", "-C", str(TOP), "worktree", "remove", "--force", str(other)], check=True)
     return _ratios(found["before"], found["now"])
 
 
