@@ -1,4 +1,4 @@
-"""The space grains live in: open or periodic, axis by axis, centred on the origin."""
+"""Simulation box: open or periodic along each axis, centred on the origin."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .compiler.jit import formula
 from .errors import BadInput, shown
 from .units import si
 
-FEW = 200
-"""Points whose pairs are all looked at."""
+ALL_PAIRS_UP_TO = 200
+"""Number of points up to which `Box.close_pairs` examines all pairs."""
 
 
 class Span(NamedTuple):
-    """What kernels know of a box: lengths L [m] and 1/L per axis, both 0 on an open axis."""
+    """Box for kernels: lengths L [m] and 1/L per axis, both 0 on an open axis."""
 
     x: float
     y: float
@@ -29,9 +29,9 @@ class Span(NamedTuple):
 
 @formula
 def nearest_image(v, span):
-    """The shortest periodic image of a separation v [m]; open axes stay as they are.
+    """Shortest periodic image of a separation v [m]; components along open axes are unchanged.
 
-    np.rint vectorises; a component of exactly L/2 may come back as either sign.
+    np.rint vectorises.  A component of exactly L/2 may get either sign.
     """
     return (
         v[0] - span.x * np.rint(v[0] * span.inverse_x),
@@ -43,7 +43,18 @@ def nearest_image(v, span):
 @checked
 @dataclass(frozen=True)
 class Box:
-    """Lengths of the periodic axes [m]; None for an open axis.  Build it with `open` or `periodic`."""
+    """Simulation box, created with `Box.open` or `Box.periodic`.
+
+    Parameters
+    ----------
+    lengths : tuple of float or None, optional
+        Length of each axis [m] > 0; None for an open axis.
+
+    Raises
+    ------
+    BadInput
+        If a length is not positive.
+    """
 
     lengths: tuple[float | None, float | None, float | None] = (None, None, None)
 
@@ -53,18 +64,30 @@ class Box:
 
     @classmethod
     def open(cls) -> Box:
-        """Free space."""
+        """Open box: free space."""
         return cls()
 
     @classmethod
     @checked
     def periodic(cls, x: Any, y: Any = "same", z: Any = "same") -> Box:
-        """A periodic box: one length for a cube, or one per axis with None for an open axis.
+        """Periodic box.
+
+        Parameters
+        ----------
+        x : float or str
+            Length along x [m] > 0; by default also along y and z.
+        y, z : float, str or None, optional
+            Lengths along y and z [m] > 0; None for an open axis.
+
+        Returns
+        -------
+        Box
+            The box.
 
         Raises
         ------
         BadInput
-            a length that is not positive, or of the wrong unit.
+            If a length is not positive or has a wrong unit.
         """
         y = x if isinstance(y, str) and y == "same" else y
         z = x if isinstance(z, str) and z == "same" else z
@@ -76,6 +99,7 @@ class Box:
 
     @property
     def is_open(self) -> bool:
+        """Whether all axes are open."""
         return all(v is None for v in self.lengths)
 
     @property
@@ -85,46 +109,56 @@ class Box:
 
     @property
     def volume(self) -> float:
-        """[m³]; infinite if any axis is open."""
+        """Volume [m³]; infinite if any axis is open."""
         return float(np.prod([v if v is not None else np.inf for v in self.lengths]))
 
     @property
     def span(self) -> Span:
-        """The same for kernels."""
+        """The box as a tuple for kernels."""
         return Span(
             *(v if v is not None else 0.0 for v in self.lengths),
             *(1.0 / v if v is not None else 0.0 for v in self.lengths),
         )
 
     def nearest(self, separation: np.ndarray) -> np.ndarray:
-        """Shortest images of separations (…, 3) [m]."""
+        """Shortest periodic images of separations (…, 3) [m]."""
         separation = np.asarray(separation, dtype=np.float64)
         return np.stack(nearest_image(np.moveaxis(separation, -1, 0), self.span), axis=-1)
 
     def wrap(self, position: np.ndarray) -> np.ndarray:
-        """Positions (…, 3) [m] moved into −L/2 … L/2 on periodic axes."""
+        """Positions (…, 3) [m] wrapped into −L/2 … L/2 on periodic axes."""
         return self.nearest(position)
 
     def close_pairs(self, position: np.ndarray, reach: float) -> np.ndarray:
-        """All pairs i < j of points (N, 3) [m] that are at most `reach` [m] apart, (P, 2), sorted.
+        """All pairs of points that are at most `reach` apart, by nearest images on periodic axes.
 
-        On periodic axes the nearest images count; `reach` must be below half the shortest of them.
+        Parameters
+        ----------
+        position : ndarray
+            (N, 3) points [m].
+        reach : float
+            Distance [m], below half the shortest periodic axis.
+
+        Returns
+        -------
+        ndarray
+            (P, 2) indices i < j, sorted.
         """
-        if len(position) <= FEW:
+        if len(position) <= ALL_PAIRS_UP_TO:
             first, second = np.triu_indices(len(position), 1)
-            apart = self.nearest(position[first] - position[second])
-            return np.stack([first, second], axis=1)[(apart**2).sum(axis=1) <= reach**2]
+            separation = self.nearest(position[first] - position[second])
+            return np.stack([first, second], axis=1)[(separation**2).sum(axis=1) <= reach**2]
 
-        from scipy.spatial import cKDTree  # slow to load
+        from scipy.spatial import cKDTree  # slow import
 
         lengths = np.array([0.0 if v is None else v for v in self.lengths])
-        folded = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)
-        folded = np.where((lengths > 0.0) & (folded >= lengths), 0.0, folded)  # −1e-300 modulo L is L
-        pairs = cKDTree(folded, boxsize=lengths).query_pairs(reach, output_type="ndarray")
+        wrapped = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)
+        wrapped = np.where((lengths > 0.0) & (wrapped >= lengths), 0.0, wrapped)  # np.mod(−1e-300, L) is L
+        pairs = cKDTree(wrapped, boxsize=lengths).query_pairs(reach, output_type="ndarray")
         return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
     def describe(self) -> str:
-        """One line for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
+        """Description in one line, for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
         from .units import format_quantity
 
         if self.is_open:
@@ -133,7 +167,13 @@ class Box:
 
 
 def as_box(value: Any) -> Box:
-    """A Box from a Box, a length, or three lengths.  Raises BadInput."""
+    """Box from a Box, a length, three lengths, or None for an open box.
+
+    Raises
+    ------
+    BadInput
+        If the value is none of these.
+    """
     if isinstance(value, Box):
         return value
     if value is None:
@@ -141,7 +181,7 @@ def as_box(value: Any) -> Box:
     if isinstance(value, (list, tuple)) or np.ndim(value) == 1:
         if len(value) != 3:
             raise BadInput(
-                f'box = {shown(value)} must be one length or three; for an open axis give None, in a case file "open"'
+                f'box = {shown(value)} must be one length or three; for an open axis give None (in a case file "open")'
             )
         return Box.periodic(*value)
     return Box.periodic(value)

@@ -93,7 +93,7 @@ def test_a_folder_of_another_user_is_refused(home, monkeypatch):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         assert cache.unsafe(home / "theirs") == f"belongs to another user (uid {owner}), who could run code as you"
-        with pytest.raises(cache._Unsafe):  # here all folders are another's, the new one, too
+        with pytest.raises(cache._UnsafeFolder):  # here all folders are another's, the new one, too
             cache.private_folder("digest")
     assert "belongs to another user" in str(caught[0].message)
     assert not (home / "theirs" / "digest").exists()
@@ -120,7 +120,7 @@ def test_the_fallback_of_another_is_not_taken(home, monkeypatch):
     planted.chmod(0o777)
     registered = []
     monkeypatch.setattr(cache.atexit, "register", lambda *given: registered.append(given))
-    folder = chosen("is not kept", f"{planted} can be written by other users")
+    folder = chosen("is not cached", f"{planted} can be written by other users")
     assert folder.parent.parent == home / "tmp" and folder.parent != planted
     assert mode(folder.parent) == mode(folder) == 0o700
     ((delete, *given),) = registered
@@ -149,7 +149,7 @@ def test_systems_without_owners(home, monkeypatch):
     assert chosen() == home / "mine" / "digest"
     (home / "file").write_text("")
     monkeypatch.setenv("SAND_CACHE", str(home / "file"))
-    assert chosen("is not kept").parent.name != "sand-cache"
+    assert chosen("is not cached").parent.name != "sand-cache"
 
 
 IMPORT = "import sys, sand; assert 'platformdirs' not in sys.modules and 'numba' not in sys.modules"

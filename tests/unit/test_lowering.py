@@ -79,7 +79,7 @@ def test_who_passes_arguments_otherwise_is_told():
 
     grains = sand.Grains(np.zeros((1, 3)), 0.1, sand.SILICA, velocity=[[3.0, 0.0, 0.0]]).arrays
     assert kernel(speed, cached=False)(grains) == 3.0
-    with pytest.raises(TypeError, match=r"sand\.core\.jit\.kernel"):
+    with pytest.raises(TypeError, match=r"sand\.compiler\.jit\.kernel"):
         numba.njit(speed)(grains)
 
 

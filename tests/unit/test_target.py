@@ -103,7 +103,7 @@ def test_code_is_made_for_the_processor_that_is_named(tmp_path):
 )
 def test_features_that_are_named_count_more_than_the_name(name, features, expected):
     """As for LLVM, which adds them to what the name stands for."""
-    assert lowering._fast_when_wide(name, features) is expected
+    assert lowering._fast_512_bit(name, features) is expected
 
 
 @pytest.mark.compiled("small")

@@ -1,11 +1,11 @@
-"""How our compiled functions call each other: numba's own way, with less to write down.
+"""Calling convention of SAND's compiled functions: numba's with less code per call.
 
-Two things are different.  How a call ended is looked at only where something can be raised.  And the tuples of arrays
-that go from function to function, some 400 numbers, are passed as they are: numba takes them apart for each call, and
-puts them together again in each function.  Kernels and functions that are kept apart take them apart, because only of
-arguments of their own can LLVM be told that no two arrays overlap.
+There are two differences.  The status of a call is checked only where the callee may raise an exception.  And named
+tuples of arrays, some 400 scalars in all, are passed as LLVM aggregates; numba flattens them into scalars for each
+call, and rebuilds them in each function.  Kernels and noinline functions have flattened arguments, because only
+arguments can be declared not to overlap (LLVM's `noalias`), not parts of an aggregate.
 
-All of it leans on numba's inside, as `lowering` does; nobody else imports this.
+All of this depends on numba's internals, as `lowering` does, which is the only module that imports this one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from typing import Any, ClassVar
 
 from llvmlite import ir  # type: ignore[import-untyped]
-from llvmlite.ir import instructions as made  # type: ignore[import-untyped]
+from llvmlite.ir.instructions import InsertValue  # type: ignore[import-untyped]
 from numba.core.callconv import CPUCallConv
 from numba.core.cgutils import get_or_insert_function
 from numba.core.cpu import CPUContext
@@ -23,36 +23,36 @@ from numba.core.datamodel.packer import ArgPacker
 from numba.core.types.containers import BaseNamedTuple, BaseTuple
 from numba.core.types.npytypes import Array
 
-__all__ = ["Builder", "Context", "ours_alone", "take_apart"]
+__all__ = ["Builder", "Context", "flatten_arguments", "takes_aggregates"]
 
-_NEVER = ir.Constant(ir.IntType(1), 0)
-_KNOWN = "_ZN4sand", "_ZN5numba7cpython8builtins", "_ZN5numba7cpython7numbers"
-"""How the names of functions begin that we can tell of: our own, and max, min, int, powers of integers."""
-_STEP_OF_0 = ("range() arg 3 must not be zero",)
-_loud: set[str] = set()
-"""Names of those that may raise: with bounds that are checked, for instance, or because they call others."""
+_FALSE = ir.Constant(ir.IntType(1), 0)
+_ANALYSED = "_ZN4sand", "_ZN5numba7cpython8builtins", "_ZN5numba7cpython7numbers"
+"""Name prefixes of functions for which exceptions are tracked: SAND's own, and max, min, int, powers of integers."""
+_ZERO_STEP = ("range() arg 3 must not be zero",)
+_may_raise: set[str] = set()
+"""Names of functions that may raise exceptions, by checks of array bounds for instance, or through a callee."""
 
 
 class Builder(ir.IRBuilder):
-    """Writes down less."""
+    """LLVM instruction builder that omits redundant instructions."""
 
     def extract_value(self, agg: Any, idx: Any, name: str = "") -> Any:
-        """What was put into a tuple is taken from there, not out of the tuple."""
-        place = list(idx) if isinstance(idx, (list, tuple)) else [idx]
-        while place and isinstance(agg, made.InsertValue):
-            there = list(agg.indices)
-            if place[: len(there)] == there:
-                agg, place = agg.value, place[len(there) :]
-            elif there[: len(place)] == place:
+        """Return the value that was inserted into an aggregate instead of extracting it."""
+        path = list(idx) if isinstance(idx, (list, tuple)) else [idx]
+        while path and isinstance(agg, InsertValue):
+            inner = list(agg.indices)
+            if path[: len(inner)] == inner:
+                agg, path = agg.value, path[len(inner) :]
+            elif inner[: len(path)] == path:
                 break
             else:
                 agg = agg.aggregate
-        return super().extract_value(agg, place, name) if place else agg
+        return super().extract_value(agg, path, name) if path else agg
 
     @contextmanager
     def if_then(self, pred: Any, likely: bool | None = None) -> Iterator[Any]:
-        """Nothing where it never happens."""
-        if pred is _NEVER:
+        """Generate no branch for a condition that is always false."""
+        if pred is _FALSE:
             with self.goto_block(ir.Block(self.function)):
                 yield None
         else:
@@ -60,129 +60,133 @@ class Builder(ir.IRBuilder):
                 yield end
 
 
-_apart: set[str] = set()
-"""Names of functions whose arguments are taken apart."""
+_flattened_functions: set[str] = set()
+"""Names of functions whose arguments are flattened."""
 
 
-def take_apart(name: str) -> None:
-    """Let a function of ours have its arguments as numba passes them; to be said before it is declared."""
-    _apart.add(name)
+def flatten_arguments(name: str) -> None:
+    """Use numba's flattened arguments for a function; must be called before the function is declared."""
+    _flattened_functions.add(name)
 
 
-_whole: set[str] = set()
-"""Names of functions with an argument that is passed as it is."""
+_aggregate_functions: set[str] = set()
+"""Names of functions with an argument that is passed as an aggregate."""
 
 
-def ours_alone(name: str) -> bool:
-    """True for a function that only ours may call: others would pass its arguments in another way."""
-    return name in _whole
+def takes_aggregates(name: str) -> bool:
+    """Whether a function has aggregate arguments, so that only functions compiled by `lowering` can call it."""
+    return name in _aggregate_functions
 
 
-def _has_arrays(kind: Any) -> bool:
-    if isinstance(kind, Array):
+def _has_arrays(value_type: Any) -> bool:
+    """Whether a type is an array or a tuple that contains arrays."""
+    if isinstance(value_type, Array):
         return True
-    return isinstance(kind, BaseTuple) and any(_has_arrays(each) for each in kind.types)
+    return isinstance(value_type, BaseTuple) and any(_has_arrays(each) for each in value_type.types)
 
 
-def _passed_whole(kind: Any) -> bool:
-    """True for our own named tuples with arrays in them."""
-    ours = isinstance(kind, BaseNamedTuple) and kind.instance_class.__module__.startswith("sand.")
-    return ours and _has_arrays(kind)
+def _is_aggregate(value_type: Any) -> bool:
+    """Whether values of a type are passed as aggregates: named tuples of SAND that contain arrays."""
+    own = isinstance(value_type, BaseNamedTuple) and value_type.instance_class.__module__.startswith("sand.")
+    return own and _has_arrays(value_type)
 
 
-class _Whole:
-    """How a value is passed that stays as it is."""
+class _AggregateModel:
+    """Data model of an argument that is passed as an aggregate."""
 
     def __init__(self, model: Any):
         self.get_argument_type = model.get_value_type
 
     def as_argument(self, builder: Any, value: Any) -> Any:
-        """As it is."""
+        """The value itself."""
         return value
 
     from_argument = as_argument
 
 
-class _Models:
-    """How values of each type are passed."""
+class _ArgumentModels:
+    """Data models by argument type."""
 
     def __init__(self, models: Any):
         self._models = models
 
-    def lookup(self, kind: Any) -> Any:
-        """For one type."""
-        model = self._models.lookup(kind)
-        return _Whole(model) if _passed_whole(kind) else model
+    def lookup(self, value_type: Any) -> Any:
+        """Data model of one type."""
+        model = self._models.lookup(value_type)
+        return _AggregateModel(model) if _is_aggregate(value_type) else model
 
 
 class _Packer(ArgPacker):
     def assign_names(self, args: Any, names: Any) -> None:
-        """They have names, if only numbers."""
+        """Do nothing: names of LLVM values are not needed."""
 
 
-class _Convention(CPUCallConv):
-    """Arguments that are passed whole; calls of functions that do not raise, where how they ended is not looked at."""
+class _CallConvention(CPUCallConv):
+    """Calls with aggregate arguments, without status checks where the callee cannot raise."""
 
-    whole = False
+    aggregates = False
 
-    def of(self, name: str) -> _Convention:
-        """The same for a function of this name."""
-        self.whole = name.startswith(_KNOWN[0]) and name not in _apart
+    def select(self, name: str) -> _CallConvention:
+        """The convention for a function of this name."""
+        self.aggregates = name.startswith(_ANALYSED[0]) and name not in _flattened_functions
         return self
 
     def _get_arg_packer(self, argtypes: Any) -> Any:
-        return self.context.packer_for(argtypes, self.whole)
+        return self.context.packer_for(argtypes, self.aggregates)
 
-    def decorate_function(self, fn: Any, *given: Any, **options: Any) -> None:
-        """As always."""
-        self.of(fn.name)
-        super().decorate_function(fn, *given, **options)
+    def decorate_function(self, fn: Any, *args: Any, **options: Any) -> None:
+        """As in numba, for the convention of this function."""
+        self.select(fn.name)
+        super().decorate_function(fn, *args, **options)
 
     def decode_arguments(self, builder: Any, argtypes: Any, func: Any) -> Any:
-        """As always."""
-        self.of(func.name)
+        """As in numba, for the convention of this function."""
+        self.select(func.name)
         return super().decode_arguments(builder, argtypes, func)
 
-    def call_function(self, builder: Any, callee: Any, *given: Any, **options: Any) -> Any:
-        """As always, but for the look at how it ended."""
-        self.of(callee.name)
-        status, result = super().call_function(builder, callee, *given, **options)
-        if callee.name.startswith(_KNOWN) and callee.name not in _loud:
-            return status._replace(is_error=_NEVER), result
-        _loud.add(builder.function.name)
+    def call_function(self, builder: Any, callee: Any, *args: Any, **options: Any) -> Any:
+        """As in numba, but with a constant status if the callee cannot raise."""
+        self.select(callee.name)
+        status, result = super().call_function(builder, callee, *args, **options)
+        if callee.name.startswith(_ANALYSED) and callee.name not in _may_raise:
+            return status._replace(is_error=_FALSE), result
+        _may_raise.add(builder.function.name)
         return status, result
 
     def return_user_exc(self, builder: Any, exc: Any, exc_args: Any = None, *rest: Any, **options: Any) -> None:
-        """Raise: callers must look, but for what ours never do, a `range` in steps of 0, a negative power of 0."""
-        if exc_args != _STEP_OF_0 and not builder.function.name.startswith(_KNOWN[1:]):
-            _loud.add(builder.function.name)
+        """Raise an exception, and mark the function as raising.
+
+        Two exceptions do not count, since SAND never causes them: a `range` with step 0 and a negative power of 0.
+        """
+        if exc_args != _ZERO_STEP and not builder.function.name.startswith(_ANALYSED[1:]):
+            _may_raise.add(builder.function.name)
         super().return_user_exc(builder, exc, exc_args, *rest, **options)
 
     def return_status_propagate(self, builder: Any, status: Any) -> None:
-        """Pass on what was raised."""
-        if status.is_error is not _NEVER:
+        """Propagate an exception of a callee."""
+        if status.is_error is not _FALSE:
             super().return_status_propagate(builder, status)
 
 
 class Context(CPUContext):
-    """What it takes to lower."""
+    """Target context with the calling convention."""
 
-    call_conv = property(_Convention)
+    call_conv = property(_CallConvention)
     packers: ClassVar[dict[Any, Any]] = {}
 
-    def packer_for(self, argtypes: Any, whole: bool) -> Any:
-        """One for each set of types and way to pass them."""
-        key = tuple(t._code for t in argtypes), whole
+    def packer_for(self, argtypes: Any, aggregates: bool) -> Any:
+        """Argument packer for a set of types and a convention, created once."""
+        key = tuple(t._code for t in argtypes), aggregates
         if key not in self.packers:
             models = self.data_model_manager
-            self.packers[key] = _Packer(_Models(models) if whole else models, argtypes)
+            self.packers[key] = _Packer(_ArgumentModels(models) if aggregates else models, argtypes)
         return self.packers[key]
 
     def declare_function(self, module: Any, fndesc: Any) -> Any:
-        """As always, once it is there with the arguments that it has."""
-        convention = self.call_conv.of(fndesc.mangled_name)
-        kind = convention.get_function_type(fndesc.restype, fndesc.argtypes)
-        get_or_insert_function(module, kind, fndesc.mangled_name)
-        if convention.whole and any(map(_passed_whole, fndesc.argtypes)):
-            _whole.add(fndesc.mangled_name)
+        """Declare a function with the arguments of its convention."""
+        convention = self.call_conv.select(fndesc.mangled_name)
+        function_type = convention.get_function_type(fndesc.restype, fndesc.argtypes)
+        get_or_insert_function(module, function_type, fndesc.mangled_name)
+        if convention.aggregates and any(map(_is_aggregate, fndesc.argtypes)):
+            _aggregate_functions.add(fndesc.mangled_name)
         return super().declare_function(module, fndesc)

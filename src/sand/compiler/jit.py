@@ -1,10 +1,10 @@
-"""The door to the compiler: only `lowering`, `convention`, `atomics` and this name numba (CUDA apart).
+"""Decorators for compiled functions.  Only `lowering`, `convention`, `atomics` and this module import numba.
 
-`formula`  scalar physics on floats and 3-tuples.  It stays an ordinary Python function.
-`rare`     like `formula`, but not pasted into the caller: for code that seldom runs.
-`loop`     a loop over arrays that is pasted into a larger loop.  No array may be passed twice.
-`noinline` a loop that stays a function of its own, so that all who call it get the same bits.  No array twice.
-`kernel`   a compiled entry point, called from Python.  No array may be passed twice.
+`formula`   Scalar physics on floats and 3-tuples; inlined; remains an ordinary Python function.
+`rare`      Like `formula`, but not inlined: for code that is seldom executed.
+`loop`      A loop over arrays, inlined into a larger loop.  No array may be passed twice.
+`noinline`  A loop that remains a function of its own, so that all callers get the same bits.  No array twice.
+`kernel`    A compiled entry point, called from Python.  No array may be passed twice.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from .cache import private_folder
 _NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compiling formula kernel loop noinline rare"
 __all__ = _NAMES.split()
 
-# As fast as fastmath=True, but NaN and infinity stay what they are, so that guards can see them.
+# As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
 _COMMON: dict[str, Any] = {"_nrt": False, "fastmath": _FAST, "error_model": "numpy"}
 
 
-def _promise_no_aliases() -> dict[str, Any]:
-    """The option `noalias`, which numba has but does not list; without it code is slower, never wrong."""
+def _no_alias_option() -> dict[str, Any]:
+    """The option `noalias`, which numba has but does not list; without it code is correct, but slower."""
     try:
         from numba.core.cpu import CPUTargetOptions
         from numba.core.options import _mapping
@@ -44,50 +44,55 @@ def _promise_no_aliases() -> dict[str, Any]:
     return {"noalias": True}
 
 
-_NO_ALIASES = _promise_no_aliases()
+_NO_ALIASES = _no_alias_option()
 
 
 TESTED_NUMBA = (0, 62), (0, 68)
-"""First and last version of numba whose inside `lowering` fits; others compile three times as long, without threads."""
+"""First and last version of numba with which `lowering` is tested.
+
+With other versions compiling takes three times as long, and there are no threads.
+"""
 
 
-def _own_compilers() -> list[dict[str, Any]]:
-    """Options for kernels, those with long loops, inner functions and those kept apart; none for another numba."""
+def _pipeline_options() -> list[dict[str, Any]]:
+    """Options for kernels, kernels with long loops, inner and noinline functions; empty for an untested numba."""
     if TESTED_NUMBA[0] <= numba.version_info.short <= TESTED_NUMBA[1]:
         try:
-            from .lowering import FAST_WHEN_WIDE, ApartCompiler, InnerCompiler, KernelCompiler, WideCompiler
+            from .lowering import FAST_512_BIT, FunctionCompiler, KernelCompiler, LongVectorCompiler, NoinlineCompiler
         except (ImportError, AttributeError):
-            pass  # numba's inside is not what it was in the versions that were tried
+            pass  # numba's internals differ from those of the tested versions
         else:
-            wide = WideCompiler if FAST_WHEN_WIDE else KernelCompiler
-            return [{"pipeline_class": each} for each in (KernelCompiler, wide, InnerCompiler, ApartCompiler)]
+            long_vectors = LongVectorCompiler if FAST_512_BIT else KernelCompiler
+            return [
+                {"pipeline_class": each} for each in (KernelCompiler, long_vectors, FunctionCompiler, NoinlineCompiler)
+            ]
     if not numba.config.DISABLE_JIT:
         first, last = (".".join(map(str, version)) for version in TESTED_NUMBA)
         warn(
-            f"SAND does not know numba {numba.__version__} (tried: {first} to {last}): results are right, but "
+            f"SAND is not tested with numba {numba.__version__} (tested: {first} to {last}): results are correct, but "
             "compiling takes about three times as long and every simulation uses one thread only"
         )
     return [{}, {}, {}, {}]
 
 
-# nobody calls these from Python once compiled: without their wrappers the first compile is shorter
-_KERNEL, _WIDE, _LOWERED, _APART = _own_compilers()
-_BARE: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_INNER = _BARE | _LOWERED
+# inner functions are never called from Python in compiled form: without wrappers compiling is faster
+_KERNEL, _LONG_VECTOR_KERNEL, _FUNCTION, _NOINLINE = _pipeline_options()
+_NO_WRAPPERS: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_INNER = _NO_WRAPPERS | _FUNCTION
 
 COMPILED = not numba.config.DISABLE_JIT
-"""False where numba is told to leave everything to Python."""
-LONG_VECTORS = _WIDE != _KERNEL
-"""Are there kernels with vectors of 512 bits, on processors that LLVM would use half of?"""
-HAS_NOINLINE = bool(_APART)
-"""Can `noinline` loops be kept apart, so that all threads get the same bits from them?"""
+"""False if NUMBA_DISABLE_JIT is set, so that all functions run in Python."""
+LONG_VECTORS = _LONG_VECTOR_KERNEL != _KERNEL
+"""Whether there are kernels with 512-bit vectors, on processors for which LLVM chooses 256 bits by default."""
+HAS_NOINLINE = bool(_NOINLINE)
+"""Whether `noinline` loops are compiled separately, so that all threads get the same bits from them."""
 
 
-def _once_for_each_type(function: Callable) -> None:
-    """Let numba compile a registered function once for each set of argument types.
+def _compile_once_per_type(function: Callable) -> None:
+    """Make numba compile a registered function once per set of argument types.
 
-    It would do so once more for every set of options among its callers, which changes nothing in ours, and spend
-    much of its time on comparing them.
+    By default numba compiles it again for every set of options among its callers, which changes nothing here, and
+    spends much time on comparing the options.
     """
     try:
         from numba.core.typing.templates import builtin_registry
@@ -108,24 +113,24 @@ def _once_for_each_type(function: Callable) -> None:
 
 
 def _registered(**options: Any) -> Callable[[Callable], Callable]:
-    """A decorator for functions that kernels may call and that stay ordinary Python."""
+    """Decorator for functions that kernels may call and that remain ordinary Python functions."""
 
     def register(function: Callable) -> Callable:
-        ours = function.__module__.partition(".")[0] == "sand"
-        # others may do what needs numba's own environment, such as print
-        register_jitable(**(options if ours else {k: v for k, v in options.items() if k != "pipeline_class"}))(function)
-        _once_for_each_type(function)
+        own = function.__module__.partition(".")[0] == "sand"
+        # user functions may need numba's own environment, for print and the like
+        register_jitable(**(options if own else {k: v for k, v in options.items() if k != "pipeline_class"}))(function)
+        _compile_once_per_type(function)
         return function
 
     return register
 
 
-# options that are not given are those of the caller: all are given
+# options that are not given would be inherited from the caller: all are given
 _ALIASES = dict.fromkeys(_NO_ALIASES, False)
 formula = _registered(**_INNER, **_ALIASES, forceinline=True)
 rare = _registered(**_INNER, **_ALIASES, forceinline=False)
 loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
-noinline = _registered(**_BARE, **_APART, **_NO_ALIASES, forceinline=False)
+noinline = _registered(**_NO_WRAPPERS, **_NOINLINE, **_NO_ALIASES, forceinline=False)
 
 
 _COMPILED = (
@@ -136,10 +141,10 @@ _COMPILED = (
 
 
 def _digest() -> str:
-    """Fingerprint of every source that reaches compiled code, and of the compiler.
+    """Digest of all sources that affect compiled code, and of the version of numba.
 
-    Numba looks for edits in the file of the kernel only; without this, a formula changed next door
-    would go on being computed the old way.  Editing a command recompiles nothing.
+    Numba detects edits only in the file of the kernel.  Without the digest, an edited formula in another file would be
+    ignored.  Edits of other files, such as those of commands, recompile nothing.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     package = Path(__file__).parents[1]
@@ -151,15 +156,15 @@ def _digest() -> str:
 
 @cache
 def cache_folder() -> Path:
-    """Where compiled code is kept: a folder named after our sources and the compiler, see `cache.private_folder`."""
+    """Folder of compiled code, named after the digest of sources and compiler; see `cache.private_folder`."""
     return private_folder(_digest())
 
 
 _FOLDER = cache_folder()
 
 
-def _load_alone(compiled: Any) -> None:
-    """Let what is kept be loaded without all that numba knows to compile, an eighth of a second of a start."""
+def _load_without_compiler(compiled: Any) -> None:
+    """Load cached code without initialising numba's compiler, which saves an eighth of a second at start."""
     try:
         from numba.core.runtime import rtsys
 
@@ -169,7 +174,7 @@ def _load_alone(compiled: Any) -> None:
         return
 
     def load_overload(signature: Any, target: Any) -> Any:
-        rtsys.initialize(target)  # machine code may name its functions
+        rtsys.initialize(target)  # machine code may refer to its functions
         with guard():
             return load(signature, target)
 
@@ -177,50 +182,59 @@ def _load_alone(compiled: Any) -> None:
 
 
 def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long_vectors: bool = False) -> Callable:
-    """Compile `function` on its first call and keep the result in our own cache folder.
+    """Compile `function` on its first call and cache the result in SAND's cache folder.
 
-    numba's global cache folder is put back at once: a user's own kernels go where the user wants.
+    numba's global cache folder is restored at once, so that kernels of the user are cached where the user wants.
 
     Parameters
     ----------
+    function : callable
+        The function.
     cached : bool, optional
-        False for code that reaches formulas from outside SAND, whose edits our digest does not see.
+        False for code that contains formulas of the user, whose edits the digest does not detect.
     nogil : bool, optional
-        True for code that other Python threads may run beside.
+        True for code during which other Python threads may run.
     long_vectors : bool, optional
-        True for loops that are long enough for the longest vectors of the processor, some 64 times and more.
+        True for loops of about 64 iterations and more, which profit from the longest SIMD vectors.
+
+    Returns
+    -------
+    callable
+        The compiled function.
     """
-    if long_vectors and LONG_VECTORS:  # what is kept is found by its name; where both are the same, it is compiled once
+    if long_vectors and LONG_VECTORS:  # cache entries are found by name; the two variants differ only here
         name = f"{function.__qualname__}_wide"
         function = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
         function.__qualname__ = name
-    before = numba.config.CACHE_DIR
+    global_folder = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        options = (_WIDE if long_vectors else _KERNEL) | _COMMON | _NO_ALIASES
+        options = (_LONG_VECTOR_KERNEL if long_vectors else _KERNEL) | _COMMON | _NO_ALIASES
         compiled = numba.njit(cache=cached, nogil=nogil, no_cfunc_wrapper=True, **options)(function)
     finally:
-        numba.config.CACHE_DIR = before
+        numba.config.CACHE_DIR = global_folder
     if cached:
-        _load_alone(compiled)
+        _load_without_compiler(compiled)
     return compiled
 
 
 class _Listener(event.Listener):
-    def __init__(self, tell: Callable[[], None]):
-        self._tell: Callable[[], None] | None = tell
+    """Listener for compilation events that notifies once."""
+
+    def __init__(self, notify: Callable[[], None]):
+        self._notify: Callable[[], None] | None = notify
 
     def on_start(self, _event: Any) -> None:
-        if self._tell is not None:
-            tell, self._tell = self._tell, None
-            tell()
+        if self._notify is not None:
+            notify, self._notify = self._notify, None
+            notify()
 
     def on_end(self, _event: Any) -> None:
         pass
 
 
 @contextmanager
-def compiling(tell: Callable[[], None]) -> Iterator[None]:
-    """Call `tell` once if anything has to be compiled inside the block (not when the cache serves)."""
-    with event.install_listener("numba:compile", _Listener(tell)):
+def compiling(notify: Callable[[], None]) -> Iterator[None]:
+    """Call `notify` once if anything is compiled inside the block (not if the cache contains it)."""
+    with event.install_listener("numba:compile", _Listener(notify)):
         yield

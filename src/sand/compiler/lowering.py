@@ -1,10 +1,11 @@
-"""How our compiled code is made: numba's own way, without what ours does not need.
+"""Faster compilation: numba's pipeline without the steps that SAND's functions do not need.
 
-Numba makes machine code of every function before it pastes it into a caller, where all of that is done again; here a
-function that only kernels call stays as it was lowered, and is linked with a kernel once.  Nothing of ours counts
-references, and nothing is thrown away before all is done.  `convention` tells how functions call each other.
+Numba generates machine code for every function before inlining it into its caller, where the work is repeated.  Here a
+function that only kernels call stays in LLVM's intermediate representation and is linked with each kernel once.  No
+code in SAND uses reference counting, and garbage collection is suspended during compilation.  `convention` contains the
+calling convention.
 
-All of it leans on numba's inside.  Where that has changed, the import fails, and `jit` does without.
+All of this depends on numba's internals.  If they have changed, the import fails, and `jit` uses numba's own pipeline.
 """
 
 from __future__ import annotations
@@ -15,7 +16,14 @@ from typing import Any
 
 from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager  # type: ignore[import-untyped]
-from llvmlite.ir import instructions as made  # type: ignore[import-untyped]
+from llvmlite.ir.instructions import (  # type: ignore[import-untyped]
+    CompareInstr,
+    ExtractValue,
+    InsertValue,
+    LoadInstr,
+    PhiInstr,
+    SelectInstr,
+)
 from numba.core import config
 from numba.core import typed_passes as typed
 from numba.core import untyped_passes as untyped
@@ -25,30 +33,30 @@ from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.ir import Arg, Assign
 from numba.core.lowering import Lower
 
-from .convention import Builder, Context, ours_alone, take_apart
+from .convention import Builder, Context, flatten_arguments, takes_aggregates
 
-__all__ = ["FAST_WHEN_WIDE", "ApartCompiler", "InnerCompiler", "KernelCompiler", "WideCompiler"]
-
-
-def _below(library: Any) -> list[Any]:
-    """The libraries that one calls, and those that the lowered among them call, each once."""
-    found: dict[Any, None] = {}
-    waiting = list(library._linking_libraries)
-    while waiting:
-        called = waiting.pop(0)
-        if called not in found:
-            found[called] = None
-            waiting += called._linking_libraries if isinstance(called, Lowered) else []
-    return list(found)
+__all__ = ["FAST_512_BIT", "FunctionCompiler", "KernelCompiler", "LongVectorCompiler", "NoinlineCompiler"]
 
 
-class Kernel(JITCodeLibrary):
-    """A kernel and all that it calls."""
+def _transitive_callees(library: Any) -> list[Any]:
+    """Libraries called by a library, directly or through a `FunctionLibrary`, each once."""
+    libraries: dict[Any, None] = {}
+    pending = list(library._linking_libraries)
+    while pending:
+        called = pending.pop(0)
+        if called not in libraries:
+            libraries[called] = None
+            pending += called._linking_libraries if isinstance(called, FunctionLibrary) else []
+    return list(libraries)
 
-    wide = False
+
+class KernelLibrary(JITCodeLibrary):
+    """LLVM code of a kernel and of all functions that it calls."""
+
+    long_vectors = False
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Make the code small, for the kernel is optimised as a whole; numba does more, and again for each callee."""
+        """Reduce the code size only: the kernel is optimised as a whole later."""
         ll_module.data_layout = self._codegen._data_layout
         options, passes = self._codegen._pass_builder(), create_new_function_pass_manager()
         passes.add_sroa_pass()
@@ -59,131 +67,135 @@ class Kernel(JITCodeLibrary):
                 passes.run(function, options)
 
     def finalize(self) -> None:
-        """Link, optimise, make machine code."""
-        called = _below(self)
+        """Link, optimise and generate machine code."""
+        called = _transitive_callees(self)
         for library in called:
-            if isinstance(library, Lowered):
-                self._final_module.link_in(library.alone(), preserve=True)
-        self._linking_libraries = [library for library in called if not isinstance(library, Lowered)]
+            if isinstance(library, FunctionLibrary):
+                self._final_module.link_in(library.own_module(), preserve=True)
+        self._linking_libraries = [library for library in called if not isinstance(library, FunctionLibrary)]
         super().finalize()
 
 
-class WideKernel(Kernel):
-    """One whose loops are long enough for the longest vectors."""
+class LongVectorKernelLibrary(KernelLibrary):
+    """Kernel whose loops are long enough for the longest SIMD vectors."""
 
-    wide = True
+    long_vectors = True
 
 
-class Lowered(Kernel):
-    """A function for kernels to be linked with, neither optimised as a whole nor turned into machine code."""
+class FunctionLibrary(KernelLibrary):
+    """Function to be linked with kernels; neither optimised by itself nor compiled to machine code."""
 
     def finalize(self) -> None:
-        """What it calls is linked with the kernel."""
+        """Finish without linking: callees are linked with the kernel."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
-    def alone(self) -> Any:
-        """Its own code."""
+    def own_module(self) -> Any:
+        """LLVM module of this function without its callees."""
         return super()._get_module_for_linking()
 
     def _get_module_for_linking(self) -> Any:
-        """Its own code and that of all that it calls, for who is no kernel of ours."""
-        whole = self.alone().clone()
-        if any(ours_alone(function.name) and not function.is_declaration for function in whole.functions):
-            raise TypeError(f"{self.name} takes arrays of a world: compile what calls it with sand.compiler.jit.kernel")
-        for library in _below(self):
-            whole.link_in(library.alone() if isinstance(library, Lowered) else library._get_module_for_linking(), True)
-        return whole
+        """LLVM module of this function and its callees, for callers compiled by numba's own pipeline."""
+        module = self.own_module().clone()
+        if any(takes_aggregates(function.name) and not function.is_declaration for function in module.functions):
+            raise TypeError(f"{self.name} takes arrays of a state: compile its callers with sand.compiler.jit.kernel")
+        for library in _transitive_callees(self):
+            own = isinstance(library, FunctionLibrary)
+            module.link_in(library.own_module() if own else library._get_module_for_linking(), True)
+        return module
 
     def get_pointer_to_function(self, name: str) -> int:
-        """None."""
+        """Null pointer, since there is no machine code."""
         self._ensure_finalized()
         return 0
 
     codegen = property(lambda self: self)
 
     def set_env(self, name: str, env: Any) -> None:
-        """Nothing of ours reads an environment, and there is no machine code that could."""
+        """Do nothing: no function reads an environment."""
 
 
-class Apart(Lowered):
-    """The same for a function that must not be pasted into its callers; only large loops are such."""
+class NoinlineLibrary(FunctionLibrary):
+    """Function that must not be inlined; used only for large loops."""
 
-    wide = True
-
-
-_PURE = made.ExtractValue, made.InsertValue, made.LoadInstr, made.CompareInstr, made.SelectInstr
+    long_vectors = True
 
 
-def _drop_unused(function: Any) -> None:
-    """Take out what is put together, read or compared, but not used."""
+_PURE = ExtractValue, InsertValue, LoadInstr, CompareInstr, SelectInstr
+
+
+def _remove_unused_instructions(function: Any) -> None:
+    """Remove instructions without side effects whose results are not used."""
     each = [i for block in function.blocks for i in block.instructions]
     uses: Counter[int] = Counter()
     for i in each:
-        uses.update(id(v) for v in ([v for v, _ in i.incomings] if isinstance(i, made.PhiInstr) else i.operands))
-    waiting, gone = each, set()
-    while waiting:
-        i = waiting.pop()
+        uses.update(id(v) for v in ([v for v, _ in i.incomings] if isinstance(i, PhiInstr) else i.operands))
+    pending, removed = each, set()
+    while pending:
+        i = pending.pop()
         pure = isinstance(i, _PURE) or getattr(i, "opname", "") in ("or", "xor")
-        if pure and not uses[id(i)] and id(i) not in gone:
-            gone.add(id(i))
+        if pure and not uses[id(i)] and id(i) not in removed:
+            removed.add(id(i))
             uses.subtract(map(id, i.operands))
-            waiting += i.operands
+            pending += i.operands
     for block in function.blocks:
-        block.instructions[:] = [i for i in block.instructions if id(i) not in gone]
+        block.instructions[:] = [i for i in block.instructions if id(i) not in removed]
 
 
 def _target() -> tuple[str, str]:
-    """Name and features ("+avx2,-avx512f,…") of the processor that numba makes code for.
+    """Name and features ("+avx2,-avx512f,…") of the target processor.
 
-    These are `NUMBA_CPU_NAME` and `NUMBA_CPU_FEATURES` where they are set, else those of this machine.
+    These are `NUMBA_CPU_NAME` and `NUMBA_CPU_FEATURES` if set, else those of this machine.
     """
     name = get_host_cpu_name() if config.CPU_NAME is None else config.CPU_NAME
     return name, get_host_cpu_features() if config.CPU_FEATURES is None else config.CPU_FEATURES
 
 
-_FP16 = {"sapphirerapids", "emeraldrapids", "graniterapids", "graniterapids-d", "diamondrapids"}
-"""LLVM's names of processors that have avx512fp16, for features that do not name it."""
+_AVX512FP16_CPUS = {"sapphirerapids", "emeraldrapids", "graniterapids", "graniterapids-d", "diamondrapids"}
+"""LLVM names of processors with avx512fp16, for feature lists that do not mention it."""
 
 
-def _fast_when_wide(name: str, features: str) -> bool:
-    """Does the processor compute with 512 bits without slowing down?  The last word on a feature counts."""
-    said = [word[0] == "+" for word in features.split(",") if word[1:] == "avx512fp16"]
-    return said[-1] if said else name in _FP16
+def _fast_512_bit(name: str, features: str) -> bool:
+    """Whether the processor executes 512-bit instructions without lowering its clock rate.
+
+    The last mention in the feature list decides, else the name of the processor.
+    """
+    listed = [word[0] == "+" for word in features.split(",") if word[1:] == "avx512fp16"]
+    return listed[-1] if listed else name in _AVX512FP16_CPUS
 
 
-_SLOW_TO_GATHER = _target()[0].startswith("znver")
-"""AMD's Zen: takes numbers from many places faster one by one than by its instruction for it (measured on Zen 4)."""
+_SLOW_GATHER = _target()[0].startswith("znver")
+"""AMD Zen: scalar loads are faster than gather instructions (measured on Zen 4)."""
 
-FAST_WHEN_WIDE = _fast_when_wide(*_target())
-"""Processors, Intel's since Sapphire Rapids, that do not slow down for 512 bits, of which LLVM uses half by itself."""
+FAST_512_BIT = _fast_512_bit(*_target())
+"""Processors, Intel's since Sapphire Rapids, that are fast at 512 bits, although LLVM uses 256 bits by default."""
 
 
 class _Lower(Lower):
-    """From numba's own language to LLVM's."""
+    """Translation of numba's intermediate representation to LLVM's."""
 
-    def __init__(self, context: Any, place: Any, *given: Any, **options: Any):
-        super().__init__(context, place, *given, **options)
-        self._inner, self._apart = type(place) is Lowered, isinstance(place, Apart)
-        self._wide = place.wide and FAST_WHEN_WIDE
+    def __init__(self, context: Any, library: Any, *args: Any, **options: Any):
+        super().__init__(context, library, *args, **options)
+        self._inner, self._noinline = type(library) is FunctionLibrary, isinstance(library, NoinlineLibrary)
+        self._long_vectors = library.long_vectors and FAST_512_BIT
 
     def setup_function(self, fndesc: Any) -> None:
-        """Begin."""
+        """Declare the function with its attributes."""
         if not self._inner:
-            take_apart(fndesc.mangled_name)
+            flatten_arguments(fndesc.mangled_name)
         super().setup_function(fndesc)
-        if self._apart:
+        if self._noinline:
             self.function.attributes.add("noinline")
-        if _SLOW_TO_GATHER:  # llvmlite knows no attributes with a value, but writes down what is in the set
+        if _SLOW_GATHER:  # llvmlite has no attributes with values, but prints the members of the set verbatim
             features = f"{self.context.codegen()._tm_features},+prefer-no-gather".lstrip(",")
             set.add(self.function.attributes, f'"target-features"="{features}"')
-        if self._wide:
+        if self._long_vectors:
             set.add(self.function.attributes, '"prefer-vector-width"="512"')
         self.builder = Builder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
 
     def _find_singly_assigned_variable(self) -> None:
-        """Arguments stay what they are, too, instead of being written to memory and read again."""
+        """Treat arguments that are never reassigned as values, instead of storing them in memory."""
         super()._find_singly_assigned_variable()
         times = Counter(a.target.name for b in self.blocks.values() for a in b.find_insts(Assign))
         for a in self.blocks[self.firstblk].find_insts(Assign):
@@ -191,12 +203,12 @@ class _Lower(Lower):
                 self._singly_assigned_vars.add(a.target.name)
 
     def delvar(self, name: str) -> None:
-        """Nothing of ours counts references."""
+        """Do nothing: there is no reference counting."""
 
     def lower_normal_function(self, fndesc: Any) -> None:
-        """All of a function."""
+        """Lower the function, and remove unused instructions."""
         super().lower_normal_function(fndesc)
-        _drop_unused(self.function)
+        _remove_unused_instructions(self.function)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -206,9 +218,9 @@ class _Lowering(typed.NativeLowering):
 
 
 class KernelCompiler(CompilerBase):
-    """The compiler for kernels: numba's passes, but for those that find nothing to do in our code."""
+    """Compiler for kernels: numba's passes without those that have no effect on SAND's code."""
 
-    kept: Any = Kernel
+    library_class: Any = KernelLibrary
     passes = (
         untyped.TranslateByteCode,
         untyped.FixupArgs,
@@ -223,21 +235,21 @@ class KernelCompiler(CompilerBase):
     )
 
     def compile_extra(self, func: Any) -> Any:
-        """As always, but nobody looks meanwhile for what could be thrown away: little can, among millions of things."""
-        collects = gc.isenabled()
+        """Compile without garbage collection, which would examine millions of objects and free few."""
+        enabled = gc.isenabled()
         gc.disable()
         try:
             return super().compile_extra(func)
         finally:
-            if collects:
+            if enabled:
                 gc.enable()
 
     def define_pipelines(self) -> list[Any]:
-        """What is done, in this order."""
-        self.state.targetctx.__class__ = Context  # a copy for this function
-        place = self.kept(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        place.enable_object_caching()
-        self.state["library"] = place
+        """Set up library and passes."""
+        self.state.targetctx.__class__ = Context  # the context is a copy made for this function
+        library = self.library_class(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        library.enable_object_caching()
+        self.state["library"] = library
         manager = PassManager("sand")
         for each in self.passes:
             manager.add_pass(each, each.__name__)
@@ -245,19 +257,19 @@ class KernelCompiler(CompilerBase):
         return [manager]
 
 
-class WideCompiler(KernelCompiler):
-    """The same for those with long loops."""
+class LongVectorCompiler(KernelCompiler):
+    """Compiler for kernels with long loops."""
 
-    kept = WideKernel
-
-
-class InnerCompiler(KernelCompiler):
-    """The compiler for functions that only kernels call."""
-
-    kept = Lowered
+    library_class = LongVectorKernelLibrary
 
 
-class ApartCompiler(KernelCompiler):
-    """The same for those that must not be pasted into their callers."""
+class FunctionCompiler(KernelCompiler):
+    """Compiler for functions that only kernels call."""
 
-    kept = Apart
+    library_class = FunctionLibrary
+
+
+class NoinlineCompiler(KernelCompiler):
+    """Compiler for functions that must not be inlined."""
+
+    library_class = NoinlineLibrary
