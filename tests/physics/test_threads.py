@@ -9,7 +9,7 @@ import pytest
 import sand
 from sand import threads
 from sand.errors import BadInput
-from sand.integrate.task_queue import ACTIVE, QUIT, TASK, WORD, uses_task_queue, new_task_queue, worker_loops
+from sand.integrate.task_queue import ACTIVE, QUIT, TASK, WORD, new_task_queue, uses_task_queue, worker_loops
 from sand.simulation import assemble as translate
 from sand.simulation import engine
 from sand.state.state import CONTACTS, OUTSIDE, SLIPPED

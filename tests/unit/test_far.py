@@ -9,7 +9,7 @@ import sand
 from sand.constants import COULOMB, GRAVITATION, MAGNETIC
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import Cutoff, cut_weight, pair_load_cut
-from sand.forces.pair.dipole_rates import uncut_rates, cut_curvature, pair_rates
+from sand.forces.pair.dipole_rates import cut_curvature, pair_rates, uncut_rates
 from sand.forces.pair.inverse_square_formulas import central_field, central_potential, central_rate
 
 SMOOTH = cutoff_for(1.0, "smooth")

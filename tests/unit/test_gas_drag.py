@@ -8,7 +8,7 @@ import pytest
 import sand
 from sand.compiler.jit import kernel
 from sand.constants import BOLTZMANN
-from sand.forces.base import Force, ExternalForce
+from sand.forces.base import ExternalForce, Force
 from sand.forces.gas import drag as law
 from sand.forces.gas.loops import VACUUM, GasParameters, gas_kick, shortest_stopping_time
 from sand.forces.gas.model import Gas

@@ -10,14 +10,14 @@ from ..box import Box
 from ..contact.law import Bond
 from ..contact.model import Contact
 from ..errors import BadInput
-from ..forces.base import Force, ExternalForce, LongRangeForce, compose, compose_long_range
+from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
 from ..forces.external.loops import is_builtin
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
 from ..grains import Grains
 from ..integrate.adaptive import Adaptive
-from ..integrate.kernel_spec import ExternalWork, ContactParameters, GasSettings, KernelSpec, StepParameters
+from ..integrate.kernel_spec import ContactParameters, ExternalWork, GasSettings, KernelSpec, StepParameters
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.task_queue import uses_task_queue
 from ..integrate.verlet import Verlet
@@ -202,7 +202,7 @@ def _world(grains: Grains, box: Box, rules: StepParameters, plan: KernelSpec, ro
 def _stride(grains: Grains, box: Box, found: Found) -> float:
     """The longest way [m] that a grain may go in one Runge–Kutta step, so that no pair is missed.
 
-    With a list, Δr/4, as `integrate.event_location.first_touch` argues.  And an image of a grain other than the nearest must not
+    With a list, Δr/4, as `integrate.event_location.first_contact_time` argues.  And an image of a grain other than the nearest must not
     come to touch: it is half a box side away, and two grains close that less r1 + r2 together.  A tenth is kept back
     for what lies between two stages.
     """
