@@ -124,7 +124,7 @@ def test_the_automatic_cutoff_reaches_beyond_the_grains():
         velocity=[[1.0, 0, 0], [-1.0, 0, 0]],
     )
     chosen = sand.Simulation(grains, [sand.Dipoles()], box="1 um").choices["dipoles cut-off"]
-    assert chosen.startswith("60 nm (smooth, two grain diameters, beyond 1.5 b_max")
+    assert chosen.startswith("60 nm (smooth, two grain diameters, more than 1.5 b_max")
 
 
 @pytest.mark.compiled("contacts")

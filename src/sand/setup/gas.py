@@ -1,4 +1,4 @@
-"""Gas of grains at random positions with thermal velocities."""
+"""A gas of grains in a box."""
 
 from __future__ import annotations
 
@@ -10,29 +10,28 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import MOST_GRAINS, checked
+from ..arguments import checked
 from ..box import Box, Span, as_box
 from ..constants import BOLTZMANN, LIGHT
 from ..errors import BadInput, did_you_mean, warn
 from ..grains import Grains, moment_size, vector_for_all
 from ..material import Material
-from ..units import MELTED, format_quantity, in_unit, seed_given, si, whole_number
+from ..units import MELTED, MOST_GRAINS, format_quantity, in_unit, seed_given, si, whole_number
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
-"""Variance of each spin component in units of kT/I, for a mean rotational energy of kT/2, (3/2)kT or 0."""
+"""Variance of each spin component in units of kT/I: mean rotational energy kT/2 in all, (3/2)kT, or none."""
 
 CLEARANCE = 0.1
-"""Smallest initial gap between surfaces, in mean radii."""
+"""Least gap between surfaces at the start, in mean radii."""
 TRIES = 2000
-"""Largest number of attempts to place a grain."""
 JAMMED, REACHED, PACKED = 0.38, 0.34, 0.64
-"""Upper limits of the filling factor: equal spheres at random; more than `MANY` equal spheres; unequal spheres."""
+"""Parts of space that spheres placed at random fill at most: equal ones; many of them, in `TRIES` tries; others."""
 MANY = 1000
-"""Number of grains above which the limit `REACHED` applies."""
+"""Grains from which on that is certain."""
 PATIENCE = 5.0
-"""Wall time [s] after which placing grains warns once."""
+"""Wall time [s] after which placing grains is worth a word."""
 RELATIVE = 0.2
-"""Largest thermal speed over the speed of light; no grain of a large sample then exceeds the speed of light."""
+"""Thermal speeds over that of light at which no grain of a large number is faster."""
 
 
 @checked
@@ -48,36 +47,36 @@ def gas(
     spins: str = "kT/2",
     seed: int = 0,
 ) -> Grains:
-    """Thermal gas of grains at random positions without overlaps, with random moments.
+    """Grains at random places, thermal, with random moments, none overlapping.
 
     Parameters
     ----------
     number : int
-        Number of grains N ≥ 1.
-    box : Box or float or str
-        Box periodic along all axes, or the length of a cubic one.
-    radius : float or str or array_like
-        One radius or (N,) [m].
+        N ≥ 1.
+    box
+        a Box periodic on all axes (or a length for a cube).
+    radius
+        one [m], or (N,).
     material : Material or str
-        Material or name of a preset.
-    moment : float or str or array_like, optional
-        Magnitude of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
-        specific moment; directions are isotropic. One vector (3,) [A m²] is the moment of every grain.
-    charge : float or str or array_like, optional
-        Charge of each grain [C], one number or (N,). Default: 0.
-    temperature : float or str, optional
-        Temperature T [K] ≥ 0 of velocities and spins; thermal speeds must be far below that of light. Velocities are
-        Maxwellian with zero total momentum.
+        a Material or the name of a preset.
+    moment : optional
+        size of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
+        own; directions are isotropic. One vector (3,) [A m²] is the moment of every grain.
+    charge : optional
+        of each grain [C], one number or (N,); none by default.
+    temperature : optional
+        T [K] ≥ 0 of velocities and spins, thermal speeds far below that of light.  Velocities are
+        Maxwellian, total momentum 0.
     spins : str, optional
-        Mean rotational energy per grain: "kT/2" as in Dominik & Nübold (2002), section 3; "equipartition", (3/2) kT;
-        "none".
+        "kT/2" mean rotational energy per grain as in Dominik & Nübold (2002), section 3;
+        "equipartition" (3/2) kT; "none".
     seed : int, optional
-        Seed of the random numbers. Positions, velocities, spins and moments use separate streams.
+        same seed, same grains; positions, velocities, spins and moments draw from separate streams.
 
     Raises
     ------
     BadInput
-        If an argument is invalid, or the box is too full for random positions.
+        wrong numbers, or a box too full to place the grains at random.
     """
     space = as_box(box)
     if any(v is None for v in space.lengths):
@@ -88,7 +87,7 @@ def gas(
     kelvin = si(temperature, "K", "temperature", least=0.0)
     streams = [np.random.default_rng(s) for s in np.random.SeedSequence(seed_given(seed)).spawn(4)]
     size = in_unit(radius, "m")
-    if number > MANY and size is not None and np.ndim(size) == 0:  # before arrays of this length are allocated
+    if number > MANY and size is not None and np.ndim(size) == 0:  # before arrays of this length are made
         _refuse_full(np.full(1, size), number, space)
     blank = Grains(np.zeros((number, 3)), radius, material, charge=charge)
     _refuse_hot(blank, kelvin)
@@ -113,23 +112,23 @@ def directions(count: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _refuse_hot(grains: Grains, kelvin: float) -> None:
-    """Raise BadInput if grains or their surfaces would reach relativistic speeds; warn above the solid range."""
+    """Raises BadInput where grains would move as fast as light, or their surfaces; warns where no grain is solid."""
     speed = math.sqrt(3.0 * BOLTZMANN * kelvin / float(grains.mass.min()))
     surface = float(np.sqrt(BOLTZMANN * kelvin / grains.inertia * grains.radius**2).max())
     if max(speed, surface) > RELATIVE * LIGHT:
         raise BadInput(
-            f"temperature = {kelvin:g} K: grains would move at {max(speed, surface):.3g} m/s, speed of light "
-            f"{LIGHT:.4g} m/s; use a lower temperature, or larger grains"
+            f"temperature = {kelvin:g} K: grains would move at {max(speed, surface):.3g} m/s, and that of light is "
+            f"{LIGHT:.4g} m/s; take a lower temperature, or larger grains"
         )
     if kelvin > MELTED:
-        warn(f"temperature = {kelvin:g} K: no material is solid above {MELTED:g} K; grains are treated as solid")
+        warn(f"temperature = {kelvin:g} K: no material is solid above {MELTED:g} K; grains only move as if they were")
 
 
 def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
-    """Raise BadInput if so many grains of these radii (in turn) cannot be placed by random sequential addition.
+    """Raises BadInput where so many grains, with these radii in turn, cannot be placed at random.
 
-    Equal spheres with their clearance fill at most 0.38 of space (Widom 1966; Zhang & Torquato 2013); many grains reach
-    less within `TRIES` attempts each.
+    With their clearance, spheres placed one after the other fill at most 0.38 of space (Widom 1966; Zhang & Torquato
+    2013), and many of them less in `TRIES` tries each.
     """
     equal = radius.max() < 1.1 * radius.min()
     most = (JAMMED if number < MANY else REACHED) if equal else PACKED
@@ -137,67 +136,69 @@ def _refuse_full(radius: np.ndarray, number: int, box: Box) -> None:
     filled = 4.0 / 3.0 * math.pi * float(each.mean()) * number / box.volume
     if filled > most:
         raise BadInput(
-            f"the box is too full: {number} grains with their clearance would fill {filled:.3g} of it, and random "
-            f"positions fill at most {most:g}; use a larger box or fewer grains, up to {int(number * most / filled)}"
+            f"no room for grains: {number} would fill {filled:.3g} with their clearance, and random places fill "
+            f"at most {most:g} of a box; take a larger box or fewer grains, up to {int(number * most / filled)}"
         )
 
 
 def scatter(radius: np.ndarray, box: Box, rng: np.random.Generator) -> np.ndarray:
-    """Random centres (N, 3) [m] in a periodic box, placed in order of decreasing radius with gaps of `CLEARANCE`.
+    """Random centres (N, 3) [m] in a periodic box, largest grains first, CLEARANCE mean radii apart.
 
     Raises
     ------
     BadInput
-        If no position was found for a grain in `TRIES` attempts.
+        no place found for a grain in TRIES attempts.
     """
     lengths = np.array(box.lengths, dtype=np.float64)
     gap = CLEARANCE * float(radius.mean())
     if 2.0 * (2.0 * radius.max() + gap) > lengths.min():
         raise BadInput(
-            f"a box of {format_quantity(lengths.min(), 'm')} is too small for grains of radius "
-            f"{format_quantity(radius.max(), 'm')}; use one of at least 3 diameters"
+            f"a box of {format_quantity(lengths.min(), 'm')} is too small for grains of radius {format_quantity(radius.max(), 'm')}; "
+            "take one of at least 3 diameters"
         )
     _refuse_full(radius, len(radius), box)
-    # cells wider than the interaction range, so that only the 27 cells around a position are searched
+    # cells wider than any two grains need, so that only those in and around a grain's own can be too close
     sides = np.floor(lengths / (2.0 * radius.max() + gap)).astype(int).tolist()
-    near: dict[tuple[int, ...], list[tuple[float, ...]]] = {}  # spheres in and around each cell
-    placed, attempts = np.empty((len(radius), 3)), _attempts(rng, lengths, sides)
-    start, warned = wall.monotonic(), False
+    near: dict[tuple[int, ...], list[tuple[float, ...]]] = {}  # spheres in and around a cell
+    placed, tries = np.empty((len(radius), 3)), _tries(rng, lengths, sides)
+    begun, told = wall.monotonic(), False
     for n, i in enumerate(np.argsort(-radius, kind="stable").tolist()):
         own = float(radius[i])
-        for position, cell in itertools.islice(attempts, TRIES):
-            if _is_free(position, own, gap, near.get(cell, ()), box.span):
-                placed[i] = position
+        for place, home in itertools.islice(tries, TRIES):
+            if _is_free(place, own, gap, near.get(home, ()), box.span):
+                placed[i] = place
                 around = itertools.product(
-                    *({(c + k) % m for k in (-1, 0, 1)} for c, m in zip(cell, sides, strict=True))
+                    *({(c + k) % m for k in (-1, 0, 1)} for c, m in zip(home, sides, strict=True))
                 )
-                for neighbour in around:
-                    near.setdefault(neighbour, []).append((*position, own))
+                for cell in around:
+                    near.setdefault(cell, []).append((*place, own))
                 break
         else:
             filled = 4.0 / 3.0 * math.pi * (radius**3).sum() / lengths.prod()
             raise BadInput(
-                f"no free position for grain {n + 1} of {len(radius)} in {TRIES} attempts (filling factor "
-                f"{filled:.1%}); use a larger box or fewer grains"
+                f"no room for grain {n + 1} of {len(radius)} after {TRIES} tries (filling {filled:.1%}); "
+                "take a larger box or fewer grains"
             )
-        if not warned and wall.monotonic() > start + PATIENCE:
-            warned = True
-            warn(f"placing {len(radius)} grains is slow in a box this full: {n + 1} placed in {PATIENCE:g} s")
+        if not told and wall.monotonic() > begun + PATIENCE:
+            told = True
+            warn(
+                f"placing {len(radius)} grains takes long: {n + 1} after {PATIENCE:g} s, and the box gets fuller"
+            )
     return placed
 
 
-def _attempts(
+def _tries(
     rng: np.random.Generator, lengths: np.ndarray, sides: list[int]
 ) -> Iterator[tuple[tuple[float, ...], tuple[int, ...]]]:
-    """Endless random positions in the box, each with its cell; generated in batches."""
+    """Random places in the box without end, each with its cell; drawn many at a time."""
     while True:
-        positions = (rng.random((256, 3)) - 0.5) * lengths
-        cells = np.floor((positions / lengths + 0.5) * sides).astype(int) % sides
-        yield from zip(map(tuple, positions.tolist()), map(tuple, cells.tolist()), strict=True)
+        places = (rng.random((256, 3)) - 0.5) * lengths
+        cells = np.floor((places / lengths + 0.5) * sides).astype(int) % sides
+        yield from zip(map(tuple, places.tolist()), map(tuple, cells.tolist()), strict=True)
 
 
 def _is_free(place: tuple[float, ...], own: float, gap: float, others: Iterable[tuple[float, ...]], span: Span) -> bool:
-    """Whether a sphere of radius `own` keeps a distance above `gap` from all these spheres (x, y, z, radius)."""
+    """True if a sphere of this radius is farther than `gap` from all these spheres (x, y, z, radius)."""
     px, py, pz = place
     lx, ly, lz, ix, iy, iz = span
     for x, y, z, radius in others:
