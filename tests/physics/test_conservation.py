@@ -25,8 +25,8 @@ def test_momenta_are_kept(seed, radii, far, bound):
 
     Verlet keeps both exactly, with the far loads summed in every step or in cycles; what is left is rounding:
     ε √steps ~ 1e-13 of Σ|mv| and Σ|x×mv| + |Iω|.  The held part of far loads is added with the same bits again and
-    again, so that its rounding errors add up, ε steps ~ 2e-11 at worst.  Without `correct_angular_momentum` L is lost at
-    1e-6.
+    again, so that its rounding errors add up, ε steps ~ 2e-11 at worst.  Without `correct_angular_momentum` L is lost
+    at 1e-6.
     """
     fast = 8.0 * np.random.default_rng(seed + 100).normal(size=(16, 3))
     grains = random_aggregate(16, seed, radii=radii, moment="300 A m^2/kg", velocity=fast)

@@ -212,7 +212,7 @@ def test_only_rounding_tells_the_orders_apart(far):
 
 @pytest.mark.compiled("contacts", "small")
 def test_who_may_touch_soon_is_known_in_the_new_order():
-    """In the step after an order was made, every near pair that is closer than INNER_SKIN_FRACTION of the reach is picked.
+    """After sorting, the inner list holds every listed pair that is closer than INNER_SKIN_FRACTION of the reach.
 
     What is picked are columns of the near list, which were sorted.
     """

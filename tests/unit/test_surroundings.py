@@ -204,7 +204,7 @@ def test_forces_that_have_a_place_say_so():
 
 
 def test_a_users_force_needs_none_of_the_new_members():
-    """A class written before `time_dependent`, `position_dependent` and `longest_step` is still a force that acts on one grain."""
+    """A class without `time_dependent`, `position_dependent` and `longest_step` is an external force."""
     asked = ("parameters", "check", "numbers", "flux_density_size")
     old = type("Old", (), {"name": "old", "references": "", "formula": None, **dict.fromkeys(asked, lambda self: 0)})
     assert isinstance(old(), ExternalForce)

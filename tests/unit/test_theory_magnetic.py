@@ -94,7 +94,7 @@ def test_sizes_and_moments():
         (lambda: theory.capture_radius(MOMENT, MASS, 0.0), "speed"),
         (lambda: theory.capture_radius(MOMENT, "3 m", 1.0), "mass"),
         (lambda: theory.coupling(MOMENT, R, "-3 K"), "temperature"),
-        (lambda: theory.dipole_energy([0, 0, 1], [0, 0, 1], [0, 0, 0]), "one place"),
+        (lambda: theory.dipole_energy([0, 0, 1], [0, 0, 1], [0, 0, 0]), "same position"),
         (lambda: theory.dipole_energy([0, 1], [0, 0, 1], [0, 0, 1]), "three components"),
         (lambda: theory.dipole_energy([0, 0, "1 m"], [0, 0, 1], [0, 0, 1]), "moment1 z"),
         (lambda: theory.effective_potential(R, R, 1.0, MASS, "x"), "alpha"),

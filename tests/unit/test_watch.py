@@ -86,7 +86,7 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
 
 @pytest.mark.validate
 def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
-    """Leeway + the largest displacement since the pick, in the first step of a call, ≤ INNER_SKIN_FRACTION of the reach.
+    """Leeway + the largest displacement since the pick, in the first step of a call, ≤ INNER_SKIN_FRACTION reach.
 
     A contact that forms ends the leeway, and so does one that breaks: 2000 steps are as many calls of one step, which
     pick in each.

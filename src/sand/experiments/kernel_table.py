@@ -16,7 +16,7 @@ from ..arguments import checked
 from ..errors import BadInput
 from ..io.run_folder import replace_file
 from ..io.table import write_table
-from ..theory.kinetics import CollisionKernel, Rate
+from ..theory.kinetics import CollisionKernel, KernelFunction
 
 GRAM, CUBIC_CM = 1e3, 1e6
 """g in a kg, cm³ in a m³."""
@@ -77,19 +77,19 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Col
 
 
 @checked
-def on_grid(kernel: Rate, masses: Any) -> np.ndarray:
+def on_grid(kernel: KernelFunction, masses: Any) -> np.ndarray:
     """K(m_i, m_j) (K, K) [m³/s] of masses (K,) [kg] > 0 that rise.  Raises BadInput."""
     m = _masses(masses)
     return np.asarray(kernel(*np.broadcast_arrays(m[:, None], m[None, :])), float)
 
 
 @checked
-def write_csv(path: str | Path, kernel: Rate, masses: Any) -> None:
+def write_csv(path: str | Path, kernel: KernelFunction, masses: Any) -> None:
     """A line for each pair m1 ≤ m2: `mass1` [kg], `mass2` [kg], `kernel` [m³/s].
 
     Parameters
     ----------
-    kernel : Rate
+    kernel : KernelFunction
         K(m1, m2) [m³/s].
     masses
         (K,) [kg] > 0, rising.
@@ -109,7 +109,7 @@ def write_csv(path: str | Path, kernel: Rate, masses: Any) -> None:
 
 
 @checked
-def write_cgs(path: str | Path, kernel: Rate, masses: Any) -> None:
+def write_cgs(path: str | Path, kernel: KernelFunction, masses: Any) -> None:
     """Plain text for `numpy.loadtxt`: masses (K,) [g] in the first row, then K (K, K) [cm³/s].
 
     Arguments and errors as for `write_csv`.

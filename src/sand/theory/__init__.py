@@ -1,4 +1,4 @@
-"""Closed forms: what one can know without running anything."""
+"""Theory: closed forms for contacts, magnetic capture and growth, and the coagulation equation."""
 
 from . import kinetics, smoluchowski
 from .contact import ContactNumbers, contact

@@ -1,4 +1,4 @@
-"""One contact in numbers: sizes, forces, energies, limits, periods, speeds."""
+"""Characteristic values of one contact: lengths, forces, energies, critical displacements, periods, speeds."""
 
 from __future__ import annotations
 
@@ -17,37 +17,44 @@ from ..units import si
 
 @dataclass(frozen=True)
 class ContactNumbers:
-    """Everything in closed form about the contact of two grains, SI; see `contact`.
+    """Characteristic values of the contact of two grains in SI units; computed by `contact`.
 
     Attributes
     ----------
     reduced_radius : float
-        R = r1 r2/(r1+r2) [m].
+        R = r1 r2/(r1 + r2) [m].
     rest_radius : float
-        a0 = (9πγR²/E*)^(1/3) [m]; jkr_ratio: a0/R, below 0.3 where JKR holds.
+        Contact radius at equilibrium, a0 = (9πγR²/E*)^(1/3) [m].
+    jkr_ratio : float
+        a0/R; JKR theory is valid below about 0.3.
     pull_off_force : float
         F_c = 3πγR [N].
     rest_overlap, pull_off_overlap : float
-        δ0 = a0²/(3R), δ_c = a0²/(2·6^(1/3) R) [m].
+        Overlap at equilibrium, δ0 = a0²/(3R), and at pull-off, δ_c = a0²/(2·6^(1/3) R) [m].
     break_energy : float
-        from rest to the break, 1.542585 F_cδ_c [J].
+        Energy to break a contact at equilibrium, 1.542585 F_c δ_c [J].
     cycle_energy : float
-        form at δ = 0 and break at −δ_c, 0.935503 F_cδ_c [J].
+        Energy dissipated in forming at δ = 0 and breaking at −δ_c, 0.935503 F_c δ_c [J].
     normal_stiffness, slide_stiffness, roll_stiffness : float
-        k_n, k_s, k_r [N/m]; twist_stiffness: k_t [N m].
+        k_n, k_s, k_r [N/m].
+    twist_stiffness : float
+        k_t [N m].
     slide_limit, roll_limit : float
-        ζ_c, ξ_c [m]; twist_limit: φ_c [rad].
+        Critical displacements ζ_c, ξ_c [m].
+    twist_limit : float
+        Critical angle φ_c [rad].
     slide_force : float
-        critical sliding force k_s ζ_c [N]; roll_moment: k_r R ξ_c = 4F_cξ_c and twist_moment:
-        k_t φ_c [N m].
+        Critical sliding force k_s ζ_c [N].
+    roll_moment, twist_moment : float
+        Critical moments k_r R ξ_c = 4F_c ξ_c and k_t φ_c [N m].
     roll_energy_clamped, roll_energy_released : float
-        to roll along πR, for equal spheres one by 90° round the other [J]:
-        12π²γRξ_c and 6π²γRξ_c (the literature's E_roll = 6π²γRξ_c is the latter).
+        Energy to roll by πR (equal spheres: one rolls by 90° around the other) with clamped or reset displacements,
+        12π²γRξ_c and 6π²γRξ_c [J]. The latter is E_roll of the literature.
     normal_period, slide_period, roll_period, twist_period : float
-        of the free pair [s].
+        Oscillation periods of the free pair [s].
     sticking_speed : float
-        relative speed below which undamped grains stick head-on, m̄v²/2 = cycle_energy [m/s];
-        for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).
+        Largest relative speed of a head-on impact without damping after which grains stick [m/s]:
+        m̄v²/2 = cycle_energy, for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).
     """
 
     reduced_radius: float
@@ -77,7 +84,15 @@ class ContactNumbers:
     sticking_speed: float
 
     def rebound_speed(self, speed: Any) -> float:
-        """Relative speed [m/s] after a head-on impact without damping: √(v² − v_s²), 0 if the grains stick."""
+        """Relative speed [m/s] after a head-on impact without damping.
+
+        √(v² − v_s²), v_s the sticking speed; 0 if the grains stick.
+
+        Parameters
+        ----------
+        speed : float or str
+            v ≥ 0 [m/s].
+        """
         v = si(speed, "m/s", "speed", least=0.0)
         return math.sqrt(max(v * v - self.sticking_speed**2, 0.0))
 
@@ -92,25 +107,32 @@ def contact(
     mixing: str = "geometric",
     rolling_limit: Any = None,
 ) -> ContactNumbers:
-    """The contact between two grains, without damping and with plain stiffnesses.
+    """Characteristic values of a contact without damping, with the stiffnesses of the equilibrium contact radius.
 
     Parameters
     ----------
     material : Material or str
-        of grain 1, or the name of a preset.
-    radius
+        Material of grain 1, or the name of a preset.
+    radius : float or str
         r1 [m] > 0.
-    other, other_radius : optional
-        of grain 2; the same as grain 1 by default.
+    other : Material or str, optional
+        Material of grain 2; that of grain 1 by default.
+    other_radius : float or str, optional
+        r2 [m] > 0; r1 by default.
     mixing : str, optional
-        rule for γ_eff, see `contact.mixing.MIXING`.
-    rolling_limit : optional
-        ξ_c [m] instead of the materials' own.
+        Rule for γ_eff, see `contact.mixing.MIXING`.
+    rolling_limit : float or str, optional
+        ξ_c [m] > 0 in place of the value of the materials.
+
+    Returns
+    -------
+    ContactNumbers
+        In SI units.
 
     Raises
     ------
     BadInput
-        wrong numbers, or a pair without adhesion, which has no such contact.
+        If a parameter is out of range, or a material has no surface energy.
     """
     a = as_material(material)
     b = a if other is None else as_material(other, "other")
@@ -120,7 +142,9 @@ def contact(
         raise BadInput(f"mixing = {mixing!r}; {did_you_mean(mixing, list(MIXING))}")
     for m in (a, b):
         if not (m.surface_energy or 0.0) > 0.0:
-            raise BadInput(f"material '{m.name}' has no surface energy above 0, so its grains do not stick")
+            raise BadInput(
+                f"material '{m.name}' has no surface energy above 0, so its grains have no adhesive contacts"
+            )
     limit = None if rolling_limit is None else si(rolling_limit, "m", "rolling_limit", above=0.0)
     pairing = pairing_between(a, b, mixing=mixing, rolling_limit=limit)
     m1, m2 = (m.density * 4.0 / 3.0 * math.pi * r**3 for m, r in ((a, r1), (b, r2)))
@@ -128,17 +152,22 @@ def contact(
 
 
 def _numbers(bond: Bond, modulus: float, radii: tuple[float, float], masses: tuple[float, float]) -> ContactNumbers:
-    """From the constants the program itself uses."""
+    """From the constants of the contact law."""
     unit = bond.pull_off_force * bond.pull_off_overlap
     at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
     cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
-    light = sum(1.0 / m for m in masses)
-    turns = sum(2.5 / (m * r * r) for m, r in zip(masses, radii, strict=True))
-    slides = light + sum(2.5 / m for m in masses)
+    inverse_mass = sum(1.0 / m for m in masses)
+    inverse_inertia = sum(2.5 / (m * r * r) for m, r in zip(masses, radii, strict=True))
+    inverse_slide = inverse_mass + sum(2.5 / m for m in masses)
     k_n = jkr.normal_stiffness(bond.rest_radius, modulus)
     rolled = bond.roll_stiffness * bond.roll_limit * math.pi * bond.reduced_radius
-    periods = (k_n * light, bond.slide_stiffness * slides, bond.roll_stiffness * bond.reduced_radius**2 * turns)
-    normal, slide, roll, twist = (2.0 * math.pi / math.sqrt(w) for w in (*periods, bond.twist_stiffness * turns))
+    squared_frequencies = (
+        k_n * inverse_mass,
+        bond.slide_stiffness * inverse_slide,
+        bond.roll_stiffness * bond.reduced_radius**2 * inverse_inertia,
+        bond.twist_stiffness * inverse_inertia,
+    )
+    normal, slide, roll, twist = (2.0 * math.pi / math.sqrt(w) for w in squared_frequencies)
     return ContactNumbers(
         reduced_radius=bond.reduced_radius,
         rest_radius=bond.rest_radius,
@@ -164,5 +193,5 @@ def _numbers(bond: Bond, modulus: float, radii: tuple[float, float], masses: tup
         slide_period=slide,
         roll_period=roll,
         twist_period=twist,
-        sticking_speed=math.sqrt(2.0 * cycle * light),
+        sticking_speed=math.sqrt(2.0 * cycle * inverse_mass),
     )

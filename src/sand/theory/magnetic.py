@@ -1,6 +1,6 @@
 """Two magnetic grains: energies, distances and cross-sections of section 3.1 of the paper (Eqs. 1–14, 27).
 
-Arguments are SI numbers or texts with a unit.  What the paper misprints is given right here and named.
+Arguments are SI numbers or texts with a unit.  Misprints of the paper are corrected and stated.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from ..units import si
 
 @checked
 def reduced_mass(mass: Any, other: Any = None) -> float:
-    """m̄ = m1 m2/(m1 + m2) [kg], m/2 for two equal ones (below Eq. 8).
+    """Reduced mass m̄ = m1 m2/(m1 + m2) [kg], m/2 for equal masses (below Eq. 8).
 
     Parameters
     ----------
-    mass, other
-        m1, m2 [kg] > 0; the same by default.
+    mass, other : float or str
+        m1, m2 [kg] > 0; equal by default.
 
     Raises
     ------
     BadInput
-        not a mass above 0.
+        If a mass is not above 0.
     """
     m1 = si(mass, "kg", "mass", above=0.0)
     m2 = m1 if other is None else si(other, "kg", "other", above=0.0)
@@ -36,19 +36,19 @@ def reduced_mass(mass: Any, other: Any = None) -> float:
 
 @checked
 def thermal_speed(mass: Any, temperature: Any) -> float:
-    """v_th = √(k_B T/m) [m/s] (section 4.1), one component's standard deviation.
+    """Thermal speed v_th = √(k_B T/m) [m/s] (section 4.1), the standard deviation of one velocity component.
 
     Parameters
     ----------
-    mass
+    mass : float or str
         m [kg] > 0.
-    temperature
+    temperature : float or str
         T [K] ≥ 0.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
     heat = BOLTZMANN * si(temperature, "K", "temperature", least=0.0)
     return math.sqrt(heat / si(mass, "kg", "mass", above=0.0))
@@ -56,46 +56,49 @@ def thermal_speed(mass: Any, temperature: Any) -> float:
 
 @checked
 def coupling(moment: Any, distance: Any, temperature: Any) -> float:
-    """λ = μ²μ₀/(4π d³ k_B T) (Eq. 1): magnetic over thermal energy.
+    """Coupling parameter λ = μ²μ₀/(4π d³ k_B T) (Eq. 1), the ratio of magnetic to thermal energy.
 
     Parameters
     ----------
-    moment
+    moment : float or str
         μ [A m²] ≥ 0.
-    distance
+    distance : float or str
         d [m] > 0, the sum of the radii.
-    temperature
+    temperature : float or str
         T [K] > 0.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
     return dipole.coupling(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
 
 
 @checked
 def interaction_radius(moment: Any, distance: Any, temperature: Any) -> float:
-    """R_m = (2μ₀μ²/(π k_B T))^(1/3) = 2 d λ^(1/3) [m] (Eq. 2); it does not depend on d. Arguments as for `coupling`."""
+    """Interaction radius R_m = (2μ₀μ²/(π k_B T))^(1/3) = 2 d λ^(1/3) [m] (Eq. 2).
+
+    Independent of d; parameters and exceptions as for `coupling`.
+    """
     return dipole.interaction_radius(*_thermal(moment, distance, temperature), MAGNETIC, BOLTZMANN)
 
 
 @checked
 def geometric_cross_section(radius: Any, other: Any = None) -> float:
-    """σ = π (R_i + R_j)² [m²] of two spheres (Eq. 4, printed with a factor 4 that Eq. 26 does not have).
+    """Geometric cross-section σ = π (R_i + R_j)² [m²] of two spheres (Eq. 4, printed with a factor 4; cf. Eq. 26).
 
     Eq. 3, πR² of one grain, is `geometric_cross_section(radius, 0.0)`.
 
     Parameters
     ----------
-    radius, other
-        R_i, R_j [m] ≥ 0; the same by default.
+    radius, other : float or str
+        R_i, R_j [m] ≥ 0; equal by default.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
     r1 = si(radius, "m", "radius", least=0.0)
     r2 = r1 if other is None else si(other, "m", "other", least=0.0)
@@ -104,40 +107,42 @@ def geometric_cross_section(radius: Any, other: Any = None) -> float:
 
 @checked
 def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
-    """U = k [μ·μ′/r³ − 3 (μ·r)(μ′·r)/r⁵] [J] (Eq. 6, whose last r′ is r), k = μ₀/4π.
+    """Energy of two dipoles, U = k [μ·μ′/r³ − 3 (μ·r)(μ′·r)/r⁵] [J], k = μ₀/4π (Eq. 6).
+
+    The last r′ of Eq. 6 is a misprint of r.
 
     Parameters
     ----------
-    moment1, moment2
+    moment1, moment2 : sequence
         μ, μ′ (3,) [A m²].
-    apart
-        r (3,) [m], from one to the other, not 0.
+    apart : sequence
+        Separation r (3,) [m], not 0.
 
     Raises
     ------
     BadInput
-        not three finite numbers, or no distance.
+        If a vector does not have three finite components, or the separation is 0.
     """
     a, b = _three(moment1, "A m^2", "moment1"), _three(moment2, "A m^2", "moment2")
     r = _three(apart, "m", "apart")
     if not any(r):
-        raise BadInput("apart = 0: two dipoles in one place have no finite energy")
+        raise BadInput("apart = 0: the energy of two dipoles at the same position is not finite")
     return dipole.pair_load(r, a, b, MAGNETIC)[3]
 
 
 @checked
 def potential_parameter(moment1: Any, moment2: Any = None) -> float:
-    """α = 2kμμ′ [J m³] (Eq. 7): U_min = −α/d³.
+    """Parameter of the attractive potential, α = 2kμμ′ [J m³] (Eq. 7): U_min = −α/d³.
 
     Parameters
     ----------
-    moment1, moment2
-        μ, μ′ [A m²] ≥ 0; the same by default.
+    moment1, moment2 : float or str
+        μ, μ′ [A m²] ≥ 0; equal by default.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
     first, second = _moments(moment1, moment2)
     return dipole.contact_energy(first, second, 1.0, MAGNETIC)
@@ -145,32 +150,45 @@ def potential_parameter(moment1: Any, moment2: Any = None) -> float:
 
 @checked
 def lowest_energy(moment1: Any, distance: Any, moment2: Any = None) -> float:
-    """U_min = −2kμμ′/d³ [J] (Eq. 7), moments head to tail at the distance d [m] > 0.  Raises BadInput."""
+    """Lowest energy of two dipoles, head to tail at a distance d, U_min = −2kμμ′/d³ [J] (Eq. 7).
+
+    Parameters
+    ----------
+    moment1, moment2 : float or str
+        μ, μ′ [A m²] ≥ 0; equal by default.
+    distance : float or str
+        d [m] > 0.
+
+    Raises
+    ------
+    BadInput
+        If a parameter is out of range.
+    """
     first, second = _moments(moment1, moment2)
     return -dipole.contact_energy(first, second, si(distance, "m", "distance", above=0.0), MAGNETIC)
 
 
 @checked
 def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
-    """U_eff = m̄ b² v∞²/(2r²) − α/r³ [J] (Eqs. 8–10), moments always along r.
+    """Effective potential U_eff = m̄ b² v∞²/(2r²) − α/r³ [J] of moments aligned with r (Eqs. 8–10).
 
     Parameters
     ----------
-    distance
+    distance : float or str
         r [m] > 0.
-    impact_parameter
+    impact_parameter : float or str
         b [m] ≥ 0.
-    speed
-        v∞ [m/s] ≥ 0, relative.
-    mass
-        m̄ [kg] > 0, reduced.
-    alpha
-        `potential_parameter` [J m³].
+    speed : float or str
+        Relative speed v∞ [m/s] ≥ 0.
+    mass : float or str
+        Reduced mass m̄ [kg] > 0.
+    alpha : float or str
+        `potential_parameter` α [J m³] ≥ 0.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
     r, b = si(distance, "m", "distance", above=0.0), si(impact_parameter, "m", "impact_parameter", least=0.0)
     v, m = si(speed, "m/s", "speed", least=0.0), si(mass, "kg", "mass", above=0.0)
@@ -179,9 +197,10 @@ def effective_potential(distance: Any, impact_parameter: Any, speed: Any, mass: 
 
 @checked
 def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
-    """U_0 = (m̄ v∞² b²/3)³/(2α²) [J] (Eq. 11): the maximum of `effective_potential`, at r = 3α/(m̄ b² v∞²).
+    """Centrifugal barrier U_0 = (m̄ v∞² b²/3)³/(2α²) [J] (Eq. 11), at r = 3α/(m̄ b² v∞²).
 
-    Arguments as there; α > 0, there is no barrier without attraction.
+    It is the maximum of `effective_potential`; parameters and exceptions as there, but α > 0: without attraction there
+    is no barrier.
     """
     b, v = si(impact_parameter, "m", "impact_parameter", least=0.0), si(speed, "m/s", "speed", least=0.0)
     strength = si(alpha, "J m^3", "alpha", above=0.0)
@@ -190,21 +209,23 @@ def barrier(impact_parameter: Any, speed: Any, mass: Any, alpha: Any) -> float:
 
 @checked
 def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> float:
-    """b_max = √3 (α/(m̄ v∞²))^(1/3) [m] (Eqs. 12, 13; what is printed as Eq. 13 is b_max²).
+    """Largest impact parameter of capture, b_max = √3 (α/(m̄ v∞²))^(1/3) [m] (Eqs. 12, 13).
+
+    Eq. 13 of the paper prints b_max².
 
     Parameters
     ----------
-    moment1, moment2
-        μ, μ′ [A m²] ≥ 0; the same by default.
-    mass
-        m̄ [kg] > 0, reduced (`reduced_mass`).
-    speed
-        v∞ [m/s] > 0, relative.
+    moment1, moment2 : float or str
+        μ, μ′ [A m²] ≥ 0; equal by default.
+    mass : float or str
+        Reduced mass m̄ [kg] > 0 (`reduced_mass`).
+    speed : float or str
+        Relative speed v∞ [m/s] > 0.
 
     Raises
     ------
     BadInput
-        out of range.
+        If a parameter is out of range.
     """
     first, second = _moments(moment1, moment2)
     m, v = si(mass, "kg", "mass", above=0.0), si(speed, "m/s", "speed", above=0.0)
@@ -213,9 +234,10 @@ def capture_radius(moment1: Any, mass: Any, speed: Any, moment2: Any = None) -> 
 
 @checked
 def capture_cross_section(moment1: Any, mass: Any, speed: Any, moment2: Any = None, c: Any = 1.0) -> float:
-    """σ_m = c 3π (α/(m̄ v∞²))^(2/3) [m²] (Eq. 14; Eq. 27 with the paper's c of 0.8–0.9); arguments as `capture_radius`.
+    """Cross-section of magnetic capture, σ_m = c 3π (α/(m̄ v∞²))^(2/3) [m²] (Eq. 14; Eq. 27 with c = 0.8–0.9).
 
-    The paper's c is a matter of the distance from which grains start: see the page on cross-sections.
+    The value of c in the paper results from the distance at which its trajectories start; see the page on
+    cross-sections of the documentation. Parameters and exceptions as for `capture_radius`, and c ≥ 0.
     """
     return si(c, "1", "c", least=0.0) * math.pi * capture_radius(moment1, mass, speed, moment2) ** 2
 

@@ -41,7 +41,8 @@ def translation_friction(radius, density, speed, accommodation):
     """Coefficient of drag f_t = (4π/3) r² ρ_g v̄ (1 + (π/8) α) [kg/s], F = −f_t v (Epstein 1924).
 
     To first order in v, specular reflection contributes 1.  Diffuse reflection contributes 1/2 for the normal and 1/2
-    for the tangential momentum of the incoming molecules, and π/8 because more molecules leave the side facing the flow.
+    for the tangential momentum of the incoming molecules, and π/8 because more molecules leave on the side facing the
+    flow.
     """
     return 4.0 / 3.0 * math.pi * radius**2 * density * speed * (1.0 + math.pi / 8.0 * accommodation)
 

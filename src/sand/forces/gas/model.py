@@ -132,7 +132,7 @@ class Gas:
         fastest = int(np.argmax(speed))
         if speed[fastest] > LARGEST_SPEED * numbers.mean_speed:
             warnings.append(
-                f"gas: grain {fastest} moves at {format_quantity(speed[fastest], 'm/s')} through a gas of mean molecular speed "
+                f"gas: grain {fastest} moves at {format_quantity(speed[fastest], 'm/s')}, the mean molecular speed is "
                 f"{format_quantity(numbers.mean_speed, 'm/s')}; Epstein's law holds for much smaller speeds "
                 "and underestimates the drag"
             )
@@ -141,7 +141,8 @@ class Gas:
             largest = float(grains.radius.max())
             if path < MIN_KNUDSEN * largest:
                 warnings.append(
-                    f"gas: the mean free path is {format_quantity(path, 'm')}, the largest radius {format_quantity(largest, 'm')}; "
-                    f"Epstein's law holds above {MIN_KNUDSEN:g} radii and overestimates the drag"
+                    f"gas: the mean free path is {format_quantity(path, 'm')}, the largest radius "
+                    f"{format_quantity(largest, 'm')}; Epstein's law holds above {MIN_KNUDSEN:g} radii "
+                    "and overestimates the drag"
                 )
         return warnings

@@ -83,7 +83,7 @@ class Dipoles(CutoffForce):
 
 
 def thermal_capture(grains: Grains) -> float:
-    """Capture radius b_max [m] (Eq. 13) of the mean moment at the thermal speed √(kT/m); infinite for grains at rest."""
+    """Capture radius b_max [m] (Eq. 13) of the mean moment at the thermal speed √(kT/m); infinite at rest."""
     temperature = kinetic_temperature(grains)
     mass = float(grains.mass.mean())
     moment = float(np.linalg.norm(grains.moment, axis=1).mean())
