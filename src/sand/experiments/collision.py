@@ -24,7 +24,7 @@ from ..setup.encounters import encounter, turned_at_random
 from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
 from ..units import si
-from .collision_outcome import Approach, Collision, judged
+from .collision_outcome import Approach, Collision, classify_collision
 
 QUIET = 3
 """A collision is over after this many looks in a row without a contact made, moved or broken."""
@@ -73,8 +73,8 @@ def collide(
         see `encounter` and `Simulation`.
     """
     start = approach(target, projectile, speed=speed, impact_parameter=impact_parameter, along=along, seed=seed)
-    simulation = prepared(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
-    return finished(start, simulation), simulation
+    simulation = prepare(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
+    return run_to_end(start, simulation), simulation
 
 
 def approach(
@@ -89,7 +89,7 @@ def approach(
     return Approach(target, projectile, met.grains, met.flight, v, seed)
 
 
-def prepared(
+def prepare(
     start: Approach, forces: Sequence[Force] | None = None, stepping: Verlet | Adaptive | None = None, **options: Any
 ) -> Simulation:
     """The simulation of a collision at its start; options are passed on to `Simulation`.  Raises BadInput."""
@@ -98,12 +98,12 @@ def prepared(
         [Contact()] if forces is None else forces,
         stepping=stepping,
         seed=start.seed,
-        frame_every=start.look_every,
+        frame_every=start.check_every,
         **options,
     )
 
 
-def gone_on_with(
+def resume_collision(
     start: Approach,
     folder: str | Path,
     forces: Sequence[Force] | None = None,
@@ -118,7 +118,7 @@ def gone_on_with(
         as `config.build.resume`; or the folder holds another collision than the one asked for.
     """
     simulation = resume(folder, **options)
-    asked, begun = (case_of(one, math.inf, math.inf) for one in (prepared(start, forces, stepping), simulation))
+    asked, begun = (case_of(one, math.inf, math.inf) for one in (prepare(start, forces, stepping), simulation))
     changed = [name for name in asked if name != "run" and asked[name] != begun[name]]
     first = _first_frame(Path(folder) / TRAJECTORY)
     for name in ("position", "velocity") if first is not None else ():
@@ -148,7 +148,7 @@ def _first_frame(path: Path) -> Any:
         frames.close()
 
 
-def finished(start: Approach, simulation: Simulation) -> Collision:
+def run_to_end(start: Approach, simulation: Simulation) -> Collision:
     """Run a collision on to its end, from wherever it stands, and judge it.
 
     Raises
@@ -156,7 +156,7 @@ def finished(start: Approach, simulation: Simulation) -> Collision:
     BadInput
         the physics stopped it.
     Interrupted
-        Ctrl-C; `gone_on_with` goes on.
+        Ctrl-C; `resume_collision` goes on.
     """
     before = len(simulation.contacts["pair"]) if simulation.steps == 0 else int(simulation.ledger.rows[0]["contacts"])
     record = simulation.record
@@ -165,7 +165,7 @@ def finished(start: Approach, simulation: Simulation) -> Collision:
     quiet = _until_quiet(simulation, start)
     if record is not None:
         record.draw(simulation)
-    return judged(simulation, start, before, quiet)
+    return classify_collision(simulation, start, before, quiet)
 
 
 def _until_quiet(simulation: Simulation, start: Approach) -> bool:
@@ -182,7 +182,7 @@ def _until_quiet(simulation: Simulation, start: Approach) -> bool:
             if result.outcome.is_physics:
                 raise BadInput(f"the collision cannot be computed: {result}")
             row = simulation.ledger.rows[-1]
-        until = row["time"] + 10.0 * start.look_every
+        until = row["time"] + 10.0 * start.check_every
         if look == 0:
             continue
         now = (int(row["made"]), int(row["moved"]), int(row["broken"]))

@@ -37,16 +37,18 @@ from ..setup.encounters import offset_of
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
-from .collision import Approach, Collision, approach, finished, gone_on_with, prepared
+from .collision import Approach, Collision, approach, prepare, resume_collision, run_to_end
 
-Kind = Literal["grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"]
+BodyKind = Literal[
+    "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
+]
 """The builders, `setup.aggregates.KINDS`, and a file."""
 
 
 class BodySection(Section):
     """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
 
-    kind: Kind
+    kind: BodyKind
     path: PathName | None = None
     length: str | None = None
     grains: Count | None = None
@@ -152,13 +154,13 @@ class CollisionCase(Section):
             seed=seed if self.impact.turn else None,
         )
 
-    def prepared(self, start: Approach, **options: Any) -> Simulation:
+    def prepare(self, start: Approach, **options: Any) -> Simulation:
         """The simulation of one collision at its start; options as for `Simulation`.  Raises BadInput."""
-        return prepared(start, self.forces.build() or None, self.stepping, **options)
+        return prepare(start, self.forces.build() or None, self.stepping, **options)
 
-    def gone_on_with(self, start: Approach, folder: Path, **options: Any) -> Simulation:
-        """The simulation of a collision that was interrupted, see `collision.gone_on_with`.  Raises BadInput."""
-        return gone_on_with(start, folder, self.forces.build() or None, self.stepping, **options)
+    def resume_collision(self, start: Approach, folder: Path, **options: Any) -> Simulation:
+        """The simulation of a collision that was interrupted, see `collision.resume_collision`.  Raises BadInput."""
+        return resume_collision(start, folder, self.forces.build() or None, self.stepping, **options)
 
     def check(self) -> Simulation:
         """The first collision at its start, in memory, so that all that can be wrong with it is found.
@@ -168,13 +170,13 @@ class CollisionCase(Section):
         BadInput
             what only shows when bodies, forces and materials come together.
         """
-        return self.prepared(self.approach(self.impact.seeds[0]))
+        return self.prepare(self.approach(self.impact.seeds[0]))
 
     def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
         """One collision; options as for `Simulation`.  Raises BadInput."""
         start = self.approach(seed)
-        simulation = self.prepared(start, **options)
-        return finished(start, simulation), simulation
+        simulation = self.prepare(start, **options)
+        return run_to_end(start, simulation), simulation
 
 
 def wrong_bodies(content: dict[str, Any]) -> list[str]:

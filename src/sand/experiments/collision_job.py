@@ -23,7 +23,7 @@ from ..io.run_folder import (
     write_toml,
 )
 from ..io.table import GrowingOutcomes
-from .collision import finished
+from .collision import run_to_end
 from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
 
 
@@ -108,12 +108,12 @@ class CollisionJob:
         """With all the files that a run leaves."""
         start, case = self._blamed(lambda: self.case.approach(seed)), self.case
         if self.resume and any(self.folder.glob("checkpoint-*.npz")):
-            simulation = case.gone_on_with(start, self.folder, observers=list(observers))
+            simulation = case.resume_collision(start, self.folder, observers=list(observers))
         else:  # without a checkpoint there is nothing to lose
             options = {"out": self.folder, "overwrite": self.overwrite or self.resume, "observers": list(observers)}
-            simulation = self._blamed(lambda: case.prepared(start, **options))
+            simulation = self._blamed(lambda: case.prepare(start, **options))
             self._describe(ONE_COLLISION)
-        return finished(start, simulation).to_dict()
+        return run_to_end(start, simulation).to_dict()
 
     def _many(self, seeds: list[int], executor: Executor | None, observers: Sequence[Any]) -> list[dict[str, Any]]:
         """Their outcomes alone, and a figure of all."""

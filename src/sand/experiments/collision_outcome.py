@@ -26,7 +26,7 @@ class Approach(NamedTuple):
     seed: int | None
 
     @property
-    def look_every(self) -> float:
+    def check_every(self) -> float:
         """Time between frames [s]: a twentieth of that which the smallest grain takes for its own diameter.
 
         But no less than 30 sound crossings.
@@ -90,7 +90,7 @@ class Collision:
         return asdict(self)
 
 
-def judged(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
+def classify_collision(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
     """What became of two bodies.
 
     Parameters

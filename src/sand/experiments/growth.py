@@ -14,9 +14,9 @@ from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..results import Run
-from .growth_boxes import alike, grow, one_box
+from .growth_boxes import grow, run_box, shared_settings
 
-__all__ = ["Box", "Growth", "alike", "boxes_in", "grow", "growth_of", "one_box", "read_box"]
+__all__ = ["BoxResult", "GrowthResult", "shared_settings", "boxes_in", "grow", "growth_of", "run_box", "read_box"]
 
 LOOKS = 10
 """Frames of each box at which its aggregates are measured, evenly over the run, the last among them."""
@@ -28,7 +28,7 @@ LEAST = 3
 """Grains of an aggregate from which its moment counts."""
 
 
-class Box(NamedTuple):
+class BoxResult(NamedTuple):
     """One run of an ensemble."""
 
     folder: Path
@@ -41,7 +41,7 @@ class Box(NamedTuple):
     case: dict[str, Any]  # as understood, without [run]
 
 
-def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
+def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResult:
     """S(t) and the aggregates of one run.
 
     Raises
@@ -61,7 +61,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
     first = frames[0]
     frames.close()
-    return Box(
+    return BoxResult(
         Path(folder),
         ledger["time"],
         ledger["mean_cluster_size"],
@@ -69,7 +69,7 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
         float(first.radius.mean()),
         _usual(np.linalg.norm(first.moment, axis=1)),
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
-        alike(run.case),
+        shared_settings(run.case),
     )
 
 
@@ -95,7 +95,7 @@ def boxes_in(folder: str | Path) -> list[Path]:
     return sorted(found, key=lambda one: (len(one.name), one.name))
 
 
-class Growth(NamedTuple):
+class GrowthResult(NamedTuple):
     """What an ensemble says; a law that it cannot tell is None, with the reason in `missing`."""
 
     time: np.ndarray  # (K,) [s], common to all boxes
@@ -121,13 +121,13 @@ class Growth(NamedTuple):
         return self.sizes.std(axis=0, ddof=1) / np.sqrt(len(self.sizes))
 
 
-def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -> Growth:
+def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = None) -> GrowthResult:
     """S(t), z, the exponent of moments and the fractal dimension of an ensemble.
 
     Parameters
     ----------
-    boxes : Sequence[Box]
-        alike but for their seeds.
+    boxes : Sequence[BoxResult]
+        shared_settings but for their seeds.
     window : tuple[float, float] or None, optional
         values of S for z: from where the mean over boxes is at the first until any box is at the second; by
         default 2 and 0.15 N, where a box runs out of partners.
@@ -135,7 +135,7 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
     Raises
     ------
     BadInput
-        no box, or boxes that are not alike.
+        no box, or boxes that are not shared_settings.
     """
     if not boxes:
         raise BadInput("an ensemble needs at least one box")
@@ -165,7 +165,7 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
 
     # moments that cancel to rounding, or of grains without any, have no logarithm
     heavy = (rows["grains"] >= LEAST) & (rows["moment"] > 1e-9 * boxes[0].moment)
-    return Growth(
+    return GrowthResult(
         time,
         sizes,
         chosen,
@@ -193,7 +193,7 @@ def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLawFit:
     return power_law(np.tile(time, len(sizes)), sizes.ravel(), np.repeat(np.arange(len(sizes)), len(time)))
 
 
-def _all_aggregates(boxes: Sequence[Box]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Box number of each row, and the rows of all boxes."""
+def _all_aggregates(boxes: Sequence[BoxResult]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """BoxResult number of each row, and the rows of all boxes."""
     of_box = np.concatenate([np.full(len(box.aggregates["grains"]), k) for k, box in enumerate(boxes)])
     return of_box, {name: np.concatenate([box.aggregates[name] for box in boxes]) for name in boxes[0].aggregates}

@@ -73,7 +73,7 @@ def grow(
 def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, Any]) -> None:
     """Raises BadInput if a folder holds boxes of another case, before that case is replaced.
 
-    Boxes at these places are looked at by `one_box`, and here only where the description of the case has changed.
+    Boxes at these places are looked at by `run_box`, and here only where the description of the case has changed.
     """
     path = place / files.CASE
     before = files.read_toml(path) if path.exists() else content
@@ -81,9 +81,9 @@ def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, 
     boxes = [there for there in boxes_of(place) if changed or there not in places]
     if not boxes:
         return
-    asked = alike(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
+    asked = shared_settings(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
     for there in boxes:
-        known = alike(files.read_toml(there / files.CASE))
+        known = shared_settings(files.read_toml(there / files.CASE))
         if others := [name for name in {**known, **asked} if known.get(name) != asked.get(name)]:
             raise BadInput(f"{there} holds a box with other [{others[0]}]; give another folder")
 
@@ -99,9 +99,9 @@ def _run_all(
     """The boxes of `grow`.  Raises BadInput for those that physics stopped."""
     jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
     if executor is None:
-        outcomes: Any = (one_box(*job, observers) for job in jobs)
+        outcomes: Any = (run_box(*job, observers) for job in jobs)
     else:
-        waiting = [executor.submit(one_box, *job) for job in jobs]
+        waiting = [executor.submit(run_box, *job) for job in jobs]
         outcomes = (future.result() for future in waiting)
     wrong = []
     for seed, one, outcome in zip(seeds, places, outcomes, strict=True):
@@ -138,7 +138,7 @@ def boxes_of(folder: Path) -> list[Path]:
     return [there.parent for there in folder.glob(f"seed-*/{files.CASE}")]
 
 
-def one_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence[Any] = ()) -> str:
+def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence[Any] = ()) -> str:
     """Run one box to its end, from its newest checkpoint if it has one; returns the name of the outcome.
 
     Raises
@@ -173,7 +173,7 @@ def _closed(place: Path) -> dict[str, Any]:
     return summary if summary.get("outcome") == "finished" else {}
 
 
-def alike(case: dict[str, Any]) -> dict[str, Any]:
+def shared_settings(case: dict[str, Any]) -> dict[str, Any]:
     """What boxes of an ensemble have in common: the case but for [run] and for cut-offs, which follow the grains."""
     forces = {
         name: {key: value for key, value in table.items() if key != "cutoff"}

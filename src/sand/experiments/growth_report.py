@@ -12,7 +12,7 @@ from ..analysis.fits import separation
 from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
-from .growth import Box, Growth, boxes_in, growth_of, read_box
+from .growth import BoxResult, GrowthResult, boxes_in, growth_of, read_box
 
 NAMES = ("analysis.json", "growth.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
@@ -22,11 +22,11 @@ class Ensemble(NamedTuple):
     """Boxes that are alike but for their seeds, and what they say together."""
 
     name: str
-    growth: Growth
-    boxes: list[Box]
+    growth: GrowthResult
+    boxes: list[BoxResult]
 
 
-def ensemble_in(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
+def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
     """The runs in a folder as one ensemble.
 
     Parameters
@@ -48,7 +48,7 @@ def ensemble_in(folder: str | Path, window: tuple[float, float] | None = None) -
         raise error.at(str(folder)) from None
 
 
-def numbers(one: Ensemble) -> dict[str, Any]:
+def ensemble_summary(one: Ensemble) -> dict[str, Any]:
     """What analysis.json holds of one ensemble; laws with value, error and interval, None where unknown."""
 
     def law(found: Any) -> dict[str, Any] | None:
@@ -72,7 +72,7 @@ def numbers(one: Ensemble) -> dict[str, Any]:
     }
 
 
-def compared(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
+def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
     """By how many standard errors the first of two ensembles is ahead of the second at their last time.
 
     `sigma` compares ln S: S itself is skewed, since a few late meetings of large clusters make most of it; that is

@@ -24,7 +24,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
     Parameters
     ----------
     ensembles : Sequence[tuple[str, Any, dict[str, Any]]]
-        name, `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment` [A m²] and
+        name, `experiments.growth.GrowthResult`, and the aggregates of all boxes with `unit_moment` [A m²] and
         `unit_radius` [m] of a grain.
     """
     with styled():

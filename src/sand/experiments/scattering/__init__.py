@@ -16,7 +16,7 @@ _MODULES = {
     "Trajectory": "flights",
     "cross_section": "cross_sections",
     "flight": "problem",
-    "flown": "cross_sections",
+    "run_flights": "cross_sections",
     "measure": "cross_sections",
     "probability_map": "maps",
     "seed_of": "cross_sections",

@@ -16,7 +16,7 @@ from ...config.sections import PathName, Seed
 from ...errors import BadInput
 from ...io.run_folder import read_toml
 from ...material import PRESETS
-from ..collision_case import BodySection, Kind, wrong_bodies
+from ..collision_case import BodyKind, BodySection, wrong_bodies
 from .encounters import Flight
 from .problem import ErrorCollector, flight, impact_parameter
 
@@ -24,7 +24,7 @@ from .problem import ErrorCollector, flight, impact_parameter
 class ScatterBody(BodySection):
     """[projectile] and [target]: a grain, or an aggregate as in `sand collide`."""
 
-    kind: Kind = "grain"
+    kind: BodyKind = "grain"
 
 
 class FlightSection(Section):
@@ -117,9 +117,9 @@ class ScatterCase(Section):
                 raise BadInput("flight.speed: a map needs speeds that differ")
         return found
 
-    def impact_parameters(self, flying: Flight) -> list[float]:
+    def impact_parameters(self, setup: Flight) -> list[float]:
         """[m]"""
-        return [impact_parameter(value, flying) for value in self.measure.impact_parameters]
+        return [impact_parameter(value, setup) for value in self.measure.impact_parameters]
 
 
 def _list(value: Any) -> Sequence[Any]:

@@ -129,13 +129,13 @@ def cross_section(
     BadInput
         one line for each mistake.
     """
-    flying = flight(radius, material, moment, temperature, speed, **options)
-    return measure(flying, relative_error=relative_error, seed=seed, executor=executor)
+    setup = flight(radius, material, moment, temperature, speed, **options)
+    return measure(setup, relative_error=relative_error, seed=seed, executor=executor)
 
 
 @checked
 def measure(
-    flying: Flight,
+    setup: Flight,
     *,
     relative_error: Any = 0.02,
     seed: int = 0,
@@ -149,7 +149,7 @@ def measure(
     Parameters
     ----------
     known, keep : optional
-        see `flown`.
+        see `run_flights`.
     watch : Callable[[int, float, float], None] or None, optional
         called with the number of flights, σ [m²] and its error after each round.
     """
@@ -157,14 +157,14 @@ def measure(
     if not 1e-4 <= goal <= 0.5:
         raise BadInput(f"relative_error = {relative_error!r} must lie in 1e-4 … 0.5")
     begun = wall.monotonic()
-    farthest = flying.distance if flying.sphere else np.inf
-    strata = Strata.up_to(flying.scales.widest, farthest)
-    before = addressed(known)
+    farthest = setup.distance if setup.sphere else np.inf
+    strata = Strata.up_to(setup.scales.widest, farthest)
+    before = rows_by_flight(known)
     # a target that moves by chance is met at a rate; one that moves along is at rest in its own frame
-    unit = flying.speed if flying.drift_spread > 0.0 else flying.relative_speed
+    unit = setup.speed if setup.drift_spread > 0.0 else setup.relative_speed
     rows: list[np.ndarray] = []
     while tasks := strata.round(goal, farthest):
-        for new in flown(flying, tasks, strata.width, seed, executor, before, keep):
+        for new in run_flights(setup, tasks, strata.width, seed, executor, before, keep):
             rows.append(new)
             for row in new:
                 strata.add(int(row[0]), int(row[1]), float(row[END] == HIT), float(row[SPEED]) / unit)
@@ -172,7 +172,7 @@ def measure(
             watch(sum(len(r) for r in rows), strata.estimate().value, strata.error())
     whole = np.concatenate(rows)
     _warn(strata, whole, farthest)
-    return _told(flying, strata, whole, seed, wall.monotonic() - begun)
+    return _told(setup, strata, whole, seed, wall.monotonic() - begun)
 
 
 def _warn(strata: Strata, rows: np.ndarray, farthest: float) -> None:
@@ -197,13 +197,13 @@ def seed_of(seed: int, setup: int) -> int:
     return (seed + setup * 0x9E3779B97F4A7C15) % 2**64
 
 
-def addressed(rows: Iterable[Sequence[float]]) -> dict[tuple[int, int], np.ndarray]:
+def rows_by_flight(rows: Iterable[Sequence[float]]) -> dict[tuple[int, int], np.ndarray]:
     """Rows of `COLUMNS` by stratum and number."""
     return {(int(row[0]), int(row[1])): np.asarray(row, float) for row in rows}
 
 
-def flown(
-    flying: Flight,
+def run_flights(
+    setup: Flight,
     tasks: Sequence[Task],
     width: float,
     seed: int,
@@ -216,7 +216,7 @@ def flown(
     Parameters
     ----------
     known : Mapping[tuple[int, int], ndarray] or None, optional
-        those that were flown before, which are not flown again.
+        those that were run_flights before, which are not run_flights again.
     keep : Callable[[ndarray], None] or None, optional
         called with the rows of each piece of work as it is done.
     """
@@ -224,7 +224,7 @@ def flown(
     ready = [before[key] for t in tasks for key in t.addresses() if key in before]
     if ready:
         yield np.array(ready)
-    for new in _pieces(flying, [piece for t in tasks for piece in _gaps(t, before)], width, seed, executor):
+    for new in _pieces(setup, [piece for t in tasks for piece in _gaps(t, before)], width, seed, executor):
         if keep is not None:
             keep(new)
         yield new
@@ -239,14 +239,14 @@ def _gaps(task: Task, known: Mapping[tuple[int, int], np.ndarray]) -> list[Task]
 
 
 def _pieces(
-    flying: Flight, tasks: list[Task], width: float, seed: int, executor: Executor | None
+    setup: Flight, tasks: list[Task], width: float, seed: int, executor: Executor | None
 ) -> Iterator[np.ndarray]:
-    """The rows of all tasks in pieces of about `PIECE` seconds; a first one, flown here, tells how long a flight is."""
+    """The rows of all tasks in pieces of about `PIECE` seconds; a first one, run_flights here, tells how long a flight is."""
     size = TRIAL
     while tasks:
         bundle, tasks = cut(tasks, size)
         begun = wall.perf_counter()
-        rows = fly(flying, bundle, width, seed)
+        rows = fly(setup, bundle, width, seed)
         size = min(max(int(PIECE * len(rows) / max(wall.perf_counter() - begun, 1e-9)), 1), MOST)
         yield rows
         if executor is not None:
@@ -256,7 +256,7 @@ def _pieces(
     waiting = []
     while tasks:
         bundle, tasks = cut(tasks, size)
-        waiting.append(executor.submit(fly, flying, bundle, width, seed))
+        waiting.append(executor.submit(fly, setup, bundle, width, seed))
     try:
         for future in as_completed(waiting):
             yield future.result()
@@ -265,7 +265,7 @@ def _pieces(
             future.cancel()
 
 
-def _told(flying: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:
+def _told(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:
     found, sure = strata.estimate(), strata.estimate(CERTAIN)
     hits, tries = strata.counts()
     k = np.arange(len(strata))
@@ -275,14 +275,14 @@ def _told(flying: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: 
         sigma=found.value,
         sigma_error=strata.error(),
         interval=(sure.low, sure.high),
-        geometric=float(np.pi * flying.scales.touch**2),
-        analytic=flying.analytic,
+        geometric=float(np.pi * setup.scales.touch**2),
+        analytic=setup.analytic,
         flights=int(tries.sum()),
         hits=int(hits.sum()),
         bound=int((ends == BOUND).sum()),
         failed=int((ends == FAILED).sum()),
-        speed=flying.speed,
-        distance=flying.distance,
+        speed=setup.speed,
+        distance=setup.distance,
         seed=seed,
         profile=np.column_stack([low, high, tries, hits]),
         drift=float(rows[:, DRIFT].max()),

@@ -13,7 +13,7 @@ from ...constants import MAGNETIC
 from ...forces.pair import dipole_formulas as dipole
 from ...grains import Grains
 from .flight_driver import Limits
-from .initial_conditions import Start
+from .initial_conditions import InitialConditions
 from .two_aggregates import TWO_AGGREGATES, Aggregates, Body
 from .two_spheres import TWO_SPHERES, Model, Spheres
 
@@ -99,10 +99,10 @@ class Flight:
             return plain
         return plain * mean_power(-1.0 / 3.0, self.speed, self.drift_spread)
 
-    def start(self, azimuth: float = -1.0) -> Start:
+    def start(self, azimuth: float = -1.0) -> InitialConditions:
         """For the kernel; azimuth [rad] of the impact parameter, below 0: by chance."""
         axes = [_axis(g) for g in (self.projectile, self.target)]
-        return Start(
+        return InitialConditions(
             self.speed,
             self.along,
             self.drift,

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arguments import checked
 from ...errors import BadInput
-from .cross_sections import addressed, flown, seed_of
+from .cross_sections import rows_by_flight, run_flights, seed_of
 from .encounters import Flight
 from .flight_driver import HIT
 from .flights import COLUMNS
@@ -95,7 +95,7 @@ def probability_map(
     seed : int, optional
         of the first; the others have `seed_of` it and their number.
     known, keep : optional
-        as for `scattering.flown`, with the number of the set-up.
+        as for `scattering.run_flights`, with the number of the set-up.
     watch : Callable[[int, int], None] or None, optional
         called with flights done and all flights.
 
@@ -113,9 +113,9 @@ def probability_map(
     hits, done = np.zeros((len(flights), cells)), np.zeros((len(flights), cells))
     tasks = [Task(k, 0, per_cell) for k in range(cells)]
     for v, one in enumerate(flights):
-        before = addressed((known or {}).get(v, ()))
+        before = rows_by_flight((known or {}).get(v, ()))
         tell = None if keep is None else partial(keep, v)
-        for told in flown(one, tasks, most[v] / cells, seed_of(seed, v), executor, before, tell):
+        for told in run_flights(one, tasks, most[v] / cells, seed_of(seed, v), executor, before, tell):
             place = told[:, STRATUM].astype(int)
             np.add.at(hits[v], place, told[:, END] == HIT)
             np.add.at(done[v], place, 1)

@@ -274,19 +274,19 @@ def _multiple(value: Any, name: str) -> tuple[float, str] | None:
     return si(match[1], "1", f"{name} in {match[2]}", least=0.0), match[2]
 
 
-def impact_parameter(value: Any, flying: Flight, name: str = "impact_parameter") -> float:
+def impact_parameter(value: Any, setup: Flight, name: str = "impact_parameter") -> float:
     """b [m] ≥ 0 from a length or "0.95 b_max".  Raises BadInput."""
     told = _multiple(value, name)
     if told is not None and told[1] == "b_max":
-        b = told[0] * flying.scales.capture
-        if flying.scales.capture == 0.0:
+        b = told[0] * setup.scales.capture
+        if setup.scales.capture == 0.0:
             raise BadInput(f"{name} = {value!r}: without moments b_max is 0; give a length")
     else:
         b = si(value, "m", name)
     if b < 0.0:
         raise BadInput(f"{name} = {value!r} must be at least 0 m")
-    if flying.sphere and b >= flying.distance:
+    if setup.sphere and b >= setup.distance:
         raise BadInput(
-            f"{name} = {value!r} must be below the radius of the start, {format_quantity(flying.distance, 'm')}"
+            f"{name} = {value!r} must be below the radius of the start, {format_quantity(setup.distance, 'm')}"
         )
     return b

@@ -98,14 +98,14 @@ class Strata:
 
     def counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Hits and flights (K,) of the annuli."""
-        hits = np.array([sum(hit for hit, _ in sorted_values(one)) for one in self.flown])
+        hits = np.array([sum(hit for hit, _ in values_in_order(one)) for one in self.flown])
         return hits, np.array([len(one) for one in self.flown])
 
     def weights(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance (K,) of what hits count for; 1 and 0 where none is known."""
         mean, spread = np.ones(len(self)), np.zeros(len(self))
         for k, one in enumerate(self.flown):
-            found = np.array([weight for hit, weight in sorted_values(one) if hit > 0.0])
+            found = np.array([weight for hit, weight in values_in_order(one) if hit > 0.0])
             if found.size:
                 mean[k], spread[k] = found.mean(), found.var()
         return mean, spread
@@ -146,7 +146,7 @@ class Strata:
         goal = relative_error * found.value
         if self.error() <= goal or found.value == 0.0:
             return []
-        p = (beside(hits) + 0.5) / (beside(tries) + 1.0)
+        p = (neighbour_sums(hits) + 0.5) / (neighbour_sums(tries) + 1.0)
         mean, spread = self.weights()
         worth = self.area() * np.sqrt(mean**2 * p * (1 - p) + p * spread)
         wanted = worth * worth.sum() / goal**2
@@ -160,7 +160,7 @@ class Strata:
         return [Task(k, int(n), int(n + m)) for k, (n, m) in enumerate(zip(tries, more, strict=True)) if m > 0]
 
 
-def beside(counts: np.ndarray) -> np.ndarray:
+def neighbour_sums(counts: np.ndarray) -> np.ndarray:
     """Sums over the two annuli to either side, without the annulus itself.
 
     Were an annulus given flights by its own hits, one that had too few by chance would get too few to find out.
@@ -169,7 +169,7 @@ def beside(counts: np.ndarray) -> np.ndarray:
     return sum(padded[2 + k : 2 + k + len(counts)] for k in (-2, -1, 1, 2))  # type: ignore[return-value]
 
 
-def sorted_values(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
+def values_in_order(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
     """In the order of their numbers, so that sums are the same bits however they came."""
     return (flights[number] for number in sorted(flights))
 

@@ -27,7 +27,7 @@ LOOKS = 2000
 """Looks after which a pair that is neither stuck nor free counts as stuck: it was caught and keeps coming back."""
 
 
-def sticks(flying: Flight, state: np.ndarray) -> bool:
+def sticks(setup: Flight, state: np.ndarray) -> bool:
     """True if the contact that begins with this state holds.
 
     The grains go on with all their contacts and dipoles (`Contact`, `Dipoles` without a cut-off, `Field`), deformable,
@@ -39,14 +39,14 @@ def sticks(flying: Flight, state: np.ndarray) -> bool:
         of the pair at the touch, (18,) or (20,), as experiments/scattering/two_spheres.py and
         experiments/scattering/two_aggregates.py lay it out.
     """
-    grains, first = grains_at(flying, state)
+    grains, first = grains_at(setup, state)
     forces: list[Any] = [Contact(), Dipoles(cutoff=None)]
-    if any(flying.field):
-        forces.append(Field(flying.field))
+    if any(setup.field):
+        forces.append(Field(setup.field))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the user has been told of them
         sim = Simulation(grains, forces)
-    period, joined_for = slowest_period(flying), 0
+    period, joined_for = slowest_period(setup), 0
     for _ in range(LOOKS):
         _, moving = _relative(sim.grains, first)
         away = float(np.linalg.norm(moving))
@@ -58,22 +58,22 @@ def sticks(flying: Flight, state: np.ndarray) -> bool:
         joined_for = joined_for + 1 if joined else 0
         if joined_for >= PERIODS:
             return True
-        if not joined and _escapes(sim.grains, first, flying):
+        if not joined and _escapes(sim.grains, first, setup):
             return False
     return True
 
 
-def slowest_period(flying: Flight) -> float:
+def slowest_period(setup: Flight) -> float:
     """2π √(m̄/k_n) [s] of the bodies' reduced mass on the softest contact that they can make, k_n = (6/5) E* a0.
 
     Without adhesion: the time of a Hertzian impact at the speed of the flight, 2.87 (m̄²/(R E*² v))^(1/5).
     """
-    contact, reduced, longest = Contact(), flying.scales.reduced, 0.0
-    for one in {(m, r) for m, r in zip(flying.projectile.material.tolist(), flying.projectile.radius, strict=True)}:
-        for two in {(m, r) for m, r in zip(flying.target.material.tolist(), flying.target.radius, strict=True)}:
-            pairing = contact.pairing(flying.projectile.materials[one[0]], flying.target.materials[two[0]])
+    contact, reduced, longest = Contact(), setup.scales.reduced, 0.0
+    for one in {(m, r) for m, r in zip(setup.projectile.material.tolist(), setup.projectile.radius, strict=True)}:
+        for two in {(m, r) for m, r in zip(setup.target.material.tolist(), setup.target.radius, strict=True)}:
+            pairing = contact.pairing(setup.projectile.materials[one[0]], setup.target.materials[two[0]])
             radius = one[1] * two[1] / (one[1] + two[1])
-            hertz = 2.87 * (reduced**2 / (radius * pairing.modulus**2 * flying.relative_speed)) ** 0.2
+            hertz = 2.87 * (reduced**2 / (radius * pairing.modulus**2 * setup.relative_speed)) ** 0.2
             longest = max(longest, hertz)
             if pairing.surface_energy > 0.0:
                 a0 = jkr.rest_radius(pairing.surface_energy, radius, pairing.modulus)
@@ -82,14 +82,14 @@ def slowest_period(flying: Flight) -> float:
     return longest
 
 
-def grains_at(flying: Flight, state: np.ndarray) -> tuple[Grains, int]:
+def grains_at(setup: Flight, state: np.ndarray) -> tuple[Grains, int]:
     """Both bodies as one set of grains, the projectile first, in the frame of their centre of mass."""
-    one, two = flying.projectile, flying.target
+    one, two = setup.projectile, setup.target
     m1, m2 = float(one.mass.sum()), float(two.mass.sum())
     parts = []
     for body, share, k in ((one, m2 / (m1 + m2), 0), (two, -m1 / (m1 + m2), 1)):
         middle, moving = share * state[R : R + 3], share * state[U : U + 3]
-        if flying.spheres:
+        if setup.spheres:
             axis = (DIRECTION1, DIRECTION2)[k]
             spin = state[(SPIN1, SPIN2)[k] :][:3]
             arm = np.zeros((1, 3))
@@ -122,9 +122,9 @@ def _relative(grains: Grains, first: int) -> tuple[np.ndarray, np.ndarray]:
     return centres[0] - centres[1], speeds[0] - speeds[1]
 
 
-def _escapes(grains: Grains, first: int, flying: Flight) -> bool:
+def _escapes(grains: Grains, first: int, setup: Flight) -> bool:
     """On the way out, and faster than all moments could hold, were they as close as the two closest grains are."""
     apart, moving = _relative(grains, first)
-    kinetic = 0.5 * flying.scales.reduced * float(moving @ moving)
+    kinetic = 0.5 * setup.scales.reduced * float(moving @ moving)
     closest = float(cdist(grains.position[:first], grains.position[first:]).min())
-    return float(apart @ moving) > 0.0 and kinetic > flying.scales.alpha / closest**3
+    return float(apart @ moving) > 0.0 and kinetic > setup.scales.alpha / closest**3
