@@ -25,8 +25,8 @@ ORDER = 8.0
 HIT, MISS, BOUND, FAILED = range(4)
 """Ends of a flight: contact, escape, still together after the largest number of steps, state not finite."""
 RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
-"""Results of a flight: impact parameter and smallest gap [m], relative speed at the start and at the end [m/s], time [s],
-energy error over the largest kinetic energy ½m̄u² during the flight."""
+"""Results of a flight: impact parameter and smallest gap [m], relative speed at the start and at the end [m/s], time
+[s], energy error over the largest kinetic energy ½m̄u² during the flight."""
 EXACT = 1e-7
 """Tolerance of the gap at contact, in units of `Limits.touch`."""
 FIRST = 1e-2
