@@ -68,7 +68,7 @@ def test_called_again_it_goes_on(tmp_path):
     with pytest.raises(sand.BadInput, match=r"other \[box\]"):
         run_box(other, 1, str(tmp_path / "seed-1"))
     (tmp_path / "seed-x").mkdir()  # not ours, and no hindrance
-    with pytest.raises(sand.BadInput, match=r"seed-1 holds a box with other \[box\]"):
+    with pytest.raises(sand.BadInput, match=r"seed-1 contains a box with different \[box\]"):
         grow(other, [2], tmp_path)
 
 
@@ -128,7 +128,7 @@ def test_what_cannot_be_told_says_why(ensembles):
     """Boxes without moments, and ones that hardly grew."""
     growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
     assert growth.moment is None and growth.missing["moment"] == "the grains have no moments"
-    assert growth.z is None and "the boxes are not between S = 2" in growth.missing["z"]
+    assert growth.z is None and "fewer than three times have S between 2" in growth.missing["z"]
     with pytest.raises(sand.BadInput, match=r"\[grains\] differs"):
         growth_of([made_up(2, 0.6, 1.4, 1), made_up(2, 0.6, 1.4, 2, grains=10)])
 

@@ -1,4 +1,4 @@
-"""Case files of collisions."""
+"""Case files of `sand collide`."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ from .collision import Approach, Collision, approach, prepare, resume_collision,
 BodyKind = Literal[
     "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
 ]
-"""The builders, `setup.aggregates.KINDS`, and a file."""
+"""Names of the builders in `setup.aggregates.KINDS`, and "file"."""
 
 
 class BodySection(Section):
-    """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
+    """Sections [target] and [projectile]: an aggregate (a different one for each seed if it is random), or a file."""
 
     kind: BodyKind
     path: PathName | None = None
@@ -100,7 +100,7 @@ class BodySection(Section):
         return self
 
     def build(self, materials: dict[str, Material], seed: int) -> Grains:
-        """Raises BadInput."""
+        """Build the body. Raises BadInput."""
         if self.kind == "file":
             own = materials[self.material]
             one = own if "material" in self.model_fields_set else None
@@ -111,7 +111,7 @@ class BodySection(Section):
 
 
 class ImpactSection(Section):
-    """[impact]: how they meet, and how often."""
+    """Section [impact]: relative motion, orientations and seeds."""
 
     speed: quantity("m/s", above=0.0)  # type: ignore[valid-type]
     impact_parameter: Any = 0.0
@@ -128,7 +128,7 @@ class ImpactSection(Section):
 
 
 class CollisionCase(Section):
-    """A whole case file of `sand collide`."""
+    """Case file of `sand collide`."""
 
     target: BodySection
     projectile: BodySection
@@ -143,7 +143,7 @@ class CollisionCase(Section):
         return integrator(value)
 
     def approach(self, seed: int) -> Approach:
-        """The bodies of one collision; with `turn` they are turned at random by the seed.  Raises BadInput."""
+        """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""
         materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
         return approach(
             self.target.build(materials, 2 * seed),
@@ -155,32 +155,32 @@ class CollisionCase(Section):
         )
 
     def prepare(self, start: Approach, **options: Any) -> Simulation:
-        """The simulation of one collision at its start; options as for `Simulation`.  Raises BadInput."""
+        """Set up the simulation of one collision; options are those of `Simulation`. Raises BadInput."""
         return prepare(start, self.forces.build() or None, self.stepping, **options)
 
     def resume_collision(self, start: Approach, folder: Path, **options: Any) -> Simulation:
-        """The simulation of a collision that was interrupted, see `collision.resume_collision`.  Raises BadInput."""
+        """Resume an interrupted collision, see `collision.resume_collision`. Raises BadInput."""
         return resume_collision(start, folder, self.forces.build() or None, self.stepping, **options)
 
     def check(self) -> Simulation:
-        """The first collision at its start, in memory, so that all that can be wrong with it is found.
+        """Set up the first collision in memory, to find errors in the combination of bodies, forces and materials.
 
         Raises
         ------
         BadInput
-            what only shows when bodies, forces and materials come together.
+            If there are errors.
         """
         return self.prepare(self.approach(self.impact.seeds[0]))
 
     def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
-        """One collision; options as for `Simulation`.  Raises BadInput."""
+        """Simulate one collision; options are those of `Simulation`. Raises BadInput."""
         start = self.approach(seed)
         simulation = self.prepare(start, **options)
         return run_to_end(start, simulation), simulation
 
 
 def wrong_bodies(content: dict[str, Any]) -> list[str]:
-    """What is wrong with the materials of a case with a target and a projectile."""
+    """Messages about the materials of a case with a target and a projectile."""
     problems = wrong_materials(content)
     own = content.get("materials", {})
     known = [*PRESETS, *(own if isinstance(own, dict) else [])]
@@ -193,7 +193,7 @@ def wrong_bodies(content: dict[str, Any]) -> list[str]:
 
 
 def with_absolute_paths(content: dict[str, Any]) -> dict[str, Any]:
-    """The case with the bodies' files named so that they are found from any folder."""
+    """The case with absolute paths to the files of bodies."""
     whole = dict(content)
     for body in BODIES & content.keys():
         given = content[body]
@@ -208,7 +208,7 @@ def read_collision(path: str | Path) -> CollisionCase:
     Raises
     ------
     BadInput
-        every mistake of the file, one line each, with its place.
+        All errors of the file, one line each, with their keys.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "collide")
@@ -218,14 +218,14 @@ def read_collision(path: str | Path) -> CollisionCase:
         case = model.model_validate(content)
     except ValidationError as error:
         extra: dict[type, list[str]] = {k: ["method"] for k in INTEGRATORS.values()}
-        problems += [line for slip in error.errors() for line in validation_errors(slip, model, extra)]
+        problems += [line for entry in error.errors() for line in validation_errors(entry, model, extra)]
     if problems or case is None:
         raise BadInput(f"{path}: {problem}" for problem in problems)
     return case
 
 
 def run_seed(text: str, seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
-    """One collision of a case given as JSON, its outcome as a dictionary: what worker processes run."""
+    """Simulate one collision of a case in JSON and return the outcome as a dictionary; runs in worker processes."""
     import warnings
 
     with warnings.catch_warnings():
@@ -243,18 +243,22 @@ def run_seeds(
     keep: Callable[[int, dict[str, Any]], None] | None = None,
     observers: Sequence[Any] = (),
 ) -> list[dict[str, Any]]:
-    """The outcomes for many seeds in their order, on any `concurrent.futures.Executor` or here.
+    """Outcomes for many seeds, in their order.
 
     Parameters
     ----------
-    case : dict[str, Any]
-        content of a case file that `read_collision` has accepted.
-    known : dict[int, dict[str, Any]] or None, optional
-        outcomes by seed that need not be computed again.
-    keep : Callable[[int, dict[str, Any]], None] or None, optional
-        called with each seed and its outcome as soon as it is there, in any order.
-    observers : Sequence[Any], optional
-        of the simulations, where there is no executor.
+    case : dict
+        Content of a case file accepted by `read_collision`.
+    seeds : list of int
+        One collision each.
+    executor : Executor, optional
+        Any `concurrent.futures.Executor`; None computes in this process.
+    known : dict or None, optional
+        Outcomes by seed that need not be computed.
+    keep : callable, optional
+        Called with each seed and its outcome on completion, in any order.
+    observers : sequence, optional
+        Observers of the simulations, without an executor.
     """
     own: dict[str, Any] = {} if executor is not None else {"observers": observers}
     work, found = partial(run_seed, json.dumps(case), **own), dict(known or {})
@@ -269,7 +273,7 @@ def run_seeds(
 def _outcomes(
     work: Callable[[int], dict[str, Any]], seeds: list[int], executor: Any
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Each seed and its outcome, as they come."""
+    """Pairs of seed and outcome, in order of completion."""
     if executor is None:
         yield from ((seed, work(seed)) for seed in seeds)
         return

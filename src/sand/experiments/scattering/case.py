@@ -150,7 +150,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     try:
         case = ScatterCase.model_validate(content)
     except ValidationError as error:
-        problems += [line for slip in error.errors() for line in validation_errors(slip, ScatterCase, {})]
+        problems += [line for entry in error.errors() for line in validation_errors(entry, ScatterCase, {})]
         raise BadInput(f"{path}: {problem}" for problem in problems) from None
     if problems:
         raise BadInput(f"{path}: {problem}" for problem in problems)

@@ -64,7 +64,7 @@ class Job:
             if with_absolute_paths(read_toml(place)) != self.content:
                 raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
         else:
-            write_toml(place, self.content, "sand scatter: what was asked for; sand resume reads it")
+            write_toml(place, self.content, "settings of sand scatter, read by sand resume")
         self.before: dict[int, list[list[float]]] = {}
         self.table = None
         if self.case.measure.job != "trajectories":

@@ -84,7 +84,7 @@ def slowest_period(setup: Flight) -> float:
 
 
 def grains_at(setup: Flight, state: np.ndarray) -> tuple[Grains, int]:
-    """Grains of both bodies, projectile first, in the frame of their centre of mass; and the projectile's number of grains."""
+    """Grains of both bodies, projectile first, in the centre-of-mass frame; and the projectile's number of grains."""
     one, two = setup.projectile, setup.target
     m1, m2 = float(one.mass.sum()), float(two.mass.sum())
     parts = []
