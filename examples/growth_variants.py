@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sand.experiments.executors import executor_for
 from sand.experiments.growth import grow
-from sand.experiments.growth_report import ensemble_in
+from sand.experiments.growth_report import read_ensemble
 from sand.io.run_folder import read_toml
 
 CASE = read_toml(Path(__file__).with_name("growth.toml"))
@@ -48,7 +48,7 @@ def main() -> None:
         for name in options.only or VARIANTS:
             folder = Path(options.out) / name.replace(" ", "-")
             grow(variant(name, options.until), range(1, options.boxes + 1), folder, executor)
-            growth = ensemble_in(folder).growth
+            growth = read_ensemble(folder).growth
             fits = [(growth.z, "exponent"), (growth.moment, "exponent"), (growth.dimension, "value")]
             columns = ["-" if fit is None else f"{getattr(fit, key):.2f} ± {fit.error:.2f}" for fit, key in fits]
             print(f"{name:10} {growth.mean[-1]:8.2f} ± {growth.error[-1]:.2f}", *(f"{text:>12}" for text in columns))

@@ -130,7 +130,7 @@ def test_momenta_and_energy():
 def test_aggregates_of_one_grain_are_spheres():
     """The rigid-body kernel with one grain each: the same flights as the kernel of spheres, 1e-6 of R at the end."""
     from sand.experiments.scattering.encounters import body_of
-    from sand.experiments.scattering.flight_driver import flights_of, room_for
+    from sand.experiments.scattering.flight_driver import allocate_workspace, flights_of
     from sand.experiments.scattering.two_aggregates import AGGREGATES, TWO_AGGREGATES, Aggregates
 
     flying = unequal()
@@ -142,7 +142,7 @@ def test_aggregates_of_one_grain_are_spheres():
     square = np.array([1.5e-7**2])
     nought = np.zeros(1, np.uint64)
     flights_of(TWO_AGGREGATES)(
-        np.uint64(0), nought, nought, square, square, room_for(AGGREGATES), results, ends,
+        np.uint64(0), nought, nought, square, square, allocate_workspace(AGGREGATES), results, ends,
         flying.start(0.0), rules, flying.limits(),
     )  # fmt: skip
     apart = one.projectile[-1] - one.target[-1]

@@ -160,7 +160,7 @@ def test_a_collision_cannot_change_on_its_way(place, hit, capsys, old, new):
     path.write_text(text.replace(old, new))
     assert main(["resume", "cut"]) == 2
     err = capsys.readouterr().err
-    assert err.count("\n") == 1 and "cannot change on its way" in err
+    assert err.count("\n") == 1 and "start a new collision in another folder" in err
 
 
 def test_many_collisions_go_on(place, capsys, monkeypatch):

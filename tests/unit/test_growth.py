@@ -10,7 +10,7 @@ import tomli_w
 import sand
 from sand.cli.main import main
 from sand.experiments.executors import executor_for
-from sand.experiments.growth import Box, boxes_in, grow, growth_of, one_box, read_box
+from sand.experiments.growth import BoxResult, boxes_in, grow, growth_of, read_box, run_box
 
 CASE = {
     "run": {"until": "30 ns", "frame_every": "1 ns"},
@@ -56,19 +56,19 @@ def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
 def test_called_again_it_goes_on(tmp_path):
     """To a later end, with the bits of a run that never stopped; a finished one is left as it is."""
     short = CASE | {"run": {"until": "10 ns", "frame_every": "1 ns"}}
-    assert one_box(short, 1, str(tmp_path / "seed-1")) == "finished"
-    assert one_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
-    assert one_box(CASE, 1, str(tmp_path / "whole")) == "finished"
+    assert run_box(short, 1, str(tmp_path / "seed-1")) == "finished"
+    assert run_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
+    assert run_box(CASE, 1, str(tmp_path / "whole")) == "finished"
     ours, theirs = (sand.open(tmp_path / name) for name in ("seed-1", "whole"))
     assert (ours.frames[-1].position == theirs.frames[-1].position).all()
     before = (tmp_path / "seed-1" / "trajectory.gsd").read_bytes()
-    assert one_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
+    assert run_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
     assert (tmp_path / "seed-1" / "trajectory.gsd").read_bytes() == before
     other = CASE | {"box": {"periodic": "0.26 um"}}
     with pytest.raises(sand.BadInput, match=r"other \[box\]"):
-        one_box(other, 1, str(tmp_path / "seed-1"))
+        run_box(other, 1, str(tmp_path / "seed-1"))
     (tmp_path / "seed-x").mkdir()  # not ours, and no hindrance
-    with pytest.raises(sand.BadInput, match=r"seed-1 holds a box with other \[box\]"):
+    with pytest.raises(sand.BadInput, match=r"seed-1 contains a box with different \[box\]"):
         grow(other, [2], tmp_path)
 
 
@@ -93,7 +93,7 @@ def made_up(z, gamma, dimension, seed, grains=1000):
     own = math.exp(0.1 * rng.normal())
     n = np.round(np.exp(rng.uniform(math.log(2), math.log(200), 300)))
     scatter = np.exp(0.1 * rng.normal(size=(2, 300)))
-    return Box(
+    return BoxResult(
         f"box-{seed}",
         time,
         (1.0 + own * 10 * time / 1e-5) ** z,
@@ -128,7 +128,7 @@ def test_what_cannot_be_told_says_why(ensembles):
     """Boxes without moments, and ones that hardly grew."""
     growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
     assert growth.moment is None and growth.missing["moment"] == "the grains have no moments"
-    assert growth.z is None and "the boxes are not between S = 2" in growth.missing["z"]
+    assert growth.z is None and "fewer than three times have S between 2" in growth.missing["z"]
     with pytest.raises(sand.BadInput, match=r"\[grains\] differs"):
         growth_of([made_up(2, 0.6, 1.4, 1), made_up(2, 0.6, 1.4, 2, grains=10)])
 

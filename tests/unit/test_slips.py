@@ -188,7 +188,7 @@ EXPERIMENTS = [
     ("sand.experiments.scattering.cross_section('10 nm', 7, speed=1)", "material = 7; give a sand.Material"),
     ("sand.experiments.scattering.cross_section('10 nm', 'iron', sped=1)", "did you mean 'speed'?"),
     ("sand.experiments.scattering.cross_section('10 nm', 'iron', speed=1, seed='a')", "seed = 'a'"),
-    ("sand.experiments.scattering.measure(7)", "flying = 7; give"),
+    ("sand.experiments.scattering.measure(7)", "setup = 7; give"),
     ("sand.experiments.scattering.probability_map(7)", "flights = 7 must be a list"),
     ("sand.experiments.kernel_table.on_grid(7, [1.0])", "kernel = 7 must be a function"),
     ("sand.theory.contact(7, '10 nm')", "material = 7; give a sand.Material"),

@@ -7,8 +7,8 @@ import sand
 from sand.constants import BOLTZMANN
 from sand.experiments.scattering import flight
 from sand.experiments.scattering.initial_conditions import R, U, draw_path
-from sand.experiments.scattering.two_aggregates import ANGULAR1, TURN1, rigid_pose
-from sand.experiments.scattering.two_spheres import DIRECTION1, DIRECTION2, SPIN1, SPIN2, sphere_pose
+from sand.experiments.scattering.two_aggregates import ANGULAR1, TURN1, draw_rigid_pose
+from sand.experiments.scattering.two_spheres import DIRECTION1, DIRECTION2, SPIN1, SPIN2, draw_sphere_pose
 from sand.numerics.quaternion import turned_back
 
 COUNT = 1500
@@ -31,7 +31,7 @@ def test_spheres(spin, part):
     """⟨½Iω²⟩ = kT/2 or 3kT/2, moments even over the sphere, b² even over its range, all to 4σ; b across the flight."""
     one, two = (sand.Grains([[0, 0, 0]], r, sand.IRON, moment=[[1e-18, 0, 0]]) for r in (1e-8, 2e-8))
     flying = flight(projectile=one, target=two, temperature="100 K", speed=0.3, spin=spin, start="3 um")
-    b, y = drawn(flying, sphere_pose)
+    b, y = drawn(flying, draw_sphere_pose)
     for grains, row in ((one, SPIN1), (two, SPIN2)):
         energy = 0.5 * grains.inertia[0] * (y[:, row : row + 3] ** 2).sum(axis=1)
         assert energy.mean() / (part * HEAT) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 3 / COUNT))
@@ -50,7 +50,7 @@ def test_aggregates():
     """A chain of three: a third of the rotational energy about each principal axis, to 4σ."""
     chain = sand.setup.aggregates.chain(3, radius="10 nm", material=sand.IRON, moment="1e-18 A m^2")
     flying = flight(projectile=chain, temperature="100 K", speed=0.3, spin="equipartition", start="3 um")
-    _, y = drawn(flying, rigid_pose)
+    _, y = drawn(flying, draw_rigid_pose)
     _, rules = flying.pair()
     inertia = np.array(rules.first.inertia)
     own = np.array([turned_back(tuple(one[TURN1 : TURN1 + 4]), tuple(one[ANGULAR1 : ANGULAR1 + 3])) for one in y])

@@ -36,15 +36,15 @@ def command(
     S(t) with its exponent z, moments against size, the fractal dimension, each with an error from the scatter
     between boxes. Two DIRs are also compared with each other.
     """
-    from ..experiments.growth_report import NAMES, compared, ensemble_in, numbers, write_analysis
+    from ..experiments.growth_report import NAMES, compare_growth, ensemble_summary, read_ensemble, write_analysis
 
     if window is not None and not 1.0 <= window[0] < window[1]:
         raise BadInput(f"--window {window[0]:g} {window[1]:g}: the first must be at least 1, the second above it")
     if len({Path(folder).absolute() for folder in folders}) < len(folders):
         raise BadInput("the same folder is given twice")
     place = None if out is None else _place(Path(out), NAMES, overwrite)
-    ensembles = [ensemble_in(folder, window) for folder in folders]
-    content = {"ensembles": [numbers(one) for one in ensembles], "comparison": compared(ensembles)}
+    ensembles = [read_ensemble(folder, window) for folder in folders]
+    content = {"ensembles": [ensemble_summary(one) for one in ensembles], "comparison": compare_growth(ensembles)}
     if place is not None:
         write_analysis(place, ensembles, content)
     if as_json:
@@ -85,16 +85,16 @@ def _tell(content: dict[str, Any], place: Path | None) -> None:
             ("D_f", _line(one, "dimension", "", " from N(r_g)")),
         ]
         report.show(one["name"], [row for row in rows if row[1]])
-    compared = content["comparison"]
-    if compared is not None:
+    comparison = content["comparison"]
+    if comparison is not None:
         report.show(
-            f"{compared['first']} against {compared['second']}",
+            f"{comparison['first']} against {comparison['second']}",
             [
                 (
                     "ln S",
-                    f"apart by {compared['sigma']:.3g} standard errors at {format_quantity(compared['time'], 's')}",
+                    f"apart by {comparison['sigma']:.3g} standard errors at {format_quantity(comparison['time'], 's')}",
                 ),
-                ("S", f"apart by {compared['sigma_of_size']:.3g}"),
+                ("S", f"apart by {comparison['sigma_of_size']:.3g}"),
             ],
         )
     if place is not None:

@@ -1,6 +1,6 @@
-"""Published figures and common measurements, each as one function.
+"""Numerical experiments: collisions, cross-sections, growth of ensembles and collision kernels.
 
-Modules are loaded when first used: `sand.experiments.scattering.cross_section(...)` needs no import of its own.
+Submodules are imported on first use: `sand.experiments.scattering.cross_section(...)` needs no further import.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import NoSuchAttribute, did_you_mean
 
 MODULES = ("chain_impact", "collision", "kernel_table", "scattering")
-"""What there is to be used; the other modules serve these and the command line."""
+"""Public submodules; the others are used by these and by the command line."""
 
 
 def __getattr__(name: str) -> Any:

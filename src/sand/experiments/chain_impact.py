@@ -1,7 +1,8 @@
-"""A grain strikes the end of a straight chain: the paper's Figure 4, and the map around it.
+"""Impact of a grain on the end of a straight chain (Dominik & Nübold 2002, Figure 4).
 
-The paper shows one picture: a linear chain that ends T-shaped after the fast impact of another grain, which
-hit-and-stick would not give.  Speed, place of impact and size are not stated; the map shows where a T arises.
+The paper shows one example of a linear chain that becomes T-shaped after the fast impact of another grain, which
+hit-and-stick growth cannot produce. It gives neither speed nor impact position nor size; `shape_map` shows which lead
+to a T.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ from ..units import si
 
 SHAPES = ("T", "branched", "bent", "straight", "ring", "broken", "gone")
 PERPENDICULAR = 30.0
-"""Degrees by which the crossbar of a T may lean from perpendicular to the chain."""
+"""Largest deviation of the crossbar of a T from perpendicular [°]."""
 STRAIGHT = 20.0
-"""Largest angle between neighbouring links of a chain that counts as straight [°]."""
+"""Largest angle between neighbouring links of a straight chain [°]."""
 FLIGHT = 40.0
-"""Length of a run, in times the projectile needs for one grain radius."""
+"""Duration of a run, in units of radius over speed."""
 FINE = 100.0
-"""Steps per fastest period: released displacements and the fate of a fast impact need more than the usual 25."""
+"""Steps per fastest period; results of fast impacts are not converged with the usual 25."""
 START = 2.3
-"""Height at which the projectile starts, in radii above the chain's axis."""
+"""Initial height of the projectile above the chain's axis, in radii."""
 
 
 class Shape(NamedTuple):
-    """What a struck chain has become."""
+    """Shape of a chain after an impact."""
 
     name: str  # one of SHAPES
-    crossbar: float  # angle between crossbar and stem [°], 90 for a perfect T; nan without a branch
-    rolled: float  # how far the struck end grain went round its neighbour [°]; nan if it broke off
+    crossbar: float  # angle between crossbar and stem [°], 90 for a perfect T; NaN without a branch
+    rolled: float  # rolling angle of the struck end grain about its neighbour [°]; NaN if it broke off
 
 
 @checked
@@ -56,42 +57,55 @@ def strike(
     stepping: Verlet | None = None,
     **options: Any,
 ) -> Simulation:
-    """Run one impact: a chain at rest along x, a grain flying along −y onto its end.
+    """Simulate one impact: a grain moving along −y hits the end of a chain at rest along x.
 
     Parameters
     ----------
-    radius
-        r [m] of all grains; speed: [m/s] > 0.
+    material : Material or str
+        Material of all grains.
+    radius : float or str
+        Radius r of all grains [m].
+    speed : float or str
+        Speed of the projectile [m/s] > 0.
     place : float
-        where the projectile's line of flight crosses the chain, in radii from the centre of the end grain,
-        positive beyond the end.
+        Impact position: distance of the line of flight from the centre of the end grain in radii, positive beyond the
+        end.
     grains : int, optional
-        N ≥ 4 of the chain.
-    options
-        passed on to `Simulation` (out, observers, frame_every).
+        Number of grains N ≥ 4 of the chain.
+    contact : Contact, optional
+        Contact model.
+    stepping : Verlet, optional
+        Integrator; by default with `FINE` steps per period.
+    **options
+        Options of `Simulation` (out, observers, frame_every).
+
+    Returns
+    -------
+    Simulation
+        The simulation at its end.
 
     Raises
     ------
     BadInput
-        numbers out of range.
+        If an argument is invalid.
     """
     r, v = si(radius, "m", "radius", above=0.0), si(speed, "m/s", "speed", above=0.0)
     if not grains >= 4:
-        raise BadInput(f"grains of a chain = {grains!r}: a struck chain needs at least 4")
+        raise BadInput(f"grains of a chain = {grains!r}: the chain needs at least 4")
     body = chain(grains, radius=r, material=material)
     above = body.position[-1] + r * np.array([place, START, 0.0])
     projectile = chain(1, radius=r, material=material)
-    met = combined([body, projectile], shifts=[np.zeros(3), above], velocities=[np.zeros(3), np.array([0.0, -v, 0.0])])
+    both = combined([body, projectile], shifts=[np.zeros(3), above], velocities=[np.zeros(3), np.array([0.0, -v, 0.0])])
     options.setdefault("frame_every", FLIGHT * r / v)
     fine = stepping or Verlet(steps_per_period=FINE)
-    simulation = Simulation(met, [contact or Contact()], stepping=fine, **options)
+    simulation = Simulation(both, [contact or Contact()], stepping=fine, **options)
     simulation.run(until=FLIGHT * r / v)
     return simulation
 
 
 @checked
 def shape_of(simulation: Simulation) -> Shape:
-    """What the chain of `strike` has become; the last grain is the projectile."""
+    """Classify the final state of `strike`; the last grain is the projectile."""
     return shape(simulation.grains.position, simulation.contacts["pair"], len(simulation.grains) - 1)
 
 
@@ -99,15 +113,19 @@ def shape_of(simulation: Simulation) -> Shape:
 def shape(position: np.ndarray, pairs: np.ndarray, grains: int) -> Shape:
     """Classify chain and projectile.
 
-    "T": a node with three neighbours, and the line between the two ends of its short branches stands within 30° of
-    perpendicular to the link to the long branch, the struck end grain having rolled by more than 30°; "branched":
-    any other node of three; "ring": a closed loop; "bent" and "straight": a chain still; "broken"; "gone": the
-    projectile missed or left again.
+    "T": a node has three neighbours, the line through the ends of the two short branches deviates by at most 30° from
+    perpendicular to the link of the long branch, and the struck end grain has rolled by more than 30°. "branched": any
+    other node with three neighbours. "ring": a closed loop. "bent", "straight": still a chain. "broken". "gone": the
+    projectile missed or separated.
 
     Parameters
     ----------
     position : ndarray
-        (N + 1, 3) [m], the projectile last; pairs: (C, 2) contacts; grains: N of the chain.
+        (N + 1, 3) [m], projectile last.
+    pairs : ndarray
+        Contacts (C, 2).
+    grains : int
+        Number of grains N of the chain.
     """
     labels = cluster_labels(grains + 1, pairs)
     neighbours: list[list[int]] = [[] for _ in range(grains + 1)]
@@ -135,7 +153,7 @@ def shape(position: np.ndarray, pairs: np.ndarray, grains: int) -> Shape:
 def first_touch(
     material: Material | str, radius: float, place: float, grains: int = 8
 ) -> tuple[np.ndarray, list[list[int]]]:
-    """Positions (N + 1, 3) [m] and contacts of the same impact with sticking at the first touch: hit-and-stick."""
+    """Positions (N + 1, 3) [m] and contacts of hit-and-stick: the projectile stays at its first contact."""
     pitch = rest_distance(material, radius)
     position = np.zeros((grains + 1, 3))
     position[:grains, 0] = pitch * (np.arange(grains) - (grains - 1))
@@ -150,7 +168,7 @@ def first_touch(
 
 @checked
 def stick_at_first_touch(material: Material | str, radius: float, place: float, grains: int = 8) -> Shape:
-    """What hit-and-stick makes of the same impact: nothing rolls."""
+    """Shape that results from hit-and-stick, without rolling."""
     position, pairs = first_touch(material, radius, place, grains)
     return shape(position, np.array(pairs), grains)
 
@@ -159,7 +177,7 @@ def stick_at_first_touch(material: Material | str, radius: float, place: float, 
 def shape_map(
     material: Material | str, radius: Any, speeds: Sequence[float], places: Sequence[float], **options: Any
 ) -> np.ndarray:
-    """Names of the shapes for every speed [m/s] and place, (speeds, places); options as for `strike`."""
+    """Names of the shapes for all speeds [m/s] and impact positions, (speeds, places); options as for `strike`."""
     return np.array(
         [[shape_of(strike(material, radius, speed=v, place=p, **options)).name for p in places] for v in speeds]
     )
@@ -175,7 +193,7 @@ def _largest_bend(position: np.ndarray) -> float:
 
 
 def _rolled(position: np.ndarray, neighbours: list[list[int]], grains: int) -> float:
-    """Angle [°] by which the end grain left the line of the chain, about its neighbour."""
+    """Rolling angle [°] of the end grain about its neighbour, from the line of the chain; NaN if it broke off."""
     end, last = grains - 1, grains - 2
     if last not in neighbours[end]:
         return float("nan")
@@ -183,7 +201,7 @@ def _rolled(position: np.ndarray, neighbours: list[list[int]], grains: int) -> f
 
 
 def _crossbar(position: np.ndarray, neighbours: list[list[int]], node: int) -> float:
-    """Angle [°], up to 90, between the stem (the longest branch) and the line through the two other neighbours."""
+    """Angle [°], up to 90, between the stem (the longest branch) and the line through the other two neighbours."""
     stem = max(neighbours[node], key=lambda k: _branch(neighbours, node, k))
     one, other = (k for k in neighbours[node] if k != stem)
     lean = _angle(position[stem] - position[node], position[one] - position[other])
@@ -191,7 +209,7 @@ def _crossbar(position: np.ndarray, neighbours: list[list[int]], node: int) -> f
 
 
 def _branch(neighbours: list[list[int]], node: int, start: int) -> int:
-    """Number of grains beyond `start`, seen from `node`."""
+    """Number of grains of the branch that begins with `start` at `node`."""
     seen, queue = {node, start}, [start]
     while queue:
         for k in neighbours[queue.pop()]:

@@ -1,4 +1,4 @@
-"""Two bodies collide: what becomes of them."""
+"""Collision of two bodies, simulated until contacts no longer change."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from ..setup.encounters import encounter, turned_at_random
 from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
 from ..units import si
-from .collision_outcome import Approach, Collision, judged
+from .collision_outcome import Approach, Collision, classify_collision
 
 QUIET = 3
-"""A collision is over after this many looks in a row without a contact made, moved or broken."""
-LOOKS = 400
-"""It is stopped after this many looks at the latest."""
+"""Number of consecutive intervals without contacts formed, slipped or broken that end a collision."""
+MOST_CHECKS = 400
+"""Largest number of intervals."""
 
 
 @checked
@@ -47,79 +47,81 @@ def collide(
     overwrite: bool = False,
     observers: Sequence[Any] = (),
 ) -> tuple[Collision, Simulation]:
-    """Let a projectile hit a target in open space and wait until nothing happens any more.
+    """Simulate the collision of a projectile with a target in open space until contacts no longer change.
 
     Parameters
     ----------
     target, projectile : Grains
-        bodies at rest, from `sand.setup` or of one's own.
+        Bodies at rest.
     speed, impact_parameter, along
-        see `sand.setup.encounter`.
+        See `sand.setup.encounter`.
     seed : int or None, optional
-        turn both bodies at random first; None leaves them as they are.
-    forces : Sequence[Force] or None, optional
+        Seed of random rotations of both bodies; None keeps their orientations.
+    forces : sequence of Force or None, optional
         `[sand.Contact()]` by default.
     stepping, out, overwrite, observers : optional
-        as for `sand.Simulation`.
+        As for `sand.Simulation`.
 
     Returns
     -------
-    tuple[Collision, Simulation]
-        The outcome, and the simulation as it ended.
+    Collision
+        The outcome.
+    Simulation
+        The simulation at its end.
 
     Raises
     ------
     BadInput
-        see `encounter` and `Simulation`.
+        As `sand.setup.encounter` and `sand.Simulation`.
     """
     start = approach(target, projectile, speed=speed, impact_parameter=impact_parameter, along=along, seed=seed)
-    simulation = prepared(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
-    return finished(start, simulation), simulation
+    simulation = prepare(start, forces, stepping, out=out, overwrite=overwrite, observers=observers)
+    return run_to_end(start, simulation), simulation
 
 
 def approach(
     target: Grains, projectile: Grains, *, speed: Any, impact_parameter: Any, along: Any, seed: int | None
 ) -> Approach:
-    """The bodies of a collision before they meet; the arguments are those of `collide`.  Raises BadInput."""
+    """Bodies of a collision before contact, with the arguments of `collide`. Raises BadInput."""
     v = si(speed, "m/s", "speed", above=0.0)
     if seed is not None:
         rng = np.random.default_rng(seed)
         target, projectile = turned_at_random(target, rng), turned_at_random(projectile, rng)
-    met = encounter(target, projectile, speed=v, impact_parameter=impact_parameter, along=along)
-    return Approach(target, projectile, met.grains, met.flight, v, seed)
+    pair = encounter(target, projectile, speed=v, impact_parameter=impact_parameter, along=along)
+    return Approach(target, projectile, pair.grains, pair.flight, v, seed)
 
 
-def prepared(
+def prepare(
     start: Approach, forces: Sequence[Force] | None = None, stepping: Verlet | Adaptive | None = None, **options: Any
 ) -> Simulation:
-    """The simulation of a collision at its start; options are passed on to `Simulation`.  Raises BadInput."""
+    """Set up the simulation of a collision; options are those of `Simulation`. Raises BadInput."""
     return Simulation(
         start.grains,
         [Contact()] if forces is None else forces,
         stepping=stepping,
         seed=start.seed,
-        frame_every=start.look_every,
+        frame_every=start.check_every,
         **options,
     )
 
 
-def gone_on_with(
+def resume_collision(
     start: Approach,
     folder: str | Path,
     forces: Sequence[Force] | None = None,
     stepping: Verlet | Adaptive | None = None,
     **options: Any,
 ) -> Simulation:
-    """The simulation of a collision that was interrupted, from the newest checkpoint in its folder.
+    """Resume the simulation of an interrupted collision from its newest checkpoint.
 
     Raises
     ------
     BadInput
-        as `config.build.resume`; or the folder holds another collision than the one asked for.
+        As `config.build.resume`; or if the folder contains a different collision.
     """
     simulation = resume(folder, **options)
-    asked, begun = (case_of(one, math.inf, math.inf) for one in (prepared(start, forces, stepping), simulation))
-    changed = [name for name in asked if name != "run" and asked[name] != begun[name]]
+    requested, stored = (case_of(one, math.inf, math.inf) for one in (prepare(start, forces, stepping), simulation))
+    changed = [name for name in requested if name != "run" and requested[name] != stored[name]]
     first = _first_frame(Path(folder) / TRAJECTORY)
     for name in ("position", "velocity") if first is not None else ():
         ours, theirs = getattr(start.grains, name), getattr(first, name)
@@ -128,14 +130,14 @@ def gone_on_with(
             changed.append(name)
     if changed:
         raise BadInput(
-            f"{folder} holds a collision with other {changed[0]}, and a collision cannot change on its way; "
-            "put its case back, or begin a new one in another folder"
+            f"{folder} contains a collision with different {changed[0]}; restore its case, or start a new collision in "
+            "another folder"
         )
     return simulation
 
 
 def _first_frame(path: Path) -> Any:
-    """Of a trajectory; None for one that is missing or damaged, which the run that goes on mends or begins anew."""
+    """First frame of a trajectory; None if it is missing or damaged, which the resumed run repairs."""
     try:
         frames = Frames(path)
     except BadInput:
@@ -148,48 +150,48 @@ def _first_frame(path: Path) -> Any:
         frames.close()
 
 
-def finished(start: Approach, simulation: Simulation) -> Collision:
-    """Run a collision on to its end, from wherever it stands, and judge it.
+def run_to_end(start: Approach, simulation: Simulation) -> Collision:
+    """Run a collision to its end and classify the outcome.
 
     Raises
     ------
     BadInput
-        the physics stopped it.
+        If the simulation stopped for physical reasons.
     Interrupted
-        Ctrl-C; `gone_on_with` goes on.
+        By Ctrl-C; `resume_collision` resumes.
     """
     before = len(simulation.contacts["pair"]) if simulation.steps == 0 else int(simulation.ledger.rows[0]["contacts"])
     record = simulation.writer
     if record is not None:
-        record.draws = False  # not at each look, but once, when all is over
+        record.draws = False  # the figure is drawn once at the end, not after each interval
     quiet = _until_quiet(simulation, start)
     if record is not None:
         record.draw(simulation)
-    return judged(simulation, start, before, quiet)
+    return classify_collision(simulation, start, before, quiet)
 
 
 def _until_quiet(simulation: Simulation, start: Approach) -> bool:
-    """Run on until contacts neither form, move nor break for a while; False if that never comes.
+    """Run until contacts neither form, slip nor break for `QUIET` intervals; False after `MOST_CHECKS` intervals.
 
-    Looks that were taken before an interruption stand in the ledger: each is its first row at or after its time.
+    Checks made before an interruption are repeated with the ledger: each uses the first row at or after its time.
     """
     across = float(np.ptp(start.grains.position, axis=0).max())
-    until, calm, last = start.flight, 0, (-1, -1, -1)
-    for look in range(1 + LOOKS):  # the first is when they can touch
+    until, unchanged, last = start.flight, 0, (-1, -1, -1)
+    for check in range(1 + MOST_CHECKS):  # the first one is at the earliest contact
         row = next((row for row in simulation.ledger.rows if row["time"] >= until), None)
         if row is None:
             result = simulation.run(until=until)
             if result.outcome.is_physics:
                 raise BadInput(f"the collision cannot be computed: {result}")
             row = simulation.ledger.rows[-1]
-        until = row["time"] + 10.0 * start.look_every
-        if look == 0:
+        until = row["time"] + 10.0 * start.check_every
+        if check == 0:
             continue
         now = (int(row["made"]), int(row["moved"]), int(row["broken"]))
-        calm = calm + 1 if now == last else 0
+        unchanged = unchanged + 1 if now == last else 0
         last = now
-        met = now[0] > 0 or row["time"] > start.flight + across / start.speed
-        if met and calm >= QUIET:
+        contact = now[0] > 0 or row["time"] > start.flight + across / start.speed
+        if contact and unchanged >= QUIET:
             return True
     return False
 
@@ -201,18 +203,18 @@ def collide_many(
     executor: Executor | None = None,
     **options: Any,
 ) -> list[Collision]:
-    """The same collision for many seeds: other aggregates, other orientations.
+    """Simulate the same collision for many seeds, with different aggregates and orientations.
 
     Parameters
     ----------
-    build : Callable[[int], tuple[Grains, Grains]]
-        makes target and projectile for a seed; a module-level function if processes are to run it.
-    seeds : Sequence[int]
-        one collision each; results come in their order, whatever the executor.
+    build : callable
+        Returns target and projectile for a seed; a module-level function if an executor runs it in other processes.
+    seeds : sequence of int
+        One collision each; results have this order.
     executor : Executor or None, optional
-        any `concurrent.futures.Executor`; None: one after the other here.
-    options
-        passed on to `collide`.
+        Any `concurrent.futures.Executor`; None computes in this process.
+    **options
+        Options of `collide`.
     """
     if executor is None:
         return [_one(build, seed, options) for seed in seeds]

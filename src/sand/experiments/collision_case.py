@@ -1,4 +1,4 @@
-"""Case files of collisions."""
+"""Case files of `sand collide`."""
 
 from __future__ import annotations
 
@@ -27,16 +27,18 @@ from ..setup.encounters import offset_of
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
-from .collision import Approach, Collision, approach, finished, gone_on_with, prepared
+from .collision import Approach, Collision, approach, prepare, resume_collision, run_to_end
 
-Kind = Literal["grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"]
-"""The builders, `setup.aggregates.KINDS`, and a file."""
+BodyKind = Literal[
+    "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
+]
+"""Names of the builders in `setup.aggregates.KINDS`, and "file"."""
 
 
 class BodySection(Section):
-    """[target] and [projectile]: an aggregate of some kind (another for each seed where chance makes it), or a file."""
+    """Sections [target] and [projectile]: an aggregate (a different one for each seed if it is random), or a file."""
 
-    kind: Kind
+    kind: BodyKind
     """Builder (as for `sand build`), or `file`."""
     path: PathName | None = None
     """File of the body; required with `kind = "file"`."""
@@ -84,7 +86,7 @@ class BodySection(Section):
         return self
 
     def build(self, materials: dict[str, Material], seed: int) -> Grains:
-        """Raises BadInput."""
+        """Build the body. Raises BadInput."""
         if self.kind == "file":
             own = materials[self.material]
             one = own if "material" in self.model_fields_set else None
@@ -95,7 +97,7 @@ class BodySection(Section):
 
 
 class ImpactSection(Section):
-    """[impact]: how they meet, and how often."""
+    """Section [impact]: relative motion, orientations and seeds."""
 
     speed: quantity("m/s", above=0.0)  # type: ignore[valid-type]
     """Relative speed of the centres of mass [m/s]."""
@@ -118,7 +120,7 @@ class ImpactSection(Section):
 
 
 class CollisionCase(Section):
-    """A whole case file of `sand collide`."""
+    """Case file of `sand collide`."""
 
     target: BodySection
     projectile: BodySection
@@ -133,7 +135,7 @@ class CollisionCase(Section):
         return without_method(value)
 
     def approach(self, seed: int) -> Approach:
-        """The bodies of one collision; with `turn` they are turned at random by the seed.  Raises BadInput."""
+        """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""
         materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
         return approach(
             self.target.build(materials, 2 * seed),
@@ -144,33 +146,33 @@ class CollisionCase(Section):
             seed=seed if self.impact.turn else None,
         )
 
-    def prepared(self, start: Approach, **options: Any) -> Simulation:
-        """The simulation of one collision at its start; options as for `Simulation`.  Raises BadInput."""
-        return prepared(start, self.forces.build() or None, self.stepping, **options)
+    def prepare(self, start: Approach, **options: Any) -> Simulation:
+        """Set up the simulation of one collision; options are those of `Simulation`. Raises BadInput."""
+        return prepare(start, self.forces.build() or None, self.stepping, **options)
 
-    def gone_on_with(self, start: Approach, folder: Path, **options: Any) -> Simulation:
-        """The simulation of a collision that was interrupted, see `collision.gone_on_with`.  Raises BadInput."""
-        return gone_on_with(start, folder, self.forces.build() or None, self.stepping, **options)
+    def resume_collision(self, start: Approach, folder: Path, **options: Any) -> Simulation:
+        """Resume an interrupted collision, see `collision.resume_collision`. Raises BadInput."""
+        return resume_collision(start, folder, self.forces.build() or None, self.stepping, **options)
 
     def check(self) -> Simulation:
-        """The first collision at its start, in memory, so that all that can be wrong with it is found.
+        """Set up the first collision in memory, to find errors in the combination of bodies, forces and materials.
 
         Raises
         ------
         BadInput
-            what only shows when bodies, forces and materials come together.
+            If there are errors.
         """
-        return self.prepared(self.approach(self.impact.seeds[0]))
+        return self.prepare(self.approach(self.impact.seeds[0]))
 
     def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
-        """One collision; options as for `Simulation`.  Raises BadInput."""
+        """Simulate one collision; options are those of `Simulation`. Raises BadInput."""
         start = self.approach(seed)
-        simulation = self.prepared(start, **options)
-        return finished(start, simulation), simulation
+        simulation = self.prepare(start, **options)
+        return run_to_end(start, simulation), simulation
 
 
 def with_absolute_paths(content: dict[str, Any]) -> dict[str, Any]:
-    """The case with the bodies' files named so that they are found from any folder."""
+    """The case with absolute paths to the files of bodies."""
     whole = dict(content)
     for body in BODIES & content.keys():
         given = content[body]
@@ -185,7 +187,7 @@ def read_collision(path: str | Path) -> CollisionCase:
     Raises
     ------
     BadInput
-        every mistake of the file, one line each, with its place.
+        All errors of the file, one line each, with their keys.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "collide")
@@ -194,7 +196,7 @@ def read_collision(path: str | Path) -> CollisionCase:
 
 
 def run_seed(text: str, seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
-    """One collision of a case given as JSON, its outcome as a dictionary: what worker processes run."""
+    """Simulate one collision of a case in JSON and return the outcome as a dictionary; runs in worker processes."""
     import warnings
 
     with warnings.catch_warnings():
@@ -212,18 +214,22 @@ def run_seeds(
     keep: Callable[[int, dict[str, Any]], None] | None = None,
     observers: Sequence[Any] = (),
 ) -> list[dict[str, Any]]:
-    """The outcomes for many seeds in their order, on any `concurrent.futures.Executor` or here.
+    """Outcomes for many seeds, in their order.
 
     Parameters
     ----------
-    case : dict[str, Any]
-        content of a case file that `read_collision` has accepted.
-    known : dict[int, dict[str, Any]] or None, optional
-        outcomes by seed that need not be computed again.
-    keep : Callable[[int, dict[str, Any]], None] or None, optional
-        called with each seed and its outcome as soon as it is there, in any order.
-    observers : Sequence[Any], optional
-        of the simulations, where there is no executor.
+    case : dict
+        Content of a case file accepted by `read_collision`.
+    seeds : list of int
+        One collision each.
+    executor : Executor, optional
+        Any `concurrent.futures.Executor`; None computes in this process.
+    known : dict or None, optional
+        Outcomes by seed that need not be computed.
+    keep : callable, optional
+        Called with each seed and its outcome on completion, in any order.
+    observers : sequence, optional
+        Observers of the simulations, without an executor.
     """
     own: dict[str, Any] = {} if executor is not None else {"observers": observers}
     work, found = partial(run_seed, json.dumps(case), **own), dict(known or {})
@@ -238,7 +244,7 @@ def run_seeds(
 def _outcomes(
     work: Callable[[int], dict[str, Any]], seeds: list[int], executor: Any
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Each seed and its outcome, as they come."""
+    """Pairs of seed and outcome, in order of completion."""
     if executor is None:
         yield from ((seed, work(seed)) for seed in seeds)
         return

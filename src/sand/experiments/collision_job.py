@@ -1,4 +1,4 @@
-"""What `sand collide` does with a case: collide, keep what is finished, put outcomes and figure into the folder."""
+"""Job of `sand collide`: simulates collisions, saves each outcome, and writes results and figure to the folder."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from ..io.run_folder import (
     write_toml,
 )
 from ..io.table import GrowingOutcomes
-from .collision import finished
+from .collision import run_to_end
 from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
 
 
 def description_in(folder: Path) -> Path | None:
-    """The case of the collisions in a folder, as `sand collide` left it there; None if it did not."""
+    """Path of the case file that `sand collide` wrote to a folder; None if there is none."""
     one, many = folder / ONE_COLLISION, folder / CASE
     if one.exists():
         return one
@@ -36,25 +36,25 @@ def description_in(folder: Path) -> Path | None:
 
 
 class CollisionJob:
-    """The collisions of one case, in a folder.
+    """Collisions of one case, in a folder.
 
     Parameters
     ----------
     path : str or Path
-        of the case file.
+        Case file.
     folder : Path or None, optional
-        where the files go; by default as the case says, or by its name.
-    seeds : list[int] or None, optional
-        instead of those in the case.
+        Output folder; by default that of the case, or the name of the case file.
+    seeds : list of int or None, optional
+        Replaces the seeds of the case.
     resume : bool, optional
-        go on with what lies there.
+        Resume the job in the folder.
     overwrite : bool, optional
-        replace what lies there.
+        Replace earlier files.
 
     Raises
     ------
     BadInput
-        every mistake of the case, or a folder that is in use.
+        All errors of the case.
     """
 
     def __init__(
@@ -75,21 +75,21 @@ class CollisionJob:
         self.content["impact"]["seeds"] = self.case.impact.seeds
 
     def run(self, executor: Executor | None = None, observers: Sequence[Any] = ()) -> dict[str, Any]:
-        """All collisions that are not finished yet; returns what collision.json holds.
+        """Simulate all collisions that are not finished; returns the content of collision.json.
 
         Parameters
         ----------
         executor : Executor or None, optional
-            for many seeds; by default they are computed here, one after the other.
-        observers : Sequence[Any], optional
-            of simulations in this process.
+            Executor for several seeds; None computes in this process.
+        observers : sequence, optional
+            Observers of the simulations in this process.
 
         Raises
         ------
         BadInput
-            what only shows when bodies, forces and materials come together, or while they collide.
+            If bodies, forces and materials do not fit together, or a simulation stopped for physical reasons.
         Interrupted
-            Ctrl-C; a job with `resume` goes on.
+            By Ctrl-C; a job with `resume` resumes.
         """
         seeds = self.case.impact.seeds
         results = [self._one(seeds[0], observers)] if len(seeds) == 1 else self._many(seeds, executor, observers)
@@ -101,26 +101,26 @@ class CollisionJob:
             "counts": dict(counts),
         }
         write_json(self.folder / COLLISION, content)
-        (self.folder / OUTCOMES).unlink(missing_ok=True)  # all of them are in collision.json
+        (self.folder / OUTCOMES).unlink(missing_ok=True)  # its content is in collision.json
         return content
 
     def _one(self, seed: int, observers: Sequence[Any]) -> dict[str, Any]:
-        """With all the files that a run leaves."""
-        start, case = self._blamed(lambda: self.case.approach(seed)), self.case
+        """Simulate a single collision with all files of a run."""
+        start, case = self._with_case_name(lambda: self.case.approach(seed)), self.case
         if self.resume and any(self.folder.glob("checkpoint-*.npz")):
-            simulation = case.gone_on_with(start, self.folder, observers=list(observers))
-        else:  # without a checkpoint there is nothing to lose
+            simulation = case.resume_collision(start, self.folder, observers=list(observers))
+        else:  # without a checkpoint there is nothing to resume
             options = {"out": self.folder, "overwrite": self.overwrite or self.resume, "observers": list(observers)}
-            simulation = self._blamed(lambda: case.prepared(start, **options))
+            simulation = self._with_case_name(lambda: case.prepare(start, **options))
             self._describe(ONE_COLLISION)
-        return finished(start, simulation).to_dict()
+        return run_to_end(start, simulation).to_dict()
 
     def _many(self, seeds: list[int], executor: Executor | None, observers: Sequence[Any]) -> list[dict[str, Any]]:
-        """Their outcomes alone, and a figure of all."""
+        """Compute the outcomes of several seeds, and a figure of all."""
         from ..plotting.collisions import collision_figure
         from ..plotting.run_figure import save
 
-        self._blamed(self.case.check)
+        self._with_case_name(self.case.check)
         if not self.resume:
             make_folder(self.folder, overwrite=self.overwrite)
             self._describe(CASE)
@@ -131,10 +131,10 @@ class CollisionJob:
         return results
 
     def _describe(self, name: str) -> None:
-        write_toml(self.folder / name, self.content, "sand collide: what was asked for; sand resume reads it")
+        write_toml(self.folder / name, self.content, "settings of sand collide, read by sand resume")
 
-    def _blamed(self, make: Any) -> Any:
-        """`make()`; what is wrong there is wrong with the case file."""
+    def _with_case_name(self, make: Any) -> Any:
+        """Call `make()`; its errors are reported as errors of the case file."""
         try:
             return make()
         except BadInput as error:

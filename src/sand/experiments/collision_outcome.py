@@ -1,4 +1,4 @@
-"""What two bodies are before they collide, and what becomes of them."""
+"""Initial state and outcome of a collision."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ..state.state import LOST
 
 
 class Approach(NamedTuple):
-    """Two bodies, turned and aimed, before they meet."""
+    """Two bodies on a collision course before contact."""
 
     target: Grains
     projectile: Grains
     grains: Grains  # of both, the target's first
-    flight: float  # time until they can touch first [s], about
+    flight: float  # approximate time of the earliest possible contact [s]
     speed: float  # [m/s]
     seed: int | None
 
     @property
-    def look_every(self) -> float:
-        """Time between frames [s]: a twentieth of that which the smallest grain takes for its own diameter.
+    def check_every(self) -> float:
+        """Time between frames [s]: 0.1 r/v of the smallest grain, a twentieth of the time for its diameter.
 
-        But no less than 30 sound crossings.
+        At least 30 sound crossing times of its radius.
         """
         smallest = float(self.grains.radius.min())
         sound = max(math.sqrt(m.density / m.young_modulus) for m in self.grains.materials)
@@ -38,30 +38,42 @@ class Approach(NamedTuple):
 
 @dataclass(frozen=True)
 class Collision:
-    """The outcome of one collision; SI.
+    """Outcome of one collision; SI.
 
     Attributes
     ----------
     outcome : str
         "stick" (one body), "bounce" (two bodies of the same grains as before), "miss", or "fragment".
     speed, impact_parameter : float
-        as asked; seed: of the orientations, None for as given.
-    fragments : tuple[int, ...]
-        grains of each body at the end, largest first.
+        Initial values [m/s], [m].
+    seed : int or None
+        Seed of the orientations; None: as given.
+    fragments : tuple of int
+        Numbers of grains of the final bodies, by decreasing mass.
     largest_remnant : float
-        mass of the largest body over all mass.
+        Mass of the largest body over the total mass.
     made, moved, broken : int
-        contacts formed, moved (a limit passed in a step), broken during the collision.
+        Contacts formed, slipped (steps in which a limit was exceeded), and broken.
     contacts_before, contacts_after : int
-        their numbers.
-    lost : dict[str, float]
-        energy dissipated per channel [J]; impact_energy: m̄v²/2 [J].
-    gyration_before : tuple[float, float]
-        radii of gyration of target and projectile [m]; gyration_after: of the largest remnant.
+        Numbers of contacts.
+    impact_energy : float
+        Energy of the relative motion m̄v²/2 [J].
+    lost : dict of str to float
+        Energy dissipated per mechanism [J].
+    gyration_before : tuple of float
+        Radii of gyration of target and projectile [m].
+    gyration_after : float
+        Radius of gyration of the largest remnant [m].
     rebound : float
-        relative speed of the two largest bodies at the end [m/s], 0 if there is one.
-    time, steps
-        of the simulation; drift: of its ledger; quiet: False if it was stopped while still busy.
+        Final relative speed of the two largest bodies [m/s], 0 for a single body.
+    time : float
+        Simulated time [s].
+    steps : int
+        Number of steps.
+    drift : float
+        Relative energy error of the ledger.
+    quiet : bool
+        False if the simulation was stopped while contacts still changed.
     """
 
     outcome: str
@@ -86,25 +98,25 @@ class Collision:
     quiet: bool = True
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Dictionary for JSON."""
         return asdict(self)
 
 
-def judged(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
-    """What became of two bodies.
+def classify_collision(simulation: Simulation, start: Approach, before: int, quiet: bool) -> Collision:
+    """Classify the outcome of a collision and measure the final bodies.
 
     Parameters
     ----------
     simulation : Simulation
-        at its end.
+        Simulation at its end.
     start : Approach
-        what it began with.
+        Initial state.
     before : int
-        contacts at the start.
+        Initial number of contacts.
     quiet : bool
-        False if it was stopped while still busy.
+        False if the simulation was stopped while contacts still changed.
     """
-    target, projectile, begun, speed = start.target, start.projectile, start.grains, start.speed
+    target, projectile, initial, speed = start.target, start.projectile, start.grains, start.speed
     grains, row = simulation.grains, simulation.ledger.rows[-1]
     labels = cluster_labels(len(grains), simulation.contacts["pair"])
     masses = np.bincount(labels, weights=grains.mass)
@@ -114,10 +126,10 @@ def judged(simulation: Simulation, start: Approach, before: int, quiet: bool) ->
     m1, m2 = float(target.mass.sum()), float(projectile.mass.sum())
     n = len(target)
     centres = [
-        np.average(begun.position[part], axis=0, weights=begun.mass[part]) for part in (slice(n), slice(n, None))
+        np.average(initial.position[part], axis=0, weights=initial.mass[part]) for part in (slice(n), slice(n, None))
     ]
     offset = centres[1] - centres[0]
-    flight = begun.velocity[-1] - begun.velocity[0]
+    flight = initial.velocity[-1] - initial.velocity[0]
     flight = flight / np.linalg.norm(flight)
     return Collision(
         outcome=_outcome(labels, len(target), int(row["made"])),

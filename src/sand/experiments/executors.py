@@ -1,4 +1,4 @@
-"""Where the work of an experiment is done: here, in processes, or on a dask cluster of the user's own."""
+"""Executors of experiments: this process, worker processes, or a dask cluster."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ..errors import BadInput
 from ..threads import set_threads
 
 ANSWER = 10.0
-"""Seconds that a scheduler has for its first answer."""
+"""Timeout of the connection to a scheduler [s]."""
 MOST_ON_WINDOWS = 61
-"""Processes of a pool there: the limit of `concurrent.futures`."""
+"""Largest number of processes of a pool on Windows, a limit of `concurrent.futures`."""
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 
 
@@ -26,24 +26,25 @@ _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s:/]+:\d{1,5}")
 def executor_for(
     workers: int = 1, scheduler: str | None = None, threads: int | None = None
 ) -> Iterator[Executor | None]:
-    """An executor for the block; None for one worker, which is this process.
+    """Context manager of an executor; None for a single worker, which is this process.
 
-    An exception in the block, Ctrl-C among them, ends the processes: each run in them writes its checkpoint first.
+    Exceptions in the block, including Ctrl-C, terminate the worker processes; each run writes its checkpoint first.
 
     Parameters
     ----------
     workers : int, optional
-        processes to start, each a new interpreter.
-    threads : int or None, optional
-        of each of them; one by default, because they share the cores.
+        Number of processes, each a new interpreter.
     scheduler : str or None, optional
-        address of a running dask scheduler, "tcp://host:port", instead. Work of a worker that dies is done
-        again by another.
+        Address of a running dask scheduler, "tcp://host:port", used instead of processes. Work of a worker that dies is
+        repeated by another.
+    threads : int or None, optional
+        Threads of each process; one by default, because the processes share the cores.
 
     Raises
     ------
     BadInput
-        no address, no `distributed`, no answer, or more workers than Windows allows.
+        If the address is invalid, `distributed` is not installed, the scheduler does not answer, or Windows does not
+        allow so many workers.
     """
     if scheduler is not None:
         with _dask(scheduler) as executor:
@@ -62,30 +63,30 @@ def executor_for(
                 yield pool
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
-                for process in processes:  # or the program would end only with the piece of work they are at
+                for process in processes:  # otherwise the program would wait for their current tasks
                     process.terminate()
                 raise
 
 
 def _leave_signals_to_parent(threads: int) -> None:
-    """Ctrl-C goes to all processes of a terminal; the parent alone answers it."""
+    """Ignore Ctrl-C, which a terminal sends to all processes; only the parent handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     set_threads(threads)
 
 
 def _nothing() -> None:
-    """Work that makes the pool start a process."""
+    """Task that makes the pool start a process."""
 
 
 def _start(pool: Executor, workers: int) -> None:
-    """Start all processes now, deaf to Ctrl-C from their first moment on."""
-    here = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if here else None
+    """Start all processes, which ignore Ctrl-C from their start."""
+    in_main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main else None
     try:
         for future in [pool.submit(_nothing) for _ in range(workers)]:
             future.result()
     finally:
-        if here:
+        if in_main:
             signal.signal(signal.SIGINT, before)
 
 

@@ -1,4 +1,4 @@
-"""How aggregates grow: what the boxes of an ensemble have in common (Figure 1, Eqs. 15–25)."""
+"""Growth of clusters in an ensemble of boxes (Dominik & Nübold 2002, Figure 1, Eqs. 15–25)."""
 
 from __future__ import annotations
 
@@ -14,45 +14,54 @@ from ..analysis.frame_statistics import COLUMNS, aggregate_statistics
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..results import Run
-from .growth_boxes import alike, grow, one_box
+from .growth_boxes import grow, run_box, shared_settings
 
-__all__ = ["Box", "Growth", "alike", "boxes_in", "grow", "growth_of", "one_box", "read_box"]
+__all__ = ["BoxResult", "GrowthResult", "boxes_in", "grow", "growth_of", "read_box", "run_box", "shared_settings"]
 
 LOOKS = 10
-"""Frames of each box at which its aggregates are measured, evenly over the run, the last among them."""
+"""Number of frames of each box in which aggregates are measured, evenly over the run, including the last."""
 FIRST_SIZE = 2.0
-"""S from which growth is fitted; before, most grains have met nobody."""
+"""Smallest S of the fit; below it most grains have not collided."""
 LARGEST_PART = 0.15
-"""Part of all grains up to which S is fitted: beyond, a box runs out of partners."""
+"""Largest S of the fit as a fraction of all grains; beyond it collision partners are depleted."""
 LEAST = 3
-"""Grains of an aggregate from which its moment counts."""
+"""Smallest number of grains of an aggregate in the fit of moments."""
 
 
-class Box(NamedTuple):
-    """One run of an ensemble."""
+class BoxResult(NamedTuple):
+    """Growth history and aggregates of one run of an ensemble."""
 
     folder: Path
     time: np.ndarray  # (K,) [s]
     size: np.ndarray  # (K,) S(t)
     grains: int
     radius: float  # mean of the grains [m]
-    moment: float  # mean size of theirs [A m²]
-    aggregates: dict[str, np.ndarray]  # census of all looks, and `time` [s] of each row
-    case: dict[str, Any]  # as understood, without [run]
+    moment: float  # mean magnitude of the moments of the grains [A m²]
+    aggregates: dict[str, np.ndarray]  # columns of `aggregate_statistics` of all frames read, and `time` [s]
+    case: dict[str, Any]  # settings that boxes of an ensemble share
 
 
-def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
-    """S(t) and the aggregates of one run.
+def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResult:
+    """Read S(t) and the aggregates of one run.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the run.
+    looks : int, optional
+        Number of frames, evenly over the run, in which aggregates are measured.
+    least : int, optional
+        Smallest number of grains of an aggregate.
 
     Raises
     ------
     BadInput
-        there is no run, or one that cannot be read.
+        If there is no readable run.
     """
     run = Run(folder)
     frames, ledger = run.frames, run.ledger
     if not len(frames) or "mean_cluster_size" not in ledger:
-        raise BadInput(f"{folder} holds a run without frames or ledger")
+        raise BadInput(f"{folder} contains a run without frames or ledger")
     numbers = np.unique(np.linspace(0, len(frames) - 1, looks + 1).round().astype(int)[1:])
     found: list[dict[str, np.ndarray]] = []
     for number in numbers:
@@ -61,42 +70,42 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> Box:
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
     first = frames[0]
     frames.close()
-    return Box(
+    return BoxResult(
         Path(folder),
         ledger["time"],
         ledger["mean_cluster_size"],
         len(first),
         float(first.radius.mean()),
-        _usual(np.linalg.norm(first.moment, axis=1)),
+        _mean_magnitude(np.linalg.norm(first.moment, axis=1)),
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
-        alike(run.case),
+        shared_settings(run.case),
     )
 
 
-def _usual(moments: np.ndarray) -> float:
-    """Mean size of the moments of the grains that have one; 0 if none has."""
+def _mean_magnitude(moments: np.ndarray) -> float:
+    """Mean magnitude of the non-zero moments; 0 if there are none."""
     return float(moments[moments > 0.0].mean()) if (moments > 0.0).any() else 0.0
 
 
 def boxes_in(folder: str | Path) -> list[Path]:
-    """The run in a folder, or the runs in its folders, in the order of their numbers.
+    """Folders of the run in a folder, or of the runs in its subfolders, in numerical order.
 
     Raises
     ------
     BadInput
-        there is none.
+        If there is none.
     """
     place = Path(folder)
     if (place / files.TRAJECTORY).exists():
         return [place]
     found = [one.parent for one in place.glob(f"*/{files.TRAJECTORY}")]
     if not found:
-        raise BadInput(f"{folder} holds no run, and none of its folders does")
+        raise BadInput(f"{folder} and its subfolders contain no run")
     return sorted(found, key=lambda one: (len(one.name), one.name))
 
 
-class Growth(NamedTuple):
-    """What an ensemble says; a law that it cannot tell is None, with the reason in `missing`."""
+class GrowthResult(NamedTuple):
+    """Growth laws of an ensemble; a law that cannot be fitted is None, with the reason in `missing`."""
 
     time: np.ndarray  # (K,) [s], common to all boxes
     sizes: np.ndarray  # (boxes, K): S(t)
@@ -110,39 +119,44 @@ class Growth(NamedTuple):
 
     @property
     def mean(self) -> np.ndarray:
-        """S(t), mean over boxes."""
+        """Mean of S(t) over boxes."""
         return self.sizes.mean(axis=0)
 
     @property
     def error(self) -> np.ndarray:
-        """Its standard error; not a number for one box."""
+        """Standard error of the mean; NaN for a single box."""
         if len(self.sizes) < 2:
             return np.full(self.sizes.shape[1], np.nan)
         return self.sizes.std(axis=0, ddof=1) / np.sqrt(len(self.sizes))
 
 
-def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -> Growth:
-    """S(t), z, the exponent of moments and the fractal dimension of an ensemble.
+def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = None) -> GrowthResult:
+    """Fit growth exponent, moment exponent and fractal dimension of an ensemble.
 
     Parameters
     ----------
-    boxes : Sequence[Box]
-        alike but for their seeds.
-    window : tuple[float, float] or None, optional
-        values of S for z: from where the mean over boxes is at the first until any box is at the second; by
-        default 2 and 0.15 N, where a box runs out of partners.
+    boxes : sequence of BoxResult
+        Boxes with equal settings except for the seed.
+    window : tuple of float or None, optional
+        Range of S for the fit of z: from the time when the mean over boxes reaches the first value until any box
+        exceeds the second. By default 2 and 0.15 N, beyond which depletion affects growth.
+
+    Returns
+    -------
+    GrowthResult
+        Fitted laws.
 
     Raises
     ------
     BadInput
-        no box, or boxes that are not alike.
+        If there are no boxes, or their settings differ.
     """
     if not boxes:
         raise BadInput("an ensemble needs at least one box")
     for box in boxes[1:]:
         for name in {**boxes[0].case, **box.case}:
             if boxes[0].case.get(name) != box.case.get(name):
-                raise BadInput(f"{box.folder} is not like {boxes[0].folder}: [{name}] differs; put it elsewhere")
+                raise BadInput(f"{box.folder} and {boxes[0].folder} have different [{name}]; move one elsewhere")
     last = min(box.time[-1] for box in boxes)
     time = np.append(boxes[0].time[boxes[0].time < last], last)
     sizes = np.array([np.interp(time, box.time, box.size) for box in boxes])
@@ -163,9 +177,9 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
             raise BadInput("the grains have no moments")
         return power_law(rows["grains"][which], rows["moment"][which] / boxes[0].moment, of_box[which])
 
-    # moments that cancel to rounding, or of grains without any, have no logarithm
+    # moments that vanish within rounding have no logarithm
     heavy = (rows["grains"] >= LEAST) & (rows["moment"] > 1e-9 * boxes[0].moment)
-    return Growth(
+    return GrowthResult(
         time,
         sizes,
         chosen,
@@ -179,12 +193,12 @@ def growth_of(boxes: Sequence[Box], window: tuple[float, float] | None = None) -
 
 
 def _within(time: np.ndarray, sizes: np.ndarray, window: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Times from which the mean over boxes is in the window until any box leaves it, and S (boxes, K) then."""
+    """Times from which the mean over boxes is in the window until any box leaves it, and S (boxes, K) at these."""
     used = (sizes.mean(axis=0) >= window[0]) & (sizes.max(axis=0) <= window[1]) & (time > 0.0)
     if used.sum() < 3:
         raise BadInput(
-            f"the boxes are not between S = {window[0]:g} and {window[1]:g} at three times or more; "
-            f"their mean goes from {sizes.mean(axis=0)[0]:.3g} to {sizes.mean(axis=0)[-1]:.3g}"
+            f"fewer than three times have S between {window[0]:g} and {window[1]:g}; "
+            f"the mean of S goes from {sizes.mean(axis=0)[0]:.3g} to {sizes.mean(axis=0)[-1]:.3g}"
         )
     return time[used], sizes[:, used]
 
@@ -193,7 +207,7 @@ def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLawFit:
     return power_law(np.tile(time, len(sizes)), sizes.ravel(), np.repeat(np.arange(len(sizes)), len(time)))
 
 
-def _all_aggregates(boxes: Sequence[Box]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Box number of each row, and the rows of all boxes."""
+def _all_aggregates(boxes: Sequence[BoxResult]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Box index of each row, and the rows of all boxes."""
     of_box = np.concatenate([np.full(len(box.aggregates["grains"]), k) for k, box in enumerate(boxes)])
     return of_box, {name: np.concatenate([box.aggregates[name] for box in boxes]) for name in boxes[0].aggregates}

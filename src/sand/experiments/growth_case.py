@@ -1,4 +1,4 @@
-"""Case files of `sand grow`: those of `sand run`, and which seeds."""
+"""Case files of `sand grow`: those of `sand run` with a list of seeds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..io.run_folder import read_toml
 
 
 class GrowSection(Section):
-    """[grow]: one box for each seed."""
+    """Section [grow]: one box for each seed."""
 
     seeds: list[Seed] = Field(min_length=1)
     """One box is run for each seed."""
@@ -27,13 +27,15 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
 
     Returns
     -------
-    tuple[dict[str, Any], list[int] or None]
-        The case of a box as `growth.grow` takes it, and the seeds if the file has [grow].
+    content : dict
+        Case of a box, as for `growth_boxes.grow`.
+    seeds : list of int or None
+        Seeds of [grow]; None without this section.
 
     Raises
     ------
     BadInput
-        every mistake of the file, one line each, with its place.
+        All errors of the file, one line each, with their keys.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "grow")
@@ -50,6 +52,6 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
         raise BadInput(problems + error.problems) from None
     if problems:
         raise BadInput(problems)
-    if case.grains.file is not None:  # as seen from the case file
+    if case.grains.file is not None:  # relative to the case file
         content["grains"]["file"] = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return content, seeds

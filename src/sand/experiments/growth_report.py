@@ -1,4 +1,4 @@
-"""What an analysis of ensembles leaves: numbers, tables, a figure."""
+"""Report of `sand analyse`: numbers, tables and a figure of one or more ensembles."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from ..analysis.fits import separation
 from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
-from .growth import Box, Growth, boxes_in, growth_of, read_box
+from .growth import BoxResult, GrowthResult, boxes_in, growth_of, read_box
 
 NAMES = ("analysis.json", "growth.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
 
 
 class Ensemble(NamedTuple):
-    """Boxes that are alike but for their seeds, and what they say together."""
+    """Boxes with equal settings except for the seed, and their growth laws."""
 
     name: str
-    growth: Growth
-    boxes: list[Box]
+    growth: GrowthResult
+    boxes: list[BoxResult]
 
 
-def ensemble_in(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
-    """The runs in a folder as one ensemble.
+def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None) -> Ensemble:
+    """Read the runs in a folder as one ensemble.
 
     Parameters
     ----------
     folder : str or Path
-        of a run, or of runs.
-    window : tuple[float, float] or None, optional
-        values of S between which z is fitted.
+        Folder of a run, or of several.
+    window : tuple of float or None, optional
+        Range of S for the fit of z.
 
     Raises
     ------
     BadInput
-        no run, or runs that are not alike.
+        If there is no run, or the settings of the runs differ.
     """
     boxes = [read_box(one) for one in boxes_in(folder)]
     try:
@@ -48,8 +48,8 @@ def ensemble_in(folder: str | Path, window: tuple[float, float] | None = None) -
         raise error.at(str(folder)) from None
 
 
-def numbers(one: Ensemble) -> dict[str, Any]:
-    """What analysis.json holds of one ensemble; laws with value, error and interval, None where unknown."""
+def ensemble_summary(one: Ensemble) -> dict[str, Any]:
+    """Entry of one ensemble in analysis.json; laws with value, error and interval, None where unknown."""
 
     def law(found: Any) -> dict[str, Any] | None:
         return None if found is None else found._asdict()
@@ -72,11 +72,11 @@ def numbers(one: Ensemble) -> dict[str, Any]:
     }
 
 
-def compared(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
-    """By how many standard errors the first of two ensembles is ahead of the second at their last time.
+def compare_growth(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
+    """Difference of two ensembles at their last common time in standard errors, positive if the first is larger.
 
-    `sigma` compares ln S: S itself is skewed, since a few late meetings of large clusters make most of it; that is
-    `sigma_of_size`.
+    `sigma` compares ln S. S itself (`sigma_of_size`) has a skewed distribution, because late collisions of few large
+    clusters dominate it. None unless there are two ensembles of at least two boxes each.
     """
     if len(ensembles) != 2 or min(len(one.boxes) for one in ensembles) < 2:
         return None
@@ -89,12 +89,12 @@ def compared(ensembles: Sequence[Ensemble]) -> dict[str, Any] | None:
 
 
 def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[str, Any]) -> None:
-    """analysis.json, S(t) and all aggregates as tables, and the figure.
+    """Write analysis.json, the tables of S(t) and of all aggregates, and the figure.
 
     Raises
     ------
     FilesFailed
-        the disk is full, …
+        If a file cannot be written.
     """
     from ..plotting.growth import growth_figure
     from ..plotting.run_figure import save
@@ -114,7 +114,7 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
 
 
 def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:
-    """A row for each time; boxes that an ensemble has less than another are empty."""
+    """One row for each time, with empty columns for boxes that only other ensembles have."""
     growth = one.growth
     rows = []
     for k, time in enumerate(growth.time.tolist()):

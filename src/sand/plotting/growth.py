@@ -25,8 +25,8 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
 
     Parameters
     ----------
-    ensembles : Sequence[tuple[str, Growth, dict]]
-        For each ensemble its name, its `experiments.growth.Growth`, and the aggregates of all boxes with `unit_moment`
+    ensembles : Sequence[tuple[str, GrowthResult, dict]]
+        For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with `unit_moment`
         [A m²] and `unit_radius` [m], the moment and radius of one grain.
     """
     with plot_style():

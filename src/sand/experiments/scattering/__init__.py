@@ -1,6 +1,6 @@
-"""Scattering of two bodies: trajectories, capture cross-sections and probability maps.
+"""Scattering of two bodies: trajectories, capture cross-sections and maps of the hit probability.
 
-Names are loaded when first used: `sand.experiments.scattering.cross_section(...)` needs no import of its own.
+Functions are imported on first use: `sand.experiments.scattering.cross_section(...)` needs no further import.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _MODULES = {
     "Trajectory": "flights",
     "cross_section": "cross_sections",
     "flight": "problem",
-    "flown": "cross_sections",
+    "run_flights": "cross_sections",
     "measure": "cross_sections",
     "probability_map": "maps",
     "seed_of": "cross_sections",

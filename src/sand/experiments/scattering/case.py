@@ -16,20 +16,20 @@ from ...config.sections import PathName, Section, Seed
 from ...errors import BadInput
 from ...io.run_folder import read_toml
 from ...material import PRESETS
-from ..collision_case import BodySection, Kind
+from ..collision_case import BodyKind, BodySection
 from .encounters import Flight
 from .problem import ErrorCollector, flight, impact_parameter
 
 
 class ScatterBody(BodySection):
-    """[projectile] and [target]: a grain, or an aggregate as in `sand collide`."""
+    """Sections [projectile] and [target]: a grain, or an aggregate as in `sand collide`."""
 
-    kind: Kind = "grain"
+    kind: BodyKind = "grain"
     """Builder (as for `sand build`), or `file`."""
 
 
 class FlightSection(Section):
-    """[flight]: how they meet; every key as in `sand.experiments.scattering.flight`."""
+    """Section [flight]: initial conditions, with the arguments of `sand.experiments.scattering.flight`."""
 
     temperature: Any = 0.0
     speed: Any = None
@@ -46,7 +46,7 @@ class FlightSection(Section):
 
 
 class MeasureSection(Section):
-    """[measure]: what is wanted, how well."""
+    """Section [measure]: what to compute, and its accuracy."""
 
     job: Literal["cross-section", "map", "trajectories"] = "cross-section"
     """Quantity to compute: cross-sections, a map of hit probabilities, or trajectories."""
@@ -74,7 +74,7 @@ class MeasureSection(Section):
 
 
 class ScatterCase(Section):
-    """A whole case file of `sand scatter`."""
+    """Case file of `sand scatter`."""
 
     projectile: ScatterBody
     target: ScatterBody | None = None
@@ -83,11 +83,17 @@ class ScatterCase(Section):
     materials: dict[str, MaterialSection] = Field(default_factory=dict)
 
     def flights(self) -> list[Flight]:
-        """One set-up for each speed, and for each of `spins` of trajectories.  Raises BadInput, all mistakes."""
-        ask = ErrorCollector()
+        """One set-up for each speed, and for trajectories for each of `spins`.
+
+        Raises
+        ------
+        BadInput
+            All errors of bodies and initial conditions.
+        """
+        errors = ErrorCollector()
         materials = {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
         bodies = {
-            name: ask.take(lambda body=body, k=k: body.build(materials, 2 * self.measure.seed + k))  # type: ignore[misc]
+            name: errors.take(lambda body=body, k=k: body.build(materials, 2 * self.measure.seed + k))  # type: ignore[misc]
             for k, (name, body) in enumerate((("projectile", self.projectile), ("target", self.target)))
             if body is not None
         }
@@ -96,39 +102,41 @@ class ScatterCase(Section):
         spins = self.measure.spins or [given.pop("spin")]
         given.pop("spin", None)
         if not speeds:
-            ask.problems.append("flight.speed is missing; give one, or a list of them")
+            errors.problems.append("flight.speed is missing; give one, or a list of them")
         if len(speeds) > 1 and self.measure.job == "trajectories":
-            ask.problems.append("flight.speed: trajectories are flown at one speed; give one")
+            errors.problems.append("flight.speed: trajectories are computed for a single speed; give one")
         if self.measure.job != "trajectories":
-            ask.problems += [
+            errors.problems += [
                 f"measure.{name} is for job = 'trajectories'; leave it out"
                 for name in ("spins", "impact_parameters")
                 if getattr(self.measure, name)
             ]
         found = [
-            ask.take(lambda speed=speed, spin=spin: flight(**bodies, **given, speed=speed, spin=spin))  # type: ignore[misc]
+            errors.take(lambda speed=speed, spin=spin: flight(**bodies, **given, speed=speed, spin=spin))  # type: ignore[misc]
             for spin in spins
             for speed in speeds
             if bodies.get("projectile") is not None
         ]
         b = [
-            ask.take(lambda value=value: impact_parameter(value, found[0], "measure.impact_parameters"))  # type: ignore[misc]
+            errors.take(lambda value=value: impact_parameter(value, found[0], "measure.impact_parameters"))  # type: ignore[misc]
             for value in self.measure.impact_parameters
             if found and found[0] is not None
         ]
-        if self.measure.job == "trajectories" and not b and not ask.problems:
-            ask.problems.append("measure.impact_parameters is missing: which trajectories? for example ['0.95 b_max']")
-        ask.problems = list(dict.fromkeys(ask.problems))  # once, not for every speed
-        ask.done()
+        if self.measure.job == "trajectories" and not b and not errors.problems:
+            errors.problems.append(
+                "measure.impact_parameters is missing: which trajectories? for example ['0.95 b_max']"
+            )
+        errors.problems = list(dict.fromkeys(errors.problems))  # errors common to all speeds are reported once
+        errors.done()
         if self.measure.job == "map":
             found.sort(key=lambda one: one.speed)
             if len({one.speed for one in found}) < len(found):
                 raise BadInput("flight.speed: a map needs speeds that differ")
         return found
 
-    def impact_parameters(self, flying: Flight) -> list[float]:
-        """[m]"""
-        return [impact_parameter(value, flying) for value in self.measure.impact_parameters]
+    def impact_parameters(self, setup: Flight) -> list[float]:
+        """Impact parameters of the trajectories [m]."""
+        return [impact_parameter(value, setup) for value in self.measure.impact_parameters]
 
 
 def _list(value: Any) -> Sequence[Any]:
@@ -143,7 +151,7 @@ def read_scattering(path: str | Path) -> tuple[ScatterCase, list[Flight]]:
     Raises
     ------
     BadInput
-        every mistake of the file, one line each, with its place.
+        All errors of the file, one line each, with their keys.
     """
     content = read_toml(path)
     refuse_other_command(content, path, "scatter")

@@ -1,8 +1,8 @@
-"""Cross-sections of two magnetic bodies: single flights, σ with its error, maps of the probability to meet.
+"""Capture cross-sections of two magnetic bodies by Monte Carlo sampling of the impact parameter.
 
-A flight starts at a stated distance, as a straight line would bring it there, and ends at a hit (surfaces touch) or
-when the projectile is as far away again and on its way out.  Errors of a step are prescribed (Dormand & Prince's order
-8, 1e-8 of the scales), and everything drawn by chance is a function of (seed, stratum, number).
+A flight starts at a given distance on a straight line, without earlier deflection. It ends at a hit (the surfaces
+touch) or when the bodies recede beyond the starting distance. Steps have a prescribed error (Dormand & Prince, order 8,
+1e-8 of the scales). All random numbers are functions of (seed, stratum, number).
 """
 
 from __future__ import annotations
@@ -26,33 +26,42 @@ from .problem import flight
 from .sampling import CERTAIN, Strata, Task, cut
 
 PIECE, TRIAL, MOST = 0.5, 16, 4096
-"""Seconds that a piece of work should take; flights of the first one; most of any."""
+"""Target duration of a batch [s]; flights of the first batch; largest number of flights of a batch."""
 END, SPEED, DRIFT = (COLUMNS.index(name) for name in ("end", "speed", "drift"))
 
 
 @dataclass(frozen=True)
 class CrossSection:
-    """σ of one set-up; SI.
+    """Capture cross-section of one set-up; SI.
 
     Attributes
     ----------
     sigma : float
-        area of the impact parameters that lead to a hit [m²]; for a target that moves by chance the rate of
-        hits over number density and v∞, ⟨σ(u) u⟩/v∞, u the relative speed. sigma_error: one standard deviation;
-        interval: 95 %.
+        Area of the impact parameters that lead to a hit [m²]. For a target with random velocity: ⟨σ(u) u⟩/v∞, u the
+        relative speed, which is the rate of hits over number density and v∞.
+    sigma_error : float
+        Standard error [m²].
+    interval : tuple of float
+        95 % confidence interval [m²].
     geometric : float
-        π (r1 + r2)² [m²], of outer spheres for aggregates; analytic: Eq. 14 [m²] at the relative speed, with
-        Σ|μ| for aggregates, averaged as σ is for a target that moves by chance.
+        π (r1 + r2)² [m²], of bounding spheres for aggregates.
+    analytic : float
+        Eq. 14 of Dominik & Nübold (2002) [m²] at the relative speed, with Σ|μ| for aggregates; averaged like `sigma`
+        for a target with random velocity.
     flights, hits : int
-        how many; bound, failed: of them, neither hit nor miss; counted as misses.
-    speed : float
-        [m/s]; distance: of the start [m]; seed.
+        Their numbers.
+    bound, failed : int
+        Flights that ended as neither hit nor miss; they count as misses.
+    speed, distance : float
+        Speed of the projectile [m/s] and distance of the start [m].
+    seed : int
+        Seed of the random numbers.
     profile : ndarray
-        rows (b₋, b₊, flights, hits) of each annulus, (K, 4).
+        Rows (b₋, b₊, flights, hits) of each annulus, (K, 4).
     drift : float
-        largest change of a flight's energy over the largest kinetic energy of its relative motion.
+        Largest energy error of a flight over the largest kinetic energy of its relative motion.
     seconds : float
-        spent.
+        Wall time of the computation.
     """
 
     sigma: float
@@ -73,26 +82,26 @@ class CrossSection:
 
     @property
     def enhancement(self) -> float:
-        """σ/π(r1 + r2)², as in Eqs. 5 and 26."""
+        """Enhancement over the geometric cross-section, σ/π(r1 + r2)², as in Eqs. 5 and 26."""
         return self.sigma / self.geometric
 
     @property
     def enhancement_error(self) -> float:
-        """Of one standard deviation."""
+        """Standard error of `enhancement`."""
         return self.sigma_error / self.geometric
 
     @property
     def c(self) -> float:
-        """σ over Eq. 14 (Eq. 27); NaN without moments."""
+        """Coefficient c = σ over Eq. 14 (Eq. 27); NaN without moments."""
         return self.sigma / self.analytic if self.analytic > 0.0 else float("nan")
 
     @property
     def c_error(self) -> float:
-        """Of one standard deviation."""
+        """Standard error of `c`."""
         return self.sigma_error / self.analytic if self.analytic > 0.0 else float("nan")
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """All attributes and derived values, for JSON."""
         own = {name: getattr(self, name) for name in self.__dataclass_fields__}
         more = {name: getattr(self, name) for name in ("enhancement", "enhancement_error", "c", "c_error")}
         return own | more
@@ -111,99 +120,108 @@ def cross_section(
     executor: Executor | None = None,
     **options: Any,
 ) -> CrossSection:
-    """σ of two magnetic grains: the area of impact parameters that lead to a hit, over all orientations and spins.
+    """Capture cross-section σ of two magnetic grains, averaged over orientations and spins.
 
     Parameters
     ----------
-    radius, material, moment, temperature, speed, options
-        see `flight`.
-    relative_error : optional
-        of σ at which to stop, one standard deviation, 1e-4 … 0.5.
+    radius, material, moment, temperature, speed, **options
+        See `flight`.
+    relative_error : float, optional
+        Standard error of σ, relative to σ, at which sampling stops, 1e-4 … 0.5.
     seed : int, optional
-        ≥ 0, of all that is drawn by chance.
-    executor : Executor or None, optional
-        any `concurrent.futures.Executor`; None: here. The numbers are the same.
+        Seed of the random numbers, ≥ 0.
+    executor : Executor, optional
+        Any `concurrent.futures.Executor`; None computes in this process. Results do not depend on it.
+
+    Returns
+    -------
+    CrossSection
+        σ with its error.
 
     Raises
     ------
     BadInput
-        one line for each mistake.
+        If arguments are invalid; one line for each.
     """
-    flying = flight(radius, material, moment, temperature, speed, **options)
-    return measure(flying, relative_error=relative_error, seed=seed, executor=executor)
+    setup = flight(radius, material, moment, temperature, speed, **options)
+    return measure(setup, relative_error=relative_error, seed=seed, executor=executor)
 
 
 @checked
 def measure(
-    flying: Flight,
+    setup: Flight,
     *,
     relative_error: Any = 0.02,
     seed: int = 0,
     executor: Executor | None = None,
     known: Iterable[Sequence[float]] = (),
     keep: Callable[[np.ndarray], None] | None = None,
-    watch: Callable[[int, float, float], None] | None = None,
+    progress: Callable[[int, float, float], None] | None = None,
 ) -> CrossSection:
-    """As `cross_section`, of a `Flight`.
+    """Capture cross-section of a `Flight`, see `cross_section`.
 
     Parameters
     ----------
+    setup : Flight
+        Bodies and initial conditions, from `flight`.
+    relative_error, seed, executor
+        As for `cross_section`.
     known, keep : optional
-        see `flown`.
-    watch : Callable[[int, float, float], None] or None, optional
-        called with the number of flights, σ [m²] and its error after each round.
+        See `run_flights`.
+    progress : callable, optional
+        Called with the number of flights, σ [m²] and its error after each round.
     """
     goal = si(relative_error, "1", "relative_error", above=0.0)
     if not 1e-4 <= goal <= 0.5:
         raise BadInput(f"relative_error = {relative_error!r} must lie in 1e-4 … 0.5")
-    begun = wall.monotonic()
-    farthest = flying.distance if flying.sphere else np.inf
-    strata = Strata.up_to(flying.scales.widest, farthest)
-    before = addressed(known)
-    # a target that moves by chance is met at a rate; one that moves along is at rest in its own frame
-    unit = flying.speed if flying.drift_spread > 0.0 else flying.relative_speed
+    start = wall.monotonic()
+    farthest = setup.distance if setup.sphere else np.inf
+    strata = Strata.up_to(setup.scales.widest, farthest)
+    before = rows_by_flight(known)
+    # with a random target velocity σ is a rate over v∞; with a fixed one it is measured in the frame of the target
+    unit = setup.speed if setup.drift_spread > 0.0 else setup.relative_speed
     rows: list[np.ndarray] = []
     while tasks := strata.round(goal, farthest):
-        for new in flown(flying, tasks, strata.width, seed, executor, before, keep):
+        for new in run_flights(setup, tasks, strata.width, seed, executor, before, keep):
             rows.append(new)
             for row in new:
                 strata.add(int(row[0]), int(row[1]), float(row[END] == HIT), float(row[SPEED]) / unit)
-        if watch is not None:
-            watch(sum(len(r) for r in rows), strata.estimate().value, strata.error())
+        if progress is not None:
+            progress(sum(len(r) for r in rows), strata.estimate().value, strata.error())
     whole = np.concatenate(rows)
     _warn(strata, whole, farthest)
-    return _told(flying, strata, whole, seed, wall.monotonic() - begun)
+    return _result(setup, strata, whole, seed, wall.monotonic() - start)
 
 
 def _warn(strata: Strata, rows: np.ndarray, farthest: float) -> None:
-    """Of a σ that is not what it seems.  Raises BadInput where flights could not be computed."""
+    """Warn if σ is unreliable. Raises BadInput if more than 1 % of the flights failed."""
     failed = int((rows[:, END] == FAILED).sum())
     if failed > 0.01 * len(rows):
-        raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin are out of all range")
+        raise BadInput(f"{failed} of {len(rows)} flights cannot be computed: speed, start or spin is extreme")
     if failed:
         warn(f"{failed} of {len(rows)} flights could not be computed and count as misses")
     hits, _ = strata.counts()
     if not hits.any():
-        warn(f"none of {len(rows)} flights hit: sigma is 0 as far as they can tell")
+        warn(f"none of {len(rows)} flights hit: sigma is 0 within the error")
     if hits[-1] and (len(strata) + 1) * strata.width > farthest * (1 + 1e-9):
-        warn("flights hit at all b that begin on the sphere of starts: sigma is cut off there")
+        warn("flights hit at all impact parameters up to the radius of the start: sigma is truncated there")
 
 
 def seed_of(seed: int, setup: int) -> int:
-    """Of the set-ups of a job: each draws for itself, so that errors at two speeds have nothing to do with each other.
+    """Seed of one set-up of a job, so that the errors of different set-ups are independent.
 
-    The seed itself for the first; multiples of 2⁶⁴/golden ratio are far from each other.
+    The first set-up uses the seed itself; the others add multiples of 2⁶⁴ over the golden ratio.
     """
     return (seed + setup * 0x9E3779B97F4A7C15) % 2**64
 
 
-def addressed(rows: Iterable[Sequence[float]]) -> dict[tuple[int, int], np.ndarray]:
-    """Rows of `COLUMNS` by stratum and number."""
+def rows_by_flight(rows: Iterable[Sequence[float]]) -> dict[tuple[int, int], np.ndarray]:
+    """Rows of `COLUMNS` by (stratum, number)."""
     return {(int(row[0]), int(row[1])): np.asarray(row, float) for row in rows}
 
 
-def flown(
-    flying: Flight,
+def run_flights(
+    setup: Flight,
     tasks: Sequence[Task],
     width: float,
     seed: int,
@@ -211,27 +229,37 @@ def flown(
     known: Mapping[tuple[int, int], np.ndarray] | None = None,
     keep: Callable[[np.ndarray], None] | None = None,
 ) -> Iterator[np.ndarray]:
-    """The rows of all flights asked for, in pieces and in any order.
+    """Compute all flights of the tasks; yields their rows in batches of arbitrary order.
 
     Parameters
     ----------
-    known : Mapping[tuple[int, int], ndarray] or None, optional
-        those that were flown before, which are not flown again.
-    keep : Callable[[ndarray], None] or None, optional
-        called with the rows of each piece of work as it is done.
+    setup : Flight
+        Bodies and initial conditions.
+    tasks : sequence of Task
+        Flights to compute.
+    width : float
+        Width of an annulus [m].
+    seed : int
+        Seed of the random numbers.
+    executor : Executor, optional
+        Any `concurrent.futures.Executor`; None computes in this process.
+    known : mapping, optional
+        Rows of earlier flights by (stratum, number), which are not computed again.
+    keep : callable, optional
+        Called with the rows of each new batch.
     """
     before = known or {}
     ready = [before[key] for t in tasks for key in t.addresses() if key in before]
     if ready:
         yield np.array(ready)
-    for new in _pieces(flying, [piece for t in tasks for piece in _gaps(t, before)], width, seed, executor):
+    for new in _pieces(setup, [piece for t in tasks for piece in _gaps(t, before)], width, seed, executor):
         if keep is not None:
             keep(new)
         yield new
 
 
 def _gaps(task: Task, known: Mapping[tuple[int, int], np.ndarray]) -> list[Task]:
-    """What of a task is not known yet."""
+    """Flights of a task that are not known yet."""
     missing = [number for stratum, number in task.addresses() if (stratum, number) not in known]
     breaks = [k for k in range(1, len(missing)) if missing[k] != missing[k - 1] + 1]
     edges = [0, *breaks, len(missing)]
@@ -239,15 +267,15 @@ def _gaps(task: Task, known: Mapping[tuple[int, int], np.ndarray]) -> list[Task]
 
 
 def _pieces(
-    flying: Flight, tasks: list[Task], width: float, seed: int, executor: Executor | None
+    setup: Flight, tasks: list[Task], width: float, seed: int, executor: Executor | None
 ) -> Iterator[np.ndarray]:
-    """The rows of all tasks in pieces of about `PIECE` seconds; a first one, flown here, tells how long a flight is."""
+    """Rows of all tasks in batches of about `PIECE` seconds; the first batch, computed here, measures the speed."""
     size = TRIAL
     while tasks:
         bundle, tasks = cut(tasks, size)
-        begun = wall.perf_counter()
-        rows = fly(flying, bundle, width, seed)
-        size = min(max(int(PIECE * len(rows) / max(wall.perf_counter() - begun, 1e-9)), 1), MOST)
+        start = wall.perf_counter()
+        rows = fly(setup, bundle, width, seed)
+        size = min(max(int(PIECE * len(rows) / max(wall.perf_counter() - start, 1e-9)), 1), MOST)
         yield rows
         if executor is not None:
             break
@@ -256,7 +284,7 @@ def _pieces(
     waiting = []
     while tasks:
         bundle, tasks = cut(tasks, size)
-        waiting.append(executor.submit(fly, flying, bundle, width, seed))
+        waiting.append(executor.submit(fly, setup, bundle, width, seed))
     try:
         for future in as_completed(waiting):
             yield future.result()
@@ -265,7 +293,7 @@ def _pieces(
             future.cancel()
 
 
-def _told(flying: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:
+def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:
     found, sure = strata.estimate(), strata.estimate(CERTAIN)
     hits, tries = strata.counts()
     k = np.arange(len(strata))
@@ -275,14 +303,14 @@ def _told(flying: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: 
         sigma=found.value,
         sigma_error=strata.error(),
         interval=(sure.low, sure.high),
-        geometric=float(np.pi * flying.scales.touch**2),
-        analytic=flying.analytic,
+        geometric=float(np.pi * setup.scales.touch**2),
+        analytic=setup.analytic,
         flights=int(tries.sum()),
         hits=int(hits.sum()),
         bound=int((ends == BOUND).sum()),
         failed=int((ends == FAILED).sum()),
-        speed=flying.speed,
-        distance=flying.distance,
+        speed=setup.speed,
+        distance=setup.distance,
         seed=seed,
         profile=np.column_stack([low, high, tries, hits]),
         drift=float(rows[:, DRIFT].max()),

@@ -1,4 +1,4 @@
-"""What two bodies are sent past each other, and how: the numbers of scattering experiments."""
+"""Set-up of a scattering experiment: two bodies, their initial conditions and scales."""
 
 from __future__ import annotations
 
@@ -13,49 +13,63 @@ from ...constants import MAGNETIC
 from ...forces.pair import dipole_formulas as dipole
 from ...grains import Grains
 from .flight_driver import Limits
-from .initial_conditions import Start
+from .initial_conditions import InitialConditions
 from .two_aggregates import TWO_AGGREGATES, Aggregates, Body
 from .two_spheres import TWO_SPHERES, Model, Spheres
 
 MOST_STEPS = 2_000_000
-"""A flight that is not over after so many steps is called bound."""
+"""Largest number of steps of a flight; flights that reach it are bound."""
 
 
 class Scales(NamedTuple):
-    """What everything is measured in."""
+    """Scales of an encounter in closed form."""
 
     reduced: float  # m̄ [kg]
-    touch: float  # sum of the radii, of outer spheres for aggregates [m]
+    touch: float  # sum of the radii, of bounding spheres for aggregates [m]
     alpha: float  # 2kμμ′ [J m³], with Σ|μ| for aggregates
-    capture: float  # b_max (Eqs. 12, 13) at the speed of the flight [m]; 0 without moments
-    widest: float  # impact parameter [m] that a central potential −α/r³ captures at most, focusing included
+    capture: float  # b_max (Dominik & Nübold 2002, Eqs. 12, 13) [m]; 0 without moments
+    widest: float  # largest impact parameter captured by a central potential −α/r³, focusing included [m]
 
 
 @dataclass(frozen=True)
 class Flight:
-    """Two bodies and how they meet; SI, all checked (experiments/scattering/problem.py makes one from what users say).
+    """Set-up of a scattering experiment in checked SI values; `problem.flight` builds it from user input.
 
     Attributes
     ----------
     projectile, target : Grains
-        grains; the projectile comes in along `along`, the target has the velocity `drift`.
+        The bodies. The projectile approaches along `along`; the target has the velocity `drift`.
     speed : float
-        v∞ of the projectile [m/s]; temperature: [K], of spins and of a target that moves by chance.
+        Speed v∞ of the projectile [m/s].
     distance : float
-        of the plane, or the radius of the sphere, that flights start on [m]; sphere: which of the two.
+        Distance of the plane, or radius of the sphere, on which flights start [m].
+    sphere : bool
+        Whether flights start on a sphere.
     escape : float
-        distance [m] beyond which one that flies away is gone; 0: that of its start.
-    axes : int
-        RANDOM, ALIGNED or GIVEN of experiments/scattering/initial_conditions.py.
-    spin : tuple[tuple[float, float, float], tuple[float, float, float]]
-        three components [rad/s] of projectile and target, a thermal spin of `spin_energy` [J] each is added.
+        Distance [m] beyond which a receding body has escaped; 0: that of its start.
+    along : tuple of float
+        Unit vector of the velocity of the projectile.
+    drift : tuple of float
+        Mean velocity of the target [m/s].
     drift_spread : float
-        standard deviation of each component of the target's velocity [m/s].  Impact parameters are
-        those of the relative motion.
-    field : tuple[float, float, float]
-        external flux density [T]; tolerance: error of a step over the scales.
+        Standard deviation of each component of the target's velocity [m/s]. Impact parameters are those of the relative
+        motion.
+    axes : int
+        `RANDOM`, `ALIGNED` or `GIVEN` of `initial_conditions`.
+    spin : tuple
+        Spins of projectile and target [rad/s], to which thermal spins of mean energy `spin_energy` are added.
+    spin_energy : tuple of float
+        Mean energies of the thermal spins [J].
+    field : tuple of float
+        External flux density [T].
+    tolerance : float
+        Error of a step over the scales.
+    most_steps : int
+        Largest number of steps of a flight; flights that reach it are bound.
+    temperature : float
+        Temperature [K] of spins and of the target's velocity.
     contact : bool
-        go on through the real contact, and count only what sticks.
+        Whether to simulate the contact after a hit, and count only hits that stick.
     """
 
     projectile: Grains
@@ -78,31 +92,31 @@ class Flight:
 
     @property
     def spheres(self) -> bool:
-        """True for one grain against one."""
+        """Whether both bodies are single grains."""
         return len(self.projectile) == len(self.target) == 1
 
     @property
     def scales(self) -> Scales:
-        """Sizes in closed form."""
+        """Scales at the relative speed."""
         return scales_of(self.projectile, self.target, self.relative_speed)
 
     @property
     def relative_speed(self) -> float:
-        """|v∞ − drift| [m/s]; a target that moves by chance counts as at rest on average."""
+        """Relative speed |v∞ − drift| [m/s]; a random target velocity counts with its mean."""
         return math.dist([self.speed * a for a in self.along], self.drift)
 
     @property
     def analytic(self) -> float:
-        """Eq. 14 [m²] at the relative speed; for a target that moves by chance ⟨σ_Eq14(u) u⟩/v∞, as σ is told."""
+        """Cross-section of Eq. 14 [m²] at the relative speed; for a random target velocity ⟨σ_Eq14(u) u⟩/v∞."""
         plain = math.pi * self.scales.capture**2
         if self.drift_spread == 0.0:
             return plain
         return plain * mean_power(-1.0 / 3.0, self.speed, self.drift_spread)
 
-    def start(self, azimuth: float = -1.0) -> Start:
-        """For the kernel; azimuth [rad] of the impact parameter, below 0: by chance."""
+    def start(self, azimuth: float = -1.0) -> InitialConditions:
+        """Initial conditions for the kernel; the azimuth [rad] of the impact parameter is random if negative."""
         axes = [_axis(g) for g in (self.projectile, self.target)]
-        return Start(
+        return InitialConditions(
             self.speed,
             self.along,
             self.drift,
@@ -118,7 +132,7 @@ class Flight:
         )
 
     def pair(self) -> tuple[Model, Spheres | Aggregates]:
-        """The kind of pair and its numbers, for the kernel."""
+        """Equations of motion of the pair and their parameters, for the kernel."""
         one, two = self.projectile, self.target
         if self.spheres:
             sizes = [float(np.linalg.norm(g.moment[0])) for g in (one, two)]
@@ -140,13 +154,13 @@ class Flight:
         )
 
     def limits(self) -> Limits:
-        """For the kernel."""
+        """End conditions and accuracy, for the kernel."""
         s = self.scales
         return Limits(self.tolerance, self.escape, self.most_steps, s.touch, s.reduced)
 
 
 def scales_of(projectile: Grains, target: Grains, speed: float) -> Scales:
-    """Sizes in closed form of two bodies that meet at this speed [m/s]."""
+    """Scales of two bodies with this relative speed [m/s]."""
     m1, m2 = float(projectile.mass.sum()), float(target.mass.sum())
     reduced = m1 * m2 / (m1 + m2)
     touch = extent(projectile) + extent(target)
@@ -154,13 +168,13 @@ def scales_of(projectile: Grains, target: Grains, speed: float) -> Scales:
     alpha = dipole.contact_energy(*strong, 1.0, MAGNETIC)
     capture = float(dipole.capture_radius(*strong, reduced, speed, MAGNETIC))
     focused = touch * math.sqrt(1.0 + 2.0 * alpha / (touch**3 * reduced * speed**2))
-    # where the top of the barrier, b_max/√3 away, lies inside the grains, they touch before it matters
+    # if the top of the centrifugal barrier, at b_max/√3, lies inside the grains, they touch before reaching it
     widest = capture if capture > math.sqrt(3.0) * touch else focused
     return Scales(reduced, touch, alpha, capture, widest)
 
 
 def mean_power(power: float, speed: float, spread: float) -> float:
-    """⟨(u/v)^p⟩ for u = |v − w|, each component of w normal with this standard deviation [m/s]."""
+    """Mean ⟨(u/v)^p⟩ of u = |v − w|, each component of w normal with this standard deviation [m/s]."""
     u = np.linspace(0.0, speed + 12.0 * spread, 20_001)[1:]
     near, far = ((u - speed) / spread) ** 2, ((u + speed) / spread) ** 2
     density = u / (speed * spread * math.sqrt(2.0 * math.pi)) * (np.exp(-0.5 * near) - np.exp(-0.5 * far))
@@ -168,13 +182,13 @@ def mean_power(power: float, speed: float, spread: float) -> float:
 
 
 def extent(body: Grains) -> float:
-    """Outermost surface of a body from its centre of mass [m]."""
+    """Outer radius of a body about its centre of mass [m]."""
     middle = np.average(body.position, axis=0, weights=body.mass)
     return float((np.linalg.norm(body.position - middle, axis=1) + body.radius).max())
 
 
 def _axis(body: Grains) -> tuple[float, float, float]:
-    """Direction of the first grain's moment; +x without one."""
+    """Direction of the first grain's moment; +x without a moment."""
     moment = body.moment[0]
     size = float(np.linalg.norm(moment))
     x, y, z = moment / size if size > 0.0 else (1.0, 0.0, 0.0)
@@ -182,13 +196,13 @@ def _axis(body: Grains) -> tuple[float, float, float]:
 
 
 def body_of(grains: Grains) -> Body:
-    """Grains as a rigid body in its principal frame."""
+    """Rigid body of these grains, in its principal frame."""
     mass, count = grains.mass, len(grains)
     arm = grains.position - np.average(grains.position, axis=0, weights=mass)
-    round_ = (mass * (arm**2).sum(axis=1) + grains.inertia).sum()
-    tensor = round_ * np.eye(3) - np.einsum("i,ij,ik->jk", mass, arm, arm)
+    isotropic = (mass * (arm**2).sum(axis=1) + grains.inertia).sum()
+    tensor = isotropic * np.eye(3) - np.einsum("i,ij,ik->jk", mass, arm, arm)
     inertia, frame = np.linalg.eigh(tensor)
-    frame[:, 2] = np.cross(frame[:, 0], frame[:, 1])  # right-handed; eigenvectors are so up to a sign
+    frame[:, 2] = np.cross(frame[:, 0], frame[:, 1])  # makes the frame right-handed
     pose = Rotation.from_matrix(frame).as_quat()
     return Body(
         np.ascontiguousarray((arm @ frame).T),

@@ -1,7 +1,7 @@
-"""Flights of two free bodies past each other, many in one call: Dormand–Prince steps, from a start to a touch or out.
+"""Driver of flights of two free bodies: Dormand–Prince steps (order 8) from the start to contact or escape.
 
-No array of the world is needed: a pair is a row of numbers (experiments/scattering/two_spheres.py), and each flight is a function of its
-address (seed, stratum, number) alone, so that any can be flown again by itself.
+The state of a pair is one small array (`two_spheres`, `two_aggregates`). Each flight is a function of its identifier
+(seed, stratum, number) alone, so that any flight can be repeated.
 """
 
 import functools
@@ -15,55 +15,55 @@ from scipy.integrate import DOP853 as SCHEME
 from ...compiler.jit import kernel, loop, rare
 from ...integrate.runge_kutta import step_size_factor
 from ...numerics.vec import dot, norm
-from .initial_conditions import R, U, at, draw_path
+from .initial_conditions import R, U, draw_path, vector_at
 from .two_spheres import Model
 
 STAGES = SCHEME.n_stages
-"""12; the rates at the new state, number 13, serve as the first of the next step."""
+"""12 stages; the rates at the new state, number 13, are the first stage of the next step."""
 ORDER = 8.0
-"""The error of a step goes as this power of its length."""
+"""Order of the error estimate of a step."""
 HIT, MISS, BOUND, FAILED = range(4)
-"""How a flight ended: at a touch, beyond the escape distance, still together after the most steps, not finite."""
+"""Ends of a flight: contact, escape, still together after the largest number of steps, state not finite."""
 RESULTS = ("end", "impact_parameter", "speed", "time", "steps", "closest", "impact_speed", "drift")
-"""What is kept of each flight, in this order: impact parameter and closest distance of surfaces [m], relative speed at
-the start and at the end [m/s], time [s], change of the energy over the largest ½m̄u² that was met."""
+"""Results of a flight: impact parameter and smallest gap [m], relative speed at the start and at the end [m/s], time
+[s], energy error over the largest kinetic energy ½m̄u² during the flight."""
 EXACT = 1e-7
-"""A touch is found to this part of `Limits.touch`."""
+"""Tolerance of the gap at contact, in units of `Limits.touch`."""
 FIRST = 1e-2
-"""First step to try, in |r|/|u|."""
+"""First trial step, in units of |r|/|u|."""
 SMALLEST = 1e-18
-"""Steps below this part of |r|/|u| at the start mean that something is not finite."""
+"""Smallest step, in units of the initial |r|/|u|; smaller ones indicate values that are not finite."""
 
 
-class Room(NamedTuple):
-    """Where a flight is computed."""
+class Workspace(NamedTuple):
+    """Work arrays of one flight."""
 
     y: np.ndarray  # (size,) the state
     new: np.ndarray  # (size,) the state after a trial step
     rate: np.ndarray  # (13, size) rates of change at each stage
     error: np.ndarray  # (size,)
-    nought: np.ndarray  # (size,) zeros
-    trail: np.ndarray  # (rows, 1 + size) time and state after each step of the last flight, as far as there are rows
+    zeros: np.ndarray  # (size,) zeros
+    history: np.ndarray  # (rows, 1 + size) time and state after each of the first `rows` steps of the last flight
 
 
-def room_for(size: int, rows: int = 0) -> Room:
-    """Room for states of `size` numbers and a trail of so many rows."""
+def allocate_workspace(size: int, rows: int = 0) -> Workspace:
+    """Allocate work arrays for states of length `size` and a history of `rows` steps."""
     one = [np.zeros(size) for _ in range(4)]
-    return Room(one[0], one[1], np.zeros((STAGES + 1, size)), one[2], one[3], np.zeros((rows, 1 + size)))
+    return Workspace(one[0], one[1], np.zeros((STAGES + 1, size)), one[2], one[3], np.zeros((rows, 1 + size)))
 
 
 class Limits(NamedTuple):
-    """When flights end and how well they are computed."""
+    """End conditions and accuracy of flights."""
 
-    tolerance: float  # error of a step over the scales
-    escape: float  # distance [m] beyond which a body that flies away has escaped; 0: that of its start
+    tolerance: float  # largest error of a step over the scales
+    escape: float  # distance [m] beyond which a receding body has escaped; 0: that of its start
     most_steps: int
-    touch: float  # a length [m], r1 + r2
+    touch: float  # length scale r1 + r2 [m]
     reduced: float  # m̄ [kg]
 
 
-def blend_of(weights: np.ndarray, size: int) -> Callable:
-    """The loop out = y + dt Σ w_s k_s, with the weights and their number known to the compiler."""
+def linear_combination(weights: np.ndarray, size: int) -> Callable:
+    """Compile the loop out = y + dt Σ w_s k_s with constant weights."""
     stages = tuple(int(s) for s in np.flatnonzero(weights))
     used = tuple(float(weights[s]) for s in stages)
     count = len(used)
@@ -80,128 +80,134 @@ def blend_of(weights: np.ndarray, size: int) -> Callable:
 
 
 @functools.cache
-def stages_of(rates: Callable, size: int, stage: int) -> Callable:
-    """The loop that goes through the stages up to this one, the last of which is the new state."""
-    blend = blend_of(SCHEME.B if stage == STAGES else SCHEME.A[stage, :stage], size)
+def runge_kutta_stages(rates: Callable, size: int, stage: int) -> Callable:
+    """Compile the loop over the stages up to `stage`; the last one is the new state."""
+    blend = linear_combination(SCHEME.B if stage == STAGES else SCHEME.A[stage, :stage], size)
     if stage == 1:
 
         @loop
-        def first(room, rules, dt):
-            blend(room.y, room.rate, dt, room.new)
-            rates(room.new, room.rate[1], rules)
+        def first(work, parameters, dt):
+            blend(work.y, work.rate, dt, work.new)
+            rates(work.new, work.rate[1], parameters)
 
         return first
-    before = stages_of(rates, size, stage - 1)
+    before = runge_kutta_stages(rates, size, stage - 1)
 
     @loop
-    def further(room, rules, dt):
-        before(room, rules, dt)
-        blend(room.y, room.rate, dt, room.new)
-        rates(room.new, room.rate[stage], rules)
+    def further(work, parameters, dt):
+        before(work, parameters, dt)
+        blend(work.y, work.rate, dt, work.new)
+        rates(work.new, work.rate[stage], parameters)
 
     return further
 
 
 @loop
-def note(trail, step, time, y):
-    """Write time and state into the trail, if it is long enough."""
-    if step < trail.shape[0]:
-        trail[step, 0] = time
+def record_step(history, step, time, y):
+    """Write time and state to the history, as long as it has rows."""
+    if step < history.shape[0]:
+        history[step, 0] = time
         for row in range(y.size):
-            trail[step, 1 + row] = y[row]
+            history[step, 1 + row] = y[row]
 
 
 @functools.cache
 def flight_of(model: Model) -> Callable:
-    """The loop that flies one pair to its end: (end, time, steps, closest gap, drift)."""
-    rates, error_of, gap_of, energy_of, tidy = model.rates, model.error, model.gap, model.energy, model.tidy
+    """Compile the loop that integrates one flight to its end: (end, time, steps, smallest gap, drift)."""
+    rates, error_of, gap_of, energy_of, normalise = model.rates, model.error, model.gap, model.energy, model.normalise
 
     size = model.size
-    go_through = stages_of(rates, size, STAGES)
-    blend5, blend3 = blend_of(SCHEME.E5, size), blend_of(SCHEME.E3, size)
+    all_stages = runge_kutta_stages(rates, size, STAGES)
+    blend5, blend3 = linear_combination(SCHEME.E5, size), linear_combination(SCHEME.E3, size)
 
     @rare
-    def tried(room, rules, dt):
-        """One step to `new`: its error over the scales, infinite if not a number."""
-        go_through(room, rules, dt)
-        size_of_all = 0.0
+    def trial_step(work, parameters, dt):
+        """One step to `new`; returns its error over the scales, infinite if a value is not finite."""
+        all_stages(work, parameters, dt)
+        total = 0.0
         for row in range(size):
-            size_of_all += abs(room.new[row])
-        if not size_of_all < math.inf:  # scales and maxima would hide what is not a number
+            total += abs(work.new[row])
+        if not total < math.inf:  # maxima of error and scale would hide a NaN
             return math.inf
-        blend5(room.nought, room.rate, dt, room.error)
-        fifth = error_of(room.y, room.error, rules)
-        blend3(room.nought, room.rate, dt, room.error)
-        third = error_of(room.y, room.error, rules)
+        blend5(work.zeros, work.rate, dt, work.error)
+        fifth = error_of(work.y, work.error, parameters)
+        blend3(work.zeros, work.rate, dt, work.error)
+        third = error_of(work.y, work.error, parameters)
         if not (fifth + third < math.inf):
             return math.inf
         return fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third) if fifth > 0.0 else 0.0
 
     @loop
-    def fly(room, rules, limits):
-        y, new, rate = room.y, room.new, room.rate
-        r, u = at(y, R), at(y, U)
-        outside = limits.escape if limits.escape > 0.0 else norm(r)
+    def fly(work, parameters, limits):
+        y, new, rate = work.y, work.new, work.rate
+        r, u = vector_at(y, R), vector_at(y, U)
+        escape = limits.escape if limits.escape > 0.0 else norm(r)
         first = norm(r) / norm(u)
-        rates(y, rate[0], rules)
-        begun = energy_of(y, rules)
-        gap, longest = gap_of(y, rules)
+        rates(y, rate[0], parameters)
+        initial_energy = energy_of(y, parameters)
+        gap, longest_step = gap_of(y, parameters)
         time, dt, closest, steps = 0.0, FIRST * first, gap, 0
         fastest, end = dot(u, u), BOUND
-        note(room.trail, 0, time, y)
+        record_step(work.history, 0, time, y)
         while steps < limits.most_steps:
-            dt = min(dt, longest)
-            off = tried(room, rules, dt) / limits.tolerance
-            if not off <= 1.0:
-                dt *= step_size_factor(off, ORDER)
+            dt = min(dt, longest_step)
+            error_ratio = trial_step(work, parameters, dt) / limits.tolerance
+            if not error_ratio <= 1.0:
+                dt *= step_size_factor(error_ratio, ORDER)
                 if not dt > SMALLEST * first:
                     return FAILED, time, steps, closest, 0.0
                 continue
-            new_gap, longest = gap_of(new, rules)
-            if new_gap < -EXACT * limits.touch and gap > 0.0:  # beyond the touch: to where the chord has it
+            new_gap, longest_step = gap_of(new, parameters)
+            if new_gap < -EXACT * limits.touch and gap > 0.0:  # overlap: shorten the step by the secant method
                 dt *= max(0.1, gap / (gap - new_gap))
                 continue
-            tidy(new)
+            normalise(new)
             for row in range(size):
                 y[row] = new[row]
                 rate[0, row] = rate[STAGES, row]
             gap, time, steps = new_gap, time + dt, steps + 1
-            dt *= step_size_factor(off, ORDER)
+            dt *= step_size_factor(error_ratio, ORDER)
             closest = min(closest, gap)
-            note(room.trail, steps, time, y)
-            r, u = at(y, R), at(y, U)
+            record_step(work.history, steps, time, y)
+            r, u = vector_at(y, R), vector_at(y, U)
             fastest = max(fastest, dot(u, u))
             if gap <= EXACT * limits.touch:
                 end = HIT
                 break
-            if dot(r, r) >= outside * outside and dot(r, u) > 0.0:
+            if dot(r, r) >= escape * escape and dot(r, u) > 0.0:
                 end = MISS
                 break
-        return end, time, steps, closest, abs(energy_of(y, rules) - begun) / (0.5 * limits.reduced * fastest)
+        return (
+            end,
+            time,
+            steps,
+            closest,
+            abs(energy_of(y, parameters) - initial_energy) / (0.5 * limits.reduced * fastest),
+        )
 
     return fly
 
 
 @functools.cache
 def flights_of(model: Model) -> Callable:
-    """The compiled loop that flies many pairs.
+    """Compile the loop over many flights.
 
-    It takes the seed, their strata and numbers (K,), the least and largest b² of each (K,) [m²], a `Room`, `results`
-    (K, 8) and `ends` (K, size) to fill, and the numbers of start, kind of pair and limits.
+    Its arguments are the seed, strata and numbers (K,), lower and upper limits of b² (K,) [m²], a `Workspace`, the
+    outputs `results` (K, 8) and `ends` (K, size), the `InitialConditions`, the parameters of the pair and the `Limits`.
     """
-    fly, pose = flight_of(model), model.pose
+    fly, draw_pose = flight_of(model), model.draw_pose
 
-    def fly_all(seed, strata, numbers, low, high, room, results, ends, start, rules, limits):
-        y = room.y
+    def fly_all(seed, strata, numbers, low, high, work, results, ends, start, parameters, limits):
+        y = work.y
         for flight in range(numbers.size):
-            address = (seed, strata[flight], numbers[flight])
-            b = draw_path(y, address, low[flight], high[flight], start)
-            pose(y, address, start, rules)
-            speed = norm(at(y, U))
-            end, time, steps, closest, drift = fly(room, rules, limits)
-            told = (float(end), b, speed, time, float(steps), closest, norm(at(y, U)), drift)
-            for column in range(len(told)):
-                results[flight, column] = told[column]
+            flight_id = (seed, strata[flight], numbers[flight])
+            b = draw_path(y, flight_id, low[flight], high[flight], start)
+            draw_pose(y, flight_id, start, parameters)
+            speed = norm(vector_at(y, U))
+            end, time, steps, closest, drift = fly(work, parameters, limits)
+            values = (float(end), b, speed, time, float(steps), closest, norm(vector_at(y, U)), drift)
+            for column in range(len(values)):
+                results[flight, column] = values[column]
             for row in range(y.size):
                 ends[flight, row] = y[row]
 

@@ -1,4 +1,4 @@
-"""What `sand scatter` does with a case: fly, keep each piece of work, put results and figure into the folder."""
+"""Job of `sand scatter`: computes flights, saves each batch, and writes results and figure to the folder."""
 
 from __future__ import annotations
 
@@ -23,30 +23,32 @@ from .flights import COLUMNS, Trajectory, trajectory
 from .maps import probability_map
 
 POINTS = 1001
-"""Of a trajectory in results.csv, at equal times."""
-Watch = Callable[[str, float], None]
-"""Called with a line on how far things are, and the part that is done."""
+"""Number of rows of a trajectory in results.csv, equally spaced in time."""
+Progress = Callable[[str, float], None]
+"""Called with a status line and the fraction that is done."""
 
 
 @dataclass
 class Job:
-    """One case in its folder.
+    """One case of `sand scatter` in its folder.
 
     Parameters
     ----------
-    case, flights
-        from `read_scattering`.
-    content : dict[str, Any]
-        of the case file, as read.
+    case : ScatterCase
+        Case from `read_scattering`.
+    flights : list of Flight
+        Set-ups from `read_scattering`.
+    content : dict
+        Content of the case file.
     folder : Path
-        there already.
+        Existing folder.
     resume : bool, optional
-        go on with the flights that lie there.
+        Use the flights saved in the folder.
 
     Raises
     ------
     BadInput
-        the folder belongs to another case.
+        If the folder contains another case.
     """
 
     case: ScatterCase
@@ -62,7 +64,7 @@ class Job:
             if with_absolute_paths(read_toml(place)) != self.content:
                 raise BadInput(f"{place} is another case than the one given; give another folder, or --overwrite")
         else:
-            write_toml(place, self.content, "sand scatter: what was asked for; sand resume reads it")
+            write_toml(place, self.content, "settings of sand scatter, read by sand resume")
         self.before: dict[int, list[list[float]]] = {}
         self.table = None
         if self.case.measure.job != "trajectories":
@@ -70,16 +72,16 @@ class Job:
             for row in self.table.rows:
                 self.before.setdefault(int(row[0]), []).append(row[1:])
 
-    def run(self, executor: Executor | None = None, watch: Watch | None = None) -> dict[str, Any]:
-        """All of it; returns what scattering.json holds."""
-        told = {
+    def run(self, executor: Executor | None = None, progress: Progress | None = None) -> dict[str, Any]:
+        """Compute everything; returns the content of scattering.json."""
+        results = {
             "cross-section": self._cross_sections,
             "map": self._map,
             "trajectories": self._trajectories,
-        }[self.case.measure.job](executor, watch or (lambda text, part: None))
+        }[self.case.measure.job](executor, progress or (lambda text, part: None))
         if self.table is not None:
             self.table.sort()
-        content = {"job": self.case.measure.job, "seed": self.case.measure.seed, "versions": versions(), **told}
+        content = {"job": self.case.measure.job, "seed": self.case.measure.seed, "versions": versions(), **results}
         write_json(self.folder / SCATTERING, content)
         return content
 
@@ -87,7 +89,7 @@ class Job:
         assert self.table is not None
         self.table.add([setup, *row] for row in rows.tolist())
 
-    def _cross_sections(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
+    def _cross_sections(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
         from ...plotting.scattering import sigma_figure
 
         found = []
@@ -101,7 +103,7 @@ class Job:
                     executor=executor,
                     known=self.before.get(k, ()),
                     keep=lambda rows, k=k: self._keep(k, rows),  # type: ignore[misc]
-                    watch=lambda n, s, e, part=part, one=one: watch(  # type: ignore[misc]
+                    progress=lambda n, s, e, part=part, one=one: progress(  # type: ignore[misc]
                         f"{one.speed:.4g} m/s: {n} flights, sigma = {s:.4g} +- {e:.1g} m^2", part
                     ),
                 )
@@ -112,7 +114,7 @@ class Job:
         save(sigma_figure(found, _title(self.flights)), self.folder / FIGURE)
         return {"cross_sections": rows}
 
-    def _map(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
+    def _map(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
         from ...plotting.scattering import map_figure
 
         settings = self.case.measure
@@ -124,14 +126,14 @@ class Job:
             executor=executor,
             known=self.before,
             keep=self._keep,
-            watch=lambda n, total: watch(f"{n} of {total} flights", n / total),
+            progress=lambda n, total: progress(f"{n} of {total} flights", n / total),
         )
         rows = found.to_rows()
         write_table(self.folder / RESULTS, rows)
         save(map_figure(found, _title(self.flights)), self.folder / FIGURE)
         return {"cells": rows, "r1_plus_r2": found.geometric}
 
-    def _trajectories(self, executor: Executor | None, watch: Watch) -> dict[str, Any]:
+    def _trajectories(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
         from ...plotting.scattering import trajectories_figure
 
         groups: list[list[Trajectory]] = []
@@ -139,21 +141,21 @@ class Job:
             groups.append([])
             for n, b in enumerate(self.case.impact_parameters(one)):
                 groups[-1].append(trajectory(one, b, seed=self.case.measure.seed, stratum=k, number=n))
-                watch(f"flight {n + 1} of set-up {k + 1}", k / len(self.flights))
+                progress(f"flight {n + 1} of set-up {k + 1}", k / len(self.flights))
         write_table(self.folder / RESULTS, [row for k, group in enumerate(groups) for row in _path_rows(k, group)])
         names = [str(spin) for spin in self.case.measure.spins or [self.case.flight.spin]]
         save(trajectories_figure(groups, names, self.flights[0].scales, _title(self.flights)), self.folder / FIGURE)
         kept = ("end", "impact_parameter", "speed", "closest", "exchanged", "drift")
-        told = [
+        results = [
             {"setup": k, **{name: getattr(one, name) for name in kept}}
             for k, group in enumerate(groups)
             for one in group
         ]
-        return {"trajectories": told, "b_max": self.flights[0].scales.capture}
+        return {"trajectories": results, "b_max": self.flights[0].scales.capture}
 
 
 def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
-    """Time and positions of both, `POINTS` times of each flight."""
+    """Time and positions of both bodies, `POINTS` rows for each flight."""
     rows = []
     for n, one in enumerate(group):
         times = np.linspace(0.0, one.time[-1], POINTS)
@@ -166,7 +168,7 @@ def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
 
 
 def _title(flights: list[Flight]) -> str:
-    """What is scattered, in a line."""
+    """Description of bodies and start in one line."""
     one = flights[0]
     from ...plotting.style import format_si
 

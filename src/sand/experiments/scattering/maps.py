@@ -1,4 +1,4 @@
-"""Probability to meet in the plane of speed and impact parameter (Figure 3)."""
+"""Map of the hit probability over speed and impact parameter (Dominik & Nübold 2002, Figure 3)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arguments import checked
 from ...errors import BadInput
-from .cross_sections import addressed, flown, seed_of
+from .cross_sections import rows_by_flight, run_flights, seed_of
 from .encounters import Flight
 from .flight_driver import HIT
 from .flights import COLUMNS
@@ -22,14 +22,16 @@ END, STRATUM = COLUMNS.index("end"), COLUMNS.index("stratum")
 
 @dataclass(frozen=True)
 class ProbabilityMap:
-    """P(hit | b, v); SI.
+    """Hit probability P(hit | b, v); SI.
 
     Attributes
     ----------
     speeds : ndarray
-        (V,) [m/s]; edges: of the cells in b, (V, B + 1) [m].
+        (V,) [m/s].
+    edges : ndarray
+        Edges of the cells in b, (V, B + 1) [m].
     hits, flights : ndarray
-        (V, B).
+        Numbers (V, B).
     capture : ndarray
         b_max of each speed (V,) [m] (Eqs. 12, 13).
     geometric : float
@@ -45,15 +47,15 @@ class ProbabilityMap:
 
     @property
     def probability(self) -> np.ndarray:
-        """(V, B)"""
+        """Fraction of hits (V, B)."""
         return self.hits / np.maximum(self.flights, 1)
 
     def interval(self, z: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Wilson's bounds (V, B)."""
+        """Wilson bounds (V, B) for `z` standard deviations."""
         return wilson(self.hits, self.flights, z)
 
     def to_rows(self) -> list[dict[str, float]]:
-        """A row for each cell."""
+        """One row for each cell."""
         low, high = self.interval()
         return [
             {
@@ -82,27 +84,31 @@ def probability_map(
     executor: Executor | None = None,
     known: Mapping[int, Iterable[Sequence[float]]] | None = None,
     keep: Callable[[int, np.ndarray], None] | None = None,
-    watch: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> ProbabilityMap:
-    """Fly `per_cell` pairs in each cell of speed and impact parameter; b² is spread evenly in a cell.
+    """Compute `per_cell` flights in each cell of speed and impact parameter; b² is uniform within a cell.
 
     Parameters
     ----------
-    flights : Sequence[Flight]
-        one set-up for each speed.
+    flights : sequence of Flight
+        One set-up for each speed.
     cells : int, optional
-        how many in b for each speed, up to 1.2 times the widest b that a central potential captures there.
+        Number of cells in b for each speed, up to 1.2 times the largest b captured by a central potential.
+    per_cell : int, optional
+        Flights in each cell.
     seed : int, optional
-        of the first; the others have `seed_of` it and their number.
+        Seed of the first set-up; the others use `seed_of`.
+    executor : Executor, optional
+        Any `concurrent.futures.Executor`; None computes in this process.
     known, keep : optional
-        as for `scattering.flown`, with the number of the set-up.
-    watch : Callable[[int, int], None] or None, optional
-        called with flights done and all flights.
+        As for `scattering.run_flights`, with the index of the set-up.
+    progress : callable, optional
+        Called with the numbers of flights done and of all flights.
 
     Raises
     ------
     BadInput
-        no set-up, or a number of cells or flights below 1.
+        If there is no set-up, or a number of cells or flights is below 1.
     """
     if not flights or cells < 1 or per_cell < 1:
         raise BadInput(f"a map needs speeds, and cells = {cells} and per_cell = {per_cell} of at least 1")
@@ -113,14 +119,14 @@ def probability_map(
     hits, done = np.zeros((len(flights), cells)), np.zeros((len(flights), cells))
     tasks = [Task(k, 0, per_cell) for k in range(cells)]
     for v, one in enumerate(flights):
-        before = addressed((known or {}).get(v, ()))
-        tell = None if keep is None else partial(keep, v)
-        for told in flown(one, tasks, most[v] / cells, seed_of(seed, v), executor, before, tell):
-            place = told[:, STRATUM].astype(int)
-            np.add.at(hits[v], place, told[:, END] == HIT)
-            np.add.at(done[v], place, 1)
-            if watch is not None:
-                watch(int(done.sum()), done.size * per_cell)
+        before = rows_by_flight((known or {}).get(v, ()))
+        keep_rows = None if keep is None else partial(keep, v)
+        for rows in run_flights(one, tasks, most[v] / cells, seed_of(seed, v), executor, before, keep_rows):
+            cell = rows[:, STRATUM].astype(int)
+            np.add.at(hits[v], cell, rows[:, END] == HIT)
+            np.add.at(done[v], cell, 1)
+            if progress is not None:
+                progress(int(done.sum()), done.size * per_cell)
     return ProbabilityMap(
         np.array([one.speed for one in flights]),
         np.linspace(0.0, np.array(most), cells + 1, axis=1),

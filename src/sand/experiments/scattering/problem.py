@@ -1,4 +1,4 @@
-"""From what a user says of a scattering experiment to checked numbers."""
+"""User input of scattering experiments: conversion to checked numbers."""
 
 from __future__ import annotations
 
@@ -26,29 +26,30 @@ SPINS = {"none": 0.0, "kT/2": 0.5, "equipartition": 1.5}
 ORIENTATIONS = {"random": RANDOM, "aligned": ALIGNED, "given": GIVEN}
 SHAPES = ("plane", "sphere")
 OUTCOMES = ("hit", "stick")
-WORDS: dict[str, Any] = {
+ALLOWED: dict[str, Any] = {
     "speed_unit": SPEED_UNITS,
     "orientation": ORIENTATIONS,
     "start_shape": SHAPES,
     "outcome": OUTCOMES,
 }
-"""What may be said."""
+"""Allowed words of the text arguments."""
 AUTO_START = 10.0
-"""Distance of the start in b_max; at least `LEAST_START` radii of contact."""
+"""Default distance of the start in units of b_max."""
 LEAST_START = 5.0
+"""Smallest default distance of the start in units of r1 + r2."""
 _OF_CAPTURE = re.compile(r"\s*(\S+)\s+(b_max|R_m)\s*")
 FARTHEST = 1e9
-"""Largest start in sums of the radii."""
+"""Largest distance of the start in units of r1 + r2."""
 
 
 class ErrorCollector:
-    """Collects what is wrong, so that all of it is told at once."""
+    """Collects errors, so that they can be reported together."""
 
     def __init__(self) -> None:
         self.problems: list[str] = []
 
     def take(self, make: Callable[[], Any], instead: Any = None) -> Any:
-        """`make()`, or `instead` if that is a mistake."""
+        """Return `make()`, or `instead` if it raises BadInput, whose messages are collected."""
         try:
             return make()
         except BadInput as error:
@@ -56,7 +57,7 @@ class ErrorCollector:
             return instead
 
     def done(self) -> None:
-        """Raises BadInput if anything was wrong."""
+        """Raise BadInput if there were errors."""
         if self.problems:
             raise BadInput(self.problems)
 
@@ -82,115 +83,126 @@ def flight(
     outcome: str = "hit",
     tolerance: Any = 1e-8,
 ) -> Flight:
-    """A scattering experiment from what a user says.
+    """Set up a scattering experiment.
 
     Parameters
     ----------
-    radius : optional
-        of the grains [m] > 0; material: their `Material` or its name; moment: as `Grains` takes one.
-    temperature : optional
-        T [K] ≥ 0, of thermal speeds and spins.
-    speed : optional
-        v∞ of the projectile > 0 [m/s], or in v_th = √(k_B T/m) of the projectile with `speed_unit="thermal"`.
-    spin : optional
-        mean rotational energy per body: "none", "kT/2" (the paper's U_rot), "equipartition" (3/2 k_B T), all
-        by chance; or a vector [rad/s] for both; or two of them, of projectile and target.
-    start : optional
-        distance before the target: "auto", the larger of 10 b_max and 5 (r1 + r2); a length [m]; or
-        "20 b_max", "1 R_m" (Eq. 2; needs a temperature).
+    radius : float or str, optional
+        Radius of the grains [m] > 0.
+    material : Material or str, optional
+        Their material or the name of a preset.
+    moment : float or str or array_like, optional
+        Their magnetic moment, as for `Grains`.
+    temperature : float or str, optional
+        Temperature T [K] ≥ 0 of thermal speeds and spins.
+    speed : float or str, optional
+        Speed v∞ of the projectile > 0 [m/s], or in units of its v_th = √(k_B T/m) with `speed_unit="thermal"`.
+    speed_unit : str, optional
+        "m/s" or "thermal".
+    spin : str or array_like, optional
+        Mean rotational energy per body for random spins: "none", "kT/2" (U_rot of Dominik & Nübold 2002) or
+        "equipartition" (3/2 k_B T); or a vector [rad/s] for both bodies; or two vectors, for projectile and target.
+    start : float or str, optional
+        Distance of the start from the target: "auto", the larger of 10 b_max and 5 (r1 + r2); a length [m]; or "20
+        b_max", "1 R_m" (Eq. 2; needs a temperature).
     start_shape : str, optional
-        of all starts together, "plane" across the flight, or "sphere" about the target.
+        Surface of the starting points: "plane" perpendicular to the flight, or "sphere" about the target.
     target, projectile : Grains or None, optional
-        grains, or aggregates, instead of radius, material and moment; the target is like the
-        projectile by default. Their own velocities and spins do not count.
+        Grains or aggregates, instead of radius, material and moment. The target equals the projectile by default.
+        Their own velocities and spins are ignored.
     orientation : str, optional
-        "random"; "aligned", single grains' moments along the line of centres at the start; "given".
-    target_velocity : optional
-        three components [m/s], or "thermal", √(k_B T/m) for each; None: at rest.
-    field : optional
-        external flux density, three components [T]; None: none.
-    escape : optional
-        distance [m] > r1 + r2 at which a body on its way out is gone; "auto": that of its start.
+        "random"; "aligned", with the moments of single grains along the initial line of centres; or "given".
+    target_velocity : str or array_like, optional
+        Three components [m/s], or "thermal", random with standard deviation √(k_B T/m) each; None: at rest.
+    field : array_like, optional
+        External flux density, three components [T]; None: zero.
+    escape : float or str, optional
+        Distance [m] > r1 + r2 at which a receding body has escaped; "auto": that of its start.
     outcome : str, optional
-        "hit", surfaces touch; "stick": those that hold, each followed through its real contact.
-    tolerance : optional
-        error of a step over the scales, 1e-13 … 1e-3.
+        Definition of a hit: "hit", the surfaces touch; "stick", the simulated contact holds.
+    tolerance : float, optional
+        Error of a step over the scales, 1e-13 … 1e-3.
+
+    Returns
+    -------
+    Flight
+        The set-up.
 
     Raises
     ------
     BadInput
-        one line for each mistake.
+        If arguments are invalid; one line for each.
     """
     return _checked(dict(locals()))
 
 
 def _checked(given: dict[str, Any]) -> Flight:
-    """All of what was given, checked, so that every mistake is told at once."""
-    ask = ErrorCollector()
-    first, second = _bodies(ask, given)
-    heat = ask.take(lambda: si(given["temperature"], "K", "temperature", least=0.0), 0.0)
-    for name, allowed in WORDS.items():
+    """Check all arguments of `flight` and report their errors together."""
+    errors = ErrorCollector()
+    first, second = _bodies(errors, given)
+    heat = errors.take(lambda: si(given["temperature"], "K", "temperature", least=0.0), 0.0)
+    for name, allowed in ALLOWED.items():
         if not isinstance(given[name], str) or given[name] not in allowed:
-            ask.problems.append(f"{name} = {given[name]!r}; {did_you_mean(str(given[name]), list(allowed))}")
+            errors.problems.append(f"{name} = {given[name]!r}; {did_you_mean(str(given[name]), list(allowed))}")
     rest = (0.0, 0.0, 0.0)
-    drift, spread = ask.take(lambda: _drift(given["target_velocity"], heat, second), (rest, 0.0))
-    whirl, energy = ask.take(lambda: _spin(given["spin"], heat), ((rest, rest), 0.0))
-    outer = ask.take(lambda: rest if given["field"] is None else three(given["field"], "T", "field"))
-    exact = ask.take(lambda: si(given["tolerance"], "1", "tolerance", above=0.0), 1e-8)
-    if not 1e-13 <= exact <= 1e-3:
-        ask.problems.append(f"tolerance = {given['tolerance']!r} must lie in 1e-13 … 1e-3")
-    gone = ask.take(lambda: 0.0 if given["escape"] == "auto" else si(given["escape"], "m", "escape", above=0.0))
-    fast = ask.take(lambda: _speed(given["speed"], given["speed_unit"], heat, first))
-    away: Any = None
-    if first is not None and second is not None and fast is not None:
+    drift, spread = errors.take(lambda: _drift(given["target_velocity"], heat, second), (rest, 0.0))
+    spins, energy = errors.take(lambda: _spin(given["spin"], heat), ((rest, rest), 0.0))
+    external = errors.take(lambda: rest if given["field"] is None else three(given["field"], "T", "field"))
+    tolerance = errors.take(lambda: si(given["tolerance"], "1", "tolerance", above=0.0), 1e-8)
+    if not 1e-13 <= tolerance <= 1e-3:
+        errors.problems.append(f"tolerance = {given['tolerance']!r} must lie in 1e-13 … 1e-3")
+    escape = errors.take(lambda: 0.0 if given["escape"] == "auto" else si(given["escape"], "m", "escape", above=0.0))
+    speed_si = errors.take(lambda: _speed(given["speed"], given["speed_unit"], heat, first))
+    distance: Any = None
+    if first is not None and second is not None and speed_si is not None:
         if given["orientation"] == "aligned" and not len(first) == len(second) == 1:
-            ask.problems.append("orientation = 'aligned' is for single grains; give aggregates as they lie, 'given'")
-        speed = math.dist((fast, 0.0, 0.0), drift)
-        if speed < 1e-9 * fast:
-            ask.problems.append("speed and target_velocity are the same: the bodies never meet")
+            errors.problems.append("orientation = 'aligned' is for single grains; use 'given' for aggregates")
+        speed = math.dist((speed_si, 0.0, 0.0), drift)
+        if speed < 1e-9 * speed_si:
+            errors.problems.append("speed and target_velocity are equal: the bodies never collide")
         else:
-            away = ask.take(lambda: _distance(given["start"], first, second, speed, heat))
+            distance = errors.take(lambda: _distance(given["start"], first, second, speed, heat))
             touch = scales_of(first, second, speed).touch
-            if gone and not gone > touch:
-                ask.problems.append(
-                    f"escape = {given['escape']!r} must lie beyond the contact, {format_quantity(touch, 'm')}"
+            if escape and not escape > touch:
+                errors.problems.append(
+                    f"escape = {given['escape']!r} must exceed r1 + r2 = {format_quantity(touch, 'm')}"
                 )
-    ask.done()
+    errors.done()
     return Flight(
         first,
         second,
-        fast,
-        away,
+        speed_si,
+        distance,
         sphere=given["start_shape"] == "sphere",
-        escape=gone,
+        escape=escape,
         drift=drift,
         drift_spread=spread,
         axes=ORIENTATIONS[given["orientation"]],
-        spin=whirl,
+        spin=spins,
         spin_energy=(energy, energy),
-        field=outer,
-        tolerance=exact,
+        field=external,
+        tolerance=tolerance,
         temperature=heat,
         contact=given["outcome"] == "stick",
     )
 
 
-def _bodies(ask: ErrorCollector, given: dict[str, Any]) -> tuple[Any, Any]:
-    """Projectile and target; None for what could not be made."""
+def _bodies(errors: ErrorCollector, given: dict[str, Any]) -> tuple[Any, Any]:
+    """Projectile and target; None if invalid."""
     for name in ("projectile", "target"):
         if given[name] is not None and not isinstance(given[name], Grains):
-            ask.problems.append(f"{name} = {shown(given[name])} must be grains, such as sand.setup.grain(...)")
+            errors.problems.append(f"{name} = {shown(given[name])} must be grains, such as sand.setup.grain(...)")
             return None, None
     first = given["projectile"]
     if first is None:
-        first = ask.take(lambda: _made(given["radius"], given["material"], given["moment"]))
+        first = errors.take(lambda: _single_grain(given["radius"], given["material"], given["moment"]))
     elif given["radius"] is not None or given["material"] is not None:
-        ask.problems.append("radius and material are those of the projectile already; leave them out")
+        errors.problems.append("radius and material follow from the projectile; leave them out")
     return first, first if given["target"] is None else given["target"]
 
 
-def _made(radius: Any, material: Material | str | None, moment: Any) -> Grains:
-    """One grain at rest, its moment along +x; other than `setup.grain` it needs no surface energy."""
+def _single_grain(radius: Any, material: Material | str | None, moment: Any) -> Grains:
+    """One grain at rest with its moment along +x; unlike `setup.grain`, it needs no surface energy."""
     missing = [name for name, value in (("radius", radius), ("material", material)) if value is None]
     if missing:
         raise BadInput(f"{name} is missing; give radius and material, or a projectile" for name in missing)
@@ -212,7 +224,7 @@ def _speed(speed: Any, unit: str, heat: float, body: Grains | None) -> float | N
 
 
 def _drift(value: Any, heat: float, body: Grains | None) -> tuple[Any, float]:
-    """Mean velocity of the target and the standard deviation of each component [m/s]."""
+    """Mean velocity of the target, and the standard deviation of each component [m/s]."""
     rest = (0.0, 0.0, 0.0)
     if value is None or body is None:
         return rest, 0.0
@@ -222,7 +234,7 @@ def _drift(value: Any, heat: float, body: Grains | None) -> tuple[Any, float]:
 
 
 def _spin(value: Any, heat: float) -> tuple[Any, float]:
-    """Given spins of both [rad/s], and the mean energy of thermal ones [J]."""
+    """Mean spins of both bodies [rad/s], and the mean energy of thermal spins [J]."""
     rest = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     if isinstance(value, str):
         if value not in SPINS:
@@ -238,13 +250,13 @@ def _spin(value: Any, heat: float) -> tuple[Any, float]:
 
 
 def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: float) -> float:
-    """Distance of the start [m].  Raises BadInput where it lies inside the contact."""
+    """Distance of the start [m]. Raises BadInput if the bodies touch there."""
     scales = scales_of(first, second, speed)
     if isinstance(start, str) and start == "auto":
         return max(AUTO_START * scales.capture, LEAST_START * scales.touch)
-    told = _multiple(start, "start")
-    if told is not None:
-        times, unit = told
+    multiple = _multiple(start, "start")
+    if multiple is not None:
+        times, unit = multiple
         if scales.capture == 0.0:
             raise BadInput(f"start = {start!r}: without moments b_max and R_m are 0; give a length")
         if unit == "R_m" and not heat > 0.0:
@@ -258,35 +270,35 @@ def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: flo
         distance = si(start, "m", "start", above=0.0)
     if not distance > scales.touch:
         raise BadInput(
-            f"start = {start!r}, {format_quantity(distance, 'm')}, lies inside the contact: the bodies reach to "
-            f"{format_quantity(scales.touch, 'm')}; start farther out"
+            f"start = {start!r}, {format_quantity(distance, 'm')}, is inside r1 + r2 = "
+            f"{format_quantity(scales.touch, 'm')}; increase it"
         )
     if not distance < FARTHEST * scales.touch:
-        raise BadInput(f"start = {start!r} is out of all range: at most {FARTHEST:.0e} times r1 + r2")
+        raise BadInput(f"start = {start!r} must be at most {FARTHEST:.0e} times r1 + r2")
     return distance
 
 
 def _multiple(value: Any, name: str) -> tuple[float, str] | None:
-    """Number and unit of "10 b_max" or "1 R_m"; None for anything else.  Raises BadInput for a number that is none."""
+    """Number and unit of "10 b_max" or "1 R_m"; None for other values. Raises BadInput for an invalid number."""
     match = _OF_CAPTURE.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         return None
     return si(match[1], "1", f"{name} in {match[2]}", least=0.0), match[2]
 
 
-def impact_parameter(value: Any, flying: Flight, name: str = "impact_parameter") -> float:
-    """b [m] ≥ 0 from a length or "0.95 b_max".  Raises BadInput."""
-    told = _multiple(value, name)
-    if told is not None and told[1] == "b_max":
-        b = told[0] * flying.scales.capture
-        if flying.scales.capture == 0.0:
+def impact_parameter(value: Any, setup: Flight, name: str = "impact_parameter") -> float:
+    """Convert an impact parameter, a length or "0.95 b_max", to b [m] ≥ 0. Raises BadInput."""
+    multiple = _multiple(value, name)
+    if multiple is not None and multiple[1] == "b_max":
+        b = multiple[0] * setup.scales.capture
+        if setup.scales.capture == 0.0:
             raise BadInput(f"{name} = {value!r}: without moments b_max is 0; give a length")
     else:
         b = si(value, "m", name)
     if b < 0.0:
         raise BadInput(f"{name} = {value!r} must be at least 0 m")
-    if flying.sphere and b >= flying.distance:
+    if setup.sphere and b >= setup.distance:
         raise BadInput(
-            f"{name} = {value!r} must be below the radius of the start, {format_quantity(flying.distance, 'm')}"
+            f"{name} = {value!r} must be below the radius of the start, {format_quantity(setup.distance, 'm')}"
         )
     return b

@@ -1,7 +1,7 @@
-"""Stratified sampling of the impact parameter: which flights are needed for a cross-section, and what they tell.
+"""Stratified sampling of the impact parameter with adaptive allocation of flights.
 
-Strata are annuli of equal width in b.  Flight `number` of stratum `k` is the same whoever asks for it, so results do
-not depend on how the work was split, on the order in which it came back, nor on interruptions.
+Strata are annuli of equal width in b. Flight `number` of stratum `k` has fixed random numbers, so that results do not
+depend on how the work is distributed, on the order of completion, or on interruptions.
 """
 
 from __future__ import annotations
@@ -13,33 +13,33 @@ from typing import NamedTuple
 import numpy as np
 
 STRATA = 24
-"""Annuli up to the first guess of where no hit is possible."""
+"""Initial number of annuli."""
 HEADROOM = 1.2
-"""First guess over the widest impact parameter of a central potential."""
+"""Initial range of impact parameters, in units of the largest one captured by a central potential."""
 EMPTY = 4
-"""Outermost annuli that must be without a hit; otherwise more are added."""
+"""Number of outermost annuli that must be without hits; otherwise annuli are added."""
 PILOT = 48
-"""Flights in each annulus to begin with."""
+"""Initial number of flights in each annulus."""
 STEP_UP = 3.0
-"""A round has at most so many times the flights of all rounds before, because its plan is only as good as they."""
+"""Largest ratio of the flights of a round to those of all earlier rounds, on which its allocation is based."""
 ONE_SIGMA, CERTAIN = 1.0, 1.96
-"""Normal deviates of an error bar and of an interval of 95 %."""
+"""Normal deviates of a standard error and of a 95 % interval."""
 
 
 class Task(NamedTuple):
-    """Flights to be flown: first ≤ number < last of one stratum."""
+    """Flights to compute: first ≤ number < last of one stratum."""
 
     stratum: int
     first: int
     last: int
 
     def addresses(self) -> Iterator[tuple[int, int]]:
-        """Stratum and number of each."""
+        """(stratum, number) of each flight."""
         return ((self.stratum, number) for number in range(self.first, self.last))
 
 
 class Estimate(NamedTuple):
-    """A sum over strata with its bounds."""
+    """Sum over strata with its bounds."""
 
     value: float
     low: float
@@ -47,7 +47,20 @@ class Estimate(NamedTuple):
 
 
 def wilson(hits: np.ndarray, tries: np.ndarray, z: float) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of a probability from so many hits in so many tries (Wilson 1927); 0 and 1 without a try."""
+    """Wilson score interval of a probability (Wilson 1927); (0, 1) without trials.
+
+    Parameters
+    ----------
+    hits, tries : ndarray
+        Numbers of hits and trials.
+    z : float
+        Normal deviate.
+
+    Returns
+    -------
+    low, high : ndarray
+        Bounds of the probability.
+    """
     n = np.maximum(tries, 1)
     p = hits / n
     middle = (p + z * z / (2 * n)) / (1 + z * z / n)
@@ -59,59 +72,59 @@ def wilson(hits: np.ndarray, tries: np.ndarray, z: float) -> tuple[np.ndarray, n
 
 
 class Strata:
-    """What is known of each annulus.
+    """Results of the flights of each annulus.
 
     Parameters
     ----------
     width : float
-        of an annulus [m].
+        Width of an annulus [m].
     count : int
-        how many annuli.
+        Number of annuli.
     """
 
     def __init__(self, width: float, count: int):
         self.width = width
-        self.flown: list[dict[int, tuple[float, float]]] = [{} for _ in range(count)]
+        self.results: list[dict[int, tuple[float, float]]] = [{} for _ in range(count)]
 
     @classmethod
     def up_to(cls, widest: float, farthest: float = math.inf) -> Strata:
-        """The first guess; b may not go beyond `farthest` [m], where a sphere of starts ends."""
+        """Initial annuli; b is limited to `farthest` [m], the radius of a starting sphere."""
         return cls(min(HEADROOM * widest, farthest) / STRATA, STRATA)
 
     def __len__(self) -> int:
-        return len(self.flown)
+        return len(self.results)
 
     def edges(self, stratum: int | np.ndarray) -> tuple[float | np.ndarray, float | np.ndarray]:
-        """Least and largest b [m]."""
+        """Smallest and largest b of a stratum [m]."""
         return stratum * self.width, (stratum + 1) * self.width
 
     def area(self) -> np.ndarray:
-        """π (b₊² − b₋²) (K,) [m²]."""
+        """Areas π (b₊² − b₋²) (K,) [m²]."""
         k = np.arange(len(self))
         return math.pi * self.width**2 * (2 * k + 1.0)
 
     def add(self, stratum: int, number: int, hit: float, weight: float) -> None:
-        """One flight: 1 or 0, and what it counts for."""
+        """Add the result of a flight: hit (1 or 0), and its weight."""
         while stratum >= len(self):
-            self.flown.append({})
-        self.flown[stratum][number] = (hit, weight)
+            self.results.append({})
+        self.results[stratum][number] = (hit, weight)
 
     def counts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Hits and flights (K,) of the annuli."""
-        hits = np.array([sum(hit for hit, _ in sorted_values(one)) for one in self.flown])
-        return hits, np.array([len(one) for one in self.flown])
+        """Numbers of hits and of flights (K,) of the annuli."""
+        hits = np.array([sum(hit for hit, _ in values_in_order(one)) for one in self.results])
+        return hits, np.array([len(one) for one in self.results])
 
     def weights(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and variance (K,) of what hits count for; 1 and 0 where none is known."""
+        """Mean and variance (K,) of the weights of hits; 1 and 0 without hits."""
         mean, spread = np.ones(len(self)), np.zeros(len(self))
-        for k, one in enumerate(self.flown):
-            found = np.array([weight for hit, weight in sorted_values(one) if hit > 0.0])
+        for k, one in enumerate(self.results):
+            found = np.array([weight for hit, weight in values_in_order(one) if hit > 0.0])
             if found.size:
                 mean[k], spread[k] = found.mean(), found.var()
         return mean, spread
 
     def estimate(self, z: float = ONE_SIGMA) -> Estimate:
-        """σ = Σ A ⟨w hit⟩ [m²]; bounds from Wilson's, added in squares (Donner & Zou 2012)."""
+        """Estimate σ = Σ A ⟨w hit⟩ [m²], with Wilson bounds combined in quadrature (Donner & Zou 2012)."""
         hits, tries = self.counts()
         mean, spread = self.weights()
         area = self.area()
@@ -124,33 +137,33 @@ class Strata:
         return Estimate(value, value - down, value + up)
 
     def error(self) -> float:
-        """Half the width of one standard deviation to both sides [m²]."""
+        """Half the width of the one-standard-deviation interval [m²]."""
         found = self.estimate()
         return 0.5 * (found.high - found.low)
 
     def round(self, relative_error: float, farthest: float = math.inf) -> list[Task]:
-        """The flights that are to come next; none if σ is known well enough.
+        """Flights of the next round; an empty list if σ is accurate enough.
 
-        First so many in each annulus, and more annuli as long as the outermost have hits; then where they help most,
-        n ∝ A √(p(1 − p)) (Neyman 1934), with p from the neighbours.
+        First, `PILOT` flights in each annulus, with further annuli as long as the outermost ones have hits. Then
+        flights are allocated by n ∝ A √(p(1 − p)) (Neyman 1934), with p from neighbouring annuli.
         """
         hits, tries = self.counts()
         pilot = [Task(k, int(n), PILOT) for k, n in enumerate(tries) if n < PILOT]
         if pilot:
             return pilot
-        room = farthest / self.width - len(self) + 1e-9
-        if hits[-EMPTY:].any() and room >= 1.0:
-            further = int(min(max(len(self) // 4, 1), room))
+        possible = farthest / self.width - len(self) + 1e-9
+        if hits[-EMPTY:].any() and possible >= 1.0:
+            further = int(min(max(len(self) // 4, 1), possible))
             return [Task(len(self) + k, 0, PILOT) for k in range(further)]
         found = self.estimate()
         goal = relative_error * found.value
         if self.error() <= goal or found.value == 0.0:
             return []
-        p = (beside(hits) + 0.5) / (beside(tries) + 1.0)
+        p = (neighbour_sums(hits) + 0.5) / (neighbour_sums(tries) + 1.0)
         mean, spread = self.weights()
         worth = self.area() * np.sqrt(mean**2 * p * (1 - p) + p * spread)
         wanted = worth * worth.sum() / goal**2
-        # rounding up leaves at least one in each annulus that is not settled
+        # rounded up to at least one flight in each annulus that needs more
         more = np.maximum(np.ceil(wanted) - tries, 0.0)
         budget = STEP_UP * tries.sum()
         if more.sum() > budget:
@@ -160,22 +173,22 @@ class Strata:
         return [Task(k, int(n), int(n + m)) for k, (n, m) in enumerate(zip(tries, more, strict=True)) if m > 0]
 
 
-def beside(counts: np.ndarray) -> np.ndarray:
-    """Sums over the two annuli to either side, without the annulus itself.
+def neighbour_sums(counts: np.ndarray) -> np.ndarray:
+    """Sums over two annuli on either side, without the annulus itself.
 
-    Were an annulus given flights by its own hits, one that had too few by chance would get too few to find out.
+    Allocation by an annulus' own hits would be biased: an annulus with few hits by chance would get too few flights.
     """
     padded = np.pad(np.asarray(counts, float), 2)
     return sum(padded[2 + k : 2 + k + len(counts)] for k in (-2, -1, 1, 2))  # type: ignore[return-value]
 
 
-def sorted_values(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """In the order of their numbers, so that sums are the same bits however they came."""
+def values_in_order(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """Results in the order of their numbers, so that sums have equal bits in any order of completion."""
     return (flights[number] for number in sorted(flights))
 
 
 def cut(tasks: list[Task], most: int) -> tuple[list[Task], list[Task]]:
-    """The first `most` flights, and all others, in their order."""
+    """Split tasks into the first `most` flights and the rest."""
     head: list[Task] = []
     for k, task in enumerate(tasks):
         size = task.last - task.first

@@ -1,4 +1,4 @@
-"""From a touch to its outcome: the real contact of two bodies that have just met."""
+"""Simulation of the contact after a hit, to decide whether two bodies stick."""
 
 from __future__ import annotations
 
@@ -22,58 +22,59 @@ from .two_aggregates import ANGULAR1, ANGULAR2, TURN1, TURN2
 from .two_spheres import DIRECTION1, DIRECTION2, SPIN1, SPIN2
 
 PERIODS = 40
-"""A pair that has been in contact for so many normal periods without a break sticks."""
-LOOKS = 2000
-"""Looks after which a pair that is neither stuck nor free counts as stuck: it was caught and keeps coming back."""
+"""Number of normal oscillation periods in uninterrupted contact after which bodies stick."""
+MOST_CHECKS = 2000
+"""Number of checks after which bodies that collide repeatedly without escaping count as sticking."""
 
 
-def sticks(flying: Flight, state: np.ndarray) -> bool:
-    """True if the contact that begins with this state holds.
+def sticks(setup: Flight, state: np.ndarray) -> bool:
+    """Whether the bodies stick after a hit with this state.
 
-    The grains go on with all their contacts and dipoles (`Contact`, `Dipoles` without a cut-off, `Field`), deformable,
-    until they have stayed in contact, or have come apart and fly away.
+    The grains are simulated with all contacts and dipole forces (`Contact`, `Dipoles` without a cut-off, `Field`) until
+    they have stayed in contact, or have separated and escape.
 
     Parameters
     ----------
+    setup : Flight
+        Bodies and initial conditions.
     state : ndarray
-        of the pair at the touch, (18,) or (20,), as experiments/scattering/two_spheres.py and
-        experiments/scattering/two_aggregates.py lay it out.
+        State of the pair at contact, (18,) of `two_spheres` or (20,) of `two_aggregates`.
     """
-    grains, first = grains_at(flying, state)
+    grains, first = grains_at(setup, state)
     forces: list[Any] = [Contact(), Dipoles(cutoff=None)]
-    if any(flying.field):
-        forces.append(Field(flying.field))
+    if any(setup.field):
+        forces.append(Field(setup.field))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the user has been told of them
+        warnings.simplefilter("ignore")  # issued before
         sim = Simulation(grains, forces)
-    period, joined_for = slowest_period(flying), 0
-    for _ in range(LOOKS):
-        _, moving = _relative(sim.grains, first)
-        away = float(np.linalg.norm(moving))
-        # apart, the next thing can only happen after a way of the size of the grains
-        free_flight = 0.05 * float(grains.radius.min()) / away if away > 0.0 else period
-        sim.run(until=sim.time + (period if joined_for or not sim.time else max(period, free_flight)))
+    period, periods_in_contact = slowest_period(setup), 0
+    for _ in range(MOST_CHECKS):
+        speed = float(np.linalg.norm(_relative(sim.grains, first)[1]))
+        # separated bodies are checked after 0.05 radii of free flight
+        free_flight = 0.05 * float(grains.radius.min()) / speed if speed > 0.0 else period
+        sim.run(until=sim.time + (period if periods_in_contact or not sim.time else max(period, free_flight)))
         pairs = sim.contacts["pair"]
-        joined = bool(len(pairs)) and bool(((pairs < first).sum(axis=1) == 1).any())
-        joined_for = joined_for + 1 if joined else 0
-        if joined_for >= PERIODS:
+        in_contact = bool(len(pairs)) and bool(((pairs < first).sum(axis=1) == 1).any())
+        periods_in_contact = periods_in_contact + 1 if in_contact else 0
+        if periods_in_contact >= PERIODS:
             return True
-        if not joined and _escapes(sim.grains, first, flying):
+        if not in_contact and _escapes(sim.grains, first, setup):
             return False
     return True
 
 
-def slowest_period(flying: Flight) -> float:
-    """2π √(m̄/k_n) [s] of the bodies' reduced mass on the softest contact that they can make, k_n = (6/5) E* a0.
+def slowest_period(setup: Flight) -> float:
+    """Longest normal oscillation period 2π √(m̄/k_n) [s] of any contact of the bodies, with k_n = (6/5) E* a0.
 
-    Without adhesion: the time of a Hertzian impact at the speed of the flight, 2.87 (m̄²/(R E*² v))^(1/5).
+    m̄ is the reduced mass of the bodies. Without adhesion: the duration of a Hertzian impact at the speed of the
+    flight, 2.87 (m̄²/(R E*² v))^(1/5).
     """
-    contact, reduced, longest = Contact(), flying.scales.reduced, 0.0
-    for one in {(m, r) for m, r in zip(flying.projectile.material.tolist(), flying.projectile.radius, strict=True)}:
-        for two in {(m, r) for m, r in zip(flying.target.material.tolist(), flying.target.radius, strict=True)}:
-            pairing = contact.pairing(flying.projectile.materials[one[0]], flying.target.materials[two[0]])
+    contact, reduced, longest = Contact(), setup.scales.reduced, 0.0
+    for one in {(m, r) for m, r in zip(setup.projectile.material.tolist(), setup.projectile.radius, strict=True)}:
+        for two in {(m, r) for m, r in zip(setup.target.material.tolist(), setup.target.radius, strict=True)}:
+            pairing = contact.pairing(setup.projectile.materials[one[0]], setup.target.materials[two[0]])
             radius = one[1] * two[1] / (one[1] + two[1])
-            hertz = 2.87 * (reduced**2 / (radius * pairing.modulus**2 * flying.relative_speed)) ** 0.2
+            hertz = 2.87 * (reduced**2 / (radius * pairing.modulus**2 * setup.relative_speed)) ** 0.2
             longest = max(longest, hertz)
             if pairing.surface_energy > 0.0:
                 a0 = jkr.rest_radius(pairing.surface_energy, radius, pairing.modulus)
@@ -82,14 +83,14 @@ def slowest_period(flying: Flight) -> float:
     return longest
 
 
-def grains_at(flying: Flight, state: np.ndarray) -> tuple[Grains, int]:
-    """Both bodies as one set of grains, the projectile first, in the frame of their centre of mass."""
-    one, two = flying.projectile, flying.target
+def grains_at(setup: Flight, state: np.ndarray) -> tuple[Grains, int]:
+    """Grains of both bodies, projectile first, in the centre-of-mass frame; and the projectile's number of grains."""
+    one, two = setup.projectile, setup.target
     m1, m2 = float(one.mass.sum()), float(two.mass.sum())
     parts = []
     for body, share, k in ((one, m2 / (m1 + m2), 0), (two, -m1 / (m1 + m2), 1)):
         middle, moving = share * state[R : R + 3], share * state[U : U + 3]
-        if flying.spheres:
+        if setup.spheres:
             axis = (DIRECTION1, DIRECTION2)[k]
             spin = state[(SPIN1, SPIN2)[k] :][:3]
             arm = np.zeros((1, 3))
@@ -100,20 +101,20 @@ def grains_at(flying: Flight, state: np.ndarray) -> tuple[Grains, int]:
             spin = turn.apply(own)
             arm, moment = turn.apply(rigid.point.T), turn.apply(rigid.moment.T)
         parts.append((middle + arm, moving + np.cross(spin, arm), np.tile(spin, (len(body), 1)), moment))
-    position, velocity, whirl, moments = (np.concatenate(column) for column in zip(*parts, strict=True))
+    position, velocity, spins, moments = (np.concatenate(column) for column in zip(*parts, strict=True))
     grains = Grains(
         position,
         np.concatenate([one.radius, two.radius]),
         [b.materials[m] for b in (one, two) for m in b.material],
         velocity=velocity,
-        spin=whirl,
+        spin=spins,
         moment=moments,
     )
     return grains, len(one)
 
 
 def _relative(grains: Grains, first: int) -> tuple[np.ndarray, np.ndarray]:
-    """Separation and relative velocity of the two centres of mass, projectile from target."""
+    """Separation and relative velocity of the centres of mass, projectile minus target."""
     mass = grains.mass
     parts = (slice(first), slice(first, None))
     centres, speeds = (
@@ -122,9 +123,9 @@ def _relative(grains: Grains, first: int) -> tuple[np.ndarray, np.ndarray]:
     return centres[0] - centres[1], speeds[0] - speeds[1]
 
 
-def _escapes(grains: Grains, first: int, flying: Flight) -> bool:
-    """On the way out, and faster than all moments could hold, were they as close as the two closest grains are."""
-    apart, moving = _relative(grains, first)
-    kinetic = 0.5 * flying.scales.reduced * float(moving @ moving)
+def _escapes(grains: Grains, first: int, setup: Flight) -> bool:
+    """Whether the bodies recede with a kinetic energy above the largest possible magnetic energy at their distance."""
+    separation, velocity = _relative(grains, first)
+    kinetic = 0.5 * setup.scales.reduced * float(velocity @ velocity)
     closest = float(cdist(grains.position[:first], grains.position[first:]).min())
-    return float(apart @ moving) > 0.0 and kinetic > flying.scales.alpha / closest**3
+    return float(separation @ velocity) > 0.0 and kinetic > setup.scales.alpha / closest**3

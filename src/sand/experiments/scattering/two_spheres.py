@@ -1,8 +1,8 @@
-"""Two free magnetic bodies in the frame of one of them: rates of change, errors, gap and energy.
+"""Equations of motion of two free magnetic spheres, in relative coordinates.
 
-The state is one row of numbers: r = x1 − x2 and u = v1 − v2 of the projectile (1) from the target (2), then their
-orientations and spins.  `Model` is what a flight (experiments/scattering/flight_driver.py) needs to know of a kind of body; there are
-spheres here, rigid aggregates in experiments/scattering/two_aggregates.py.
+The state is one array: r = x1 − x2 and u = v1 − v2 of the projectile (1) relative to the target (2), then their
+orientations and spins. `Model` is the interface to the driver of flights (`flight_driver`); rigid aggregates are
+defined in `two_aggregates`.
 """
 
 import math
@@ -12,30 +12,42 @@ from typing import NamedTuple
 from ...compiler.jit import formula, loop
 from ...forces.pair.dipole_formulas import pair_load
 from ...numerics.vec import add, cross, dot, scale
-from .initial_conditions import AXIS1, AXIS2, WHIRL1, WHIRL2, R, U, at, drawn_axis, drawn_spin, unit, write
+from .initial_conditions import (
+    AXIS1,
+    AXIS2,
+    SPIN_STREAM1,
+    SPIN_STREAM2,
+    R,
+    U,
+    draw_axis,
+    draw_spin,
+    set_vector,
+    unit,
+    vector_at,
+)
 
 DIRECTION1, DIRECTION2, SPIN1, SPIN2 = 6, 9, 12, 15
-"""Where the unit vectors of the moments and the spins of two spheres begin."""
+"""Offsets of the unit vectors of the moments and of the spins in the state of two spheres."""
 SPHERES = 18
-"""Numbers in the state of two spheres."""
+"""Length of the state of two spheres."""
 CLOSE = 0.02
-"""In reach of a touch no step is longer than this part of the smallest radius: a graze that is missed is 5e-5 deep."""
+"""Longest path per step near contact, in units of the smallest radius; undetected grazing contacts are 5e-5 deep."""
 
 
 class Model(NamedTuple):
-    """The loops of one kind of pair; all take the state first and the kind's own numbers last."""
+    """Functions of one type of pair; all take the state first and the parameters of the pair last."""
 
-    size: int  # numbers in the state
-    rates: Callable  # (y, out, rules): dy/dt
-    error: Callable  # (y, error, rules): largest error over its scale
-    gap: Callable  # (y, rules): least distance of two surfaces [m], longest step [s] for which a touch is seen
-    energy: Callable  # (y, rules) [J]
-    tidy: Callable  # (y): unit vectors of unit length
-    pose: Callable  # (y, address, start, rules): draws orientations and spins; r and u are there
+    size: int  # length of the state
+    rates: Callable  # (y, out, parameters): dy/dt
+    error: Callable  # (y, error, parameters): largest error over its scale
+    gap: Callable  # (y, parameters): smallest gap [m], longest step [s] that cannot miss a contact
+    energy: Callable  # (y, parameters) [J]
+    normalise: Callable  # (y): restores unit vectors and quaternions
+    draw_pose: Callable  # (y, flight_id, start, parameters): draws orientations and spins; r and u are set before
 
 
 class Spheres(NamedTuple):
-    """Numbers of two magnetic spheres."""
+    """Parameters of two magnetic spheres."""
 
     k: float  # μ₀/4π [T m/A]
     reduced: float  # m̄ [kg]
@@ -49,82 +61,94 @@ class Spheres(NamedTuple):
 
 
 @loop
-def sphere_rates(y, out, rules):
-    """ṙ = u, u̇ = F/m̄, ê̇ = ω×ê, ω̇ = μ×(B + B_ext)/I (Eqs. 29, 33 with their 1/m and 1/I; 39, 40)."""
-    e1, e2 = at(y, DIRECTION1), at(y, DIRECTION2)
-    moment1, moment2 = scale(rules.moment1, e1), scale(rules.moment2, e2)
-    force, field1, field2, _ = pair_load(at(y, R), moment1, moment2, rules.k)
-    write(out, R, at(y, U))
-    write(out, U, scale(1.0 / rules.reduced, force))
-    write(out, DIRECTION1, cross(at(y, SPIN1), e1))
-    write(out, DIRECTION2, cross(at(y, SPIN2), e2))
-    write(out, SPIN1, scale(1.0 / rules.inertia1, cross(moment1, add(field1, rules.field))))
-    write(out, SPIN2, scale(1.0 / rules.inertia2, cross(moment2, add(field2, rules.field))))
+def sphere_rates(y, out, parameters):
+    """Rates ṙ = u, u̇ = F/m̄, ê̇ = ω×ê, ω̇ = μ×(B + B_ext)/I.
+
+    Eqs. 29, 33 (with the factors 1/m and 1/I), 39 and 40 of Dominik & Nübold (2002).
+    """
+    e1, e2 = vector_at(y, DIRECTION1), vector_at(y, DIRECTION2)
+    moment1, moment2 = scale(parameters.moment1, e1), scale(parameters.moment2, e2)
+    force, field1, field2, _ = pair_load(vector_at(y, R), moment1, moment2, parameters.k)
+    set_vector(out, R, vector_at(y, U))
+    set_vector(out, U, scale(1.0 / parameters.reduced, force))
+    set_vector(out, DIRECTION1, cross(vector_at(y, SPIN1), e1))
+    set_vector(out, DIRECTION2, cross(vector_at(y, SPIN2), e2))
+    set_vector(out, SPIN1, scale(1.0 / parameters.inertia1, cross(moment1, add(field1, parameters.field))))
+    set_vector(out, SPIN2, scale(1.0 / parameters.inertia2, cross(moment2, add(field2, parameters.field))))
 
 
 @formula
-def over(error, square):
-    """|e|²/scale², 0 where there is no error."""
+def relative_square(error, square):
+    """Relative squared error |e|²/scale², 0 for e = 0."""
     e = dot(error, error)
     return e / square if e > 0.0 else 0.0
 
 
 @loop
-def sphere_error(y, error, rules):
-    """The largest error over its scale: |r|, |u|, 1 and |ω|, or what the fields make of a pair at rest here.
+def sphere_error(y, error, parameters):
+    """Largest error over its scale; the scales are |r|, |u|, 1 and |ω|.
 
-    Speeds and spins may pass through 0; √(α/(m̄ r³)) and √((α/r³ + μB)/I) stand in for them then.
+    Speeds and spins may vanish; √(α/(m̄ r³)) and √((α/r³ + μB)/I), from the fields at this separation, are lower
+    bounds of their scales.
     """
-    r = at(y, R)
+    r = vector_at(y, R)
     square = dot(r, r)
-    strength = 2.0 * rules.k * rules.moment1 * rules.moment2 / (square * math.sqrt(square))
-    outer = math.sqrt(dot(rules.field, rules.field))
-    u, w1, w2 = at(y, U), at(y, SPIN1), at(y, SPIN2)
-    worst = max(over(at(error, R), square), over(at(error, U), max(dot(u, u), strength / rules.reduced)))
-    worst = max(worst, over(at(error, DIRECTION1), 1.0), over(at(error, DIRECTION2), 1.0))
-    swing1 = (strength + rules.moment1 * outer) / rules.inertia1
-    swing2 = (strength + rules.moment2 * outer) / rules.inertia2
-    worst = max(worst, over(at(error, SPIN1), max(dot(w1, w1), swing1)))
-    return math.sqrt(max(worst, over(at(error, SPIN2), max(dot(w2, w2), swing2))))
+    strength = 2.0 * parameters.k * parameters.moment1 * parameters.moment2 / (square * math.sqrt(square))
+    outer = math.sqrt(dot(parameters.field, parameters.field))
+    u, w1, w2 = vector_at(y, U), vector_at(y, SPIN1), vector_at(y, SPIN2)
+    worst = max(
+        relative_square(vector_at(error, R), square),
+        relative_square(vector_at(error, U), max(dot(u, u), strength / parameters.reduced)),
+    )
+    worst = max(
+        worst, relative_square(vector_at(error, DIRECTION1), 1.0), relative_square(vector_at(error, DIRECTION2), 1.0)
+    )
+    swing1 = (strength + parameters.moment1 * outer) / parameters.inertia1
+    swing2 = (strength + parameters.moment2 * outer) / parameters.inertia2
+    worst = max(worst, relative_square(vector_at(error, SPIN1), max(dot(w1, w1), swing1)))
+    return math.sqrt(max(worst, relative_square(vector_at(error, SPIN2), max(dot(w2, w2), swing2))))
 
 
 @loop
-def sphere_gap(y, rules):
-    """Distance of the surfaces [m], and the longest step [s] that no touch can be jumped over in."""
-    r, u = at(y, R), at(y, U)
-    gap = math.sqrt(dot(r, r)) - rules.touch
+def sphere_gap(y, parameters):
+    """Gap [m], and the longest step [s] that cannot miss a contact."""
+    r, u = vector_at(y, R), vector_at(y, U)
+    gap = math.sqrt(dot(r, r)) - parameters.touch
     speed = math.sqrt(dot(u, u))
-    way = max(0.5 * gap, CLOSE * rules.smallest)
+    way = max(0.5 * gap, CLOSE * parameters.smallest)
     return gap, way / speed if speed > 0.0 else math.inf
 
 
 @loop
-def sphere_energy(y, rules):
-    """½m̄u² + ½I1ω1² + ½I2ω2² + U − (μ1 + μ2)·B_ext [J] (Eqs. 6, 41)."""
-    u, w1, w2 = at(y, U), at(y, SPIN1), at(y, SPIN2)
-    moment1, moment2 = scale(rules.moment1, at(y, DIRECTION1)), scale(rules.moment2, at(y, DIRECTION2))
-    _, _, _, energy = pair_load(at(y, R), moment1, moment2, rules.k)
-    moving = rules.reduced * dot(u, u) + rules.inertia1 * dot(w1, w1) + rules.inertia2 * dot(w2, w2)
-    return 0.5 * moving + energy - dot(add(moment1, moment2), rules.field)
+def sphere_energy(y, parameters):
+    """Energy ½m̄u² + ½I1ω1² + ½I2ω2² + U − (μ1 + μ2)·B_ext [J] (Dominik & Nübold 2002, Eqs. 6, 41)."""
+    u, w1, w2 = vector_at(y, U), vector_at(y, SPIN1), vector_at(y, SPIN2)
+    moment1, moment2 = (
+        scale(parameters.moment1, vector_at(y, DIRECTION1)),
+        scale(parameters.moment2, vector_at(y, DIRECTION2)),
+    )
+    _, _, _, energy = pair_load(vector_at(y, R), moment1, moment2, parameters.k)
+    moving = parameters.reduced * dot(u, u) + parameters.inertia1 * dot(w1, w1) + parameters.inertia2 * dot(w2, w2)
+    return 0.5 * moving + energy - dot(add(moment1, moment2), parameters.field)
 
 
 @loop
-def sphere_tidy(y):
-    """|ê| = 1, to rounding."""
-    write(y, DIRECTION1, unit(at(y, DIRECTION1)))
-    write(y, DIRECTION2, unit(at(y, DIRECTION2)))
+def normalise_spheres(y):
+    """Restore |ê| = 1 against rounding."""
+    set_vector(y, DIRECTION1, unit(vector_at(y, DIRECTION1)))
+    set_vector(y, DIRECTION2, unit(vector_at(y, DIRECTION2)))
 
 
 @loop
-def sphere_pose(y, address, start, rules):
-    """Moments and spins by chance or as asked for (experiments/scattering/initial_conditions.py)."""
-    line = unit(at(y, R))
-    write(y, DIRECTION1, drawn_axis(address, AXIS1, start.axes, start.axis1, line))
-    write(y, DIRECTION2, drawn_axis(address, AXIS2, start.axes, start.axis2, line))
-    spread1 = math.sqrt(2.0 / 3.0 * start.spin_energy1 / rules.inertia1)
-    spread2 = math.sqrt(2.0 / 3.0 * start.spin_energy2 / rules.inertia2)
-    write(y, SPIN1, drawn_spin(address, WHIRL1, start.spin1, spread1))
-    write(y, SPIN2, drawn_spin(address, WHIRL2, start.spin2, spread2))
+def draw_sphere_pose(y, flight_id, start, parameters):
+    """Draw moments and spins as `InitialConditions` prescribes."""
+    line = unit(vector_at(y, R))
+    set_vector(y, DIRECTION1, draw_axis(flight_id, AXIS1, start.axes, start.axis1, line))
+    set_vector(y, DIRECTION2, draw_axis(flight_id, AXIS2, start.axes, start.axis2, line))
+    spread1 = math.sqrt(2.0 / 3.0 * start.spin_energy1 / parameters.inertia1)
+    spread2 = math.sqrt(2.0 / 3.0 * start.spin_energy2 / parameters.inertia2)
+    set_vector(y, SPIN1, draw_spin(flight_id, SPIN_STREAM1, start.spin1, spread1))
+    set_vector(y, SPIN2, draw_spin(flight_id, SPIN_STREAM2, start.spin2, spread2))
 
 
-TWO_SPHERES = Model(SPHERES, sphere_rates, sphere_error, sphere_gap, sphere_energy, sphere_tidy, sphere_pose)
+TWO_SPHERES = Model(SPHERES, sphere_rates, sphere_error, sphere_gap, sphere_energy, normalise_spheres, draw_sphere_pose)
