@@ -89,7 +89,7 @@ def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) ->
     axes.plot(
         rows["grains"][without_rings], moment[without_rings], ".", ms=3, color=colour, alpha=0.5, label="without rings"
     )
-    ring_style = {"ms": 3, "mew": 0.6, "color": MUTED, "alpha": 0.7, "label": "with rings"}
+    ring_style: dict[str, Any] = {"ms": 3, "mew": 0.6, "color": MUTED, "alpha": 0.7, "label": "with rings"}
     axes.plot(rows["grains"][~without_rings], moment[~without_rings], "x", **ring_style)
     n = np.array([2.0, rows["grains"].max()])
     text = f"all: $N^{{{_with_error(growth.moment)}}}$"
