@@ -71,7 +71,7 @@ def test_rods_are_met_where_they_are(w):
 def test_chunks_bound_the_memory(monkeypatch):
     """Ten thousand grains in pieces, in small pieces and at once: the same picture, and only at once more memory.
 
-    With pieces of MOST_SAMPLES the peak is that of the picture itself, as with pieces a twentieth of it; without a
+    With pieces of MAX_SAMPLES the peak is that of the picture itself, as with pieces a twentieth of it; without a
     bound it is twice as much.  The picture is full in the middle.
     """
     rng = np.random.default_rng(5)
@@ -79,8 +79,8 @@ def test_chunks_bound_the_memory(monkeypatch):
         rng.normal(size=(10_000, 3)), np.full(10_000, 0.03), np.full((10_000, 3), 0.5), np.zeros((10_000, 3))
     )
     peaks, pictures = [], []
-    for most in (trace.MOST_SAMPLES, trace.MOST_SAMPLES // 20, 10**9):
-        monkeypatch.setattr(trace, "MOST_SAMPLES", most)
+    for most in (trace.MAX_SAMPLES, trace.MAX_SAMPLES // 20, 10**9):
+        monkeypatch.setattr(trace, "MAX_SAMPLES", most)
         tracemalloc.start()
         pictures.append(render_spheres(grains, (-3.2, 3.2, -2.0, 2.0), 800, 500))
         peaks.append(tracemalloc.get_traced_memory()[1])
@@ -100,5 +100,5 @@ def test_a_ball_larger_than_the_picture_is_cut_into_squares():
 def test_rods_join():
     """Joined rods are all of them, in order."""
     one = Rods(np.zeros((1, 3)), np.ones((1, 3)), np.ones((1, 2)), np.ones((1, 3)), np.ones(1))
-    both = Rods.joined(one, dataclasses.replace(one, lit=np.zeros(1)))
-    np.testing.assert_array_equal(both.lit, [1.0, 0.0])
+    both = Rods.joined(one, dataclasses.replace(one, shading=np.zeros(1)))
+    np.testing.assert_array_equal(both.shading, [1.0, 0.0])

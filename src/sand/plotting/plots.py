@@ -27,7 +27,7 @@ from .panels import (
     energy_unit,
     time_unit,
 )
-from .render.colouring import DECADES
+from .render.colouring import LOG_RANGE
 from .run_figure import DPI, RunFigure
 from .style import BLUE, DARK_BACKGROUND, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, format_si, plot_style, si_prefix
 
@@ -132,7 +132,7 @@ def _histogram(axes: Axes, values: np.ndarray, meaning: str, unit: str) -> None:
         half = 0.5 * abs(low) or 0.5
         low, high = low - half, high + half
     bins = int(np.clip(np.sqrt(len(shown)) * 1.5, 5, 60))
-    if low > 0.0 and high > DECADES * low:
+    if low > 0.0 and high > LOG_RANGE * low:
         axes.set_xscale("log")
         edges = np.geomspace(low, high, bins + 1)
     else:

@@ -1,4 +1,4 @@
-"""The figure at the end of every run: clusters, energies, losses and balance over time; the grains in 3-D."""
+"""Figure of a run: clusters, energies, losses and energy balance over time, and an image of the grains."""
 
 from __future__ import annotations
 
@@ -22,43 +22,44 @@ if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
 
 WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
-"""Inches, inches, pixels per inch: 1600 × 1000 pixels."""
-SMALL_GRAIN = 11.0
-"""Pixels: with grains of a smaller radius in the box, the largest clusters are shown by themselves too."""
-SQUEEZE = 6
-"""Of zlib; 9 saves another twentieth of a figure of shaded grains, and takes ten times as long, a second."""
+"""[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
+MIN_GRAIN_RADIUS = 11.0
+"""Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
+COMPRESSION = 6
+"""zlib level of PNG files; level 9 saves another 5 % and takes ten times as long (1 s)."""
 _PNG: dict[str, Any] = {
     "format": "png",
     "dpi": DPI,
     "metadata": {"Software": "SAND"},
-    "pil_kwargs": {"compress_level": SQUEEZE},
+    "pil_kwargs": {"compress_level": COMPRESSION},
 }
 
+# Positions of the panels in units of the figure size.
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
 _TOP, _BOTTOM = 0.862, 0.075
-_EDGE = 0.012
+_MARGIN = 0.012
 
 
 class RunFigure(Figure):
-    """A figure that notebooks display as it is, whatever backend is in use."""
+    """A figure that notebooks display as PNG with any backend."""
 
     def _repr_png_(self) -> bytes:
         return png(self)
 
 
 def run_figure(simulation: Simulation) -> Figure:
-    """One landscape figure of the run so far.
+    """Figure of a run so far.
 
-    Left, over time: clusters (Eq. 17), energies, losses by channel, the balance of the books.  Right: the
-    grains as they are now, coloured by cluster, with their moments; where they are small, the largest
-    clusters once more.  Energies in N k_B T of the start, or in J if the grains were at rest.
+    Left, over time: clusters (Eq. 17), energies, losses by channel, and the energy balance. Right: the grains at the
+    present time with their moments, coloured by cluster; if they are small, the largest clusters again, enlarged.
+    Energies are in N k_B T₀, or in joules if the grains were initially at rest.
 
-    A run that has no rows in its ledger yet, or in which no position is a finite number, gets the other half.
+    The left half is empty if the ledger has no row, the right half if no position is finite.
     """
     scene = make_scene(simulation.grains, simulation.contacts["pair"], simulation.box)
     with plot_style():
         figure = RunFigure(figsize=(WIDTH, HEIGHT), dpi=DPI)
-        _draw_headline(figure, simulation)
+        _draw_header(figure, simulation)
         if simulation.ledger.rows:
             _draw_history(figure, simulation)
         if scene.label.size:
@@ -66,34 +67,34 @@ def run_figure(simulation: Simulation) -> Figure:
     return figure
 
 
-def _draw_headline(figure: Figure, simulation: Simulation) -> None:
-    told = headline(simulation.grains, simulation.box, simulation.time)
-    figure.text(_EDGE, 0.968, told, size=10.5, weight="bold", va="center")
+def _draw_header(figure: Figure, simulation: Simulation) -> None:
+    title = headline(simulation.grains, simulation.box, simulation.time)
+    figure.text(_MARGIN, 0.968, title, size=10.5, weight="bold", va="center")
     if not simulation.ledger.rows:
         return
     last = simulation.ledger.rows[-1]
     count = int(last["clusters"])
     facts = [
         f"{count} cluster{'s' if count != 1 else ''}",
-        f"mean size S = {_count(last['mean_cluster_size'])}",
+        f"mean size S = {_format_mean(last['mean_cluster_size'])}",
         f"largest {int(last['largest_cluster'])}",
-        f"{int(last['contacts'])} contacts ({int(last['made'])} made, {int(last['broken'])} broken)",
+        f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)",
     ]
     if simulation.temperature > 0.0:
         facts.append(f"$T_0$ = {format_number(simulation.temperature)} K")
-    figure.text(_EDGE, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
+    figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
 
 
-def _count(number: float) -> str:
-    return f"{number:.0f}" if number >= 100.0 else f"{number:.3g}"
+def _format_mean(size: float) -> str:
+    return f"{size:.0f}" if size >= 100.0 else f"{size:.3g}"
 
 
 def headline(grains: Any, box: Box, time: float) -> str:
-    """Who is where, and how old: '100 grains of iron, r = 10 nm, periodic box 1.2 µm, t = 5 µs'."""
+    """Title of a run: '100 grains of iron, r = 10 nm, periodic cube of 1.2 µm, t = 5 µs'."""
     parts = [
         f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {_materials(grains)}",
-        f"r = {_span(grains.radius)}",
-        _describe(box),
+        f"r = {_radius_range(grains.radius)}",
+        _describe_box(box),
         f"t = {format_si(time, 's')}",
     ]
     return ",  ".join(parts)
@@ -104,14 +105,14 @@ def _materials(grains: Any) -> str:
     return ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
 
 
-def _span(radius: np.ndarray) -> str:
+def _radius_range(radius: np.ndarray) -> str:
     small, large = float(radius.min()), float(radius.max())
     if large < 1.001 * small:
         return format_si(large, "m")
     return f"{format_si(small, 'm')} to {format_si(large, 'm')}"
 
 
-def _describe(box: Box) -> str:
+def _describe_box(box: Box) -> str:
     if box.is_open:
         return "open space"
     if len(set(box.lengths)) == 1:
@@ -135,13 +136,13 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
 
 
 def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
-    """The box, and under it the largest clusters if they are small in it; `lost` grains are not drawn."""
-    whole = (0.03, 0.85)
-    window = view_window(scene, _pixels(whole[1])[0] / _pixels(whole[1])[1])
-    grain = float(np.median(scene.radius)) * _pixels(whole[1])[0] / (window[1] - window[0])
-    small = grain < SMALL_GRAIN and bool(scene.largest_clusters())
+    """All grains in the box, and below it the largest clusters if grains are small; `lost` grains are not drawn."""
+    full = (0.03, 0.85)
+    window = view_window(scene, _pixels(full[1])[0] / _pixels(full[1])[1])
+    grain_radius = float(np.median(scene.radius)) * _pixels(full[1])[0] / (window[1] - window[0])
+    enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(scene.largest_clusters())
     strip = 0.235
-    bottom, height = (whole[0] + strip + 0.02, whole[1] - strip - 0.02) if small else whole
+    bottom, height = (full[0] + strip + 0.02, full[1] - strip - 0.02) if enlarge else full
     axes = _panel(figure, _RIGHT, bottom, height)
     draw_scene(axes, scene, _pixels(height))
     panel_letter(axes, "e", 0.0)
@@ -155,21 +156,21 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
         va="bottom",
         ha="left",
     )
-    if small:
-        axes = _panel(figure, _RIGHT, whole[0], strip)
+    if enlarge:
+        axes = _panel(figure, _RIGHT, full[0], strip)
         draw_largest(axes, scene, _pixels(strip))
         panel_letter(axes, "f", 0.0)
 
 
 def _caption(scene: Scene, lost: int) -> str:
-    told = []
+    parts = []
     if scene.largest_clusters():
-        told.append("one colour per cluster, single grains grey")
+        parts.append("one colour per cluster, single grains grey")
     if scene.arrow.any():
-        told.append("arrows: moments")
+        parts.append("arrows: moments")
     if lost:
-        told.append(f"left out: {lost} without a finite position")
-    return "; ".join(told)
+        parts.append(f"left out: {lost} without a finite position")
+    return "; ".join(parts)
 
 
 def _panel(figure: Figure, columns: tuple[float, float], bottom: float, height: float) -> Axes:
@@ -177,58 +178,58 @@ def _panel(figure: Figure, columns: tuple[float, float], bottom: float, height: 
 
 
 def _pixels(height: float) -> tuple[int, int]:
-    """Of a panel on the right whose height is that share of the figure's."""
+    """Width and height in pixels of a panel on the right with this height relative to the figure."""
     return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
 
 
 def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
-    """Bottom and height of panels above each other, the highest first; `heights` in proportion."""
-    room = (_TOP - _BOTTOM - gap * (len(heights) - 1)) / sum(heights)
-    places, top = [], _TOP
+    """Bottom and height of panels on the left from top to bottom, with heights in the given proportions."""
+    scale = (_TOP - _BOTTOM - gap * (len(heights) - 1)) / sum(heights)
+    panels, top = [], _TOP
     for share in heights:
-        places.append((top - share * room, share * room))
-        top -= share * room + gap
-    return places
+        panels.append((top - share * scale, share * scale))
+        top -= share * scale + gap
+    return panels
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG."""
+    """Encode a figure as PNG."""
     with plot_style():
         figure.savefig(content := io.BytesIO(), **_PNG)
     return content.getvalue()
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write the figure as a PNG; the file is whole or not there.
+    """Write a figure as PNG, atomically.
 
     Raises
     ------
     FilesFailed
-        the disk is full, the folder has vanished, …
+        If the file cannot be written.
     """
     replace_file(Path(path), png(figure))
 
 
 def show(figure: Figure) -> Figure:
-    """Show the figure in a window where there can be one; notebooks display what is returned."""
+    """Show a figure in a window, unless in a notebook, which displays the returned figure."""
     if not in_notebook():
         from matplotlib import pyplot as plt
 
-        if plt.get_backend().lower() in _windows():
-            # pyplot takes a figure only when it makes it: this hands it ours as the new one.
+        if plt.get_backend().lower() in _window_backends():
+            # pyplot manages only figures that it has created: let its factory return this one.
             plt.figure(FigureClass=lambda *_, **__: figure)
             plt.show()
     return figure
 
 
 def in_notebook() -> bool:
-    """Whether cells of a notebook call."""
-    python = sys.modules.get("IPython")
-    shell: Any = python.get_ipython() if python is not None else None
+    """Whether the code runs in a notebook."""
+    ipython = sys.modules.get("IPython")
+    shell: Any = ipython.get_ipython() if ipython is not None else None
     return shell is not None and hasattr(shell, "kernel")
 
 
-def _windows() -> set[str]:
-    """Backends that open windows."""
-    kits = ("qt5", "qt", "gtk3", "gtk4", "tk", "wx")
-    return {f"{kit}{how}" for kit in kits for how in ("agg", "cairo")} | {"macosx"}
+def _window_backends() -> set[str]:
+    """Names of the matplotlib backends that open windows."""
+    toolkits = ("qt5", "qt", "gtk3", "gtk4", "tk", "wx")
+    return {f"{toolkit}{renderer}" for toolkit in toolkits for renderer in ("agg", "cairo")} | {"macosx"}

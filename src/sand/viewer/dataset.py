@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,9 @@ from .packets import frame_bytes, frame_packet, grains_packet
 from .ranges import quantity_ranges
 from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, stale_note
 from .series import series_from_frames, series_from_ledger
-from .simulation_view import FieldDescription
+
+if TYPE_CHECKING:
+    from .simulation_view import FieldDescription
 
 FORMAT = 1
 MAX_TRACKED = 8_000_000

@@ -9,10 +9,10 @@ import numpy as np
 from ..analysis.ledger_columns import LedgerColumns
 from ..io.frame import Frame, stored_frame
 from .dataset import RunDataset
-from .simulation_view import FieldDescription
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
+    from .simulation_view import FieldDescription
 
 
 class Snapshot:

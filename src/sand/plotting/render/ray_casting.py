@@ -1,8 +1,8 @@
-"""What each point of a picture shows: spheres and rods met by rays, the nearest one wins.
+"""Ray casting of spheres and rods into a depth buffer.
 
-Eye coordinates in samples: x to the right, y up, z towards the eye, the origin in the middle of the picture.  A ray
-through (X, Y, 0) holds the points (X(1 − wz), Y(1 − wz), z); w is one over the distance of the eye, 0 for parallel
-rays.
+Eye coordinates in units of samples: x to the right, y up, z towards the eye, the origin in the centre of the image.
+The ray through (X, Y, 0) consists of the points (X(1 − wz), Y(1 − wz), z), where w is the reciprocal distance of the
+eye; w = 0 gives parallel projection.
 """
 
 from __future__ import annotations
@@ -13,26 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 TILE_EDGES = (4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64)
-"""Samples along an edge of the squares that shapes are cut into."""
+"""Edge lengths [samples] of the square tiles in which shapes are processed."""
 MAX_SAMPLES = 400_000
-"""Looked at in one go: what bounds the memory."""
-NOTHING = -1
+"""Samples processed at a time; limits memory."""
 
 
 @dataclass(frozen=True)
 class Solids:
-    """Spheres, then rods: cones cut flat at both ends, cylinders among them.  N spheres, M rods, all in samples.
+    """N spheres and M rods (cylinders or truncated cones with flat ends), all lengths in samples.
 
     Attributes
     ----------
     centre, radius : ndarray
         (N, 3), (N,) of spheres.
     start, end, end_radii : ndarray
-        (M, 3), (M, 3), (M, 2) of rods: middles of the two ends, and their radii.
+        (M, 3), (M, 3), (M, 2) centres of the two ends of rods, and their radii.
     colour : ndarray
-        (N + M, 3), 0 to 1, spheres first.
-    lit : ndarray
-        (N + M,) how much light and shade change the colour, 0 to 1.
+        (N + M, 3) red, green, blue from 0 to 1, spheres first.
+    shading : ndarray
+        (N + M,) weight of the shading, 0 to 1.
     """
 
     centre: np.ndarray
@@ -41,65 +40,74 @@ class Solids:
     end: np.ndarray
     end_radii: np.ndarray
     colour: np.ndarray
-    lit: np.ndarray
+    shading: np.ndarray
 
     def depths(self) -> tuple[float, float]:
-        """Lowest and highest z of anything."""
-        thick = self.end_radii.max(axis=1) if len(self.end_radii) else np.zeros(0)
-        low = [self.centre[:, 2] - self.radius, np.minimum(self.start, self.end)[:, 2] - thick]
-        high = [self.centre[:, 2] + self.radius, np.maximum(self.start, self.end)[:, 2] + thick]
+        """Lowest and highest z of all shapes; at least the plane z = 0."""
+        radius = self.end_radii.max(axis=1) if len(self.end_radii) else np.zeros(0)
+        low = [self.centre[:, 2] - self.radius, np.minimum(self.start, self.end)[:, 2] - radius]
+        high = [self.centre[:, 2] + self.radius, np.maximum(self.start, self.end)[:, 2] + radius]
         return float(np.concatenate(low).min(initial=0.0)), float(np.concatenate(high).max(initial=0.0))
 
 
 class DepthBuffer:
-    """The nearest shape in each sample of a picture, and how deep it lies there.
+    """Nearest shape in each sample of an image, and its depth.
 
     Parameters
     ----------
-    shape : tuple[int, int]
-        rows and columns; the first row is the lowest.
+    shape : tuple of int
+        Rows and columns; the first row is the lowest.
     solids : Solids
-        what there is to see.
+        Shapes to be drawn.
     w : float, optional
-        one over the distance of the eye; 0: parallel rays.
+        Reciprocal distance of the eye; 0 for parallel projection.
+
+    Attributes
+    ----------
+    nearest : ndarray
+        uint64 per sample, 0 if empty: the float32 bits of the depth in the upper half, the number of the shape + 1 in
+        the lower half, so that the larger value belongs to the nearer shape.
     """
 
     def __init__(self, shape: tuple[int, int], solids: Solids, w: float = 0.0):
         self.shape, self.solids, self.w = shape, solids, w
-        self.far, near = solids.depths()
-        self.range = max(near - self.far, 1.0) * 1.001
-        # depth in the upper half, shape + 1 in the lower: the larger of two numbers is the nearer of two shapes
+        self.lowest, highest = solids.depths()
+        self.range = max(highest - self.lowest, 1.0) * 1.001
         self.nearest = np.zeros(shape, dtype=np.uint64)
         for items, tile in _tiles(shape, *_sphere_windows(self), solids.centre[:, 2]):
             self._rasterise(items, tile, self._intersect_spheres, 0)
         for items, tile in _tiles(shape, *_rod_windows(self), solids.start[:, 2]):
             self._rasterise(_tiles_near_axis(self, items, tile), tile, self._intersect_rods, len(solids.radius))
 
-    def _rasterise(self, items: np.ndarray, tile: int, meet, first: int) -> None:
-        """Squares `items` (K, 3): which shape, lowest column and row."""
+    def depth(self, key: np.ndarray) -> np.ndarray:
+        """Depth z stored in values of `nearest`."""
+        return (key >> np.uint64(32)).astype(np.uint32).view(np.float32) * self.range + self.lowest
+
+    def _rasterise(self, items: np.ndarray, tile: int, intersect, first: int) -> None:
+        """Draw tiles `items` (K, 3): shape (shape `first` has number 0), lowest column, lowest row."""
         flat, (height, width) = self.nearest.reshape(-1), self.shape
-        step, many = np.arange(tile), max(MAX_SAMPLES // tile**2, 1)
-        for begin in range(0, len(items), many):
-            which, left, low = items[begin : begin + many][::-1].T
+        step, tiles_at_once = np.arange(tile), max(MAX_SAMPLES // tile**2, 1)
+        for begin in range(0, len(items), tiles_at_once):
+            which, left, low = items[begin : begin + tiles_at_once][::-1].T
             columns, rows = left[:, None] + step, low[:, None] + step
-            z = meet(
+            z = intersect(
                 which,
                 (columns + 0.5 - width / 2)[:, None, :],
                 (rows + 0.5 - height / 2)[:, :, None],
             )
             inside = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[:, None, :]
             b, r, c = np.nonzero(np.isfinite(z) & inside)
-            share = np.clip((z[b, r, c] - self.far) / self.range, 1e-30, 1.0).astype(np.float32)
+            share = np.clip((z[b, r, c] - self.lowest) / self.range, 1e-30, 1.0).astype(np.float32)
             key = (share.view(np.uint32).astype(np.uint64) << np.uint64(32)) | (which[b] + first + 1).astype(np.uint64)
-            place = rows[b, r] * width + columns[b, c]
-            front = key > flat[place]
-            while front.any():  # of several numbers for one place the last is kept: look again until it is the largest
-                place, key = place[front], key[front]
-                flat[place] = key
-                front = key > flat[place]
+            index = rows[b, r] * width + columns[b, c]
+            front = key > flat[index]
+            while front.any():  # of several values for one index, numpy stores the last: repeat until it is the largest
+                index, key = index[front], key[front]
+                flat[index] = key
+                front = key > flat[index]
 
     def _intersect_spheres(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """z where rays first meet spheres, not a number where they do not."""
+        """First intersection z of rays and spheres; NaN if there is none."""
         cx, cy, cz = self.solids.centre[which].T[:, :, None, None]
         radius, w = self.solids.radius[which][:, None, None], self.w
         ox = ((x * (1.0 - w * cz) - cx) / radius).astype(np.float32)
@@ -114,11 +122,12 @@ class DepthBuffer:
             return cz + radius * ((along + root) / long)
 
     def _intersect_rods(self, which: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """z where rays first meet rods, not a number where they do not."""
+        """First intersection z of rays and rods; NaN if there is none."""
         s, w = self.solids, self.w
         a, axis = s.start[which], (s.end - s.start)[which]
         first, second = s.end_radii[which].T[:, :, None, None]
-        top = np.maximum(a[:, 2], a[:, 2] + axis[:, 2]) + s.end_radii[which].max(axis=1)  # rays begin in front of all
+        # Rays start at z = top, in front of the rod.
+        top = np.maximum(a[:, 2], a[:, 2] + axis[:, 2]) + s.end_radii[which].max(axis=1)
         bx, by, bz = axis.T[:, :, None, None]
         m0 = bx * bx + by * by + bz * bz
         scale = (1.0 - w * top)[:, None, None]
@@ -130,18 +139,18 @@ class DepthBuffer:
         m3, m5 = dx * ox + dy * oy - oz, ox * ox + oy * oy + oz * oz
         with np.errstate(invalid="ignore", divide="ignore"):
             t = _intersect_cone(m0, m1, m2, m3, m5, dd, first, second)
-            near = -m1 / m2
-            disc = (m5 + 2.0 * near * m3 + near * near * dd < first**2) & (m1 < 0.0)
-            away = (m0 - m1) / m2
-            lid = (m5 - 2.0 * m1 + m0 + 2.0 * away * (m3 - m2) + away * away * dd < second**2) & (m1 > m0)
-            t = np.where(disc & (near > 0.0), near, np.where(lid & (away > 0.0), away, t))
+            t1 = -m1 / m2
+            hits_start = (m5 + 2.0 * t1 * m3 + t1 * t1 * dd < first**2) & (m1 < 0.0)
+            t2 = (m0 - m1) / m2
+            hits_end = (m5 - 2.0 * m1 + m0 + 2.0 * t2 * (m3 - m2) + t2 * t2 * dd < second**2) & (m1 > m0)
+            t = np.where(hits_start & (t1 > 0.0), t1, np.where(hits_end & (t2 > 0.0), t2, t))
         return top[:, None, None] - t
 
     def surface(self, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Which shape (K,), point (K, 3) and outward unit normal (K, 3) in covered samples."""
+        """Shape (K,), point (K, 3) and outward unit normal (K, 3) in covered samples."""
         key = self.nearest[rows, columns]
         which = (key & np.uint64(0xFFFFFFFF)).astype(np.int64) - 1
-        z = (key >> np.uint64(32)).astype(np.uint32).view(np.float32) * self.range + self.far
+        z = self.depth(key)
         height, width = self.shape
         near = 1.0 - self.w * z
         point = np.column_stack([(columns + 0.5 - width / 2) * near, (rows + 0.5 - height / 2) * near, z])
@@ -157,16 +166,20 @@ class DepthBuffer:
         axis, (first, second) = (s.end - s.start)[which], s.end_radii[which].T
         q, m0 = point - s.start[which], (axis * axis).sum(axis=1)
         along = (q * axis).sum(axis=1) / m0
-        out = q - along[:, None] * axis
-        reach = np.linalg.norm(out, axis=1)
-        slant = ((first - second) / m0 * reach)[:, None] * axis
-        flat = reach < first + (second - first) * along - 0.05
+        radial = q - along[:, None] * axis
+        distance = np.linalg.norm(radial, axis=1)
+        slope = ((first - second) / m0 * distance)[:, None] * axis
+        on_end = distance < first + (second - first) * along - 0.05
         ends = np.sign(along - 0.5)[:, None] * axis
-        return np.where(flat[:, None], ends, out + slant)
+        return np.where(on_end[:, None], ends, radial + slope)
 
 
 def _intersect_cone(m0, m1, m2, m3, m5, dd, first, second):
-    """Where rays meet the side of a cone, from products of axis, ray and way to the first end; NaN: nowhere."""
+    """Ray parameter of the first intersection with the side of a cone, from scalar products; NaN if there is none.
+
+    m0 = b·b, m1 = o·b, m2 = d·b, m3 = d·o, m5 = o·o and dd = d·d, with the axis b of the cone from its first to its
+    second end, the ray o + t d, and o relative to the first end.
+    """
     narrow = first - second
     h = m0 + narrow * narrow
     k2 = m0 * m0 * dd - m2 * m2 * h
@@ -178,7 +191,7 @@ def _intersect_cone(m0, m1, m2, m3, m5, dd, first, second):
 
 
 def _sphere_windows(buffer: DepthBuffer) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 2) lowest and highest column and row of spheres: exact tangents."""
+    """Lowest and highest column and row (N, 2) of the exact outlines of spheres."""
     s, w = buffer.solids, buffer.w
     if w == 0.0:
         return s.centre[:, :2] - s.radius[:, None], s.centre[:, :2] + s.radius[:, None]
@@ -190,6 +203,7 @@ def _sphere_windows(buffer: DepthBuffer) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rod_windows(buffer: DepthBuffer) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds (M, 2) of the columns and rows of rods."""
     s, w = buffer.solids, buffer.w
     ends = []
     for point, end_radii in ((s.start, s.end_radii[:, 0]), (s.end, s.end_radii[:, 1])):
@@ -201,7 +215,7 @@ def _rod_windows(buffer: DepthBuffer) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _tiles_near_axis(buffer: DepthBuffer, items: np.ndarray, tile: int) -> np.ndarray:
-    """Those squares that a rod's projection comes near to: a long one crosses few of those in its window."""
+    """Select the tiles close to the projected axis of a rod; a long rod covers few of the tiles in its window."""
     s, w = buffer.solids, buffer.w
     which = items[:, 0]
     a, b = (p[which, :2] / np.maximum(1.0 - w * p[which, 2], 1e-3)[:, None] for p in (s.start, s.end))
@@ -216,17 +230,20 @@ def _tiles_near_axis(buffer: DepthBuffer, items: np.ndarray, tile: int) -> np.nd
 def _tiles(
     shape: tuple[int, int], low: np.ndarray, high: np.ndarray, z: np.ndarray
 ) -> Iterator[tuple[np.ndarray, int]]:
-    """Windows cut into squares, those of one edge together: (K, 3) shape, lowest column and row; and the edge."""
+    """Divide windows into square tiles.
+
+    Yields for each edge length the tiles (K, 3) (shape, lowest column, lowest row), and the edge length.
+    """
     size = np.array(shape[::-1])
     with np.errstate(invalid="ignore"):
         first = np.floor(np.clip(low + size / 2 - 0.5, 0, size)).astype(np.int64)
         last = np.ceil(np.clip(high + size / 2 - 0.5, -1, size - 1)).astype(np.int64)
     span = last - first + 1
-    there = np.flatnonzero((span > 0).all(axis=1))
-    there = there[np.argsort(-z[there], kind="stable")]  # the nearest first: they hide most
-    edge = np.array(TILE_EDGES)[np.minimum(np.searchsorted(TILE_EDGES, span[there].max(axis=1)), len(TILE_EDGES) - 1)]
+    visible = np.flatnonzero((span > 0).all(axis=1))
+    visible = visible[np.argsort(-z[visible], kind="stable")]  # nearest first: they hide most of the others
+    edge = np.array(TILE_EDGES)[np.minimum(np.searchsorted(TILE_EDGES, span[visible].max(axis=1)), len(TILE_EDGES) - 1)]
     for tile in np.unique(edge):
-        own = there[edge == tile]
+        own = visible[edge == tile]
         across, along = (-(-span[own] // tile)).T
         which = np.repeat(own, across * along)
         number = np.arange(len(which)) - np.repeat(np.cumsum(across * along) - across * along, across * along)

@@ -1,4 +1,4 @@
-"""The grains in three dimensions: clusters whole, in the box, and the largest ones by themselves."""
+"""Scenes of grains: unwrapped clusters in the box, the view onto them, and the largest clusters side by side."""
 
 from __future__ import annotations
 
@@ -15,18 +15,23 @@ from ..style import LARGEST_COLOURS, MUTED, OTHER_COLOURS, SINGLE_COLOUR, TEXT_C
 from .spheres import Spheres, render_spheres
 
 AZIMUTH, ELEVATION = 32.0, 20.0
-"""Where the eye is [degrees], seen from the middle of the box; z is up."""
+"""Default direction to the eye [degrees], seen from the centre of the box; z is up."""
 LARGEST_SHOWN = 3
-"""Clusters shown by themselves."""
+"""Maximum number of clusters shown side by side."""
 
 
 def camera_rotation(towards: np.ndarray | None = None) -> np.ndarray:
-    """(3, 3): rows are the directions right, up and towards the eye in the laboratory frame.
+    """Rotation from the laboratory frame to screen coordinates.
 
     Parameters
     ----------
-    towards : ndarray or None, optional
-        (3,) direction to the eye, of any length but 0; from above, y is up.
+    towards : ndarray, optional
+        (3,) direction to the eye, of any length above 0.
+
+    Returns
+    -------
+    ndarray
+        (3, 3); rows are the directions right, up and towards the eye. Seen along z, y points up.
     """
     a, e = np.radians(AZIMUTH), np.radians(ELEVATION)
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -38,24 +43,24 @@ def camera_rotation(towards: np.ndarray | None = None) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to see, laboratory frame.
+    """Grains to be drawn, in the laboratory frame.
 
     Attributes
     ----------
     position : ndarray
-        (N, 3) [m], clusters whole and with their middle in the box.
+        (N, 3) positions [m]; clusters are unwrapped, with their centre in the box.
     radius : ndarray
-        (N,) [m].
+        (N,) radii [m].
     label : ndarray
-        (N,) cluster of each grain.
+        (N,) cluster index of each grain.
     colour : ndarray
-        (N, 3).
+        (N, 3) red, green, blue from 0 to 1.
     arrow : ndarray
-        (N, 3) direction of the moment times its share of the largest one's size.
+        (N, 3) half of the arrow of the moment, in grain radii.
     box : Box
-        with lengths [m].
+        Periodic or open box.
     number : ndarray
-        (N,) of each grain in what the scene was made from.
+        (N,) index of each grain in the frame or simulation.
     """
 
     position: np.ndarray
@@ -67,7 +72,7 @@ class Scene:
     number: np.ndarray
 
     def projected(self, rotation: np.ndarray, chosen: slice | np.ndarray = slice(None)) -> Spheres:
-        """The chosen grains in screen coordinates; rows of `rotation` are right, up, to the eye."""
+        """The chosen grains in screen coordinates (see `camera_rotation`)."""
         return Spheres(
             self.position[chosen] @ rotation.T,
             self.radius[chosen],
@@ -76,7 +81,7 @@ class Scene:
         )
 
     def corners(self) -> np.ndarray | None:
-        """(2, 2, 2, 3) corners of the box [m], on open axes around the grains; None if it is all open."""
+        """Corners (2, 2, 2, 3) of the box [m], which encloses the grains along open axes; None if all axes are open."""
         if self.box.is_open:
             return None
         low = (self.position - self.radius[:, None]).min(axis=0)
@@ -87,58 +92,61 @@ class Scene:
         return np.array(list(itertools.product(*zip(low, high, strict=True)))).reshape(2, 2, 2, 3)
 
     def edges(self) -> list[tuple[np.ndarray, np.ndarray, int, bool]]:
-        """The twelve edges of the box: two ends (3,) [m], axis, and whether they meet in the farthest corner."""
+        """The twelve edges of the box: two ends (3,) [m], axis, and whether the edge ends in the farthest corner."""
         corners = self.corners()
         if corners is None:
             return []
-        far = np.unravel_index(np.argmin(corners @ camera_rotation()[2]), (2, 2, 2))
-        found = []
+        farthest = np.unravel_index(np.argmin(corners @ camera_rotation()[2]), (2, 2, 2))
+        edges = []
         for axis, *others in itertools.product(range(3), (0, 1), (0, 1)):
             start = [*others[:axis], 0, *others[axis:]]
             end = [*others[:axis], 1, *others[axis:]]
-            found.append((corners[tuple(start)], corners[tuple(end)], axis, far in (tuple(start), tuple(end))))
-        return found
+            edges.append((corners[tuple(start)], corners[tuple(end)], axis, farthest in (tuple(start), tuple(end))))
+        return edges
 
     def largest_clusters(self) -> list[int]:
-        """Labels of clusters of at least two grains, the largest first."""
+        """Indices of the clusters of at least two grains, largest first."""
         sizes = cluster_sizes(self.label)
         order = np.argsort(-sizes, kind="stable")
         return [int(k) for k in order if sizes[k] > 1]
 
 
 def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> Scene:
-    """The scene of grains with contacts `pairs` (C, 2); grains whose place is not a number are left out.
+    """Scene of grains and their contacts; grains whose position is not finite are left out.
 
     Parameters
     ----------
-    grains
-        anything with position, radius and moment.
+    grains : Grains or Frame
+        Any object with position, radius and moment.
+    pairs : ndarray
+        (C, 2) grains in contact.
+    box : Box
+        Periodic or open box.
     whole : bool, optional
-        clusters are not cut by the faces of the box; otherwise every grain lies inside it.
+        Unwrap clusters across periodic boundaries; otherwise every grain is drawn inside the box.
     """
     label = cluster_labels(len(grains), pairs)
-    place = np.where(np.isfinite(grains.position), grains.position, np.nan)
-    position = box.wrap(place)
+    position = box.wrap(np.where(np.isfinite(grains.position), grains.position, np.nan))
     if whole:
         position = unwrapped(position, pairs, box)
         sizes = cluster_sizes(label)
-        middle = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
-        position = position + (box.wrap(middle) - middle)[label]
-    there = np.isfinite(position).all(axis=1)
-    numbered = np.unique(label[there], return_inverse=True)[1]
+        centre = np.stack([np.bincount(label, position[:, k]) / sizes for k in range(3)], axis=1)
+        position = position + (box.wrap(centre) - centre)[label]
+    finite = np.isfinite(position).all(axis=1)
+    numbered = np.unique(label[finite], return_inverse=True)[1]
     return Scene(
-        position[there],
-        grains.radius[there],
+        position[finite],
+        grains.radius[finite],
         numbered,
         cluster_colours(numbered),
-        _arrows(grains.moment[there]),
+        _arrows(grains.moment[finite]),
         box,
-        np.flatnonzero(there),
+        np.flatnonzero(finite),
     )
 
 
 def _arrows(moment: np.ndarray) -> np.ndarray:
-    """(N, 3) in radii of the grains: in proportion to the largest moment, but never too short to be seen."""
+    """Half arrows (N, 3) in grain radii, proportional to the moments, but at least 0.35 of the longest."""
     moment = np.nan_to_num(moment, posinf=0.0, neginf=0.0)
     size = np.linalg.norm(moment, axis=1, keepdims=True)
     largest = max(float(size.max(initial=0.0)), 1e-300)
@@ -147,7 +155,7 @@ def _arrows(moment: np.ndarray) -> np.ndarray:
 
 
 def cluster_colours(label: np.ndarray) -> np.ndarray:
-    """(N, 3): a colour of its own for each of the largest clusters, grey for single grains."""
+    """Colours (N, 3) of grains by cluster: unique for the largest clusters, grey for single grains."""
     sizes = cluster_sizes(label)
     of_cluster = np.tile(rgb(SINGLE_COLOUR), (sizes.size, 1))
     for rank, k in enumerate(np.argsort(-sizes, kind="stable")):
@@ -162,9 +170,9 @@ def cluster_colours(label: np.ndarray) -> np.ndarray:
 
 
 def view_window(
-    scene: Scene, wide: float, margin: float = 0.02, rotation: np.ndarray | None = None
+    scene: Scene, aspect: float, margin: float = 0.02, rotation: np.ndarray | None = None
 ) -> tuple[float, float, float, float]:
-    """Left, right, bottom, top [m] that hold the grains and the box; `wide` is width over height."""
+    """Left, right, bottom and top [m] of the view that encloses grains and box; `aspect` is width over height."""
     rotation = camera_rotation() if rotation is None else rotation
     left, right, bottom, top = scene.projected(rotation).bounds
     corners = scene.corners()
@@ -172,29 +180,31 @@ def view_window(
         flat = corners.reshape(-1, 3) @ rotation.T
         left, right = min(left, flat[:, 0].min()), max(right, flat[:, 0].max())
         bottom, top = min(bottom, flat[:, 1].min()), max(top, flat[:, 1].max())
-    return fit_window((left, right, bottom, top), wide, margin, least=5.0 * float(scene.radius.max()))
+    return fit_window((left, right, bottom, top), aspect, margin, min_height=5.0 * float(scene.radius.max()))
 
 
 def fit_window(
-    bounds: tuple[float, float, float, float], wide: float, margin: float, least: float = 0.0
+    bounds: tuple[float, float, float, float], aspect: float, margin: float, min_height: float = 0.0
 ) -> tuple[float, float, float, float]:
-    """The window of proportions `wide` around `bounds`, at least `least` [m] high."""
+    """Window with aspect ratio `aspect` around `bounds`, at least `min_height` [m] high."""
     left, right, bottom, top = bounds
-    height = max((top - bottom), (right - left) / wide, least) * (1.0 + 2.0 * margin)
+    height = max((top - bottom), (right - left) / aspect, min_height) * (1.0 + 2.0 * margin)
     x, y = (left + right) / 2, (bottom + top) / 2
-    return x - wide * height / 2, x + wide * height / 2, y - height / 2, y + height / 2
+    return x - aspect * height / 2, x + aspect * height / 2, y - height / 2, y + height / 2
 
 
 def draw_scene(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
-    """All grains in their box, with a scale bar and the directions of the axes."""
+    """Draw all grains in the box, with a scale bar and the directions of the axes."""
     window = view_window(scene, pixels[0] / pixels[1])
-    _show(axes, scene.projected(camera_rotation()), window, pixels)
+    _draw_image(axes, scene.projected(camera_rotation()), window, pixels)
     _draw_box(axes, scene)
     _draw_directions(axes)
     draw_scale_bar(axes)
 
 
-def _show(axes: Axes, spheres: Spheres, window: tuple[float, float, float, float], pixels: tuple[int, int]) -> None:
+def _draw_image(
+    axes: Axes, spheres: Spheres, window: tuple[float, float, float, float], pixels: tuple[int, int]
+) -> None:
     axes.imshow(
         render_spheres(spheres, window, *pixels),
         extent=window,
@@ -208,7 +218,7 @@ def _show(axes: Axes, spheres: Spheres, window: tuple[float, float, float, float
 
 
 def _draw_box(axes: Axes, scene: Scene) -> None:
-    """The twelve edges; the three that meet in the farthest corner lie behind the grains."""
+    """Draw the edges of the box; those that end in the farthest corner lie behind the grains."""
     for start, end, axis, behind in scene.edges():
         line = np.array([start, end]) @ camera_rotation().T
         axes.plot(
@@ -224,7 +234,7 @@ def _draw_box(axes: Axes, scene: Scene) -> None:
 
 
 def _draw_directions(axes: Axes) -> None:
-    """x, y and z as a small cross in the lower left corner."""
+    """Draw the axes x, y and z in the lower left corner."""
     left, (bottom, top) = axes.get_xlim()[0], axes.get_ylim()
     size = 0.042 * (top - bottom)
     x, y = left + 1.6 * size, bottom + 0.9 * size
@@ -234,61 +244,63 @@ def _draw_directions(axes: Axes) -> None:
 
 
 def draw_scale_bar(
-    axes: Axes, share: float = 0.25, ink: str = TEXT_COLOUR, margin: float = 0.015, grow: float = 1.0
+    axes: Axes, share: float = 0.25, colour: str = TEXT_COLOUR, margin: float = 0.015, scale: float = 1.0
 ) -> None:
-    """A bar of a round length, at most `share` of the width, in the lower right corner, and its length."""
+    """Draw a scale bar of round length in the lower right corner, at most `share` of the width of the view."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     length = round_length(share * (right - left))
     x, y = right - margin * (right - left), bottom + 4.0 / 3.0 * margin * (top - bottom)
-    axes.plot([x - length, x], [y, y], color=ink, linewidth=2.0 * grow, solid_capstyle="butt", zorder=4, gid="scale")
-    place, above = (x - length / 2, y), (0, 3 * grow)
+    axes.plot(
+        [x - length, x], [y, y], color=colour, linewidth=2.0 * scale, solid_capstyle="butt", zorder=4, gid="scale"
+    )
+    centre, offset = (x - length / 2, y), (0, 3 * scale)
     axes.annotate(
-        format_si(length, "m"), place, above, textcoords="offset points", ha="center", color=ink, size=7.5 * grow
+        format_si(length, "m"), centre, offset, textcoords="offset points", ha="center", color=colour, size=7.5 * scale
     )
 
 
 def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[int]]:
-    """The `count` largest clusters next to each other, each turned so that its long axis is across.
+    """Arrange the `count` largest clusters in a row, each rotated so that its longest axis is horizontal.
 
     Returns
     -------
-    tuple[Spheres, ndarray, list[int]]
-        What to draw; (K, 2) the middle of the lower edge of each cluster [m]; their numbers of grains.
+    tuple of (Spheres, ndarray, list of int)
+        Spheres to be drawn; (K, 2) centre of the lower edge of each cluster [m]; number of grains of each cluster.
     """
-    parts, feet, sizes, edge = [], [], [], 0.0
+    parts, lower_edges, sizes, x = [], [], [], 0.0
     gap = 3.0 * float(scene.radius.max())
     for label in scene.largest_clusters()[:count]:
-        chosen = np.flatnonzero(scene.label == label)
-        spheres = scene.projected(_principal(scene.position[chosen]), chosen)
+        members = np.flatnonzero(scene.label == label)
+        spheres = scene.projected(_principal_axes(scene.position[members]), members)
         left, right, bottom, top = spheres.bounds
-        shift = np.array([edge - left, -(bottom + top) / 2, -spheres.centre[:, 2].mean()])
+        shift = np.array([x - left, -(bottom + top) / 2, -spheres.centre[:, 2].mean()])
         parts.append(Spheres(spheres.centre + shift, spheres.radius, spheres.colour, spheres.arrow))
-        feet.append((edge + (right - left) / 2, -(top - bottom) / 2))
-        sizes.append(chosen.size)
-        edge += right - left + gap
+        lower_edges.append((x + (right - left) / 2, -(top - bottom) / 2))
+        sizes.append(members.size)
+        x += right - left + gap
     fields = zip(*((p.centre, p.radius, p.colour, p.arrow) for p in parts), strict=True)
-    return Spheres(*(np.concatenate(each) for each in fields)), np.array(feet), sizes
+    return Spheres(*(np.concatenate(each) for each in fields)), np.array(lower_edges), sizes
 
 
-def _principal(position: np.ndarray) -> np.ndarray:
-    """Rows: longest, middle and shortest axis of a cluster, right-handed."""
+def _principal_axes(position: np.ndarray) -> np.ndarray:
+    """Right-handed principal axes (3, 3) of a cluster as rows, longest first."""
     _, _, axes = np.linalg.svd(position - position.mean(axis=0), full_matrices=True)
     axes[2] = np.cross(axes[0], axes[1])
     return axes
 
 
 def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
-    """The largest clusters at a scale at which grains, contacts and moments can be told apart."""
-    wide = pixels[0] / pixels[1]
-    least = 2.0 * float(np.median(scene.radius)) * pixels[1] / 76.0  # a grain is at most 76 pixels across
+    """Draw the largest clusters side by side, enlarged so that grains and moments are distinguishable."""
+    aspect = pixels[0] / pixels[1]
+    min_height = 2.0 * float(np.median(scene.radius)) * pixels[1] / 76.0  # at most 76 pixels per grain
     for count in range(min(LARGEST_SHOWN, len(scene.largest_clusters())), 0, -1):
-        spheres, feet, sizes = side_by_side(scene, count)
+        spheres, lower_edges, sizes = side_by_side(scene, count)
         left, right, bottom, top = spheres.bounds
-        # More clusters only as long as they do not make all of them small.
-        if right - left < 1.5 * wide * max(top - bottom, least):
+        # Further clusters only if they do not make all of them small.
+        if right - left < 1.5 * aspect * max(top - bottom, min_height):
             break
-    window = fit_window((left, right, bottom - 0.22 * (top - bottom), top), wide, 0.02, least)
-    _show(axes, spheres, window, pixels)
-    for (x, y), size in zip(feet, sizes, strict=True):
-        axes.annotate(f"{size} grains", (x, y), (0, -3), textcoords="offset points", ha="center", va="top", size=7.5)
+    window = fit_window((left, right, bottom - 0.22 * (top - bottom), top), aspect, 0.02, min_height)
+    _draw_image(axes, spheres, window, pixels)
+    for edge, size in zip(lower_edges, sizes, strict=True):
+        axes.annotate(f"{size} grains", edge, (0, -3), textcoords="offset points", ha="center", va="top", size=7.5)
     draw_scale_bar(axes, 0.15)

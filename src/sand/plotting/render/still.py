@@ -1,4 +1,4 @@
-"""A still picture of a frame: true spheres, contacts, moments and the box, with a key, a scale bar and a caption."""
+"""Rendered image of a frame: grains, contacts, moments and box, with colour keys, scale bar and caption."""
 
 from __future__ import annotations
 
@@ -28,24 +28,32 @@ VIEWS: dict[str, tuple[float, float, float] | None] = {
     "top": (0.0, 0.0, 1.0),
     "side": (1.0, 0.0, 0.0),
 }
-"""Directions to the eye."""
-LEAST_SIZE, MOST_SIZE = 200, 8000
-"""Pixels along an edge."""
+"""Directions to the eye; None for the default of `scene.camera_rotation`."""
+MIN_SIZE, MAX_SIZE = 200, 8000
+"""Allowed width and height [pixels]."""
 LIGHTING_ON_LIGHT = Lighting(haze=0.26)
-LIGHTING_ON_DARK = Lighting(sky=0.64, key=0.66, specular=0.24, haze=0.45, background=tuple(rgb(DARK_BACKGROUND)))
-COLLAR = 0.52
-"""Radius of what marks a contact, in radii of the smaller grain; half its length is 0.4 of that."""
-FEW_GRAINS = 3000
-"""Up to this many, nine samples a pixel and not four."""
-_INNER = (0.035, 0.845, 0.075, 0.905)
-"""Left, right, bottom and top of where grains and box are, as shares of the picture."""
+LIGHTING_ON_DARK = Lighting(ambient=0.64, key=0.66, specular=0.24, haze=0.45, background=tuple(rgb(DARK_BACKGROUND)))
+CONTACT_RADIUS = 0.52
+"""Radius of the cylinder that marks a contact, in radii of the smaller grain; its half length is 0.4 of that."""
+MAX_FINE_GRAINS = 3000
+"""Up to this number of grains, 9 samples per pixel are taken instead of 4."""
+_VIEWPORT = (0.035, 0.845, 0.075, 0.905)
+"""Left, right, bottom and top of the area for grains and box, relative to the image."""
 
 
 class Still(RunFigure):
-    """A still picture: a figure with what was drawn of the grains in `grains_only`, (height, width, 4), 0 to 1.
+    """Figure with the rendered image of a frame.
 
-    `window` has left, right, bottom and top [m] of the whole picture in the plane through the middle of what is seen,
-    `rotation` the directions right, up and to the eye, `scene` what was drawn.
+    Attributes
+    ----------
+    grains_only : ndarray
+        (height, width, 4) rendered grains without annotations: red, green, blue and opacity from 0 to 1.
+    window : tuple of float
+        Left, right, bottom and top [m] of the whole image in the plane through the centre of the scene.
+    rotation : ndarray
+        (3, 3) rows: directions right, up and towards the eye.
+    scene : Scene
+        Grains drawn.
     """
 
     grains_only: np.ndarray
@@ -54,7 +62,7 @@ class Still(RunFigure):
     scene: Scene
 
     def image(self) -> Image.Image:
-        """The picture with all that is written on it, for Pillow."""
+        """The complete image with annotations, as a Pillow image."""
         with plot_style():
             self.savefig(content := io.BytesIO(), format="png", dpi=DPI, facecolor="auto")
         return Image.open(content)
@@ -81,95 +89,113 @@ def still_picture(
     perspective: bool = False,
     field: Sequence[float] | None = None,
 ) -> Still:
-    """A picture of a frame, without a browser or a graphics card; the same numbers give the same bits.
+    """Render an image of a frame, without a browser or graphics card; equal input gives equal pixels.
 
     Parameters
     ----------
-    frame
-        of a trajectory, or anything that has its attributes.
+    frame : Frame
+        Frame of a trajectory, or any object with its attributes.
     colour : str, optional
-        of grains: a name in `analysis.quantities.GRAINS`.
-    bonds : str or None, optional
-        contacts by "load" or "mode", see `analysis.quantities.CONTACTS`; None: not marked.
+        Quantity shown as the colour of grains: a name in `analysis.quantities.GRAINS`.
+    bonds : str, optional
+        Mark contacts with colours by "load" or "mode" (`analysis.quantities.CONTACTS`); None: do not mark them.
     arrows : bool, optional
-        moments are shown.
-    view : str or Sequence[float], optional
-        "iso", "front", "top", "side" or the direction to the eye, three numbers.
-    size : tuple[int, int], optional
-        width and height [pixels].
+        Draw moments as arrows.
+    view : str or sequence of float, optional
+        "iso", "front", "top", "side", or the direction to the eye as three numbers.
+    size : tuple of int, optional
+        Width and height [pixels], each from 200 to 8000.
     dark : bool, optional
-        on a dark ground; transparent: on none.
+        Dark background.
+    transparent : bool, optional
+        Transparent background.
     whole : bool, optional
-        clusters are not cut by the faces of a periodic box.
-    cluster : int or None, optional
-        one cluster by itself, counted from the largest, 1.
+        Unwrap clusters across periodic boundaries.
+    cluster : int, optional
+        Draw one cluster only, by rank; 1 is the largest.
     perspective : bool, optional
-        what is nearer is larger; otherwise lengths can be measured anywhere.
-    field : Sequence[float] or None, optional
-        flux density of outside (3,) [T], shown by its direction.
+        Perspective projection; the default is parallel projection, in which lengths can be measured.
+    field : sequence of float, optional
+        (3,) external flux density [T], whose direction is shown.
+
+    Returns
+    -------
+    Still
+        The image.
 
     Raises
     ------
     BadInput
-        one line for each mistake.
+        With one line for each error.
     """
     refuse_other(frame, "radius", "pair", "box")
-    towards = check_picture_options(colour, bonds, view, size)
-    outside = None if field is None else np.asarray(field, dtype=np.float64)
+    towards_eye = check_picture_options(colour, bonds, view, size)
+    flux_density = None if field is None else np.asarray(field, dtype=np.float64)
     scene = make_scene(frame, frame.pair, frame.box, whole)
-    scene, key = _coloured_scene(scene, frame, colour, outside, arrows)
+    scene, key = _coloured_scene(scene, frame, colour, flux_density, arrows)
     if cluster is not None:
         scene = _single_cluster(scene, cluster)
         if colour == "cluster":
             key = ColourKey("cluster", ((f"{len(scene.radius)} of {len(frame)} grains", scene.colour[0]),))
     if not len(scene.radius):
-        raise BadInput("there is no grain with a finite position to be drawn")
-    joints, bond_key = _contact_rods(scene, frame, bonds)
-    rotation = camera_rotation(towards)
-    keys = [each for each in (key, bond_key) if each is not None]
+        raise BadInput("there is no grain with a finite position to draw")
+    contacts, contact_key = _contact_rods(scene, frame, bonds)
+    rotation = camera_rotation(towards_eye)
+    keys = [each for each in (key, contact_key) if each is not None]
     with plot_style():
         figure = Still(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
         figure.scene, figure.rotation = scene, rotation
-        _draw(figure, joints, size, dark, perspective)
+        _draw(figure, contacts, size, dark, perspective)
         _draw_background(figure, dark, transparent)
-        _write(figure, frame, keys, outside, dark)
+        _annotate(figure, frame, keys, flux_density, dark)
     return figure
 
 
 def check_picture_options(
     colour: str, bonds: str | None, view: str | Sequence[float], size: tuple[int, int]
 ) -> np.ndarray | None:
-    """The direction to the eye, None for the usual one.  Raises BadInput with a line for each mistake."""
-    wrong: list[str] = []
+    """Check the options of `still_picture`.
+
+    Returns
+    -------
+    ndarray or None
+        (3,) direction to the eye; None for the default.
+
+    Raises
+    ------
+    BadInput
+        With one line for each error.
+    """
+    problems: list[str] = []
     for name, allowed in ((colour, GRAIN_NAMES), (bonds, CONTACT_NAMES)):
         if name is not None:
             try:
                 quantity(name, allowed)
             except BadInput as error:
-                wrong += error.problems
-    if not all(LEAST_SIZE <= length <= MOST_SIZE for length in size):
-        wrong.append(f"size {size[0]}x{size[1]}: each must be from {LEAST_SIZE} to {MOST_SIZE} pixels")
-    towards: Any = VIEWS.get(view) if isinstance(view, str) else view
+                problems += error.problems
+    if not all(MIN_SIZE <= length <= MAX_SIZE for length in size):
+        problems.append(f"size {size[0]}x{size[1]}: width and height must be from {MIN_SIZE} to {MAX_SIZE} pixels")
+    direction: Any = VIEWS.get(view) if isinstance(view, str) else view
     if isinstance(view, str) and view not in VIEWS:
         try:
-            towards = [float(part) for part in view.split(",")]
+            direction = [float(part) for part in view.split(",")]
         except ValueError:
-            wrong.append(
+            problems.append(
                 f"there is no view '{view}'; {did_you_mean(view, tuple(VIEWS))} (or three numbers: '1,-2,0.5')"
             )
-    if towards is not None:
-        numbers = np.asarray(towards, dtype=np.float64)
+    if direction is not None:
+        numbers = np.asarray(direction, dtype=np.float64)
         if numbers.shape != (3,) or not np.isfinite(numbers).all() or not 0.0 < np.linalg.norm(numbers) < 1e9:
-            wrong.append(f"view {view!r}: the direction to the eye is three numbers that are not all 0")
-    if wrong:
-        raise BadInput(wrong)
-    return None if towards is None else np.asarray(towards, dtype=np.float64)
+            problems.append(f"view {view!r}: the direction to the eye must be three finite numbers, not all 0")
+    if problems:
+        raise BadInput(problems)
+    return None if direction is None else np.asarray(direction, dtype=np.float64)
 
 
 def _coloured_scene(
     scene: Scene, frame: Any, name: str, field: np.ndarray | None, arrows: bool
 ) -> tuple[Scene, ColourKey | None]:
-    """The scene with grains of the quantity's colours, and the key to them."""
+    """Scene with grains coloured by a quantity, and the colour key."""
     values = measured(frame, name, field)[scene.number]
     colours, key = coloured(values, quantity(name), frame, scene.label)
     shown = scene.arrow if arrows else np.zeros_like(scene.arrow)
@@ -177,77 +203,78 @@ def _coloured_scene(
 
 
 def _single_cluster(scene: Scene, rank: int) -> Scene:
-    """One cluster in open space.  Raises BadInput."""
+    """Scene with the cluster of a rank only, in open space."""
     clusters = scene.largest_clusters()
     if not 1 <= rank <= len(clusters):
-        raise BadInput(f"cluster {rank}: there are {len(clusters)} of two grains or more, the largest is 1")
-    chosen = scene.label == clusters[rank - 1]
-    one = {name: getattr(scene, name)[chosen] for name in ("position", "radius", "colour", "arrow", "number")}
-    return dataclasses.replace(scene, **one, label=np.zeros(chosen.sum(), int), box=Box.open())
+        raise BadInput(f"cluster {rank}: there are {len(clusters)} clusters of two grains or more; 1 is the largest")
+    members = scene.label == clusters[rank - 1]
+    arrays = {name: getattr(scene, name)[members] for name in ("position", "radius", "colour", "arrow", "number")}
+    return dataclasses.replace(scene, **arrays, label=np.zeros(members.sum(), int), box=Box.open())
 
 
 def _contact_rods(scene: Scene, frame: Any, name: str | None) -> tuple[Rods, ColourKey | None]:
-    """A collar round every contact [m], laboratory frame; where faces of the box part two grains, one at each."""
-    place = np.full(len(frame.radius), -1)
-    place[scene.number] = np.arange(len(scene.number))
-    pair = place[np.asarray(frame.pair, dtype=np.int64).reshape(-1, 2)]
-    there = (pair >= 0).all(axis=1)
-    if name is None or not there.any():
-        return _rods(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3))), None
-    values = measured(frame, name)[there]
+    """Short cylinders [m] at contacts, laboratory frame; two where a periodic boundary separates the grains."""
+    index = np.full(len(frame.radius), -1)
+    index[scene.number] = np.arange(len(scene.number))
+    pair = index[np.asarray(frame.pair, dtype=np.int64).reshape(-1, 2)]
+    shown = (pair >= 0).all(axis=1)
+    if name is None or not shown.any():
+        return _cylinders(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3))), None
+    values = measured(frame, name)[shown]
     colours, key = coloured(values, quantity(name, CONTACT_NAMES), frame, scene.label)
-    i, j = pair[there].T
-    way = frame.box.nearest(scene.position[j] - scene.position[i])
-    size = np.linalg.norm(way, axis=1, keepdims=True)
-    thick = COLLAR * np.minimum(scene.radius[i], scene.radius[j])
-    half = 0.4 * thick[:, None] * way / np.maximum(size, 1e-300)
+    i, j = pair[shown].T
+    offset = frame.box.nearest(scene.position[j] - scene.position[i])
+    distance = np.linalg.norm(offset, axis=1, keepdims=True)
+    radius = CONTACT_RADIUS * np.minimum(scene.radius[i], scene.radius[j])
+    half = 0.4 * radius[:, None] * offset / np.maximum(distance, 1e-300)
     share = (scene.radius[i] / (scene.radius[i] + scene.radius[j]))[:, None]
-    first, second = scene.position[i] + share * way, scene.position[j] - (1.0 - share) * way
-    apart = np.linalg.norm(first - second, axis=1) > 1e-6 * size[:, 0]
-    middle = np.concatenate([first, second[apart]])
-    half, thick, colours = (np.concatenate([each, each[apart]]) for each in (half, thick, colours))
-    return _rods(middle - half, middle + half, thick, colours), key
+    first, second = scene.position[i] + share * offset, scene.position[j] - (1.0 - share) * offset
+    separated = np.linalg.norm(first - second, axis=1) > 1e-6 * distance[:, 0]
+    centre = np.concatenate([first, second[separated]])
+    half, radius, colours = (np.concatenate([each, each[separated]]) for each in (half, radius, colours))
+    return _cylinders(centre - half, centre + half, radius, colours), key
 
 
-def _rods(start: np.ndarray, end: np.ndarray, thick: np.ndarray, colour: np.ndarray, lit: float = 1.0) -> Rods:
-    return Rods(start, end, np.column_stack([thick, thick]), colour, np.full(len(start), lit))
+def _cylinders(
+    start: np.ndarray, end: np.ndarray, radius: np.ndarray, colour: np.ndarray, shading: float = 1.0
+) -> Rods:
+    return Rods(start, end, np.column_stack([radius, radius]), colour, np.full(len(start), shading))
 
 
-def _draw(figure: Still, joints: Rods, size: tuple[int, int], dark: bool, perspective: bool) -> None:
-    """The grains, what marks their contacts, and the edges of the box."""
-    scene, turn = figure.scene, figure.rotation
-    left, right, bottom, top = _INNER
-    wide = size[0] * (right - left) / (size[1] * (top - bottom))
-    x0, x1, y0, y1 = view_window(scene, wide, 0.03, turn)
-    spheres = scene.projected(turn)
+def _draw(figure: Still, contacts: Rods, size: tuple[int, int], dark: bool, perspective: bool) -> None:
+    """Render grains, contacts and the edges of the box."""
+    scene, rotation = figure.scene, figure.rotation
+    left, right, bottom, top = _VIEWPORT
+    aspect = size[0] * (right - left) / (size[1] * (top - bottom))
+    x0, x1, y0, y1 = view_window(scene, aspect, 0.03, rotation)
+    spheres = scene.projected(rotation)
     depth = float(spheres.centre[:, 2].min() + spheres.centre[:, 2].max()) / 2
     eye = 2.6 * float(np.hypot(x1 - x0, np.ptp(spheres.centre[:, 2]))) if perspective else None
-    if eye is not None:  # what comes nearer needs more room
-        room = 1.0 / (1.0 - (float((spheres.centre[:, 2] + spheres.radius).max()) - depth) / eye)
-        x0, x1 = (x0 + x1) / 2 - room * (x1 - x0) / 2, (x0 + x1) / 2 + room * (x1 - x0) / 2
-        y0, y1 = (y0 + y1) / 2 - room * (y1 - y0) / 2, (y0 + y1) / 2 + room * (y1 - y0) / 2
+    if eye is not None:  # enlarge the window by the magnification of the nearest grain
+        zoom = 1.0 / (1.0 - (float((spheres.centre[:, 2] + spheres.radius).max()) - depth) / eye)
+        x0, x1 = (x0 + x1) / 2 - zoom * (x1 - x0) / 2, (x0 + x1) / 2 + zoom * (x1 - x0) / 2
+        y0, y1 = (y0 + y1) / 2 - zoom * (y1 - y0) / 2, (y0 + y1) / 2 + zoom * (y1 - y0) / 2
     pixel = (x1 - x0) / ((right - left) * size[0])
     x0, y0 = x0 - left * size[0] * pixel, y0 - bottom * size[1] * pixel
     figure.window = (x0, x0 + pixel * size[0], y0, y0 + pixel * size[1])
-    down = np.array([0.0, 0.0, depth])
-    edges = [(a, b) for a, b, _, _ in scene.edges()]
-    ends = np.array(edges).reshape(-1, 2, 3)
-    line = rgb(MUTED_ON_DARK if dark else MUTED)
-    frame = _rods(ends[:, 0], ends[:, 1], np.full(len(ends), 0.75 * pixel), np.tile(line, (len(ends), 1)), 0.0)
-    every = Rods.joined(joints, frame)
+    shift = np.array([0.0, 0.0, depth])
+    edges = np.array([(a, b) for a, b, _, _ in scene.edges()]).reshape(-1, 2, 3)
+    colour = np.tile(rgb(MUTED_ON_DARK if dark else MUTED), (len(edges), 1))
+    box = _cylinders(edges[:, 0], edges[:, 1], np.full(len(edges), 0.75 * pixel), colour, 0.0)
+    rods = Rods.joined(contacts, box)
     figure.grains_only = render_spheres(
-        dataclasses.replace(spheres, centre=spheres.centre - down),
+        dataclasses.replace(spheres, centre=spheres.centre - shift),
         figure.window,
         *size,
-        rods=dataclasses.replace(every, start=every.start @ turn.T - down, end=every.end @ turn.T - down),
+        rods=dataclasses.replace(rods, start=rods.start @ rotation.T - shift, end=rods.end @ rotation.T - shift),
         eye=eye,
         lighting=LIGHTING_ON_DARK if dark else LIGHTING_ON_LIGHT,
-        supersampling=3 if len(spheres.radius) <= FEW_GRAINS else 2,
+        supersampling=3 if len(spheres.radius) <= MAX_FINE_GRAINS else 2,
     )
 
 
 def _draw_background(figure: Still, dark: bool, transparent: bool) -> None:
-    """The background, and the picture on it, pixel for pixel."""
+    """Draw the background and the rendered image, pixel by pixel."""
     figure.patch.set_facecolor(DARK_BACKGROUND if dark else LIGHT_BACKGROUND)
     figure.patch.set_alpha(0.0 if transparent else 1.0)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -256,15 +283,15 @@ def _draw_background(figure: Still, dark: bool, transparent: bool) -> None:
     axes.set_axis_off()
 
 
-def _write(figure: Still, frame: Any, keys: list[ColourKey], field: np.ndarray | None, dark: bool) -> None:
-    """Caption, keys, scale bar and directions; letters grow with the picture."""
-    ink, faint = (TEXT_ON_DARK, MUTED_ON_DARK) if dark else (TEXT_COLOUR, MUTED)
+def _annotate(figure: Still, frame: Any, keys: list[ColourKey], field: np.ndarray | None, dark: bool) -> None:
+    """Draw caption, colour keys, scale bar and directions, with font sizes in proportion to the image."""
+    text_colour, muted = (TEXT_ON_DARK, MUTED_ON_DARK) if dark else (TEXT_COLOUR, MUTED)
     width, height = figure.get_size_inches() * DPI
-    grow = float(min(width / 1600.0, height / 1000.0))
+    scale = float(min(width / 1600.0, height / 1000.0))
     axes = figure.axes[0]
     caption = headline(frame, frame.box, frame.time).split(",  ")
-    figure.text(0.022, 0.962, caption[-1], size=13.0 * grow, weight="bold", color=ink, va="center")
-    figure.text(0.022, 0.922, ",  ".join(caption[:-1]), size=8.5 * grow, color=faint, va="center")
-    draw_colour_keys(figure, keys, grow, ink)
-    draw_directions(figure, figure.rotation, field, grow, faint, ink)
-    draw_scale_bar(axes, 0.16, ink, 0.03, 1.2 * grow)
+    figure.text(0.022, 0.962, caption[-1], size=13.0 * scale, weight="bold", color=text_colour, va="center")
+    figure.text(0.022, 0.922, ",  ".join(caption[:-1]), size=8.5 * scale, color=muted, va="center")
+    draw_colour_keys(figure, keys, scale, text_colour)
+    draw_directions(figure, figure.rotation, field, scale, muted, dark)
+    draw_scale_bar(axes, 0.16, text_colour, 0.03, 1.2 * scale)
