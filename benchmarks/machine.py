@@ -44,7 +44,7 @@ def _triad(a, b, c, scale, times):
         scale += 1e-9
 
 
-horner, triad = kernel(_horner, wide=True), kernel(_triad, wide=True)
+horner, triad = kernel(_horner, long_vectors=True), kernel(_triad, long_vectors=True)
 
 
 @functools.cache

@@ -33,7 +33,7 @@ def _pass_alone(grains, contacts, long_range, clock, count, lost, rules):
     last = np.uint64(count[CONTACTS])
     passed = contact_pass(grains, contacts, np.uint64(0), last, rules.span, rules.contact, clock[STEP])
     log_slip_sums(count, lost, passed)
-    return passed.waiting > 0.0
+    return passed.pending > 0.0
 
 
 @loop
@@ -89,7 +89,7 @@ def _by_a_crew(plan: KernelSpec) -> Large:
         waiting = False
         for b in range(blocks):
             passed = load_slip_sums(rules.queue.passed, b)
-            waiting |= passed.waiting > 0.0
+            waiting |= passed.pending > 0.0
             log_slip_sums(count, lost, passed)
         return waiting
 
