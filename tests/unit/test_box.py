@@ -36,7 +36,7 @@ def test_close_pairs_of_few_points_and_of_many(box, monkeypatch):
     """Looking at all pairs and the tree of SciPy find the same, in the same order."""
     points = np.random.default_rng(4).uniform(-0.7, 0.7, (150, 3))
     few = box.close_pairs(points, 0.2)
-    monkeypatch.setattr("sand.box.FEW", 0)
+    monkeypatch.setattr("sand.box.ALL_PAIRS_UP_TO", 0)
     many = box.close_pairs(points, 0.2)
     assert len(few) > 100
     assert (few == many).all()

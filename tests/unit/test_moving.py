@@ -32,7 +32,7 @@ def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
     passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, dt)
     log_slip_sums(count, lost, passed)
     update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
-    return passed.waiting
+    return passed.pending
 
 
 pass_and_settle = kernel(_pass_and_update, cached=False)
