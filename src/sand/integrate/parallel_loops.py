@@ -88,11 +88,7 @@ def _shared_loops(spec: KernelSpec) -> LargeLoops:
         share(CONTACT_PASS, blocks, grains, contacts, long_range, count, parameters)
         waiting = False
         for b in range(blocks):
-<<<<<<< HEAD
             passed = load_slip_sums(parameters.queue.passed, b)
-=======
-            passed = load_slip_sums(rules.queue.passed, b)
->>>>>>> S1
             waiting |= passed.pending > 0.0
             log_slip_sums(count, lost, passed)
         return waiting
