@@ -285,9 +285,9 @@ def grow(**changed):
         (lambda: grow().exponent(), "outputs"),
         (lambda: kernel_table.measured([(1, 2, 3)]), "four"),
         (lambda: kernel_table.measured([(1, 1, 1, 1), (2, 2, 1, 1), (4, 4, 1, 1)]), "span"),
-        (lambda: kernel_table.measured([(1, 2, 1, 1), (2, 1, 2, 1), (1, 1, 1, 1)]), "same masses"),
+        (lambda: kernel_table.measured([(1, 2, 1, 1), (2, 1, 2, 1), (1, 1, 1, 1)]), "equal masses"),
         (lambda: kernel_table.measured([(1, 2, -1, 1)]), "above 0"),
-        (lambda: kernel_table.on_grid(kinetics.constant(RATE), [2.0, 1.0]), "rise"),
+        (lambda: kernel_table.on_grid(kinetics.constant(RATE), [2.0, 1.0]), "increasing"),
         (lambda: kernel_table.for_dustpy(np.ones((2, 2)), np.ones((3, 3))), "scale heights"),
     ],
 )
