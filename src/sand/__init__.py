@@ -1,6 +1,6 @@
-"""SAND, Soft Aggregate Numerical Dynamics: dust aggregates simulated grain by grain.
+"""SAND, Soft Aggregate Numerical Dynamics: grain-by-grain simulation of dust aggregates.
 
-Names are loaded when first used, so that `import sand` and `sand --help` cost nothing.
+Public names are imported on first use, so that `import sand` and `sand --help` are fast.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ register()
 TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 
 
-_HOMES = {
+_MODULES = {
     "Box": "box",
     "Grains": "grains",
     "Material": "material",
@@ -50,7 +50,7 @@ _HOMES = {
 }
 _PACKAGES = ("setup", "theory", "analysis", "experiments", "io")
 
-__all__ = ["__version__", *_HOMES, *_PACKAGES]
+__all__ = ["__version__", *_MODULES, *_PACKAGES]
 
 if TYPE_CHECKING:
     from typing import Any
@@ -94,10 +94,10 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        found = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
-        globals()[name] = found
-        return found
+    if name in _MODULES:
+        value = getattr(importlib.import_module(f".{_MODULES[name]}", __name__), name)
+        globals()[name] = value
+        return value
     if name in _PACKAGES:
         return importlib.import_module(f".{name}", __name__)
     from .errors import NoSuchAttribute, did_you_mean

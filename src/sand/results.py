@@ -1,4 +1,4 @@
-"""A run's folder to be looked at: frames, ledger, contacts, summary, each read when asked for."""
+"""Results of a run, read from its folder: frames, ledger, contacts and summary."""
 
 from __future__ import annotations
 
@@ -27,28 +27,28 @@ if TYPE_CHECKING:
 
 
 class Columns(dict[str, np.ndarray]):
-    """Columns by name; a name that is none of them is refused with the nearest one."""
+    """Columns by name; an unknown name is refused with a suggestion."""
 
     def __missing__(self, name: Any) -> np.ndarray:
-        """Raises BadInput, which is a KeyError too."""
+        """Raise BadInput, which is also a KeyError."""
         raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self))}")
 
 
 @checked
 class Run:
-    """What `sand.open(DIR)` gives; nothing is read before it is asked for; only `export` and `view` write.
+    """The results of a run, as returned by `sand.open(DIR)`; each part is read on first access.
 
-    A run that is still going can be looked at: open it again to see what has come since.
+    Only `export` and `view` write files. The run may still be going: open it again to see new frames and rows.
 
     Parameters
     ----------
     folder : str or Path
-        of a run.
+        Folder of the run.
 
     Raises
     ------
     BadInput
-        there is no run in it.
+        If it does not hold a run.
     """
 
     def __init__(self, folder: str | Path):
@@ -69,41 +69,42 @@ class Run:
 
     @cached_property
     def frames(self) -> Frames:
-        """The frames, a sequence; each is read when asked for.  Raises BadInput for a broken trajectory."""
+        """The frames, as a sequence; each is read on access.  Raises BadInput for a broken trajectory."""
         return Frames(self.folder / files.TRAJECTORY)
 
     @cached_property
     def ledger(self) -> dict[str, np.ndarray]:
-        """Columns of the ledger by name (K,), SI.  Raises BadInput."""
-        books = LedgerColumns.from_rows(read_ledger(self.folder / files.LEDGER))
-        return Columns({name: books[name] for name in books.columns})
+        """Columns of the ledger by name, (K,), SI.  Raises BadInput."""
+        ledger = LedgerColumns.from_rows(read_ledger(self.folder / files.LEDGER))
+        return Columns({name: ledger[name] for name in ledger.columns})
 
     @cached_property
     def case(self) -> dict[str, Any]:
-        """The case as understood.  Raises BadInput."""
+        """The case with all defaults filled in.  Raises BadInput."""
         return files.read_toml(self.folder / files.CASE)
 
     @property
     def summary(self) -> dict[str, Any]:
-        """How the run ended; raises BadInput while it has not."""
+        """Summary of the run.  Raises BadInput before the run has ended."""
         return files.read_json(self.folder / files.SUMMARY)
 
     @checked
     def contacts(self, frame: int = -1) -> dict[str, np.ndarray]:
-        """Contacts of a frame: pair (C, 2), overlap [m], formed [s] (C,), force on the first [N] (C, 3)."""
-        one = self.frames[frame]
-        return Columns({"pair": one.pair, "overlap": one.overlap, "formed": one.formed, "force": one.force})
+        """Contacts of a frame: pair (C, 2), overlap [m], formed [s] (C,), force on the first grain [N] (C, 3)."""
+        contacts = self.frames[frame]
+        names = ("pair", "overlap", "formed", "force")
+        return Columns({name: getattr(contacts, name) for name in names})
 
     @checked
     def at(self, frame: int = -1) -> Simulation:
-        """A new simulation in memory, its clock at 0, with the grains, contacts, box and forces of a frame.
+        """Create a simulation in memory from a frame: its grains, contacts, box and forces, with the time set to 0.
 
-        Its `loads()`, `at_grains()` and `contacts` say what a frame does not hold: energies, fields, torques.
+        Its `loads()`, `at_grains()` and `contacts` give quantities that frames lack: energies, fields, torques.
 
         Raises
         ------
         BadInput
-            see `setup.from_frame`; or a force that a case file cannot name.
+            As `setup.from_frame`; or if a case file cannot describe one of the forces.
         """
         case = read_case(self.folder / files.CASE)
         start = from_frame(self.frames[frame], case.materials_by_name())
@@ -119,39 +120,41 @@ class Run:
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:
-        """The grains in motion, as `Simulation.view`.
+        """Show the grains in motion, as `Simulation.view`.
 
         Parameters
         ----------
         path : str or Path or None, optional
-            of the page; view.html in the run's folder by default.
+            File of the page; by default view.html in the run's folder.
 
         Raises
         ------
         BadInput
-            there is no frame yet, or the trajectory is broken.
+            If there is no frame yet, or the trajectory is broken.
         """
         return view_folder(self.folder, path, lambda: self.at(-1).figure())
 
     @checked
     def flux_density(self, time: Any) -> np.ndarray | None:
-        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `told.read_field`."""
+        """External magnetic flux density (3,) [T] of the case at a time [s]; None if the case has no such field."""
         now, field = si(time, "s", "time"), read_field(self.folder)
         return None if field is None else np.asarray(field[1](now))
 
     @checked
     def picture(self, frame: int = -1, **how: Any) -> Still:
-        """A still picture of a frame, with the outside field of the case; it shows itself in a notebook.
+        """Draw a still picture of a frame, with the external field of the case; notebooks display it.
 
         Parameters
         ----------
+        frame : int, optional
+            Index of the frame, as in Python.
         how
-            see `plotting.render.still.still_picture`: colour, bonds, arrows, view, size, dark, transparent, cluster, …
+            Further arguments of `plotting.render.still.still_picture`: colour, bonds, arrows, view, size, dark, …
 
         Raises
         ------
         BadInput
-            no such frame, an unknown quantity or view, one line for each mistake.
+            If there is no such frame, or a quantity or view is unknown; all problems at once.
         """
         from .plotting.render.still import still_picture
 
@@ -160,27 +163,32 @@ class Run:
 
     @checked
     def export(self, form: str, stem: str | Path | None = None, frames: slice = slice(None)) -> list[Path]:
-        """Write frames for another program; returns the files.
+        """Write frames for another program.
 
         Parameters
         ----------
         form : str
             "xyz", "lammps-dump", "lammps-data" or "vtk".
         stem : str or Path or None, optional
-            path without ending; "trajectory" in the run's folder by default.
+            Path without suffix; by default "trajectory" in the run's folder.
         frames : slice, optional
-            which.
+            Frames to write, by default all.
+
+        Returns
+        -------
+        list[Path]
+            The files written.
 
         Raises
         ------
         BadInput
-            an unknown format, no frame, no such folder.
+            If the format is unknown, there is no frame, or the folder does not exist.
         """
         place = self.folder / "trajectory" if stem is None else Path(stem)
         return export_frames(self.frames[frames], place, form, cluster_labels)
 
     def to_xarray(self) -> Any:
-        """All frames as an xarray Dataset with dimensions frame, grain and axis, SI; xarray has to be installed."""
+        """Convert all frames to an xarray Dataset with dimensions frame, grain and axis, SI; needs xarray."""
         xarray = import_optional("xarray", "to_xarray")
         whole: list[Frame] = list(self.frames)
         vectors = ("position", "velocity", "moment", "spin")
@@ -199,7 +207,7 @@ class Run:
         return xarray.Dataset(data | {"cluster": (("frame", "grain"), labels)}, coords=coordinates)
 
     def to_pandas(self) -> Any:
-        """The ledger as a pandas DataFrame; pandas has to be installed."""
+        """Convert the ledger to a pandas DataFrame; needs pandas."""
         return import_optional("pandas", "to_pandas").DataFrame(self.ledger)
 
     def __repr__(self) -> str:
@@ -207,4 +215,4 @@ class Run:
 
 
 open = Run
-"""`sand.open(DIR)`: a run's folder to be looked at."""
+"""`sand.open(DIR)`: the results of the run in a folder."""

@@ -156,7 +156,7 @@ FAULTS = (
           "first + 1 if first != -1 else None", "first + 1",
           "unit/test_opened.py::test_the_export_command"),
     Fault("a mistake ends with exit code 0", "swallowed error", "command", "cli/program.py",
-          "return str(error).splitlines(), MISTAKE", "return str(error).splitlines(), DONE",
+          "return str(error).splitlines(), BAD_INPUT", "return str(error).splitlines(), DONE",
           "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2",
           began_as=("cli/main.py", "return str(error).splitlines(), MISTAKE", "return str(error).splitlines(), DONE")),
     Fault("an end before the start", "swallowed error", "command", "simulation/stop.py",

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import sand
-from sand.cli.interrupt import Watch
+from sand.cli.interrupt import InterruptObserver
 from sand.cli.main import main
 from sand.experiments import collision_case
 from sand.io.checkpoint import newest_checkpoint
@@ -72,7 +72,7 @@ def interrupt(patch, when):
         if when(simulation):
             os.kill(os.getpid(), signal.SIGINT)
 
-    patch.setattr(Watch, "tick", tick, raising=False)
+    patch.setattr(InterruptObserver, "tick", tick, raising=False)
 
 
 def same_run(one, other):

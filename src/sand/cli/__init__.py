@@ -1,1 +1,1 @@
-"""The `sand` command: the only room that prints.  Nothing heavy is imported before a command runs."""
+"""The `sand` command; the only package that prints. Slow imports happen when a command runs."""

@@ -1,4 +1,4 @@
-"""`sand build KIND`: an aggregate in a file."""
+"""`sand build KIND`: builds an aggregate and writes it to a file."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import click
 from ..arguments import MOST_GRAINS
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE
+from .main import DONE
 
 KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")
 
 
-@click.command("build", short_help="Make an aggregate and write it to a file.")
+@click.command("build", short_help="Build an aggregate and write it to a file.")
 @click.argument("kind", metavar="KIND", type=click.Choice((*KINDS, "pca")))
 @click.option("--grains", type=options.COUNT, metavar="N", help="Number of grains.")
-@click.option("--shape", metavar="NX,NY,NZ", help="Sides of a lattice, instead of a cube number of grains.")
+@click.option("--shape", metavar="NX,NY,NZ", help="Grains along the sides of a lattice, instead of --grains.")
 @click.option(
     "--radius",
     default="0.1 um",
@@ -30,39 +30,41 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
 @click.option(
     "--material", default="silica", show_default=True, metavar="M", help="A preset, or parts: 'silica:0.7,iron:0.3'."
 )
-@click.option("--moment", metavar="SIZE", help="Of each grain: '6.6e-18 A m^2', '200 A m^2/kg' or 'material'.")
-@click.option("--moments", type=click.Choice(("random", "aligned", "relaxed")), help="How moments point.")
-@click.option("--magnetic", metavar="PART", help="Part of the grains that have a moment, 0 to 1.")
-@click.option("--dimension", metavar="D", help="Fractal dimension of a fractal (default 1.8).")
-@click.option("--prefactor", metavar="K", help="Fractal prefactor of a fractal (default 1.3).")
-@click.option("--seed", type=options.SEED, default=0, show_default=True, help="Same seed, same aggregate.")
+@click.option("--moment", metavar="SIZE", help="Moment of each grain: '6.6e-18 A m^2', '200 A m^2/kg' or 'material'.")
+@click.option("--moments", type=click.Choice(("random", "aligned", "relaxed")), help="Directions of the moments.")
+@click.option("--magnetic", metavar="FRACTION", help="Fraction of the grains that have a moment, 0 to 1.")
+@click.option("--dimension", metavar="D", help="Fractal dimension of KIND fractal (default 1.8).")
+@click.option("--prefactor", metavar="K", help="Fractal prefactor of KIND fractal (default 1.3).")
 @click.option(
-    "--out", required=True, metavar="FILE", type=options.PLACE, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
+    "--seed", type=options.SEED, default=0, show_default=True, help="Seed; the same seed gives the same grains."
 )
-@click.option("--overwrite", is_flag=True, help="Replace the file if it is there.")
+@click.option(
+    "--out", required=True, metavar="FILE", type=options.PATH, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
+)
+@click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 @options.as_json
 @options.debug
 def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> int:
-    """Make an aggregate, all contacts at rest, and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
+    """Build an aggregate with all contacts at rest and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
 
     \b
     grain, chain          one grain, a straight chain
     lattice, hexagonal    cubic lattice, hexagonal close packing
-    bpca, bcca            ballistic particle-cluster, cluster-cluster aggregate
-    dla, dlca             the same by diffusion
-    fractal               cluster-cluster, of a chosen dimension and prefactor
+    bpca, bcca            ballistic particle-cluster, cluster-cluster aggregation
+    dla, dlca             diffusion-limited particle-cluster, cluster-cluster aggregation
+    fractal               cluster-cluster aggregate of given fractal dimension and prefactor
     rbd                   compact sphere cut from a random ballistic deposit
     """
     from ..io.bodies import refuse_target, write_body
 
-    place = Path(out)
-    refuse_target(place, overwrite=overwrite)
+    target = Path(out)
+    refuse_target(target, overwrite=overwrite)
     from ..setup.aggregates import build
 
     with report.compiling(as_json):
         body = report.with_notes(lambda: build(kind, **_arguments(given)))
-    write_body(place, body, overwrite=overwrite)
-    content = {"kind": kind, "file": str(place), "seed": given["seed"], **described(body)}
+    write_body(target, body, overwrite=overwrite)
+    content = {"kind": kind, "file": str(target), "seed": given["seed"], **_properties(body)}
     if as_json:
         report.emit(content)
     else:
@@ -71,7 +73,7 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -
 
 
 def _arguments(given: dict[str, Any]) -> dict[str, Any]:
-    """Words of the command line as arguments of `setup.aggregates.build`.  Raises BadInput."""
+    """Convert options to arguments of `setup.aggregates.build`.  Raises BadInput."""
     found = dict(given)
     shape = found.pop("shape")
     if shape is not None:
@@ -82,7 +84,7 @@ def _arguments(given: dict[str, Any]) -> dict[str, Any]:
         if math.prod(found["shape"]) > MOST_GRAINS:
             raise BadInput(f"--shape {shape} has more than {MOST_GRAINS:.0e} grains")
         if found["grains"] is not None:
-            raise BadInput("--shape already says how many grains there are; leave --grains out")
+            raise BadInput("--shape sets the number of grains; leave --grains out")
     for name in ("dimension", "prefactor", "magnetic"):
         found[name] = None if found[name] is None else _number(found[name], name)
     found["material"] = _material(found["material"])
@@ -97,7 +99,7 @@ def _number(text: str, name: str) -> float:
 
 
 def _material(text: str) -> str | dict[str, float]:
-    """'silica', or parts as in 'silica:0.7,iron:0.3'.  Raises BadInput."""
+    """Read 'silica', or parts as in 'silica:0.7,iron:0.3'.  Raises BadInput."""
     if ":" not in text:
         return text
     parts: dict[str, float] = {}
@@ -112,8 +114,8 @@ def _material(text: str) -> str | dict[str, float]:
     return parts
 
 
-def described(body: Any) -> dict[str, Any]:
-    """What is told of an aggregate: grains, radii, mass, size, dimension, contacts, energy of the moments."""
+def _properties(body: Any) -> dict[str, Any]:
+    """Properties of an aggregate: grains, radii, mass, size, dimension, contacts, moments."""
     from ..io.bodies import contacts_of
 
     size, dimension, error = _shape(body)
@@ -136,7 +138,7 @@ def described(body: Any) -> dict[str, Any]:
 
 
 def _shape(body: Any) -> tuple[float, float | None, float | None]:
-    """Radius of gyration [m], fractal dimension of the correlation integral and its error (None: too few grains)."""
+    """Radius of gyration [m], correlation dimension and its error (None if there are too few grains)."""
     from ..analysis.fractal import correlation_dimension
     from ..analysis.shape import gyration_radius
 
@@ -158,9 +160,9 @@ def _rows(content: dict[str, Any]) -> report.Rows:
         ("grains", f"{content['grains']} of {', '.join(content['materials'])}, radius {size}"),
         ("radius of gyration", format_quantity(content["radius_of_gyration"], "m")),
         ("fractal dimension", "too few grains" if dimension is None else f"{dimension:.2f} ± {error or 0.0:.2f}"),
-        ("contacts", f"{content['contacts']}, {content['mean_coordination']:.2f} for each grain"),
+        ("contacts", f"{content['contacts']}, {content['mean_coordination']:.2f} per grain"),
     ]
     if "magnetic_grains" in content:
         net = sum(v * v for v in content["net_moment"]) ** 0.5
-        rows.append(("moments", f"{content['magnetic_grains']} grains, together {net:.3g} A m^2"))
+        rows.append(("moments", f"{content['magnetic_grains']} grains, net moment {net:.3g} A m^2"))
     return [*rows, ("seed", str(content["seed"])), ("file", content["file"])]

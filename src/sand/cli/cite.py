@@ -1,4 +1,4 @@
-"""`sand cite`: what to cite."""
+"""`sand cite`: references to cite."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import click
 from ..version import __version__
 from . import options, report
 
-#: what it gave to SAND, and the reference
+#: topic, and the reference
 REFERENCES = (
     (
         "the equations of SAND, magnetic aggregation",

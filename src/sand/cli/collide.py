@@ -1,4 +1,4 @@
-"""`sand collide CASE.toml`: two bodies hit each other, once or for many seeds."""
+"""`sand collide CASE.toml`: collides two bodies, once or for many seeds."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ import click
 from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .exits import DONE, INTERRUPTED
+from .main import DONE, INTERRUPTED
 
 SHOWN = 12
-"""Collisions listed one by one on the screen; all of them are in collision.json."""
+"""Collisions listed one by one on the screen; collision.json has all of them."""
 
 
 @click.command("collide", short_help="Collide two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml", type=options.PLACE)
-@click.option("--out", metavar="DIR", type=options.PLACE, help="Folder for the files (default: the case's name).")
-@click.option("--seeds", metavar="LIST", help="Seeds instead of those in the case: '3', '1,2,5' or '1-20'.")
+@click.argument("case", metavar="CASE.toml", type=options.PATH)
+@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
+@click.option("--seeds", metavar="LIST", help="Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
 @options.threads
-@click.option("--overwrite", is_flag=True, help="Replace the run that the folder holds.")
+@click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.as_json
 @options.debug
 def command(
     case: str, out: str | None, seeds: str | None, workers: int, threads: int | None, overwrite: bool, as_json: bool
 ) -> int:
-    """Collide the bodies that CASE.toml describes, until nothing happens any more.
+    """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 
-    Leaves collision.json and a figure in the folder; for a single seed also the trajectory, the ledger and all
-    that `sand run` leaves.  Ctrl-C stops it; `sand resume` then goes on.
+    Writes collision.json and a figure to the folder; for a single seed also the trajectory, the ledger and all other
+    files of `sand run`. Ctrl-C interrupts it; continue with `sand resume`.
     """
     set_threads(threads)
     chosen = None if seeds is None else read_seeds(seeds)
@@ -45,51 +45,57 @@ def command(
 
 
 def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> int:
-    """Do a `CollisionJob`, tell how it ended; returns the exit code.
+    """Run a `CollisionJob` and print the results.
+
+    Returns
+    -------
+    int
+        The exit code.
 
     Raises
     ------
     BadInput
-        as the job; or a worker process has died.
+        As the job; or if a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 
     from ..experiments.executors import executor_for
-    from .interrupt import Watch
+    from .interrupt import InterruptObserver
 
     many = len(job.case.impact.seeds) > 1
     try:
         with (
             report.compiling(as_json or quiet),
-            Watch() as watch,
+            InterruptObserver() as interrupts,
             executor_for(workers if many else 1, threads=threads) as executor,
         ):
-            content = report.with_notes(lambda: job.run(executor, [watch]))
+            content = report.with_notes(lambda: job.run(executor, [interrupts]))
     except KeyboardInterrupt:
-        report.note(f"interrupted; {report.way_on(job.folder)}")
+        report.note(f"interrupted; {report.how_to_continue(job.folder)}")
         return INTERRUPTED
     except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.way_on(job.folder)}") from None
+        raise BadInput(f"a worker process died; {report.how_to_continue(job.folder)}") from None
     if as_json:
         report.emit(content)
     elif not quiet:
-        _tell(heading, job.folder, content["collisions"])
+        _show(heading, job.folder, content["collisions"])
     return DONE
 
 
-def counts(results: list[dict[str, Any]]) -> Counter[str]:
-    """How often each outcome came."""
-    return Counter(result["outcome"] for result in results)
+def outcome_counts(results: list[dict[str, Any]]) -> str:
+    """How often each outcome occurred, as text."""
+    counts = Counter(result["outcome"] for result in results)
+    return ", ".join(f"{n} × {name}" for name, n in counts.most_common())
 
 
 def read_seeds(text: str) -> list[int]:
-    """'3', '1,2,5', '1-20' as whole numbers.  Raises BadInput."""
+    """Read '3', '1,2,5' or '1-20' as integers.  Raises BadInput."""
     seeds: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
         ends = [first, last or first]
-        known = all(end.isdecimal() and len(end) < 20 for end in ends) and (last or not dash)
-        if not known or int(ends[1]) - int(ends[0]) > 100_000 or int(ends[1]) > options.MOST_SEED:
+        valid = all(end.isdecimal() and len(end) < 20 for end in ends) and (last or not dash)
+        if not valid or int(ends[1]) - int(ends[0]) > 100_000 or int(ends[1]) > options.MOST_SEED:
             shown = text if len(text) <= 40 else f"{text[:40]}…"
             raise BadInput(f"--seeds {shown!r} must be whole numbers below 2^63 such as '3', '1,2,5' or '1-20'")
         seeds += range(int(ends[0]), int(ends[1]) + 1)
@@ -98,19 +104,19 @@ def read_seeds(text: str) -> list[int]:
     return list(dict.fromkeys(seeds))
 
 
-def _tell(heading: str, folder: Path, results: list[dict[str, Any]]) -> None:
-    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", line(r)) for r in results[:SHOWN]]
+def _show(heading: str, folder: Path, results: list[dict[str, Any]]) -> None:
+    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", collision_line(r)) for r in results[:SHOWN]]
     if len(results) > SHOWN:
         rows.append(("…", f"and {len(results) - SHOWN} more"))
-    tally = ", ".join(f"{n} × {name}" for name, n in counts(results).most_common())
-    rows += [("outcomes", tally), ("files", f"{folder}/")]
-    report.show(heading, rows)
+    report.show(heading, [*rows, ("outcomes", outcome_counts(results)), ("files", f"{folder}/")])
 
 
-def line(r: dict[str, Any]) -> str:
-    """One collision on one line."""
+def collision_line(r: dict[str, Any]) -> str:
+    """Describe one collision on one line."""
     pieces = f"{len(r['fragments'])} bodies, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"
-    busy = "" if r["quiet"] else " (stopped while still busy)"
-    return f"{r['outcome']}{busy}: {pieces}; {events}; lost {lost:.2g} of the impact energy; drift {r['drift']:.1e}"
+    unfinished = "" if r["quiet"] else " (stopped before it came to rest)"
+    return (
+        f"{r['outcome']}{unfinished}: {pieces}; {events}; lost {lost:.2g} of the impact energy; drift {r['drift']:.1e}"
+    )

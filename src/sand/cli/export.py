@@ -1,4 +1,4 @@
-"""`sand export DIR --to FORMAT`: frames for other programs."""
+"""`sand export DIR --to FORMAT`: exports frames to other programs."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import click
 
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE
+from .main import DONE
 
 FORMATS = ("xyz", "lammps-dump", "lammps-data", "vtk")
 
 
-@click.command("export", short_help="Write a run's frames for other programs.")
-@click.argument("folder", metavar="DIR", type=options.PLACE)
-@click.option("--to", "form", required=True, type=click.Choice(FORMATS), help="What for.")
-@click.option("--out", metavar="PATH", type=options.PLACE, help="Path without ending (default: 'trajectory' in DIR).")
-@click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
-@click.option("--overwrite", is_flag=True, help="Replace files that are there.")
+@click.command("export", short_help="Export the frames of a run to other programs.")
+@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.option("--to", "form", required=True, type=click.Choice(FORMATS), help="Format of the files.")
+@click.option("--out", metavar="PATH", type=options.PATH, help="Path without suffix (default: 'trajectory' in DIR).")
+@click.option("--frames", metavar="SLICE", default=":", help="Frames, as in Python: '-1', '10:', '::5'.")
+@click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.as_json
 @options.debug
 def command(folder: str, form: str, out: str | None, frames: str, overwrite: bool, as_json: bool) -> int:
-    """Write the frames of the run in DIR for other programs.
+    """Export the frames of the run in DIR to other programs.
 
     vtk: a .vtp for each frame and a .pvd with their times, for ParaView; xyz: extended XYZ in ångström, for OVITO and
     ASE; lammps-dump and lammps-data: `units si`.
@@ -32,10 +32,10 @@ def command(folder: str, form: str, out: str | None, frames: str, overwrite: boo
 
     run = Run(folder)
     stem = Path(out) if out else Path(folder) / Path(TRAJECTORY).stem
-    endings = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
-    there = sorted(stem.parent.glob(stem.name + endings[form]))
-    if there and not overwrite:
-        raise BadInput(f"{there[0]} exists; give another --out, or --overwrite")
+    suffixes = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
+    existing = sorted(stem.parent.glob(stem.name + suffixes[form]))
+    if existing and not overwrite:
+        raise BadInput(f"{existing[0]} exists; give another --out, or --overwrite")
     written = run.export(form, stem, chosen(frames))
     if as_json:
         report.emit({"files": [str(path) for path in written]})
@@ -46,7 +46,7 @@ def command(folder: str, form: str, out: str | None, frames: str, overwrite: boo
 
 
 def chosen(text: str) -> slice:
-    """'-1', '3', '10:', '::5' as a slice.  Raises BadInput."""
+    """Read '-1', '3', '10:' or '::5' as a slice.  Raises BadInput."""
     parts = text.split(":")
     try:
         numbers = [int(part) if part.strip() else None for part in parts]

@@ -1,4 +1,4 @@
-"""`sand grow CASE.toml`: the same box for many seeds."""
+"""`sand grow CASE.toml`: runs the same box for many seeds."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
 from .collide import read_seeds
-from .exits import DONE, INTERRUPTED
+from .main import DONE, INTERRUPTED
 
-USUAL_SEEDS = list(range(1, 9))
+DEFAULT_SEEDS = list(range(1, 9))
 
 
-@click.command("grow", short_help="Run the same box for many seeds, to be analysed together.")
-@click.argument("case", metavar="CASE.toml", type=options.PLACE)
-@click.option("--seeds", metavar="LIST", help="One box each: '3', '1,2,5' or '1-8' (the default).")
+@click.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
+@click.argument("case", metavar="CASE.toml", type=options.PATH)
+@click.option("--seeds", metavar="LIST", help="Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
 @click.option(
-    "--out", metavar="DIR", type=options.PLACE, help="Folder for the boxes' folders (default: the case's name)."
+    "--out", metavar="DIR", type=options.PATH, help="Folder for the folders of the boxes (default: the case's name)."
 )
 @options.workers
 @options.scheduler
@@ -41,14 +41,15 @@ def command(
 ) -> int:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 
-    Each is a run as of `sand run`; growth.json says how they ended. Called again it goes on with what is not finished,
-    also to a later end; `sand resume DIR` does so after an interruption. `sand analyse DIR` says how aggregates grew.
+    Each box is a run as by `sand run`; growth.json lists how they ended. Called again, the command continues unfinished
+    boxes, also to a later end; after an interruption `sand resume DIR` does the same. `sand analyse DIR` measures the
+    growth.
     """
     set_threads(threads)
     chosen = None if seeds is None else read_seeds(seeds)
     from ..experiments.growth_case import read_growth
 
-    content, own = read_growth(case)  # all mistakes at once, with the file's name
+    content, own = read_growth(case)
     folder = Path(out or Path(case).stem)
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder} is a file; give another folder with --out")
@@ -59,7 +60,7 @@ def command(
         "quiet": quiet,
         "as_json": as_json,
     }
-    return boxes(content, chosen or own or USUAL_SEEDS, folder, **how)
+    return boxes(content, chosen or own or DEFAULT_SEEDS, folder, **how)
 
 
 def boxes(
@@ -73,36 +74,45 @@ def boxes(
     quiet: bool,
     as_json: bool,
 ) -> int:
-    """Run the boxes of a case, or go on with them; returns the exit code.
+    """Run or continue the boxes of a case.
+
+    Returns
+    -------
+    int
+        The exit code.
 
     Raises
     ------
     BadInput
-        as `experiments.boxes.grow`; or a worker process has died.
+        As `experiments.growth_boxes.grow`; or if a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 
     from ..experiments.executors import executor_for
     from ..experiments.growth_boxes import grow
-    from .interrupt import Watch
+    from .interrupt import InterruptObserver
 
     outcomes: dict[int, str] = {}
 
-    def told(seed: int, outcome: str) -> None:
+    def finished(seed: int, outcome: str) -> None:
         outcomes[seed] = outcome
         if not (quiet or as_json):
-            report.say(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
+            report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
 
     try:
-        with report.compiling(quiet), Watch() as watch, executor_for(workers, scheduler, threads) as executor:
-            report.with_notes(lambda: grow(content, seeds, folder, executor, told, [watch]))
+        with (
+            report.compiling(quiet),
+            InterruptObserver() as interrupts,
+            executor_for(workers, scheduler, threads) as executor,
+        ):
+            report.with_notes(lambda: grow(content, seeds, folder, executor, finished, [interrupts]))
     except KeyboardInterrupt:
-        report.note(f"interrupted; {report.way_on(folder)}")
+        report.note(f"interrupted; {report.how_to_continue(folder)}")
         return INTERRUPTED
     except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.way_on(folder)}") from None
+        raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
     if as_json:
         report.emit({"folder": str(folder), "seeds": seeds, "outcomes": outcomes})
     elif not quiet:
-        report.say(f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}")
+        report.write_line(f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}")
     return DONE

@@ -1,4 +1,4 @@
-"""`sand info DIR|FILE`: what a run or one of its files holds, on one screen."""
+"""`sand info DIR|FILE`: describes a run or one of its files on one screen."""
 
 from __future__ import annotations
 
@@ -13,24 +13,22 @@ from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_ledger
 from . import options, report
-from .info_jobs import of_job_file, of_job_folder, of_other_case
-
-Report = tuple[str, report.Rows, dict[str, Any]]
-"""A heading, rows for people, and the same for machines."""
+from .info_jobs import describe_job_file, describe_job_folder, describe_other_case
+from .report import Description
 
 
-@click.command("info", short_help="What a run, or one of its files, holds.")
-@click.argument("path", metavar="DIR|FILE", type=options.PLACE)
+@click.command("info", short_help="Describe a run or one of its files.")
+@click.argument("path", metavar="DIR|FILE", type=options.PATH)
 @options.as_json
 @options.debug
 def command(path: str, as_json: bool) -> int:
-    """What a run's folder holds, or a case file, trajectory.gsd, ledger.csv, summary.json or checkpoint.
+    """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
 
-    The same for cases, folders and results of `sand scatter` and `sand collide`.
+    Also describes cases, folders and results of `sand scatter`, `sand collide` and `sand grow`.
 
-    A case file is checked as `sand run` would, without running it.
+    A case file is checked as by `sand run`, but not run.
     """
-    heading, rows, content = report.with_notes(lambda: _teller(Path(path))(Path(path)))
+    heading, rows, content = report.with_notes(lambda: _describe(Path(path)))
     if as_json:
         report.emit(content)
     else:
@@ -38,22 +36,22 @@ def command(path: str, as_json: bool) -> int:
     return 0
 
 
-def _teller(path: Path) -> Callable[[Path], Report]:
-    """The function that knows this kind of file.  Raises BadInput."""
+def _describe(path: Path) -> Description:
+    """Describe a folder or a file according to its type.  Raises BadInput."""
     if path.is_dir():
-        return of_run
+        return describe_run(path)
     if not path.exists():
         raise BadInput(f"there is no file or folder {path}")
-    if path.suffix not in KINDS:
+    if path.suffix not in FILE_TYPES:
         raise BadInput(
-            f"{path} is not something to tell about; give a run's folder, a case file (.toml), trajectory.gsd, "
+            f"{path} is not a file that SAND can describe; give a run's folder, a case file (.toml), trajectory.gsd, "
             "a checkpoint (.npz), summary.json or ledger.csv"
         )
-    return KINDS[path.suffix]
+    return FILE_TYPES[path.suffix](path)
 
 
 def _summary(path: Path) -> dict[str, Any]:
-    """A summary that holds what is told of it.  Raises BadInput."""
+    """Read the summary of a run.  Raises BadInput if it lacks entries."""
     summary = files.read_json(path)
     try:
         report.results(summary)
@@ -65,26 +63,26 @@ def _summary(path: Path) -> dict[str, Any]:
 
 
 def _ledger(path: Path) -> list[dict[str, float]]:
-    """The rows of a ledger.  Raises BadInput."""
+    """Read the rows of a ledger.  Raises BadInput."""
     rows = read_ledger(path)
     if not rows or not {"step", "time", "total", "clusters", "mean_cluster_size", "largest_cluster"} <= rows[0].keys():
         raise BadInput(f"{path} is not a ledger of SAND, or an empty one")
     return rows
 
 
-def of_run(path: Path) -> Report:
-    """A run's folder: how it ended or how far it is."""
+def describe_run(path: Path) -> Description:
+    """Describe the folder of a run: its outcome, or its present state."""
     from ..units import format_quantity
 
     if not any((path / name).exists() for name in (files.CASE, files.ONE_COLLISION)):
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
-    if (job := of_job_folder(path)) is not None:
+    if (job := describe_job_folder(path)) is not None:
         return job
     planned = files.read_toml(path / files.CASE).get("run", {})
     summary = _summary(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
     ledger = _ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
     last = ledger[-1] if ledger else None
-    # a run that is going on, or was killed, is in its ledger beyond its summary
+    # a running or killed run has rows in its ledger after its last summary
     beyond = last if last and (summary is None or last["step"] > summary["steps"]) else None
     rows: report.Rows = []
     if summary is not None:
@@ -94,7 +92,7 @@ def of_run(path: Path) -> Report:
     if beyond is not None:
         label = "state" if summary is None else "since then"
         rows += [
-            (label, "running, or stopped without having been closed"),
+            (label, "running, or killed"),
             ("last frame", f"{format_quantity(beyond['time'], 's')} after {beyond['step']} steps"),
             ("clusters", report.clusters(beyond)),
         ]
@@ -104,35 +102,35 @@ def of_run(path: Path) -> Report:
     until = planned.get("until", 0.0)
     ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
     if report.checkpoints(path) and not ended:
-        rows.append(("go on with", report.resume_line(path)))
+        rows.append(("continue with", report.resume_line(path)))
     content: dict[str, Any] = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
     content |= {"planned_end": planned.get("until"), "files": report.files_of(path)}
     return f"{path}: a run", rows, content
 
 
-def of_case(path: Path) -> Report:
-    """A case file, checked: what would run, and what would be chosen."""
+def describe_case(path: Path) -> Description:
+    """Check and describe a case file, with the choices that would be made automatically."""
     from ..config.build import simulation_of
     from ..config.case import read_case
     from ..simulation.serialise import case_of
 
-    if (other := of_other_case(path)) is not None:
+    if (other := describe_other_case(path)) is not None:
         return other
     case = read_case(path)
     if case.grains.kind == "given":
-        rows = [("grains", f"{case.grains.number}, made by a script"), ("box", case.box.periodic.describe())]
+        rows = [("grains", f"{case.grains.number}, from a script"), ("box", case.box.periodic.describe())]
         return f"{path}: the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
-    simulation = report.with_notes(lambda: report.blame(path, lambda: simulation_of(case, None)))
+    simulation = report.with_notes(lambda: report.with_file_name(path, lambda: simulation_of(case, None)))
     folder = Path(case.run.out or path.stem)
     end = math.inf if case.run.until is None else case.run.until
     steps = math.inf if case.run.steps is None else case.run.steps
     rows = report.opening(simulation, end, steps, folder)
     content = {"kind": "case", "case": case_of(simulation, end, steps), "choices": simulation.choices}
-    return f"{path}: a case without mistakes", rows, content
+    return f"{path}: a valid case", rows, content
 
 
-def of_trajectory(path: Path) -> Report:
-    """Frames, times and the last frame of a trajectory."""
+def describe_trajectory(path: Path) -> Description:
+    """Describe the frames, times and last frame of a trajectory."""
     from ..io.trajectory import read_frames
     from ..units import format_quantity
 
@@ -159,8 +157,8 @@ def of_trajectory(path: Path) -> Report:
     return f"{path}: a trajectory", rows, content
 
 
-def of_checkpoint(path: Path) -> Report:
-    """The state a checkpoint holds."""
+def describe_checkpoint(path: Path) -> Description:
+    """Describe the state in a checkpoint."""
     from ..io.checkpoint import read_checkpoint
     from ..units import format_quantity
 
@@ -171,23 +169,23 @@ def of_checkpoint(path: Path) -> Report:
         ("time", f"{format_quantity(meta['time'], 's')} after {meta['steps']} steps"),
         ("grains", f"{grains}, {contacts} contacts"),
         ("planned end", "none" if end is None else format_quantity(end, "s")),
-        ("go on with", report.resume_line(path.parent)),
+        ("continue with", report.resume_line(path.parent)),
     ]
     content = {"kind": "checkpoint", "grains": grains, "contacts": contacts, **meta}
-    return f"{path}: a checkpoint, whole", rows, content
+    return f"{path}: an intact checkpoint", rows, content
 
 
-def of_summary(path: Path) -> Report:
-    """A summary, or the results of another command."""
-    if (job := of_job_file(path)) is not None:
+def describe_json(path: Path) -> Description:
+    """Describe the summary of a run, or the results of another command."""
+    if (job := describe_job_file(path)) is not None:
         return job
     summary = _summary(path)
     rows = [("outcome", summary["outcome_text"] + report.named(summary["grains_concerned"]))]
     return f"{path}: the summary of a run", rows + report.results(summary), {"kind": "summary", **summary}
 
 
-def of_ledger(path: Path) -> Report:
-    """First and last row of the books."""
+def describe_ledger(path: Path) -> Description:
+    """Describe the first and the last row of a ledger."""
     from ..units import format_quantity
 
     ledger = _ledger(path)
@@ -203,10 +201,10 @@ def of_ledger(path: Path) -> Report:
     return f"{path}: the ledger of a run", rows, content
 
 
-KINDS: dict[str, Callable[[Path], Report]] = {
-    ".toml": of_case,
-    ".gsd": of_trajectory,
-    ".npz": of_checkpoint,
-    ".json": of_summary,
-    ".csv": of_ledger,
+FILE_TYPES: dict[str, Callable[[Path], Description]] = {
+    ".toml": describe_case,
+    ".gsd": describe_trajectory,
+    ".npz": describe_checkpoint,
+    ".json": describe_json,
+    ".csv": describe_ledger,
 }

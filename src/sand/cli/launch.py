@@ -1,4 +1,4 @@
-"""What `sand run` and `sand resume` share: start, watch, and tell how it ended."""
+"""Shared parts of `sand run` and `sand resume`: start a simulation, follow it, and report how it ended."""
 
 from __future__ import annotations
 
@@ -15,37 +15,42 @@ from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..units import format_quantity
 from . import report
-from .exits import DONE, INTERRUPTED, PHYSICS
-from .interrupt import Watch
+from .interrupt import InterruptObserver
+from .main import DONE, INTERRUPTED, PHYSICS
 from .progress import Progress
 
 
 class End(NamedTuple):
-    """Where a run is to go: to a time [s], to a number of steps from now, or to whichever comes first."""
+    """End of a run: a time [s], a number of further steps, or whichever comes first."""
 
     until: float | None = None
     steps: int | None = None
 
 
 def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None, *, quiet: bool, as_json: bool) -> int:
-    """Make a simulation, run it and tell; returns the exit code.
+    """Create a simulation, run it, and report how it ended.
 
     Parameters
     ----------
     make : Callable[[], Any]
-        returns the simulation, its files in `folder`.
+        Returns the simulation, which writes its files to `folder`.
     heading : str
-        of what is told before the start.
+        Heading of the description before the start.
     end : End or None
-        of the run; None: the end that the simulation has in its plans.
+        End of the run; None for the planned end of the simulation.
+
+    Returns
+    -------
+    int
+        The exit code.
     """
-    talk = not (quiet or as_json)
+    verbose = not (quiet or as_json)
     bar = None
-    with report.compiling(quiet), Watch() as watch:
+    with report.compiling(quiet), InterruptObserver() as interrupts:
         simulation = report.with_notes(make)
-        simulation.observers.append(watch)
-        goal = _goal(simulation, end)
-        if talk:
+        simulation.observers.append(interrupts)
+        goal = _absolute_end(simulation, end)
+        if verbose:
             report.show(heading, report.opening(simulation, *goal, folder))
             if sys.stderr.isatty():
                 bar = Progress(*goal)
@@ -57,22 +62,22 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         except Interrupted as stop:
             result = stop.result
         except FilesFailed as error:
-            raise FilesFailed(f"{error}; {_what_is_left(folder)}") from error
+            raise FilesFailed(f"{error}; {_how_to_recover(folder)}") from error
         except (Exception, KeyboardInterrupt) as error:
-            if not (watch.asked or isinstance(error, KeyboardInterrupt)):
+            if not (interrupts.received or isinstance(error, KeyboardInterrupt)):
                 raise
-            result = _only_drawing(simulation, goal, folder)
+            result = _finished_result(simulation, goal, folder)
             if result is None:
-                return _cut_off(folder)  # a compiler that is interrupted may fail in any way
-            report.note("the figure is left out")
+                return _interrupted(folder)  # an interrupted compiler may raise any exception
+            report.note("the figure is not drawn")
         finally:
             if bar is not None:
                 bar.finish()
-    return _conclude(result, folder, talk=talk, as_json=as_json)
+    return _conclude(result, folder, verbose=verbose, as_json=as_json)
 
 
-def _only_drawing(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
-    """The result of a run that was through when Ctrl-C came, but for its figure; None for any other."""
+def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
+    """The result of a run that had finished except for its figure when it was interrupted; None for any other."""
     from ..simulation.outcome import Outcome, Result
 
     if simulation.time < goal[0] and simulation.steps < goal[1]:
@@ -86,8 +91,8 @@ def _only_drawing(simulation: Any, goal: tuple[float, float], folder: Path) -> A
     return Result(Outcome.FINISHED, simulation.steps, simulation.time, simulation.ledger.drift)
 
 
-def _goal(simulation: Any, end: End | None) -> tuple[float, float]:
-    """Time [s] and step to reach, infinite where there is none."""
+def _absolute_end(simulation: Any, end: End | None) -> tuple[float, float]:
+    """Planned end of the run: time [s] and step, infinite where not set."""
     if end is None:
         return simulation.planned
     return (
@@ -96,15 +101,15 @@ def _goal(simulation: Any, end: End | None) -> tuple[float, float]:
     )
 
 
-def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
-    """Tell how a run ended; returns the exit code."""
+def _conclude(result: Any, folder: Path, *, verbose: bool, as_json: bool) -> int:
+    """Report how a run ended; returns the exit code."""
     from ..simulation.outcome import Outcome
 
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
     if as_json:
         report.emit({**summary, "folder": str(folder)})
-    if talk:
+    if verbose:
         rows = [*report.results(summary), ("files", _listed(folder))]
         report.show("done" if outcome is Outcome.FINISHED else "so far", rows)
     if outcome is Outcome.INTERRUPTED:
@@ -114,65 +119,73 @@ def _conclude(result: Any, folder: Path, *, talk: bool, as_json: bool) -> int:
         report.note(f"stopped by physics at {when}: {outcome.value}{report.named(result.grains)}")
         last = report.checkpoints(folder)[-1]
         kept = int(last.stem.removeprefix("checkpoint-")) == result.steps
-        report.note(f"the {'state just' if kept else 'last good state'} before is in {last}")
+        report.note(f"the {'last state' if kept else 'last good state'} is in {last}")
         return PHYSICS
     return DONE
 
 
-def _cut_off(folder: Path) -> int:
-    """Ctrl-C before the first step, or twice: the last checkpoint, if any, is what is left."""
+def _interrupted(folder: Path) -> int:
+    """Report an interruption before the first step, or a second one; returns the exit code."""
     if not folder.is_dir():
-        report.note(f"interrupted; the folder {folder} is not there, start again")
+        report.note(f"interrupted; the folder {folder} does not exist, start again")
     elif report.checkpoints(folder):
-        report.note(f"interrupted at once; go on from the last checkpoint with: {report.resume_line(folder)}")
+        report.note(f"interrupted at once; continue from the last checkpoint with: {report.resume_line(folder)}")
     else:
         report.note("interrupted before the first step; nothing is lost, start again")
     return INTERRUPTED
 
 
-def _what_is_left(folder: Path) -> str:
-    """What to do when a file could not be written."""
+def _how_to_recover(folder: Path) -> str:
+    """What to do after a file could not be written."""
     if not folder.is_dir():
-        return f"the folder {folder} has vanished with all that was in it; start again"
+        return f"the folder {folder} has been removed; start again"
     if report.checkpoints(folder):
-        return f"once that is mended go on from the last checkpoint with: {report.resume_line(folder)}"
-    return "there is no checkpoint yet; once that is mended start again, with --overwrite"
+        return f"once this is solved, continue from the last checkpoint with: {report.resume_line(folder)}"
+    return "there is no checkpoint yet; once this is solved, start again with --overwrite"
 
 
 def _listed(folder: Path) -> str:
-    """The files written: folder/ and their names, as one line."""
+    """The folder and the names of its files, as one line."""
     return f"{folder}/  " + "  ".join(report.files_of(folder))
 
 
 def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
-    """What can be wrong with --out, in words of the command line, before anything is computed.
+    """Refuse a folder that cannot be used, before anything is computed.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder for the files of the run.
+    case : Path
+        The case file.
+    overwrite : bool
+        Whether files of an earlier run may be replaced.
 
     Raises
     ------
     BadInput
-        nothing can be written there; or the folder is in use and --overwrite is not given; or it holds
+        If nothing can be written to the folder; if it is not empty and `overwrite` is not given; or if it holds
         the case file itself, or a body of it.
     """
-    ground = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not ground.is_dir():
-        raise BadInput(f"cannot write to folder {folder}: {ground} is a file; give another one with --out")
-    if not os.access(ground, os.W_OK):
-        raise BadInput(f"cannot write to folder {folder}: no permission in {ground}; give another one with --out")
-    if ground != folder:
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        raise BadInput(f"cannot write to folder {folder}: {existing} is a file; give another one with --out")
+    if not os.access(existing, os.W_OK):
+        raise BadInput(f"cannot write to folder {folder}: no permission in {existing}; give another one with --out")
+    if existing != folder:
         return
     if (folder / LOCK).exists():
         refuse_locked(folder)
     if not is_used(folder):
         return
     if not overwrite:
-        told = "give another one with --out, or --overwrite to replace the run in it"
-        if report.can_go_on(folder):
-            told += f"; or go on with what is in it: {report.resume_line(folder)}"
-        raise BadInput(f"folder {folder} exists and is not empty; {told}")
+        advice = "give another one with --out, or --overwrite to replace the run in it"
+        if report.is_resumable(folder):
+            advice += f"; or continue that run: {report.resume_line(folder)}"
+        raise BadInput(f"folder {folder} exists and is not empty; {advice}")
     if any((folder / name).exists() and (folder / name).samefile(case) for name in OWN_FILES):
         raise BadInput(
-            f"--overwrite would replace the case file {case} itself; copy it to another folder first, "
-            "or give another --out"
+            f"--overwrite would replace the case file {case} itself; copy it to another folder, or give another --out"
         )
     content = read_toml(case)
     for body in sorted(BODIES & content.keys()):

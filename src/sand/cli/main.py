@@ -1,4 +1,4 @@
-"""The entry point of the `sand` command: deals with Ctrl-C from the first moment on, then loads the rest."""
+"""Entry point of the `sand` command: handles Ctrl-C from the beginning, then imports the rest."""
 
 from __future__ import annotations
 
@@ -7,78 +7,93 @@ import sys
 
 TYPE_CHECKING = False  # typing takes as long to load as all the rest here
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Any
+    from collections.abc import Callable, Sequence
+    from typing import Any, Self
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C; it stands here, too, because nothing else of ours may be loaded yet."""
+
+DONE, FAILED, BAD_INPUT, PHYSICS, INTERRUPTED = 0, 1, 2, 3, 130
+"""Exit codes: success, an internal error, an error of the user, a run stopped by physics, Ctrl-C."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code.
+    """Run one command.
 
     Parameters
     ----------
     argv : Sequence[str] or None, optional
-        words after `sand`; those of the command line by default.
+        Arguments after `sand`; those of the command line by default.
+
+    Returns
+    -------
+    int
+        The exit code.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # a terminal that cannot show µ or … gets something else instead
+        if hasattr(stream, "reconfigure"):  # replace characters that the terminal cannot show, such as µ and …
             stream.reconfigure(errors="replace")
-    with _Interrupts(to_the_end=argv is None) as interrupts:
+    # at the end of the program further Ctrl-C end it silently
+    with Interrupts((signal.SIGINT,), after=signal.SIG_DFL if argv is None else None) as interrupts:
         try:
             from .program import run_command
 
-            return run_command(words, lambda: interrupts.asked)
+            return run_command(words, lambda: interrupts.received)
         except KeyboardInterrupt:
             pass
-        except Exception:  # an import that is cut short fails in any way
-            if not interrupts.asked:
+        except Exception:  # an interrupted import can raise anything
+            if not interrupts.received:
                 raise
         sys.stderr.write("sand: interrupted\n")
         return INTERRUPTED
 
 
-class _Interrupts:
-    """Ctrl-C raises KeyboardInterrupt in the block, and is remembered: what is being imported may swallow it.
+class Interrupts:
+    """Context manager in which signals raise KeyboardInterrupt and are recorded.
+
+    The record is needed because imports and callbacks of the compiler may swallow the exception. In other threads than
+    the main one, and for signals that are ignored (as Ctrl-C in a background job of a shell), nothing is changed.
 
     Parameters
     ----------
-    to_the_end : bool
-        the program ends with the block; Ctrl-C then ends it at once, without a word.
+    numbers : Sequence[int]
+        The signals.
+    after : optional
+        Signal handler to install at the end; by default the one before.
     """
 
-    def __init__(self, to_the_end: bool):
-        self.asked = False
-        self._to_the_end = to_the_end
-        self._before: Any = None
+    def __init__(self, numbers: Sequence[int], after: Any = None):
+        self.received = False
+        self._numbers, self._after = numbers, after
+        self._before: dict[int, Callable[[int, Any], Any] | int] = {}
         self._hook = sys.unraisablehook
 
-    def __enter__(self) -> _Interrupts:
-        before = signal.getsignal(signal.SIGINT)
-        if before not in (signal.SIG_IGN, None):  # a shell's `sand run … &` is not for Ctrl-C
+    def __enter__(self) -> Self:
+        for number in self._numbers:
+            before = signal.getsignal(number)
+            if before in (signal.SIG_IGN, None):
+                continue
             try:
-                signal.signal(signal.SIGINT, self._raise)
+                signal.signal(number, self._raise)
             except ValueError:  # not in the main thread
                 return self
-            self._before = before
-            sys.unraisablehook = self._lost
+            self._before[number] = before
+        sys.unraisablehook = self._report
         return self
 
     def _raise(self, _number: int, _frame: Any) -> None:
-        self.asked = True
+        self.received = True
         raise KeyboardInterrupt
 
-    def _lost(self, unraisable: Any) -> None:
+    def _report(self, unraisable: Any) -> None:
+        """Hook for exceptions that Python cannot raise: KeyboardInterrupt is recorded and needs no message."""
         if not isinstance(unraisable.exc_value, KeyboardInterrupt):
             self._hook(unraisable)
 
     def __exit__(self, *_: object) -> None:
-        if self._before is None:
-            return
-        signal.signal(signal.SIGINT, signal.SIG_DFL if self._to_the_end else self._before)
-        sys.unraisablehook = self._hook
+        for number, before in self._before.items():
+            signal.signal(number, before if self._after is None else self._after)
+        if sys.unraisablehook == self._report:
+            sys.unraisablehook = self._hook
 
 
 if __name__ == "__main__":

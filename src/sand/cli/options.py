@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..io.run_folder import checked_name
 
 
 class PathName(click.ParamType):
-    """The name of a file or folder: not empty, and not longer than systems take."""
+    """The name of a file or folder: not empty, and not longer than systems allow."""
 
-    name = "place"
+    name = "path"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The same text.  Raises BadInput."""
+        """Check the name.  Raises BadInput."""
         name = "a name" if param is None else param.opts[0] if param.opts[0].startswith("-") else str(param.metavar)
         return checked_name(str(value), name)
 
 
-PLACE = PathName()
+PATH = PathName()
 SEED = click.IntRange(0, MOST_SEED)
 FRAME = click.IntRange(-(2**31), 2**31 - 1)
 COUNT = click.IntRange(1, MOST_GRAINS)
@@ -31,39 +31,39 @@ workers = click.option(
     type=click.IntRange(1, MOST_PROCESSES),
     default=1,
     metavar="N",
-    help="Processes that share the work (default 1).",
+    help="Number of worker processes (default 1).",
 )
 
-scheduler = click.option("--scheduler", metavar="ADDRESS", help="A running dask scheduler instead, tcp://host:port.")
+scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://host:port.")
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 
 quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
 
-# main() looks for the word itself, because what goes wrong may do so before options are understood.
-debug = click.option("--debug", is_flag=True, expose_value=False, help="Show where in the program an error arose.")
+# read from the command line by `program`, because errors may occur before options are parsed
+debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 
 
 threads = click.option(
     "--threads",
     type=click.IntRange(1, MOST_PROCESSES),
     metavar="N",
-    help="Threads for a large simulation (default: one for each core, or $SAND_THREADS); results are the same.",
+    help="Threads for a large simulation (default: one per core, or $SAND_THREADS); results do not depend on it.",
 )
 
 
 def end_of_run(text: str) -> Any:
-    """The option --until, with `text` as its help."""
+    """The option --until with the help text `text`."""
     return click.option("--until", metavar="TIME", help=text)
 
 
 def seconds(text: str | None, name: str = "--until") -> float | None:
-    """A time from the command line [s], checked as in a case file; a bare number is SI there and here.
+    """Convert a time from the command line to seconds, checked as in a case file; a bare number is SI.
 
     Raises
     ------
     BadInput
-        wrong unit, not a number, not above 0, too short for anything to happen.
+        If it has a wrong unit, is not a number, not above 0, or too short.
     """
     from ..simulation.stop import duration
 

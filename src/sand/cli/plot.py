@@ -9,7 +9,7 @@ import click
 
 from ..errors import BadInput, did_you_mean
 from . import options, report
-from .exits import DONE
+from .main import DONE
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
@@ -17,7 +17,7 @@ FOLDER = "plots"
 
 
 class Source(NamedTuple):
-    """What is plotted: a run's folder, or a trajectory alone."""
+    """The data to plot: a run, or a trajectory alone."""
 
     path: Path
     frames: Any
@@ -25,24 +25,30 @@ class Source(NamedTuple):
 
 
 @click.command("plot", short_help="Draw figures of a run, and a still picture of a frame.")
-@click.argument("source", metavar="DIR", type=options.PLACE)
-@click.option("--what", metavar="WHAT,…", help="Which (default: all over time, and still).")
-@click.option("--out", metavar="FOLDER", type=options.PLACE, help="Where to (default: 'plots' in DIR).")
-@click.option("--format", "form", type=click.Choice(FORMATS), default="png", show_default=True, help="Of the files.")
+@click.argument("source", metavar="DIR", type=options.PATH)
+@click.option("--what", metavar="WHAT,…", help="What to draw (default: all figures over time, and still).")
+@click.option("--out", metavar="FOLDER", type=options.PATH, help="Folder for the files (default: 'plots' in DIR).")
+@click.option("--format", "form", type=click.Choice(FORMATS), default="png", show_default=True, help="File format.")
 @click.option(
-    "--frame", metavar="K", type=options.FRAME, default=-1, help="Which frame, as in Python (default: the last)."
+    "--frame", metavar="K", type=options.FRAME, default=-1, help="Frame, numbered as in Python (default: the last)."
 )
-@click.option("--colour", metavar="QUANTITY", default="cluster", show_default=True, help="What colours grains show.")
-@click.option("--bonds", type=click.Choice(["load", "mode", "none"]), default="none", help="What contacts show.")
-@click.option("--arrows/--no-arrows", default=True, help="Moments as arrows (default: they are).")
-@click.option("--cluster", metavar="K", type=int, help="One cluster by itself; the largest is 1.")
-@click.option("--cut", is_flag=True, help="Clusters cut by the faces of the box, not whole.")
-@click.option("--view", metavar="VIEW", default="iso", help="iso, front, top, side, or the way to the eye: 'x,y,z'.")
-@click.option("--perspective", is_flag=True, help="What is nearer is larger.")
-@click.option("--size", metavar="WxH", default="1600x1000", show_default=True, help="Pixels of the still picture.")
-@click.option("--transparent", is_flag=True, help="Without a ground.")
-@click.option("--dark", is_flag=True, help="On a dark ground.")
-@click.option("--overwrite", is_flag=True, help="Replace files that are there.")
+@click.option(
+    "--colour", metavar="QUANTITY", default="cluster", show_default=True, help="Quantity that colours grains."
+)
+@click.option(
+    "--bonds", type=click.Choice(["load", "mode", "none"]), default="none", help="Quantity shown by contacts."
+)
+@click.option("--arrows/--no-arrows", default=True, help="Draw moments as arrows (default) or not.")
+@click.option("--cluster", metavar="K", type=int, help="Draw one cluster only; the largest is 1.")
+@click.option("--cut", is_flag=True, help="Draw clusters cut by the faces of the box, not whole.")
+@click.option(
+    "--view", metavar="VIEW", default="iso", help="iso, front, top, side, or the direction to the eye: 'x,y,z'."
+)
+@click.option("--perspective", is_flag=True, help="Perspective instead of parallel projection.")
+@click.option("--size", metavar="WxH", default="1600x1000", show_default=True, help="Size of the picture in pixels.")
+@click.option("--transparent", is_flag=True, help="Transparent background.")
+@click.option("--dark", is_flag=True, help="Dark background.")
+@click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @options.as_json
 @options.debug
 def command(
@@ -50,62 +56,66 @@ def command(
 ) -> int:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
-    WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, whose
-    histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with that of
-    their cluster), field_alignment, material. As a colour of grains, size is the number of grains in their cluster.
+    WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
+    a histogram is drawn: cluster, radius, coordination, speed, spin, kinetic_energy, alignment (of moments with the
+    moment of their cluster), field_alignment, material. As a colour of grains, size is the number of grains in their
+    cluster.
     """
     from ..io.run_folder import make_folder, replace_file
 
-    place, names = _asked(Path(source), what, out, form, overwrite, how)
-    drawn = report.with_notes(lambda: _drawn(_source(Path(source)), names, frame, form, how))
-    if not place.exists():
-        make_folder(place)
-    for path, content in zip((place / f"{name}.{form}" for name in names), drawn, strict=True):
+    folder, names = _check_options(Path(source), what, out, form, overwrite, how)
+    pictures = report.with_notes(lambda: _draw(_open_source(Path(source)), names, frame, form, how))
+    if not folder.exists():
+        make_folder(folder)
+    for path, content in zip((folder / f"{name}.{form}" for name in names), pictures, strict=True):
         replace_file(path, content)
     if as_json:
-        report.emit({"files": [str(place / f"{name}.{form}") for name in names]})
+        report.emit({"files": [str(folder / f"{name}.{form}") for name in names]})
     else:
-        report.show(f"plot {source}", [("folder", str(place)), ("files", ", ".join(f"{n}.{form}" for n in names))])
+        report.show(f"plot {source}", [("folder", str(folder)), ("files", ", ".join(f"{n}.{form}" for n in names))])
     return DONE
 
 
-def _asked(
+def _check_options(
     source: Path, what: str | None, out: str | None, form: str, overwrite: bool, how: dict[str, Any]
 ) -> tuple[Path, list[str]]:
-    """The folder to write to and what to draw; `how` made ready for the picture.  Raises BadInput for all mistakes."""
+    """Folder to write to and names of what to draw; converts `how` for the picture.  Raises BadInput, all errors."""
     from ..analysis.quantities import GRAIN_NAMES
     from ..plotting.plots import HISTORY
     from ..plotting.render.still import check_picture_options
 
-    wrong: list[str] = []
-    alone = source.is_file()
-    usual = (STILL,) if alone else (*HISTORY, STILL)
-    names = list(dict.fromkeys(part.strip() for part in what.split(","))) if what is not None else list(usual)
+    problems: list[str] = []
+    is_trajectory = source.is_file()
+    default = (STILL,) if is_trajectory else (*HISTORY, STILL)
+    names = list(dict.fromkeys(part.strip() for part in what.split(","))) if what is not None else list(default)
     allowed = (*HISTORY, STILL, *GRAIN_NAMES)
-    wrong += [f"--what {name!r} is none; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
-    if alone:
-        wrong += [f"--what {name}: {source} has no ledger; give a run's folder" for name in names if name in HISTORY]
+    problems += [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
+    if is_trajectory:
+        missing = [name for name in names if name in HISTORY]
+        problems += [f"--what {name}: {source} has no ledger; give a run's folder" for name in missing]
     if how["cluster"] is not None and what is not None and (others := [name for name in names if name != STILL]):
-        wrong.append(f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out")
+        problems.append(
+            f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
+        )
     size = _size(how["size"])
     if size is None:
-        wrong.append(f"--size {how['size']!r} must be width x height in pixels, such as 1600x1000")
+        problems.append(f"--size {how['size']!r} must be width x height in pixels, such as 1600x1000")
     how["size"], how["whole"] = size or (1600, 1000), not how.pop("cut")
     how["bonds"] = None if how["bonds"] == "none" else how["bonds"]
     try:
         check_picture_options(how["colour"], how["bonds"], how["view"], how["size"])
     except BadInput as error:
-        wrong += error.problems
-    default = source.with_name(f"{source.stem}-{FOLDER}") if alone else source / FOLDER
-    place = default if out is None else Path(out)
-    if not place.is_dir() and (place.exists() or (out is not None and not place.parent.is_dir())):
-        wrong.append(f"--out {place} cannot be a folder; give another one")
-    there = [name for name in names if (place / f"{name}.{form}").exists()]
-    if there and not overwrite:
-        wrong.append(f"{place / there[0]}.{form} exists; give another --out, or --overwrite")
-    if wrong:
-        raise BadInput(wrong)
-    return place, names
+        problems += error.problems
+    beside = source.with_name(f"{source.stem}-{FOLDER}") if is_trajectory else source / FOLDER
+    folder = beside if out is None else Path(out)
+    if not folder.is_dir() and (folder.exists() or (out is not None and not folder.parent.is_dir())):
+        problems.append(f"--out {folder} cannot be a folder; give another one")
+    existing = [name for name in names if (folder / f"{name}.{form}").exists()]
+    if existing and not overwrite:
+        problems.append(f"{folder / existing[0]}.{form} exists; give another --out, or --overwrite")
+    if problems:
+        raise BadInput(problems)
+    return folder, names
 
 
 def _size(text: str) -> tuple[int, int] | None:
@@ -115,8 +125,8 @@ def _size(text: str) -> tuple[int, int] | None:
     return int(parts[0]), int(parts[1])
 
 
-def _source(path: Path) -> Source:
-    """Raises BadInput: there is nothing of ours."""
+def _open_source(path: Path) -> Source:
+    """Open a run or a trajectory.  Raises BadInput if there is none of SAND."""
     from ..io.trajectory import Frames
     from ..results import Run
 
@@ -129,8 +139,8 @@ def _source(path: Path) -> Source:
     return Source(path, frames, None)
 
 
-def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
-    """All files, in memory, so that none is written unless all can be drawn.  Raises BadInput."""
+def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
+    """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
     from ..plotting.plots import HISTORY, figure_bytes, grains_figure, history_figure
     from ..plotting.render.still import still_picture
 
@@ -151,19 +161,19 @@ def _drawn(source: Source, names: list[str], frame: int, form: str, how: dict[st
 
 
 def _history(source: Source) -> tuple[Any, int, float]:
-    """The ledger, the number of grains, and their temperature at the start [K].  Raises BadInput."""
+    """The ledger, the number of grains, and their initial temperature [K].  Raises BadInput."""
     from ..analysis.ledger_columns import LedgerColumns
     from ..forces.pair.dipoles import kinetic_temperature
     from ..io.ledger_table import read_ledger
     from ..io.run_folder import LEDGER
 
-    books = LedgerColumns.from_rows(read_ledger(source.path / LEDGER))
+    ledger = LedgerColumns.from_rows(read_ledger(source.path / LEDGER))
     first = _frame(source, 0)
-    return books, len(first), kinetic_temperature(first)
+    return ledger, len(first), kinetic_temperature(first)
 
 
 def _frame(source: Source, number: int) -> Any:
-    """Raises BadInput: there is none of that number."""
+    """Read a frame.  Raises BadInput if it does not exist."""
     if not len(source.frames):
         raise BadInput(f"{source.path} has no frame yet")
     try:

@@ -1,4 +1,4 @@
-"""The `sand` command: parse, call one command, turn errors into exit codes."""
+"""The `sand` command: parses the command line, calls one command, and turns errors into exit codes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import click
 from ..errors import SandError
 from ..version import __version__
 from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
-from .exits import DONE, FAILED, INTERRUPTED, MISTAKE
+from .main import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
-"""One module per command; each has a `command`."""
+"""One module per command, with a click command named `command`."""
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -22,9 +22,9 @@ COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, exp
 @options.debug
 @click.pass_context
 def sand(context: click.Context) -> None:
-    """SAND: dust aggregates, grain by grain, with sticking contacts and magnetic dipoles.
+    """SAND: grain-by-grain simulation of dust aggregates with adhesive contacts and magnetic dipoles.
 
-    Exit codes: 0 done, 2 a mistake in what was asked for, 3 stopped by physics, 130 interrupted.
+    Exit codes: 0 done, 2 an error in the input, 3 stopped by physics, 130 interrupted.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -34,25 +34,30 @@ for _module in COMMANDS:
     sand.add_command(_module.command)
 
 
-def run_command(words: list[str], asked: Callable[[], bool]) -> int:
-    """One command; returns the exit code.
+def run_command(words: list[str], interrupted: Callable[[], bool]) -> int:
+    """Run one command.
 
     Parameters
     ----------
     words : list[str]
-        after `sand`.
-    asked : Callable[[], bool]
-        says whether Ctrl-C has been pressed.
+        Arguments after `sand`.
+    interrupted : Callable[[], bool]
+        Whether Ctrl-C has been pressed.
+
+    Returns
+    -------
+    int
+        The exit code.
     """
     try:
-        return _call(words, asked)
-    except BrokenPipeError:  # the reader went away, as in `sand info DIR | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or flushing at exit would complain
+        return _call(words, interrupted)
+    except BrokenPipeError:  # the reader has ended, as in `sand info DIR | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or flushing at exit would fail
         return DONE
 
 
-def _call(words: list[str], asked: Callable[[], bool]) -> int:
-    """Run the command; its errors become lines and an exit code, unless --debug."""
+def _call(words: list[str], interrupted: Callable[[], bool]) -> int:
+    """Run the command; errors become lines and an exit code, unless --debug is given."""
     try:
         with sand.make_context("sand", list(words)) as context, report.notes():
             return sand.invoke(context) or DONE
@@ -63,26 +68,26 @@ def _call(words: list[str], asked: Callable[[], bool]) -> int:
     except (KeyboardInterrupt, click.Abort):
         return _fail(["interrupted"], INTERRUPTED, words)
     except Exception as error:
-        if asked() and not isinstance(error, (SandError, click.ClickException)):
-            return _fail(["interrupted"], INTERRUPTED, words)  # an import that is cut short fails in any way
+        if interrupted() and not isinstance(error, (SandError, click.ClickException)):
+            return _fail(["interrupted"], INTERRUPTED, words)  # an interrupted import can raise anything
         if "--debug" in words and not isinstance(error, click.ClickException):
             raise
-        return _fail(*_explained(error), words)
+        return _fail(*_explain(error), words)
 
 
-def _explained(error: Exception) -> tuple[list[str], int]:
-    """What to say of an error, and the exit code."""
+def _explain(error: Exception) -> tuple[list[str], int]:
+    """Error message in lines, and the exit code."""
     if isinstance(error, SandError):
-        return str(error).splitlines(), MISTAKE
+        return str(error).splitlines(), BAD_INPUT
     if isinstance(error, click.UsageError):
         where = error.ctx.command_path if error.ctx else "sand"
-        return [f"{_one_line(error.format_message()).rstrip('.')}; see {where} --help"], MISTAKE
+        return [f"{_one_line(error.format_message()).rstrip('.')}; see {where} --help"], BAD_INPUT
     if isinstance(error, click.ClickException):
-        return [_one_line(error.format_message())], MISTAKE
+        return [_one_line(error.format_message())], BAD_INPUT
     if isinstance(error, MemoryError):
-        return ["not enough memory for this; take fewer grains"], MISTAKE
-    told = _one_line(f"{type(error).__name__}: {error}")
-    return [f"internal error ({told}); run again with --debug and report what it prints"], FAILED
+        return ["not enough memory; use fewer grains"], BAD_INPUT
+    text = _one_line(f"{type(error).__name__}: {error}")
+    return [f"internal error ({text}); run again with --debug and report the output"], FAILED
 
 
 def _one_line(text: str) -> str:

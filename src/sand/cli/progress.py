@@ -1,4 +1,4 @@
-"""The progress bar of a run."""
+"""Progress bar of a run."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ..simulation.observers import Observer
 from ..units import format_quantity
 
 FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
-"""Fits into 80 columns."""
+"""Layout of the bar, at most 80 columns."""
 
 
 class Progress(Observer):
-    """A bar over physical time: rate, time left, clusters, S and energy drift.
+    """Progress bar with simulation time, rate, remaining wall time, clusters, mean size S and energy drift.
 
     Parameters
     ----------
     end : float
-        of the run [s]; infinite if it ends at a number of steps, over which the bar then goes.
+        End of the run [s]; if infinite, the bar counts steps.
     last_step : float
-        that number.
+        Last step of the run.
     file : IO[str] or None, optional
-        a terminal.
+        A terminal.
     """
 
     tick_reads_grains = False
@@ -36,35 +36,35 @@ class Progress(Observer):
         self._numbers = ""
 
     def see(self, simulation: Any, row: dict[str, float]) -> None:
-        """New numbers at every frame."""
-        self._take(simulation, row)
+        """Show the numbers of a new frame."""
+        self._read_row(simulation, row)
         self.tick(simulation)
 
-    def _take(self, simulation: Any, row: dict[str, float]) -> None:
+    def _read_row(self, simulation: Any, row: dict[str, float]) -> None:
         clusters, size = int(row["clusters"]), row["mean_cluster_size"]
         self._numbers = f"{clusters} clusters, S = {size:.3g}, drift {simulation.ledger.drift:.1g}"
 
     def tick(self, simulation: Any) -> None:
-        """The bar moves; tqdm itself sees to it that it is not drawn too often."""
-        here = simulation.time if self._by_time else simulation.steps
+        """Advance the bar; tqdm limits how often it is drawn."""
+        position = simulation.time if self._by_time else simulation.steps
         total = self._end if self._by_time else self._last_step
         if self._bar is None:
-            self._take(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
-            self._bar = self._open(here, total)
+            self._read_row(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
+            self._bar = self._open(position, total)
         bar = self._bar
         bar.set_description_str(format_quantity(simulation.time, "s"), refresh=False)
         rate = bar.format_dict["rate"] or 0.0
         speed = f"{format_quantity(float(f'{rate:.2g}'), 's')}/s" if self._by_time else f"{rate:.2g} steps/s"
         bar.set_postfix_str(f"{speed}, {self._numbers}" if rate else self._numbers, refresh=False)
-        bar.update(min(here, total) - bar.n)
+        bar.update(min(position, total) - bar.n)
 
-    def _open(self, here: float, total: float) -> Any:
+    def _open(self, position: float, total: float) -> Any:
         from tqdm import tqdm
 
-        tqdm.monitor_interval = 0  # no thread of its own: ticks come often enough
+        tqdm.monitor_interval = 0  # no monitor thread: ticks are frequent enough
         return tqdm(
             total=total,
-            initial=here,
+            initial=position,
             bar_format=FORMAT,
             dynamic_ncols=True,
             miniters=0,
@@ -74,6 +74,6 @@ class Progress(Observer):
         )
 
     def finish(self) -> None:
-        """Take the bar away, however the run ended."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.close()

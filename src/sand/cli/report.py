@@ -1,4 +1,4 @@
-"""What is printed, and how: lines for people, one JSON object for machines, notes on stderr."""
+"""Output of the commands: lines for people, one JSON object for machines, notes on stderr."""
 
 from __future__ import annotations
 
@@ -21,75 +21,77 @@ from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, plain, read_toml
 
 T = TypeVar("T")
 Rows = list[tuple[str, str]]
+"""Labels and texts of a table of two columns."""
+Description = tuple[str, Rows, dict[str, Any]]
+"""Heading and rows for people, and the same content for machines."""
 
-
-LONGEST = 600
-"""Characters of a note."""
-_UNFIT = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
-"""Control characters, and those that change the direction of what follows: they can rewrite what a terminal shows."""
+LONGEST_NOTE = 600
+"""Largest number of characters of a note."""
+_UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+"""Control characters and characters that change the text direction, which could rewrite the content of a terminal."""
 
 
 def clean(text: str) -> str:
-    """The text as one line, with `\\x1b` and the like in place of control characters."""
-    return _UNFIT.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    """The text as one line, with escapes such as `\\x1b` in place of control characters."""
+    return _UNSAFE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
-def say(text: str, *, err: bool = False) -> None:
-    """One line for people; all that goes to the terminal comes through here, or through `clean`."""
+def write_line(text: str, *, err: bool = False) -> None:
+    """Print one line for people; everything printed to the terminal passes through here or through `clean`."""
     click.echo(clean(text), err=err)
 
 
 def note(text: str) -> None:
-    """One line on stderr; of what is too long to be read, its middle is left out."""
-    shown = text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} … {text[-LONGEST // 3 :]}"
-    say(f"sand: {shown}", err=True)
+    """Print one line on stderr; the middle of a very long one is left out."""
+    shown = text if len(text) <= LONGEST_NOTE else f"{text[: LONGEST_NOTE // 2]} … {text[-LONGEST_NOTE // 3 :]}"
+    write_line(f"sand: {shown}", err=True)
 
 
 def compiling(quiet: bool = False) -> AbstractContextManager[None]:
-    """Says so, once, if anything has to be compiled inside the block."""
+    """Print a note, once, if anything is compiled inside the block."""
     if quiet:
         return nullcontext()
-    jit = with_notes(lambda: import_module("sand.compiler.jit"))  # it may warn of the compiler or its cache
+    jit = with_notes(lambda: import_module("sand.compiler.jit"))  # may warn of the compiler or its cache
     return jit.compiling(lambda: note("compiling the loops for this combination of forces, for this and later runs …"))
 
 
 def emit(content: dict[str, Any]) -> None:
-    """The one JSON object of --json; NaN and infinities become null."""
+    """Print the JSON object of --json; NaN and infinities become null."""
     # JSON escapes all other control characters itself
     click.echo(json.dumps(plain(content), indent=2, allow_nan=False).replace("\x7f", "\\u007f"))
 
 
 def show(heading: str, rows: Rows) -> None:
-    """A heading and two columns."""
+    """Print a heading and a table of two columns."""
     width = max((len(label) for label, _ in rows), default=0)
     for line in [heading, *(f"  {label:<{width}}  {text}" for label, text in rows)]:
-        say(line)
+        write_line(line)
 
 
 def with_notes(make: Callable[[], T]) -> T:
-    """`make()`, its warnings printed as notes, each once."""
+    """Call `make`; its warnings are printed as notes, each once."""
     with notes():
         return make()
 
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """Warnings are printed as notes, at once and each once."""
-    told: set[str] = set()
+    """Print warnings as notes, immediately and each once."""
+    printed: set[str] = set()
 
-    def tell(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-        if issubclass(category, UserWarning) and str(message) not in told:
-            told.add(str(message))
+    def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        if issubclass(category, UserWarning) and str(message) not in printed:
+            printed.add(str(message))
             note(f"note: {message}")
 
     with warnings.catch_warnings():
         warnings.simplefilter("always")
-        warnings.showwarning = tell
+        warnings.showwarning = show_warning
         yield
 
 
-def blame(case: Path, make: Callable[[], T]) -> T:
-    """`make()`; what turns out to be wrong with the case there gets the file's name in front, too."""
+def with_file_name(case: Path, make: Callable[[], T]) -> T:
+    """Call `make`; the name of the case file is put in front of its error messages."""
     try:
         return make()
     except BadInput as error:
@@ -97,23 +99,23 @@ def blame(case: Path, make: Callable[[], T]) -> T:
 
 
 def resume_line(folder: Path) -> str:
-    """What to type to go on with a run."""
+    """The command that continues a run."""
     return f"sand resume {shlex.quote(str(folder))}"
 
 
-def way_on(folder: Path) -> str:
-    """How to go on with what has stopped, in words."""
-    if can_go_on(folder):
-        return f"go on with: {resume_line(folder)}"
+def how_to_continue(folder: Path) -> str:
+    """How to continue an interrupted job."""
+    if is_resumable(folder):
+        return f"continue with: {resume_line(folder)}"
     return "nothing is lost, start again"
 
 
-def can_go_on(folder: Path) -> bool:
-    """True if `sand resume` finds something to go on with in a folder."""
+def is_resumable(folder: Path) -> bool:
+    """Whether `sand resume` can continue the content of a folder."""
     if checkpoints(folder) or (folder / ONE_COLLISION).exists():
         return True
     try:
-        return command_for(read_toml(folder / CASE)) in ("grow", "scatter", "collide")
+        return command_for(read_toml(folder / CASE)) not in (None, "run")
     except BadInput:
         return False
 
@@ -124,33 +126,33 @@ def checkpoints(folder: Path) -> list[Path]:
 
 
 def files_of(folder: Path) -> list[str]:
-    """Names of the run's files that are there."""
+    """Names of the files of SAND in a folder."""
     return [name for name in OWN_FILES if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
 
 
 def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:
-    """What is about to run, and what was chosen for the user.
+    """Describe a simulation before its start, with the choices made automatically.
 
     Parameters
     ----------
     end, last_step : float
-        time [s] and step that are to be reached, infinite where there is none.
+        Planned end: time [s] and step, infinite where not set.
     """
     from ..units import format_quantity
 
     every = simulation.frame_every
-    if every is None:  # what `run` will choose
+    if every is None:  # the default of `run`
         every = (end - simulation.time) / 200.0
     several = every <= end - simulation.time
     frames = f"a frame every {format_quantity(every, 's')}" if several else "frames at start and end"
-    goals = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
-    goals += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
+    ends = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
+    ends += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
     start = f"from {format_quantity(simulation.time, 's')} " if simulation.time > 0.0 else ""
     return [
         ("grains", _grains(simulation.grains, simulation.temperature)),
         *simulation.choices.items(),
-        ("forces", ", ".join(_force(f) for f in simulation.forces) or "none: grains fly straight on"),
-        ("time", f"{start}to {' or '.join(goals)}, {frames}"),
+        ("forces", ", ".join(_force(f) for f in simulation.forces) or "none: grains move on straight lines"),
+        ("time", f"{start}to {' or '.join(ends)}, {frames}"),
         ("seed", str(simulation.seed)),
         ("folder", str(folder)),
     ]
@@ -159,8 +161,8 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
 def _grains(grains: Any, temperature: float) -> str:
     from ..units import format_quantity
 
-    def span(values: Any, say: Callable[[float], str]) -> str:
-        least, most = say(float(values.min())), say(float(values.max()))
+    def span(values: Any, text: Callable[[float], str]) -> str:
+        least, most = text(float(values.min())), text(float(values.max()))
         return least if least == most else f"{least} to {most}"
 
     parts = [
@@ -170,26 +172,23 @@ def _grains(grains: Any, temperature: float) -> str:
     if grains.body_moment.any():
         size = (grains.body_moment**2).sum(axis=1) ** 0.5
         parts.append(f"moment {span(size, lambda v: f'{v:.4g} A m^2')}")
-    moving = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "at rest"
-    return ", ".join([*parts, moving])
+    motion = f"kinetic temperature {format_quantity(temperature, 'K')}" if temperature > 0.0 else "at rest"
+    return ", ".join([*parts, motion])
 
 
 def _force(force: Any) -> str:
-    """Its name and what was set by the user; case.toml lists all settings."""
-
-    def say(value: Any) -> str:
-        return f"{value:.4g}" if isinstance(value, float) else str(value)
-
+    """Name and non-default settings of a force; case.toml lists all settings."""
     try:
-        usual = type(force)().parameters()
-    except (BadInput, TypeError):  # a force that cannot do without settings
-        usual = {}
-    settings = ", ".join(f"{key} = {say(v)}" for key, v in force.parameters().items() if v != usual.get(key))
-    return f"{force.name} ({settings})" if settings else force.name
+        defaults = type(force)().parameters()
+    except (BadInput, TypeError):  # a force with required settings
+        defaults = {}
+    changed = {key: value for key, value in force.parameters().items() if value != defaults.get(key)}
+    texts = (f"{key} = {f'{v:.4g}' if isinstance(v, float) else v}" for key, v in changed.items())
+    return f"{force.name} ({', '.join(texts)})" if changed else force.name
 
 
 def results(summary: dict[str, Any]) -> Rows:
-    """The numbers of summary.json that people ask for first."""
+    """The most important numbers of summary.json."""
     from ..units import format_quantity
 
     rate = summary["ns_per_grain_step"]
@@ -202,13 +201,13 @@ def results(summary: dict[str, Any]) -> Rows:
             f"{summary['contacts']} ({summary['contacts_made']} made, {summary['contacts_moved']} moved, "
             f"{summary['contacts_broken']} broken)",
         ),
-        ("energy drift", f"{summary['drift']:.2g} of the energy dissipated and in motion"),
+        ("energy drift", f"{summary['drift']:.2g} of the dissipated and kinetic energy"),
         ("wall time", wall if rate is None else f"{wall}, {rate:.3g} ns per grain and step"),
     ]
 
 
 def clusters(row: dict[str, Any]) -> str:
-    """Number, mean size S and largest, of a summary or a row of the ledger."""
+    """Number of clusters, mean size S and largest size, from a summary or a row of the ledger."""
     return (
         f"{int(row['clusters'])}, mean size S = {row['mean_cluster_size']:.4g}, largest {int(row['largest_cluster'])}"
     )
@@ -225,6 +224,6 @@ def format_wall_time(seconds: float) -> str:
 
 
 def named(grains: Iterable[int]) -> str:
-    """The grains an outcome concerns, in brackets; nothing if there are none."""
+    """The grains that an outcome concerns, in brackets; empty if there are none."""
     numbers = ", ".join(str(i) for i in grains)
     return f" (grains {numbers})" if numbers else ""

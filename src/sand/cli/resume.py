@@ -1,4 +1,4 @@
-"""`sand resume DIR`: go on with what was interrupted, whichever command began it."""
+"""`sand resume DIR`: continues an interrupted run or job of any command."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from ..io.run_folder import (
 )
 from ..threads import set_threads
 from . import options, report
-from .exits import DONE
+from .main import DONE
 
 RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
-"""What a finished job has in its folder."""
+"""Results file of a finished job, by command."""
 
 
-@click.command("resume", short_help="Go on with what was interrupted, in the folder of any command.")
-@click.argument("folder", metavar="DIR", type=options.PLACE)
-@options.end_of_run('Of a run: a new end instead of the planned one, such as "10 us".')
+@click.command("resume", short_help="Continue an interrupted run or job of any command.")
+@click.argument("folder", metavar="DIR", type=options.PATH)
+@options.end_of_run('For a run: a new end instead of the planned one, such as "10 us".')
 @options.workers
 @options.scheduler
 @options.threads
@@ -46,10 +46,10 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Go on with the run in DIR from its newest checkpoint, to its planned end or to --until.
+    """Continue the run in DIR from its newest checkpoint to its planned end, or to --until.
 
-    The folders of `sand collide`, `sand scatter` and `sand grow` are gone on with, too: what is finished is kept, and
-    the results are those of a job that was never interrupted.
+    Jobs of `sand collide`, `sand scatter` and `sand grow` are continued as well: finished parts are kept, and the
+    results are those of an uninterrupted job.
     """
     asked = options.seconds(until)
     set_threads(threads)
@@ -57,18 +57,18 @@ def command(
     kind = _kind(place)
     if kind != "run":
         if until is not None:
-            raise BadInput(f"--until is for a run; {folder} holds a job of `sand {kind}`")
+            raise BadInput(f"--until applies to runs; {folder} holds a job of `sand {kind}`")
         if scheduler is not None and kind == "collide":
-            raise BadInput("--scheduler is for jobs of `sand scatter` and `sand grow`; take --workers")
+            raise BadInput("--scheduler applies to jobs of `sand scatter` and `sand grow`; use --workers")
         how = {"workers": workers, "threads": threads, "quiet": quiet, "as_json": as_json}
         return _job(kind, place, scheduler, how)
     if workers > 1 or scheduler is not None:
-        raise BadInput("--workers and --scheduler are for jobs of many parts; a run takes --threads")
+        raise BadInput("--workers and --scheduler apply to jobs of many parts; for a run use --threads")
     return _run(place, until, asked, quiet=quiet, as_json=as_json)
 
 
 def _kind(folder: Path) -> str:
-    """The command that began what is in a folder.  Raises BadInput for what is none."""
+    """The command that created the content of a folder.  Raises BadInput if it is a file."""
     if folder.is_file():
         raise BadInput(f"{folder} is a file; give the folder of a run")
     one = folder / ONE_COLLISION
@@ -82,7 +82,7 @@ def _kind(folder: Path) -> str:
 
 
 def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) -> int:
-    """Go on with the job of `sand collide`, `sand scatter` or `sand grow`; returns the exit code."""
+    """Continue a job of `sand collide`, `sand scatter` or `sand grow`; returns the exit code."""
     from .collide import collide
     from .grow import boxes
     from .scatter import scatter
@@ -91,7 +91,7 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
         if how["as_json"]:
             report.emit({**read_json(folder / RESULTS[kind]), "folder": str(folder)})
         elif not how["quiet"]:
-            report.say(f"{folder} is finished, its results are in {folder / RESULTS[kind]}")
+            report.write_line(f"{folder} is finished; its results are in {folder / RESULTS[kind]}")
         return DONE
     if kind == "grow":
         from ..experiments.growth_case import read_growth
@@ -101,7 +101,7 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
     if kind == "scatter":
         from ..experiments.scattering.case import read_scattering
 
-        del how["threads"]  # a flight is done by one
+        del how["threads"]  # a flight uses one thread
         read = read_scattering(folder / CASE)
         return scatter(folder / CASE, read, folder, resume=True, scheduler=scheduler, **how)
     from ..experiments.collision_job import CollisionJob, description_in
@@ -111,14 +111,14 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
 
 
 def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as_json: bool) -> int:
-    """Go on with a run; returns the exit code."""
+    """Continue a run; returns the exit code."""
     from ..config.build import resume
     from ..units import format_quantity
     from .launch import End, launch
 
     simulation = report.with_notes(lambda: resume(place))
     if asked is not None and asked <= simulation.time:
-        raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, where {place} stands")
+        raise BadInput(f"--until = {until!r} is not later than {_stand(simulation)}, the present time of {place}")
     if asked is not None and asked < simulation.planned[0] < math.inf:
         planned, new = format_quantity(simulation.planned[0], "s"), format_quantity(asked, "s")
         report.note(f"{place} now ends at {new} instead of {planned}, as --until is earlier than the planned end")
@@ -129,7 +129,7 @@ def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as
 
 
 def _is_there(simulation: Any) -> bool:
-    """True if the planned end is reached."""
+    """Whether the planned end is reached."""
     end, last_step = simulation.planned
     return simulation.time >= end or simulation.steps >= last_step
 
@@ -147,8 +147,8 @@ def _nothing_to_do(simulation: Any, folder: Path, *, quiet: bool, as_json: bool)
         there = (folder / SUMMARY).exists()
         report.emit({**(read_json(folder / SUMMARY) if there else {}), "folder": str(folder)})
     elif not quiet:
-        report.say(
-            f"{folder} has reached its planned end, it stands at t = {_stand(simulation)}; "
-            f"to go further: {report.resume_line(folder)} --until TIME"
+        report.write_line(
+            f"{folder} has reached its planned end at t = {_stand(simulation)}; "
+            f"to continue it further: {report.resume_line(folder)} --until TIME"
         )
     return DONE

@@ -1,4 +1,4 @@
-"""`sand run CASE.toml`: the simulation that a case file describes."""
+"""`sand run CASE.toml`: runs the simulation that a case file describes."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from . import options, report
 
 
 @click.command("run", short_help="Run the simulation that a case file describes.")
-@click.argument("case", metavar="CASE.toml", required=False, type=options.PLACE)
-@click.option("--out", metavar="DIR", type=options.PLACE, help="Folder for the files (default: the case's name).")
+@click.argument("case", metavar="CASE.toml", required=False, type=options.PATH)
+@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
 @click.option(
     "--from",
     "source",
     metavar="FILE",
-    type=options.PLACE,
-    help="Trajectory, or folder of a run, whose grains and contacts to take.",
+    type=options.PATH,
+    help="Trajectory, or folder of a run, to take grains and contacts from.",
 )
-@click.option("--frame", type=options.FRAME, metavar="K", help="Which frame of it, from 0; −1, the last, by default.")
-@options.end_of_run('End of the run instead of that in the case, such as "5 us".')
-@click.option("--seed", type=options.SEED, metavar="N", help="Seed instead of that in the case.")
-@click.option("--overwrite", is_flag=True, help="Replace the run that the folder holds.")
+@click.option("--frame", type=options.FRAME, metavar="K", help="Frame of --from, from 0 (default: −1, the last).")
+@options.end_of_run('End of the run in place of that in the case, such as "5 us".')
+@click.option("--seed", type=options.SEED, metavar="N", help="Seed in place of that in the case.")
+@click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.threads
 @options.as_json
 @options.quiet
@@ -44,11 +44,11 @@ def command(
 ) -> int:
     """Run the simulation that CASE.toml describes.
 
-    Leaves in the folder: case.toml (as understood), trajectory.gsd, ledger.csv, summary.json, figure.png and
-    checkpoints.  Ctrl-C stops at the next step; `sand resume` then goes on.
+    Writes case.toml (with all defaults filled in), trajectory.gsd, ledger.csv, summary.json, figure.png and
+    checkpoints to the folder. Ctrl-C stops after the current step; continue with `sand resume`.
 
-    With --from, grains, contacts and box are those of a frame of an earlier run, time begins at 0, and CASE.toml
-    says everything else; without it, the earlier run's own case.toml does.
+    With --from, grains, contacts and box come from a frame of an earlier run, and time begins at 0; CASE.toml
+    describes everything else, by default the case.toml of the earlier run.
     """
     end = options.seconds(until)
     set_threads(threads)
@@ -62,14 +62,14 @@ def command(
     from .launch import End, launch, refuse_folder
 
     if source is None and frame is not None:
-        raise BadInput("--frame says which frame of --from FILE to start with; give that, too")
+        raise BadInput("--frame selects the frame of --from FILE to start with; give --from, too")
     grains = None if source is None else _source(source)
     name = _case_name(case, grains)
     described = read_case(name)
     if grains is not None:
         number = -1 if frame is None else frame
         described.grains = GrainsSection(kind="file", file=str(grains.absolute()), frame=number)
-        if case is None:  # a gas is not to kick as it did in the run before
+        if case is None:  # another seed, so that a gas does not repeat the kicks of the earlier run
             described.run.seed += 1 + number % 1_000_000
     if end is not None:
         described.run.until, described.run.steps = end, None
@@ -78,7 +78,7 @@ def command(
     folder = Path(out or _usual_folder(described.run.out, Path(name), grains, frame))
     refuse_folder(folder, Path(name), overwrite=overwrite)
     return launch(
-        lambda: report.blame(Path(name), lambda: simulation_of(described, folder, overwrite=overwrite)),
+        lambda: report.with_file_name(Path(name), lambda: simulation_of(described, folder, overwrite=overwrite)),
         folder,
         f"run {name}" + (f" from {source}" if source else ""),
         End(described.run.until, described.run.steps),
@@ -88,7 +88,7 @@ def command(
 
 
 def _source(source: str) -> Path:
-    """The file that grains are to be taken from.  Raises BadInput."""
+    """The trajectory to take grains from.  Raises BadInput."""
     place = Path(source).expanduser().absolute().resolve()
     if not place.exists():
         raise BadInput(f"--from: there is no file or folder {source}")
@@ -100,7 +100,7 @@ def _source(source: str) -> Path:
 
 
 def _case_name(case: str | None, source: Path | None) -> str:
-    """The case file: what was given, or that of the run whose grains are taken.  Raises BadInput."""
+    """The case file given, or that of the run whose grains are taken.  Raises BadInput."""
     if case is not None:
         return case
     if source is None:
@@ -111,7 +111,7 @@ def _case_name(case: str | None, source: Path | None) -> str:
 
 
 def _usual_folder(told: str | None, case: Path, source: Path | None, frame: int | None) -> Path:
-    """Where files go if --out does not say: what the case says, or its name; never into the earlier run."""
+    """Folder for the files without --out: from the case, or its name; never that of the earlier run."""
     if source is None:
         return Path(told or case.stem)
     return Path(f"{source.parent.name}-from-{'last' if frame is None or frame < 0 else frame}")

@@ -10,16 +10,16 @@ import click
 
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE, INTERRUPTED
+from .main import DONE, INTERRUPTED
 
 
-@click.command("scatter", short_help="Cross-sections and trajectories of two bodies that a case file describes.")
-@click.argument("case", metavar="CASE.toml", type=options.PLACE)
-@click.option("--out", metavar="DIR", type=options.PLACE, help="Folder for the files (default: the case's name).")
+@click.command("scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.")
+@click.argument("case", metavar="CASE.toml", type=options.PATH)
+@click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
 @options.workers
 @options.scheduler
-@click.option("--resume", is_flag=True, help="Go on with the flights that the folder holds, as sand resume does.")
-@click.option("--overwrite", is_flag=True, help="Replace the job that the folder holds.")
+@click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
+@click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
 @options.quiet
 @options.as_json
 @options.debug
@@ -33,11 +33,11 @@ def command(
     quiet: bool,
     as_json: bool,
 ) -> int:
-    """Fly the bodies that CASE.toml describes past each other.
+    """Compute the encounters of two bodies that CASE.toml describes.
 
-    Leaves scattering.json, results.csv and a figure in the folder, and for cross-sections and maps flights.csv with
-    every single flight. The numbers are the same for any number of workers and after any interruption; `sand resume`
-    goes on after one.
+    Writes scattering.json, results.csv and a figure to the folder, and for cross-sections and maps flights.csv with
+    every flight. The numbers do not depend on the number of workers or on interruptions; continue an interrupted job
+    with `sand resume`.
     """
     from ..experiments.scattering.case import read_scattering
 
@@ -45,7 +45,7 @@ def command(
         raise BadInput("--resume and --overwrite exclude each other")
     read = read_scattering(case)
     folder = Path(out or read[0].measure.out or Path(case).stem)
-    _refuse(folder, Path(case), resume=resume, overwrite=overwrite)
+    _check_folder(folder, Path(case), resume=resume, overwrite=overwrite)
     how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "quiet": quiet, "as_json": as_json}
     return scatter(Path(case), read, folder, resume=resume, overwrite=overwrite, **how)
 
@@ -62,19 +62,24 @@ def scatter(
     quiet: bool,
     as_json: bool,
 ) -> int:
-    """Fly what a case asks for, tell what came of it; returns the exit code.
+    """Compute a scattering job and print the results.
 
     Parameters
     ----------
     read : tuple[Any, Any]
-        what `read_scattering` gives for the case.
+        The result of `read_scattering` for the case.
     resume : bool
-        go on with the flights in the folder.
+        Whether to continue the flights in the folder.
+
+    Returns
+    -------
+    int
+        The exit code.
 
     Raises
     ------
     BadInput
-        the folder belongs to another case, or a worker process has died.
+        If the folder belongs to another case, or a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 
@@ -82,34 +87,34 @@ def scatter(
     from ..experiments.scattering.job import Job
     from ..io.lock import writing
     from ..io.run_folder import make_folder, read_toml
-    from .interrupt import Watch
+    from .interrupt import InterruptObserver
 
     bar = _Bar(not (quiet or as_json))
     try:
-        with report.compiling(quiet), Watch(), executor_for(workers, scheduler) as executor:
+        with report.compiling(quiet), InterruptObserver(), executor_for(workers, scheduler) as executor:
             if not resume:
                 make_folder(folder, overwrite=overwrite)
             with writing(folder):
                 job = Job(*read, read_toml(case), folder, resume)
-                content = report.with_notes(lambda: job.run(executor, bar.see))
+                content = report.with_notes(lambda: job.run(executor, bar.update))
     except KeyboardInterrupt:
         bar.close()
-        report.note(f"interrupted; {report.way_on(folder)}")
+        report.note(f"interrupted; {report.how_to_continue(folder)}")
         return INTERRUPTED
     except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.way_on(folder)}") from None
+        raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
     finally:
         bar.close()
     if as_json:
         report.emit({**content, "folder": str(folder)})
     elif not quiet:
         files = ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")
-        report.show(f"scatter {case}", [*rows_of(content), files])
+        report.show(f"scatter {case}", [*result_rows(content), files])
     return DONE
 
 
-def _refuse(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
-    """What can be wrong with the folder, before anything is computed."""
+def _check_folder(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
+    """Refuse a folder that cannot be used, before anything is computed.  Raises BadInput."""
     from ..io.run_folder import FLIGHTS
     from .launch import refuse_folder
 
@@ -120,12 +125,12 @@ def _refuse(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
 
 
 class _Bar:
-    """One line that is written over, on a terminal only."""
+    """Progress on one line that is overwritten; shown on a terminal only."""
 
     def __init__(self, wanted: bool):
         self.shown = wanted and sys.stderr.isatty()
 
-    def see(self, text: str, part: float) -> None:
+    def update(self, text: str, part: float) -> None:
         if self.shown:
             sys.stderr.write(f"\r{100 * part:3.0f}% {text:<70}"[:80])
             sys.stderr.flush()
@@ -135,8 +140,8 @@ class _Bar:
             sys.stderr.write("\r" + 80 * " " + "\r")
 
 
-def rows_of(content: dict[str, Any]) -> report.Rows:
-    """What people ask for first."""
+def result_rows(content: dict[str, Any]) -> report.Rows:
+    """The most important results."""
     if "cross_sections" in content:
         return [row for one in content["cross_sections"] for row in _cross_section(one)]
     if "cells" in content:

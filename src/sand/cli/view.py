@@ -1,4 +1,4 @@
-"""`sand view DIR`: a page on which the grains of a run move."""
+"""`sand view DIR`: shows the grains of a run in the browser."""
 
 from __future__ import annotations
 
@@ -14,32 +14,33 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
 from . import options, report
-from .exits import DONE
 from .export import chosen
+from .main import DONE
 
 LARGE = 100e6
-"""Bytes above which a page takes long to open."""
+"""Size [B] above which a page takes long to open."""
 WAIT = 60.0
-"""Seconds that the first frame of a run is waited for, which may have to be compiled first."""
-TOLD_EVERY = 15.0
+"""Longest wall time [s] to wait for the first frame of a run, which may have to compile first."""
+NOTE_EVERY = 15.0
+"""Wall time [s] between notes while waiting."""
 YOUNG = 5.0
-"""Seconds within which a trajectory gets its first frame."""
+"""Age [s] of a trajectory up to which its first frame may still be missing."""
 
 
-@click.command("view", short_help="Look at the grains of a run in the browser.")
-@click.argument("folder", metavar="DIR", type=options.PLACE)
+@click.command("view", short_help="Show the grains of a run in the browser.")
+@click.argument("folder", metavar="DIR", type=options.PATH)
 @click.option(
     "--html",
     "html",
     metavar="FILE",
-    type=options.PLACE,
-    help="Write one page with everything in it instead, to keep or send.",
+    type=options.PATH,
+    help="Write one self-contained page instead, to keep or send.",
 )
-@click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Every K-th frame only.")
+@click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Only every K-th frame.")
 @click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
-@click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Listen there (default: any free).")
-@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
-@click.option("--overwrite", is_flag=True, help="Replace FILE if it is there.")
+@click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port (default: any free one).")
+@click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
+@click.option("--overwrite", is_flag=True, help="Replace FILE if it exists.")
 @options.as_json
 @options.quiet
 @options.debug
@@ -54,80 +55,81 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Look at the grains of the run in DIR, or of a trajectory of SAND, in the browser.
+    """Show the grains of the run in DIR, or of a trajectory of SAND, in the browser.
 
-    A run that is still going is followed; one that is still being compiled is waited for. The page is for this machine
-    alone; Ctrl-C ends it.
+    New frames of a running simulation appear as they are written; if there is none yet, the first one is waited for.
+    The page can be opened on this machine only; Ctrl-C ends the server.
     """
     from ..viewer.html import frame_slice, write_page
 
     target = None if html is None else Path(html)
     if target is not None:
-        _refuse(target, overwrite)
-    picked = frame_slice(chosen(frames), every)
-    story = _story(Path(folder), talk=not (quiet or as_json))
-    if picked != slice(None, None, 1):
-        told = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
-        story.select(picked, ", ".join(told))
+        _refuse_target(target, overwrite)
+    selection = frame_slice(chosen(frames), every)
+    dataset = _open_dataset(Path(folder), verbose=not (quiet or as_json))
+    if selection != slice(None, None, 1):
+        parts = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
+        dataset.select(selection, ", ".join(parts))
     if target is None:
-        return _serve(story, folder, port, not no_browser, as_json, quiet)
-    size = write_page(story, target, progress=None if quiet or as_json else _Bar(target))
+        return _serve(dataset, folder, port, not no_browser, as_json, quiet)
+    size = write_page(dataset, target, progress=None if quiet or as_json else _Bar(target))
     if as_json:
         report.emit({"file": str(target), "bytes": size})
     elif not quiet:
-        report.show(f"view {folder}", [("file", str(target)), ("frames", str(len(story))), ("size", _spoken(size))])
+        rows = [("file", str(target)), ("frames", str(len(dataset))), ("size", _megabytes(size))]
+        report.show(f"view {folder}", rows)
     if size > LARGE:
         fewer = max(int(every * size / LARGE) + 1, 2)
-        report.note(f"note: {_spoken(size)} take long to open; --every {fewer} would make it about 100 MB")
+        report.note(f"note: a page of {_megabytes(size)} opens slowly; --every {fewer} would reduce it to about 100 MB")
     return DONE
 
 
-def _story(place: Path, talk: bool) -> Any:
-    """Of the run in a folder, as soon as it has a frame.  Raises BadInput: there is none, or not within WAIT."""
+def _open_dataset(path: Path, verbose: bool) -> Any:
+    """Open a run as soon as it has a frame.  Raises BadInput if it does not get one within WAIT."""
     from ..viewer.dataset import run_dataset
     from ..viewer.run_files import find_run_folder
     from ..viewer.simulation_view import read_field
 
     begun = time.monotonic()
-    told = -TOLD_EVERY
+    noted = -NOTE_EVERY
     while True:
         waited = time.monotonic() - begun
         try:
-            home = find_run_folder(place)
-            return run_dataset(place, None if home is None else read_field(home))
+            folder = find_run_folder(path)
+            return run_dataset(path, None if folder is None else read_field(folder))
         except BadInput as error:
-            if not _is_beginning(place, watched=waited > 0.1):
+            if not _is_beginning(path, seen_before=waited > 0.1):
                 raise
             if waited > WAIT:
                 raise BadInput(
-                    f"{place} has no frame after {WAIT:.0f} s; see whether its run is still going, or has failed"
+                    f"{path} has no frame after {WAIT:.0f} s; check whether its run is still running or has failed"
                 ) from error
-        if talk and waited - told >= TOLD_EVERY:
-            so_far = f" ({waited:.0f} s so far)" if told >= 0.0 else ""
-            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one{so_far}")
-            told = waited
+        if verbose and waited - noted >= NOTE_EVERY:
+            elapsed = f" ({waited:.0f} s so far)" if noted >= 0.0 else ""
+            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one{elapsed}")
+            noted = waited
         time.sleep(0.2)
 
 
-def _is_beginning(place: Path, watched: bool) -> bool:
-    """Whether a run may be about to write its first frame: its folder is empty, or holds a case and no frames.
+def _is_beginning(path: Path, seen_before: bool) -> bool:
+    """Whether a run may be about to write its first frame: its folder is empty, or has a case and no frame.
 
     Parameters
     ----------
-    watched : bool
-        it was so a moment ago; its trajectory then may be there, but without a frame.
+    seen_before : bool
+        Whether this was the case a moment ago; then a new trajectory without a frame is accepted, too.
     """
-    if not place.is_dir() or (place / SUMMARY).exists():
+    if not path.is_dir() or (path / SUMMARY).exists():
         return False
     try:
-        age = time.time() - (place / TRAJECTORY).stat().st_mtime
+        age = time.time() - (path / TRAJECTORY).stat().st_mtime
     except OSError:
-        return (place / CASE).exists() or not any(place.iterdir())
-    return watched and age < YOUNG
+        return (path / CASE).exists() or not any(path.iterdir())
+    return seen_before and age < YOUNG
 
 
-def _refuse(target: Path, overwrite: bool) -> None:
-    """Raises BadInput for a file that is there, or a folder that is not."""
+def _refuse_target(target: Path, overwrite: bool) -> None:
+    """Raise BadInput if the file exists, or its folder does not."""
     if target.is_dir():
         raise BadInput(f"{target} is a folder; give --html the name of a file, such as {target / 'view.html'}")
     if target.suffix.lower() not in (".html", ".htm"):
@@ -138,12 +140,12 @@ def _refuse(target: Path, overwrite: bool) -> None:
         raise BadInput(f"there is no folder {target.parent}; make it first")
 
 
-def _spoken(size: int) -> str:
+def _megabytes(size: int) -> str:
     return f"{size / 1e6:.3g} MB"
 
 
 class _Bar:
-    """How far the file is, on stderr, where somebody sees it."""
+    """Progress of writing the page, shown on a terminal only."""
 
     def __init__(self, target: Path):
         self.target = target
@@ -159,24 +161,24 @@ class _Bar:
             self._bar.close()
 
 
-def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
-    """Until Ctrl-C."""
+def _serve(dataset: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
+    """Serve the page until Ctrl-C."""
     from ..viewer.browser import open_page, remove_redirects
     from ..viewer.server import Server
 
-    server = Server(story, port)
+    server = Server(dataset, port)
     server.start()
     try:
         opened = browser and open_page(server.url)
         if as_json:
             report.emit({"url": server.url})
         else:
-            report.show(f"view {shlex.quote(folder)}", [("address", server.url), ("frames", str(len(story)))])
+            report.show(f"view {shlex.quote(folder)}", [("address", server.url), ("frames", str(len(dataset)))])
         if not quiet and not as_json:
             if os.environ.get("SSH_CONNECTION"):
                 tunnel = f"ssh -L {server.port}:127.0.0.1:{server.port} …"
-                report.note(f"note: from another machine, first type there: {tunnel}")
-            report.note(f"{'' if opened else 'open the address in a browser; '}Ctrl-C ends it")
+                report.note(f"note: to open it on another machine, first run there: {tunnel}")
+            report.note(f"{'' if opened else 'open the address in a browser; '}Ctrl-C ends the server")
         _wait()
     except KeyboardInterrupt:
         pass
@@ -189,6 +191,6 @@ def _serve(story: Any, folder: str, port: int, browser: bool, as_json: bool, qui
 
 
 def _wait() -> None:
-    """Until Ctrl-C."""
-    while not threading.Event().wait(0.5):  # a longer wait cannot be interrupted everywhere
+    """Wait for Ctrl-C."""
+    while not threading.Event().wait(0.5):  # an unlimited wait cannot be interrupted on all systems
         pass
