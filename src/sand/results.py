@@ -129,7 +129,7 @@ class Run:
 
     @checked
     def flux_density(self, time: Any) -> np.ndarray | None:
-        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `told.read_field`."""
+        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `read_field`."""
         now, field = si(time, "s", "time"), read_field(self.folder)
         return None if field is None else np.asarray(field[1](now))
 
