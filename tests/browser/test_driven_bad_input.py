@@ -95,7 +95,7 @@ def test_a_file_that_was_cut_off(page, file, tmp_path, where):
     }
     (tmp_path / "cut.html").write_text(file[: ends[where]], "utf-8")
     page.goto((tmp_path / "cut.html").as_uri())
-    assert "the file is not whole" in page.locator("body").inner_text()
+    assert "the file is incomplete" in page.locator("body").inner_text()
 
 
 def test_a_file_that_lost_its_manifest(view, file, tmp_path):
