@@ -136,11 +136,7 @@ class Run:
 
     @checked
     def flux_density(self, time: Any) -> np.ndarray | None:
-<<<<<<< HEAD
         """External magnetic flux density (3,) [T] of the case at a time [s]; None if the case has no such field."""
-=======
-        """Of the outside magnetic field of the case at a time [s], (3,) [T]; None without one, see `read_field`."""
->>>>>>> S5
         now, field = si(time, "s", "time"), read_field(self.folder)
         return None if field is None else np.asarray(field[1](now))
 
