@@ -265,7 +265,7 @@ def test_steps_are_counted_through_growing_arrays():
     ("far", "there", "not_there"),
     [
         ("impulse", ("slow_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "cell_of")),
-        ("taylor", ("torque_rate", "past_position", "past_moment"), ("slow_force", "path", "order", "cell")),
+        ("taylor", ("torque_rate", "past_position", "past_moment"), ("slow_force", "path", "order", "cell_start")),
         ("every step", ("force", "torque"), ("slow_torque", "force_rate", "past_position", "order")),
     ],
 )
