@@ -344,7 +344,7 @@ def add_initial_contacts(grains, contacts, count, span, law, pair, slide, roll, 
     Parameters
     ----------
     grains, contacts : GrainArrays, ContactArrays
-        Arrays of grains and contacts; the latter must have room for the new contacts.
+        Arrays of grains and contacts; the latter must have enough columns.
     count : ndarray
         Counters of the state.
     span : Span

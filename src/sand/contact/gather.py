@@ -15,7 +15,7 @@ from ..state.state import CONTACTS
 BLOCK = 64
 """Grains per block; the contacts of a block stay in the first-level cache."""
 LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
-"""Contact counts (as grain 1, as grain 2) above this share one class."""
+"""Contact counts of this number and more, separately as grain 1 and as grain 2, share a class."""
 DENSE_FROM = 3
 """Contacts per grain from which most grains have equally many contacts, so that sorting brings nothing."""
 

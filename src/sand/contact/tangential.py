@@ -20,7 +20,7 @@ def sliding(n1, n2, n, r1, r2):
 
 @formula
 def rolling(n1, n2, reduced_radius):
-    """Rolling displacement ξ = R (n1 + n2) [m], of opposite sign to Eq. 47."""
+    """Rolling displacement ξ = R (n1 + n2) [m], minus Eq. 47, which points from the contact to the axis."""
     return scale(reduced_radius, add(n1, n2))
 
 

@@ -39,7 +39,7 @@ class Search(NamedTuple):
     listed: bool  # a Verlet list exists; candidate pairs are selected from it
     reach: float  # pairs closer than this are listed [m]
     margin: float  # skin Δr of the Verlet list [m], contained in the reach; 0 without a list
-    celled: bool = False  # candidate pairs are end with cells, without a Verlet list; neither: all pairs
+    celled: bool = False  # candidate pairs are found with cells, without a Verlet list; neither: all pairs
 
 
 class Grid(NamedTuple):
@@ -164,8 +164,7 @@ def gap_on_axis(x, c, step, width):
 
 @loop
 def append_range(long_range, sorted_position, span, limit, s, first, last, used):
-    """Append the sorted indices first … last − 1 closer than √limit to grain s.  Return the new length of the list, or
-    FULL.
+    """Append the sorted indices first … last − 1 closer than √limit to grain s; returns the new length, or FULL.
 
     Squared distances are computed first, in a loop that vectorises.  Then each index is written, and the length is
     increased if the pair is close enough: without branches.  Separations of i and j have equal magnitudes to the last
@@ -188,7 +187,7 @@ def append_range(long_range, sorted_position, span, limit, s, first, last, used)
 
 @loop
 def append_cell_row(long_range, sorted_position, grid, span, limit, s, x, row, squared_half_width, used):
-    """Append the neighbours of s in the row of cells that begins at cell `row`.  Return the new length, or FULL.
+    """Append the neighbours of s in the row of cells that begins at cell `row`; returns the new length, or FULL.
 
     Candidates lie within ±√squared_half_width [m] along x; across a periodic boundary they form a second range.  On a
     periodic axis shorter than three times the reach all grains are candidates.

@@ -1,13 +1,13 @@
 """Skins of neighbour lists: how far grains may still move before a list must be rebuilt.
 
 A list is valid as long as no grain is farther than a limit from its anchor, its position when the list was built.  The
-remaining skin is a lower bound of the distance that any grain may still move before this limit can be exceeded.  Each
+remaining skin is a lower bound of the distance that any grain may still move before this limit can be exceeded; each
 step reduces it by the displacement of the fastest grain.  Only when it is used up are the displacements of all grains
-computed: the list is rebuilt if one exceeds the limit, else the remaining skin is set to the difference.  Lists are
-therefore rebuilt in the same steps as if all displacements were computed in every step.
+computed: if one exceeds the limit, the list is rebuilt; otherwise the remaining skin is set to the difference.  Lists
+are therefore rebuilt in the same steps as if all displacements were computed in every step.
 
-The inner list is rebuilt as soon as its skin is used up: checking displacements would avoid few rebuilds and need
-anchors of its own.
+The inner list is rebuilt as soon as its skin is used up: checking displacements would avoid few rebuilds and would need
+separate anchors.
 """
 
 import math
@@ -39,7 +39,7 @@ def invalidate_skins(pair_list):
 
 @loop
 def update_safe_speed(pair_list, count):
-    """Speed [m/s] at which a pair moves by δ_c in one contact step; the smallest over all candidate pairs."""
+    """Set the smallest speed [m/s], over all candidate pairs, that moves a pair by δ_c in one contact step."""
     safe_speed = math.inf
     for k in range(pair_type_count(pair_list, count)):
         safe_speed = min(safe_speed, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)

@@ -41,7 +41,7 @@ def all_aligned(arrays: Any) -> Any:
 
 @loop
 def round_up_to_simd_width(number, min_remainder):
-    """Loop length (uint64), padded to whole SIMD vectors if `min_remainder` (uint64) or more iterations would remain."""
+    """Loop length (uint64), padded to whole SIMD vectors if at least `min_remainder` (uint64) iterations remain."""
     lanes = np.uint64(SIMD_WIDTH)
     return (number + lanes - np.uint64(1)) // lanes * lanes if number % lanes >= min_remainder else number
 
