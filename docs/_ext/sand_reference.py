@@ -416,8 +416,7 @@ def ledger_page() -> str:
 
 def trajectory_page() -> str:
     """The docstrings of sand.io.frame, and the table of a checkpoint's arrays."""
-    from sand.io import checkpoint
-    from sand.io import frame
+    from sand.io import checkpoint, frame
 
     return (
         "# The trajectory\n\n" + markdown(frame.__doc__) + "\n\n`sand.io.trajectory.read_frames(path)` "
@@ -528,8 +527,8 @@ def _model_rows(section: str, model: Any, notes: dict[str, str]) -> list[list[st
 
 def case_page() -> str:
     """The model of sand.config.case: sections, keys, defaults, units."""
-    from sand.material import Material
     from sand.config import case, sections
+    from sand.material import Material
 
     head = ["key", "default", "unit", "meaning"]
     out = [

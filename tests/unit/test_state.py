@@ -10,7 +10,7 @@ import pytest
 import sand
 from sand.cli.main import main
 from sand.io.checkpoint import VERSION, newest_checkpoint, read_checkpoint, write_checkpoint
-from sand.io.state_arrays import PLANNED_END, NUMBERS, STORED, check_state
+from sand.io.state_arrays import NUMBERS, PLANNED_END, STORED, check_state
 from sand.state.state import CONTACTS, COUNT, GRAIN1, PAIRS, STAGE, STEPS
 
 REFERENCE = Path(__file__).parents[1] / "reference"
