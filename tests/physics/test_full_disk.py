@@ -121,7 +121,7 @@ def test_many_small_frames(many_frames, tmp_path, limit):
     whole, sim = many_frames, flying(tmp_path / "run")
     with no_file_longer_than(limit), pytest.raises(sand.FilesFailed, match="File too large"):
         sim.run(steps=200)
-    with pytest.raises(sand.BadInput, match=r"cannot go on.*sand\.resume"):
+    with pytest.raises(sand.BadInput, match=r"cannot continue.*sand\.resume"):
         sim.run(steps=1)
     before = len(read_frames(tmp_path / "run" / "trajectory.gsd"))
     assert before >= 1

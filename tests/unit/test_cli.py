@@ -446,7 +446,7 @@ def test_info_of_a_run_that_was_killed(done, capsys):
     (done / "summary.json").unlink()
     assert main(["info", "small"]) == 0
     out = capsys.readouterr().out
-    assert "without having been closed" in out
+    assert "running, or killed" in out
     assert " ns after " in out
     assert "sand resume small" in out
 

@@ -50,8 +50,8 @@ def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--what", "sise,still"], "'sise' is none; did you mean 'size'?"),
-        (["--what", ""], "'' is none"),
+        (["--what", "sise,still"], "'sise' is unknown; did you mean 'size'?"),
+        (["--what", ""], "'' is unknown"),
         (["--colour", "sped"], "there is no quantity 'sped'; did you mean 'speed'?"),
         (["--size", "10x10"], "width and height must be from 200 to 8000 pixels"),
         (["--size", "wide"], "--size 'wide' must be width x height"),

@@ -14,7 +14,7 @@ from sand.errors import FilesFailed
 from sand.experiments.executors import MOST_ON_WINDOWS, executor_for
 from sand.io.bodies import contacts_of
 from sand.io.checkpoint import write_checkpoint
-from sand.io.gsd_index import make_room
+from sand.io.gsd_index import reserve_space
 from sand.io.ledger_table import LedgerFile
 from sand.io.run_folder import make_folder, replace_file, write_json
 from sand.io.trajectory import TrajectoryWriter, read_frames
@@ -112,10 +112,10 @@ def test_a_full_disk_without_posix_fallocate(tmp_path, monkeypatch):
     writer.close()
     size = (tmp_path / "trajectory.gsd").stat().st_size
     monkeypatch.delattr(os, "posix_fallocate", raising=False)
-    make_room(tmp_path / "trajectory.gsd", 40, 1000)
+    reserve_space(tmp_path / "trajectory.gsd", 40, 1000)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(100, 90, 10))
     with pytest.raises(OSError, match="No space left") as error:
-        make_room(tmp_path / "trajectory.gsd", 40, 1000)
+        reserve_space(tmp_path / "trajectory.gsd", 40, 1000)
     assert error.value.errno == errno.ENOSPC
     assert (tmp_path / "trajectory.gsd").stat().st_size == size
 

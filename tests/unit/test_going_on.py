@@ -112,11 +112,11 @@ def test_a_collision_goes_on(place, hit, capsys, monkeypatch, moments):
         with monkeypatch.context() as patch:
             interrupt(patch, when)
             assert main(words) == 130
-        assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; go on with: sand resume cut"
+        assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; continue with: sand resume cut"
         assert not (place / "cut" / "collision.json").exists() and not (place / "cut" / "figure.png").exists()
         words = ["resume", "cut", "--threads", "1"]
     assert main(["info", "cut"]) == 0
-    assert "go on with  sand resume cut" in capsys.readouterr().out
+    assert "continue with  sand resume cut" in capsys.readouterr().out
     assert main(["collide", "hit.toml", "--seeds", "2", "--out", "cut"]) == 2
     assert "sand resume cut" in capsys.readouterr().err
     assert main(["resume", "cut", "--quiet"]) == 0
@@ -176,7 +176,7 @@ def test_many_collisions_go_on(place, capsys, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(GrowingOutcomes, "add", add)
         assert main(["collide", "hit.toml", "--out", "cut", "--seeds", "1-3"]) == 130
-    assert capsys.readouterr().err == "sand: interrupted; go on with: sand resume cut\n"
+    assert capsys.readouterr().err == "sand: interrupted; continue with: sand resume cut\n"
     with (place / "cut" / "collisions.jsonl").open("a") as file:
         file.write('{"seed": 2, "outc')  # torn by a kill
     assert main(["info", "cut"]) == 0
@@ -214,7 +214,7 @@ def test_boxes_go_on(place, capsys, monkeypatch):
     with monkeypatch.context() as patch:
         interrupt(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
         assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--quiet"]) == 130
-    assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; go on with: sand resume cut"
+    assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; continue with: sand resume cut"
     finished = [path for path in (place / "cut" / "seed-1").iterdir() if path.name != ".lock"]
     before = {path: path.stat().st_mtime_ns for path in finished}
     assert main(["info", "cut"]) == 0
@@ -229,7 +229,7 @@ def test_boxes_go_on(place, capsys, monkeypatch):
     assert "cut is finished" in capsys.readouterr().out
     assert main(["info", "cut"]) == 0
     assert "sand analyse cut" in capsys.readouterr().out
-    for words, part in ((["--until", "1 us"], "--until is for a run"), ([], "")):
+    for words, part in ((["--until", "1 us"], "--until applies to runs"), ([], "")):
         assert main(["resume", "cut", *words]) == (2 if words else 0)
         assert part in capsys.readouterr().err
     assert main(["run", "box.toml", "--out", "cut"]) == 2
@@ -251,7 +251,7 @@ def test_an_interrupted_run_does_not_wait_for_its_figure(place, capsys, monkeypa
     monkeypatch.setattr("sand.plotting.run_figure.run_figure", slow)
     assert main(["run", "box.toml", "--out", "done"]) == 0
     out, err = capsys.readouterr()
-    assert "done" in out and "sand: the figure is left out" in err and len(drawn) == 1
+    assert "done" in out and "sand: the figure is not drawn" in err and len(drawn) == 1
     assert json.loads((place / "done" / "summary.json").read_text())["outcome"] == "finished"
     interrupt(monkeypatch, flies)
     assert main(["run", "box.toml", "--out", "cut"]) == 130
@@ -285,7 +285,7 @@ def test_advice_where_the_folder_has_vanished(place, capsys, monkeypatch):
     interrupt(monkeypatch, lambda simulation: shutil.rmtree(place / "gone", ignore_errors=True) or simulation.steps > 0)
     assert main(["run", "box.toml", "--out", "gone"]) in (2, 130)
     err = capsys.readouterr().err
-    assert "sand resume" not in err and "vanished" in err
+    assert "sand resume" not in err and "has been removed" in err
 
 
 def test_control_characters_do_not_reach_the_terminal(place, capsys):

@@ -95,8 +95,8 @@ def test_counters_that_do_not_fit(tmp_path, place, value):
 def test_lists_that_do_not_fit(tmp_path):
     """A pair of one grain, contacts in the wrong grain's list, a list that shrinks, a grain twice in the order."""
     for name, index, value, words in (
-        ("contacts/pair", (0, 0), ARRAYS["contacts/pair"][1, 0], "beside itself"),
-        ("pair_list/pair", (1, 0), ARRAYS["pair_list/pair"][0, 0], "beside itself"),
+        ("contacts/pair", (0, 0), ARRAYS["contacts/pair"][1, 0], "the same grain twice"),
+        ("pair_list/pair", (1, 0), ARRAYS["pair_list/pair"][0, 0], "the same grain twice"),
         ("contacts/start", 1, 5, "'contacts/start'"),
         ("order", 0, 1, "once"),
         ("grains/id", 0, 1, "once"),

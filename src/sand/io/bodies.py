@@ -63,8 +63,8 @@ def read_body(
         If the file is missing or foreign, has lines that are not numbers, grains with impossible numbers (the first
         ten are named), no radii, or unknown materials.
     """
-    place = Path(path)
-    found = _read_gsd(place) if place.suffix == ".gsd" else _read_lines(path)
+    file = Path(path)
+    found = _read_gsd(file) if file.suffix == ".gsd" else _read_lines(path)
     unit = found.unit if length is None else _unit(length)
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
@@ -181,24 +181,24 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
     FilesFailed
         If the file cannot be written.
     """
-    place = Path(path)
-    refuse_target(place, overwrite=overwrite)
-    if place.suffix != ".gsd":
-        replace_file(place, xyz_text(grains).encode())
-        return place
-    beside = place.with_name(f".{place.stem}.building.gsd")
+    target = Path(path)
+    refuse_target(target, overwrite=overwrite)
+    if target.suffix != ".gsd":
+        replace_file(target, xyz_text(grains).encode())
+        return target
+    temporary = target.with_name(f".{target.stem}.building.gsd")
     try:
-        writer = TrajectoryWriter(beside)
+        writer = TrajectoryWriter(temporary)
         writer.write(0, 0.0, grains, Box.open(), contacts_of(grains), exact=True)
         writer.flush()
         writer.close()
-        replace_file(place, beside.read_bytes())
+        replace_file(target, temporary.read_bytes())
     except OSError as error:
         raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
     finally:
         with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
-    return place
+            temporary.unlink(missing_ok=True)
+    return target
 
 
 def contacts_of(grains: Grains) -> dict[str, np.ndarray]:

@@ -93,8 +93,8 @@ def _array(name: str, values: np.ndarray) -> str:
     """Format a DataArray of a VTK file, as text to full precision."""
     flat = np.asarray(values)
     parts = f' NumberOfComponents="{flat.shape[1]}"' if flat.ndim == 2 else ""
-    whole = np.issubdtype(flat.dtype, np.integer)
-    kind, form = ("Int64", "%d") if whole else ("Float64", "%.17g")
+    is_integer = np.issubdtype(flat.dtype, np.integer)
+    kind, form = ("Int64", "%d") if is_integer else ("Float64", "%.17g")
     text = " ".join(form % v for v in flat.ravel().tolist())
     return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="ascii">{text}</DataArray>'
 
@@ -108,8 +108,8 @@ def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
     n = len(frame)
     span = np.array([np.inf if v is None else 0.5 * v for v in frame.box.lengths])
     a, b = frame.pair[:, 0].astype(int), frame.pair[:, 1].astype(int)
-    near = (np.abs(frame.position[a] - frame.position[b]) < span).all(axis=1)
-    lines, overlap, force = frame.pair[near].astype(np.int64), frame.overlap[near], frame.force[near]
+    direct = (np.abs(frame.position[a] - frame.position[b]) < span).all(axis=1)
+    lines, overlap, force = frame.pair[direct].astype(np.int64), frame.overlap[direct], frame.force[direct]
     points = {
         "radius": frame.radius,
         "moment": frame.moment,
@@ -211,7 +211,7 @@ def export_frames(frames: Sequence[Frame], stem: str | Path, form: str, clusters
         raise BadInput(f"format = {form!r}; allowed: {', '.join(FORMATS)}")
     if not len(frames):
         raise BadInput("there is no frame to export")
-    place = Path(stem)
-    if not place.parent.is_dir():
-        raise BadInput(f"there is no folder {place.parent}; make it first")
-    return FORMATS[form](frames, place, clusters)
+    base = Path(stem)
+    if not base.parent.is_dir():
+        raise BadInput(f"there is no folder {base.parent}; make it first")
+    return FORMATS[form](frames, base, clusters)

@@ -52,16 +52,16 @@ def read_index(path: Path) -> tuple[int, np.ndarray]:
         begin = file.read(16 * 8)
         if begin[:8] != MAGIC[: len(begin)]:
             raise BadInput(f"{path} is not a trajectory of SAND (it is not a GSD file)")
-        place, count = (int(number) for number in np.frombuffer(begin.ljust(16 * 8, b"\0"), np.uint64)[1:3])
-        if not 0 < place <= place + count * ENTRY.itemsize <= size:
+        offset, count = (int(number) for number in np.frombuffer(begin.ljust(16 * 8, b"\0"), np.uint64)[1:3])
+        if not 0 < offset <= offset + count * ENTRY.itemsize <= size:
             raise BadInput(
                 f"{path} is a trajectory that was cut off, its index is missing: copy it again, or continue the run "
                 "with 'sand resume', which begins a new one"
             )
-        file.seek(place)
+        file.seek(offset)
         entries = np.frombuffer(file.read(count * ENTRY.itemsize), ENTRY)
     used = np.flatnonzero(entries["location"] != 0)
-    return place, entries[: used[-1] + 1 if used.size else 0]
+    return offset, entries[: used[-1] + 1 if used.size else 0]
 
 
 def holds_data(path: Path) -> bool:
@@ -71,7 +71,7 @@ def holds_data(path: Path) -> bool:
     return path.stat().st_size > HEADER + head[2] * ENTRY.itemsize + head[4] * NAME
 
 
-def make_room(path: Path, wanted: int, pending: int) -> None:
+def reserve_space(path: Path, wanted: int, pending: int) -> None:
     """Make sure that the disk can hold what GSD is about to write: data, and an index for it.
 
     GSD (up to 5.0 at least) does not stop if it cannot extend its index, and overwrites the first frames with entries.
@@ -127,7 +127,7 @@ def refuse_impossible_sizes(path: Path) -> None:
         raise BadInput(f"{path} is not a trajectory of SAND (parts of it lie outside the file)")
 
 
-def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
+def repair(path: Path, step: int) -> dict[int, tuple[int, int]]:
     """Delete the first incomplete frame after `step` and all that follow; complete ones stay.
 
     After a full disk or a power failure, the index may list more data than exist.
@@ -150,29 +150,29 @@ def mend(path: Path, step: int) -> dict[int, tuple[int, int]]:
         before = int(entries["frame"][bad[0] - 1]) if bad[0] else 0
         own = int(entries["frame"][bad[0]])
         cut(path, own if own == before + 1 else before)
-    whole: dict[int, tuple[int, int]] = {}
+    complete: dict[int, tuple[int, int]] = {}
     with gsd.hoomd.open(str(path), "r") as file:
         for number in range(_frames_until(file, step), len(file)):
             try:
                 stored = file[number]
-                whole[Frame(stored).step] = (number, code_of(stored))
+                complete[Frame(stored).step] = (number, code_of(stored))
             except Exception:  # gsd raises various exceptions for broken files
                 break
         else:
-            return whole
+            return complete
     cut(path, number)
-    return whole
+    return complete
 
 
-def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[int, tuple[int, int]], str]:
-    """As `mend`, for a run that has written frames of the steps `written`; a copy is kept if frames are lost.
+def repair_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[int, tuple[int, int]], str]:
+    """As `repair`, for a run that has written frames of the steps `written`; a copy is kept if frames are lost.
 
     Frames before the first one in the file are not missed: they were written to a file that has been removed.
 
     Returns
     -------
     tuple[dict[int, tuple[int, int]], str]
-        The result of `mend`, and a warning, which is empty if no frame up to `step` is lost.
+        The result of `repair`, and a warning, which is empty if no frame up to `step` is lost.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[
     kept = any(path.parent.glob(f"{path.name}{DAMAGED}*"))  # of an earlier loss, which was reported
     aside = set_aside(path, copy=True) if bad else None
     try:
-        whole = mend(path, step)
+        complete = repair(path, step)
         with gsd.hoomd.open(str(path), "r") as file:
             present = _frames_until(file, step)
             first = _step(file, 0) if present else step + 1
@@ -202,10 +202,10 @@ def mend_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[
     if present >= frames or (kept and not bad):
         if aside is not None:
             aside.unlink()
-        return whole, ""
+        return complete, ""
     aside = aside or set_aside(path, copy=True)
     lost = f"{path} is damaged: {frames - present} of its {frames} frames are lost; a copy of it is {aside.name}"
-    return whole, lost
+    return complete, lost
 
 
 def _frames_until(file: Any, step: int) -> int:
@@ -224,12 +224,12 @@ def _step(file: Any, number: int) -> int:
 
 def cut(path: Path, frame: int) -> None:
     """Truncate a file before a frame: its entries and all later ones become unused."""
-    place, entries = read_index(path)
+    offset, entries = read_index(path)
     late = np.flatnonzero((entries["frame"] >= frame) | _impossible(path, entries))
     if not late.size:
         return
     with open(path, "r+b") as file:
-        file.seek(place + int(late[0]) * ENTRY.itemsize)
+        file.seek(offset + int(late[0]) * ENTRY.itemsize)
         file.write(bytes((len(entries) - int(late[0])) * ENTRY.itemsize))
         file.flush()
         os.fsync(file.fileno())

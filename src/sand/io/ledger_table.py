@@ -163,11 +163,11 @@ def _missing_rows(path: Path, lines: Sequence[str]) -> str:
     BadInput
         If the digest in the summary does not match the rows.
     """
-    place = path.with_name(SUMMARY)
-    if path.name != LEDGER or not place.exists():
+    summary_file = path.with_name(SUMMARY)
+    if path.name != LEDGER or not summary_file.exists():
         return ""
     try:
-        summary = read_json(place)
+        summary = read_json(summary_file)
     except BadInput:  # reported when the summary itself is read
         return ""
     count, digest = summary.get(ROWS), summary.get(ROWS_DIGEST)

@@ -128,11 +128,11 @@ class LiveTrajectory(FrameSequence):
     def _read_new(self) -> None:
         """Read times and steps of new frames, up to the last complete one."""
         count = len(self._frames)
-        whole = count
-        while whole > len(self) and count - whole < INCOMPLETE_AT_MOST and not self._is_complete(whole - 1):
-            whole -= 1
+        complete = count
+        while complete > len(self) and count - complete < INCOMPLETE_AT_MOST and not self._is_complete(complete - 1):
+            complete -= 1
         new = []
-        for number in range(len(self), whole):
+        for number in range(len(self), complete):
             if (head := self._head(number)) is None:
                 break
             new.append(head)

@@ -84,9 +84,9 @@ class Written:
 
     def __init__(self, path: str | Path):
         self.path, self.size = Path(path), 0
-        self._beside = self.path.with_name(f".{self.path.name}.new")
+        self._temporary = self.path.with_name(f".{self.path.name}.new")
         try:
-            self._file: Any = open(self._beside, "wb")  # noqa: SIM115
+            self._file: Any = open(self._temporary, "wb")  # noqa: SIM115
         except OSError as error:
             raise self._failed(error) from error
 
@@ -111,11 +111,11 @@ class Written:
                 self._file.flush()
                 os.fsync(self._file.fileno())
                 self._file.close()
-                os.replace(self._beside, self.path)
+                os.replace(self._temporary, self.path)
         except OSError as error:
             raise self._failed(error) from error
         finally:
             with contextlib.suppress(OSError):
                 self._file.close()
             with contextlib.suppress(OSError):
-                self._beside.unlink(missing_ok=True)
+                self._temporary.unlink(missing_ok=True)

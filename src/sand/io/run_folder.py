@@ -97,9 +97,9 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                 )
             with writing(folder):
                 damaged = set_aside_in(folder, (*OWN_FILES, "checkpoint-*.npz"))
-                ours = [*(folder / name for name in OWN_FILES), *folder.glob("checkpoint-*.npz"), *damaged]
+                own = [*(folder / name for name in OWN_FILES), *folder.glob("checkpoint-*.npz"), *damaged]
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
-                for old in [folder / TRAJECTORY, *ours]:
+                for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".probe"
@@ -125,17 +125,17 @@ def replace_file(path: Path, content: bytes) -> None:
     FilesFailed
         If the file cannot be written; the old one is untouched then.
     """
-    beside = path.with_name(f".{path.name}.new")
+    temporary = path.with_name(f".{path.name}.new")
     try:
-        with open(beside, "wb") as file:
+        with open(temporary, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(beside, path)
+        os.replace(temporary, path)
         _sync_names(path.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         left = "the old content is untouched" if path.parent.is_dir() else "its folder has been removed"
         raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error
 

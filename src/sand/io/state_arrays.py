@@ -184,7 +184,7 @@ def _pairs(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     n = sizes["N"]
     if array.size and int(array.max()) >= n:
         return f"names grain {int(array.max())}, but the grains are 0 to {n - 1}"
-    return "names a grain beside itself" if (array[0] == array[1]).any() else ""
+    return "names the same grain twice" if (array[0] == array[1]).any() else ""
 
 
 def _order(array: np.ndarray, sizes: Mapping[str, int]) -> str:

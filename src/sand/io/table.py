@@ -29,7 +29,7 @@ class GrowingTable:
     Parameters
     ----------
     path : Path
-        The file; created anew unless `resume`.
+        The file; replaced unless `resume`.
     columns : Sequence[str]
         Names of the columns.
     resume : bool, optional
@@ -80,7 +80,7 @@ class GrowingOutcomes:
     Parameters
     ----------
     path : Path
-        The file; created anew unless `resume`.
+        The file; replaced unless `resume`.
     case : dict[str, Any]
         The case of the outcomes, written to the first line.
     resume : bool, optional

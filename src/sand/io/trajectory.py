@@ -18,7 +18,16 @@ from ..errors import BadInput, FilesFailed
 from ..grains import Grains
 from .damage import set_aside
 from .frame import Frame, FrameSequence, code_of, stored_frame
-from .gsd_index import CHUNKS, cut, holds_data, make_room, mend, mend_or_keep, read_index, refuse_impossible_sizes
+from .gsd_index import (
+    CHUNKS,
+    cut,
+    holds_data,
+    read_index,
+    refuse_impossible_sizes,
+    repair,
+    repair_or_keep,
+    reserve_space,
+)
 
 FLUSH_EVERY = 1.0
 """Wall time [s] between flushes; GSD buffers, and unflushed frames are lost if the process is killed."""
@@ -62,7 +71,7 @@ class TrajectoryWriter:
         try:
             if resume_at is not None and path.exists():
                 try:
-                    self._later, lost = mend_or_keep(path, resume_at, written)
+                    self._later, lost = repair_or_keep(path, resume_at, written)
                 except (BadInput, RuntimeError):
                     lost = f"{path} cannot be repaired; it is now {set_aside(path).name}, and a new one begins"
                 if lost:
@@ -127,7 +136,7 @@ class TrajectoryWriter:
         if self._file is None:
             return
         try:
-            make_room(self.path, self._entries, self._pending)
+            reserve_space(self.path, self._entries, self._pending)
             self._file.flush()
             if sync:
                 with open(self.path, "r+b") as same:  # Windows does not sync a file that is open for reading only
@@ -139,11 +148,11 @@ class TrajectoryWriter:
     def _abandon(self, error: OSError) -> FilesFailed:
         """Give up writing after an error and repair the file; returns the exception to raise."""
         if self._file is not None:
-            # when GSD's object is destroyed it would write once more and damage the file (see `make_room`): leak it
+            # when GSD's object is destroyed it would write once more and damage the file (see `reserve_space`): leak it
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
         self._abandoned = True
         with contextlib.suppress(OSError, RuntimeError, BadInput):
-            mend(self.path, self._whole_until)
+            repair(self.path, self._whole_until)
         return FilesFailed(f"cannot write {self.path}: {error.strerror or error}")
 
     def rescue(self) -> None:
@@ -160,7 +169,7 @@ class TrajectoryWriter:
 
 
 def _open_file(path: Path, append: bool) -> Any:
-    """Open a GSD file for writing, at its end or anew."""
+    """Open a GSD file for appending, or create it."""
     import gsd.hoomd
 
     if not append:

@@ -250,7 +250,7 @@ class Simulation(ReadOnlySettings):
             After Ctrl-C or SIGTERM, when the checkpoint is written.
         """
         if self._failure:
-            raise BadInput(f"this simulation cannot go on: {self._failure}")
+            raise BadInput(f"this simulation cannot continue: {self._failure}")
         end, last = stop_criteria(until, steps, self.time, self.steps, self.planned)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
             self.frame_every = max((end - self.time) / 200.0, SHORTEST_DURATION)
