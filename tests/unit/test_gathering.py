@@ -92,7 +92,7 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
         block = np.arange(first, min(first + BLOCK, GRAINS))
         assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
     _, crowded, _ = some(DENSE_FROM + 0.5)
-    assert crowded.turn[:GRAINS].tolist() == list(range(GRAINS))
+    assert crowded.gather_order[:GRAINS].tolist() == list(range(GRAINS))
 
 
 @pytest.mark.compiled("small")

@@ -15,7 +15,9 @@ from ..io.run_folder import (
     COLLISION,
     GROWTH,
     ONE_COLLISION,
+    OUTCOMES,
     SCATTERING,
+    TRAJECTORY,
     read_json,
     read_toml,
     was_written_by_sand,
@@ -24,6 +26,8 @@ from ..threads import set_threads
 from . import options, report
 from .main import DONE
 
+JOB_FILES = {OUTCOMES, COLLISION, GROWTH, SCATTERING, TRAJECTORY}
+"""Files that show that SAND wrote to a folder."""
 RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 """Results file of a finished job, by command."""
 
@@ -74,7 +78,9 @@ def _kind(folder: Path) -> str:
     one = folder / ONE_COLLISION
     case = one if one.exists() else folder / CASE
     kind = command_for(read_toml(case)) if case.exists() else None
-    if kind not in (None, "run") and not was_written_by_sand(case):
+    others = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
+    is_job = was_written_by_sand(case) or any(name in JOB_FILES or name.startswith("checkpoint-") for name in others)
+    if kind not in (None, "run") and not is_job:
         raise BadInput(
             f"{folder} is not the folder of a run or job: {case.name} in it is a case file; to start it: sand {kind} {case}"
         )

@@ -1,34 +1,24 @@
 """Export of frames to other programs: extended XYZ, LAMMPS data and dump, VTK (.vtp with .pvd).
 
 All quantities are SI, except lengths in extended XYZ: its readers expect ångström, and a comment in the file says so.
-LAMMPS files are for `units si` and `atom_style hybrid sphere dipole` (data), or a custom dump.
+LAMMPS files are for `units si` and `atom_style hybrid sphere dipole` (data), or a custom dump. The formats are written
+here because ASE rounds to 8 decimals and has neither a dump nor this atom style, and meshio has no .vtp.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from ..errors import BadInput
+from .extended_xyz import ANGSTROM, format_rows, xyz_frame
 from .run_folder import replace_file
 from .trajectory import Frame
-
-Clusters = Callable[[int, np.ndarray], np.ndarray]
-Text = Callable[[Frame, np.ndarray], str]
-Writer = Callable[[Sequence[Frame], Path, Clusters], list[Path]]
-
-ANGSTROM = 1e-10
-SYMBOLS = {"iron": "Fe", "silica": "Si", "ice": "O", "graphite": "C", "forsterite": "Mg", "magnetite": "Fe"}
-"""Chemical symbols that distinguish materials; X for others."""
-
-
-def _lines(columns: Sequence[np.ndarray], form: str) -> str:
-    """Format one line for each row of the columns (N,) or (N, k)."""
-    table = np.column_stack(columns)
-    return "".join(form % tuple(row) for row in table.tolist())
 
 
 def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
@@ -40,15 +30,13 @@ def to_xyz(frame: Frame, cluster: np.ndarray) -> str:
         "Properties=species:S:1:pos:R:3:radius:R:1:velo:R:3:moment:R:3:spin:R:3:cluster:I:1 "
         f'Time={frame.time!r} Step={frame.step} pbc="{periodic}" length_unit=angstrom other_units=SI'
     )
-    names = [SYMBOLS.get(name, "X") for name in frame.materials]
-    columns = (frame.position / ANGSTROM, frame.radius / ANGSTROM, frame.velocity, frame.moment, frame.spin)
-    rows = _lines((*columns, cluster), "%.10g " * 4 + "%.9g " * 9 + "%d\n").splitlines()
-    species = [names[k] for k in frame.material]
-    return "\n".join([str(len(frame)), head, *(f"{s} {row}" for s, row in zip(species, rows, strict=True))]) + "\n"
+    columns = [frame.position / ANGSTROM, frame.radius / ANGSTROM, frame.velocity, frame.moment, frame.spin, cluster]
+    return xyz_frame(frame.materials, frame.material, head, columns, "%.10g " * 4 + "%.9g " * 9 + "%d")
 
 
-def _bounds(frame: Frame) -> list[tuple[float, float]]:
-    return [(-0.5 * v, 0.5 * v) for v in frame.drawn]
+def _table(columns: Sequence[np.ndarray], form: str) -> str:
+    """Format one line per grain, which begins with its number from 1 on."""
+    return "".join(f"{k} {row}\n" for k, row in enumerate(format_rows(columns, form), 1))
 
 
 def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
@@ -57,16 +45,15 @@ def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
     It has step numbers but no times, because some readers do not accept `ITEM: TIME`.
     """
     walls = " ".join("pp" if v is not None else "ff" for v in frame.box.lengths)
-    box = "".join(f"{low:.17g} {high:.17g}\n" for low, high in _bounds(frame))
+    box = "".join(f"{-0.5 * v:.17g} {0.5 * v:.17g}\n" for v in frame.drawn)
     head = (
         f"ITEM: TIMESTEP\n{frame.step}\n"
         f"ITEM: NUMBER OF ATOMS\n{len(frame)}\n"
         f"ITEM: BOX BOUNDS {walls}\n{box}"
         "ITEM: ATOMS id type x y z radius vx vy vz omegax omegay omegaz mux muy muz c_cluster\n"
     )
-    ids = np.arange(1, len(frame) + 1)
-    columns = (ids, frame.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment)
-    return head + _lines((*columns, cluster + 1), "%d %d" + " %.10g" * 13 + " %d\n")
+    columns = (frame.material + 1, frame.position, frame.radius, frame.velocity, frame.spin, frame.moment, cluster + 1)
+    return head + _table(columns, "%d" + " %.10g" * 13 + " %d")
 
 
 def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
@@ -75,28 +62,24 @@ def to_lammps_data(frame: Frame, cluster: np.ndarray) -> str:
     Columns of an atom: id type x y z diameter density q mux muy muz.
     """
     box = "".join(
-        f"{low:.17g} {high:.17g} {axis}lo {axis}hi\n" for (low, high), axis in zip(_bounds(frame), "xyz", strict=True)
+        f"{-0.5 * v:.17g} {0.5 * v:.17g} {axis}lo {axis}hi\n" for v, axis in zip(frame.drawn, "xyz", strict=True)
     )
-    ids = np.arange(1, len(frame) + 1)
     density = frame.mass / (4.0 / 3.0 * np.pi * frame.radius**3)
-    columns = (ids, frame.material + 1, frame.position, 2.0 * frame.radius, density, frame.charge, frame.moment)
-    atoms = _lines(columns, "%d %d" + " %.10g" * 9 + "\n")
-    velocities = _lines((ids, frame.velocity, frame.spin), "%d" + " %.9g" * 6 + "\n")
+    columns = (frame.material + 1, frame.position, 2.0 * frame.radius, density, frame.charge, frame.moment)
     return (
         f"SAND, step {frame.step}, {frame.time!r} s, units si\n\n{len(frame)} atoms\n"
         f"{len(frame.materials)} atom types\n\n"
-        f"{box}\nAtoms # hybrid sphere dipole\n\n{atoms}\nVelocities\n\n{velocities}"
+        f"{box}\nAtoms # hybrid sphere dipole\n\n{_table(columns, '%d' + ' %.10g' * 9)}\n"
+        f"Velocities\n\n{_table((frame.velocity, frame.spin), '%.9g' + ' %.9g' * 5)}"
     )
 
 
 def _array(name: str, values: np.ndarray) -> str:
     """Format a DataArray of a VTK file, as text to full precision."""
-    flat = np.asarray(values)
-    parts = f' NumberOfComponents="{flat.shape[1]}"' if flat.ndim == 2 else ""
-    is_integer = np.issubdtype(flat.dtype, np.integer)
-    kind, form = ("Int64", "%d") if is_integer else ("Float64", "%.17g")
-    text = " ".join(form % v for v in flat.ravel().tolist())
-    return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="ascii">{text}</DataArray>'
+    parts = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+    kind, form = ("Int64", "%d") if np.issubdtype(values.dtype, np.integer) else ("Float64", "%.17g")
+    text = " ".join(form % v for v in values.ravel().tolist())
+    return f'<DataArray type="{kind}" Name="{name}"{parts} format="ascii">{text}</DataArray>'
 
 
 def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
@@ -106,22 +89,13 @@ def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
     cluster; cell data (zero for the vertices, which come first): overlap [m], force [N].
     """
     n = len(frame)
-    span = np.array([np.inf if v is None else 0.5 * v for v in frame.box.lengths])
-    a, b = frame.pair[:, 0].astype(int), frame.pair[:, 1].astype(int)
-    direct = (np.abs(frame.position[a] - frame.position[b]) < span).all(axis=1)
-    lines, overlap, force = frame.pair[direct].astype(np.int64), frame.overlap[direct], frame.force[direct]
-    points = {
-        "radius": frame.radius,
-        "moment": frame.moment,
-        "velocity": frame.velocity.astype(float),
-        "spin": frame.spin,
-        "material": frame.material.astype(np.int64),
-        "cluster": cluster.astype(np.int64),
-    }
-    cells = {
-        "overlap": np.concatenate([np.zeros(n), overlap]),
-        "force": np.concatenate([np.zeros((n, 3)), np.nan_to_num(force)]),
-    }
+    offset = np.diff(frame.position[frame.pair], axis=1)[:, 0]
+    inside = (np.abs(offset) < 0.5 * np.array(frame.drawn)).all(axis=1)
+    lines = frame.pair[inside]
+    overlap = np.concatenate([np.zeros(n), frame.overlap[inside]])
+    force = np.concatenate([np.zeros((n, 3)), frame.force[inside]])
+    columns = ("radius", "moment", "velocity", "spin", "material")
+    points = [_array(name, getattr(frame, name)) for name in columns] + [_array("cluster", cluster)]
     vertices = _array("connectivity", np.arange(n)) + _array("offsets", np.arange(1, n + 1))
     joined = _array("connectivity", lines.ravel()) + _array("offsets", 2 * np.arange(1, len(lines) + 1))
     return (
@@ -129,60 +103,34 @@ def to_vtp(frame: Frame, cluster: np.ndarray) -> str:
         f"<FieldData>{_array('TimeValue', np.array([frame.time]))}</FieldData>\n"
         f'<Piece NumberOfPoints="{n}" NumberOfVerts="{n}" NumberOfLines="{len(lines)}" NumberOfStrips="0" '
         'NumberOfPolys="0">\n'
-        f"<PointData>{''.join(_array(k, v) for k, v in points.items())}</PointData>\n"
-        f"<CellData>{''.join(_array(k, v) for k, v in cells.items())}</CellData>\n"
+        f"<PointData>{''.join(points)}</PointData>\n"
+        f"<CellData>{_array('overlap', overlap)}{_array('force', force)}</CellData>\n"
         f"<Points>{_array('Points', frame.position)}</Points>\n"
         f"<Verts>{vertices}</Verts>\n<Lines>{joined}</Lines>\n</Piece>\n</PolyData>\n</VTKFile>\n"
     )
 
 
-def _one_file(text_of: Text, ending: str) -> Writer:
-    """Writer of one file with all frames."""
-
-    def write(frames: Sequence[Frame], stem: Path, clusters: Clusters) -> list[Path]:
-        path = stem.with_name(stem.name + ending)
-        replace_file(path, "".join(text_of(frame, clusters(len(frame), frame.pair)) for frame in frames).encode())
-        return [path]
-
-    return write
-
-
-def _numbered(text_of: Text, ending: str) -> Writer:
-    """Writer of one file per frame."""
-
-    def write(frames: Sequence[Frame], stem: Path, clusters: Clusters) -> list[Path]:
-        paths = []
-        for frame in frames:
-            paths.append(stem.with_name(f"{stem.name}-{frame.step:012d}{ending}"))
-            replace_file(paths[-1], text_of(frame, clusters(len(frame), frame.pair)).encode())
-        return paths
-
-    return write
-
-
-def _with_index(frames: Sequence[Frame], stem: Path, clusters: Clusters) -> list[Path]:
-    """Write a .vtp for each frame, and the .pvd with their times."""
-    paths = _numbered(to_vtp, ".vtp")(frames, stem, clusters)
-    times = [frame.time for frame in frames]
+def _pvd(times: Sequence[float], paths: Sequence[Path]) -> str:
+    """Format the list of .vtp files with their times."""
     sets = "".join(
         f'<DataSet timestep="{time!r}" file={quoteattr(path.name)}/>\n' for time, path in zip(times, paths, strict=True)
     )
-    index = stem.with_name(stem.name + ".pvd")
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-    replace_file(index, f"{head}{sets}</Collection>\n</VTKFile>\n".encode())
-    return [index, *paths]
+    return f"{head}{sets}</Collection>\n</VTKFile>\n"
 
 
-FORMATS: dict[str, Writer] = {
-    "xyz": _one_file(to_xyz, ".xyz"),
-    "lammps-dump": _one_file(to_lammps_dump, ".dump"),
-    "lammps-data": _numbered(to_lammps_data, ".data"),
-    "vtk": _with_index,
+FORMATS: dict[str, tuple[Callable[[Frame, np.ndarray], str], str]] = {
+    "xyz": (to_xyz, ".xyz"),
+    "lammps-dump": (to_lammps_dump, ".dump"),
+    "lammps-data": (to_lammps_data, "-{:012d}.data"),
+    "vtk": (to_vtp, "-{:012d}.vtp"),
 }
-"""Writers by name: (frames, path without suffix, cluster labels) → the files written."""
+"""Text of a frame with its cluster labels, and end of the file name; one file per step if the name has the step."""
 
 
-def export_frames(frames: Sequence[Frame], stem: str | Path, form: str, clusters: Clusters) -> list[Path]:
+def export_frames(
+    frames: Sequence[Frame], stem: str | Path, form: str, clusters: Callable[[int, np.ndarray], np.ndarray]
+) -> list[Path]:
     """Write frames for another program.
 
     Parameters
@@ -211,7 +159,16 @@ def export_frames(frames: Sequence[Frame], stem: str | Path, form: str, clusters
         raise BadInput(f"format = {form!r}; allowed: {', '.join(FORMATS)}")
     if not len(frames):
         raise BadInput("there is no frame to export")
-    base = Path(stem)
-    if not base.parent.is_dir():
-        raise BadInput(f"there is no folder {base.parent}; make it first")
-    return FORMATS[form](frames, base, clusters)
+    place = Path(stem)
+    if not place.parent.is_dir():
+        raise BadInput(f"there is no folder {place.parent}; make it first")
+    text_of, ending = FORMATS[form]
+    paths = [place.with_name(place.name + ending.format(frame.step)) for frame in frames]
+    texts = (text_of(frame, clusters(len(frame), frame.pair)) for frame in frames)
+    for path, group in groupby(zip(paths, texts, strict=True), itemgetter(0)):
+        replace_file(path, "".join(text for _, text in group).encode())
+    if form != "vtk":
+        return list(dict.fromkeys(paths))
+    index = place.with_name(f"{place.name}.pvd")
+    replace_file(index, _pvd([frame.time for frame in frames], paths).encode())
+    return [index, *paths]

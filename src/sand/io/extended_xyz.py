@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,8 +11,10 @@ import numpy as np
 from ..errors import BadInput
 from ..grains import Grains
 from ..units import in_unit
-from .export import ANGSTROM, SYMBOLS
 
+ANGSTROM = 1e-10
+SYMBOLS = {"iron": "Fe", "silica": "Si", "ice": "O", "graphite": "C", "forsterite": "Mg", "magnetite": "Fe"}
+"""Chemical symbols that distinguish materials; X for others."""
 POSITIONS, RADII, MOMENTS = ("pos", "position", "positions"), ("radius", "radii"), ("moment", "moments", "dipole")
 """Accepted names of columns, by quantity."""
 
@@ -26,23 +29,30 @@ class Columns(NamedTuple):
     unit: float  # unit of length [m], unless the caller gives another
 
 
+def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
+    """Format the rows of the columns (N,) or (N, k)."""
+    return [form % tuple(row) for row in np.column_stack(columns).tolist()]
+
+
+def xyz_frame(names: Sequence[str], material: np.ndarray, head: str, columns: Sequence[np.ndarray], form: str) -> str:
+    """Format a frame: number of grains, `head`, and per grain the chemical symbol of its material and the columns."""
+    symbols = [SYMBOLS.get(names[k], "X") for k in material]
+    rows = [f"{symbol} {row}" for symbol, row in zip(symbols, format_rows(columns, form), strict=True)]
+    return "\n".join([str(len(rows)), head, *rows]) + "\n"
+
+
 def xyz_text(grains: Grains) -> str:
     """Format grains as extended XYZ: species, position and radius [Å], moment [A m²], material; full precision.
 
     Materials are indices; their names are in the second line.
     """
     names = [m.name for m in grains.materials]
-    symbols = [SYMBOLS.get(name, "X") for name in names]
     head = (
         "Properties=species:S:1:pos:R:3:radius:R:1:moment:R:3:material:I:1 "
         f'materials="{";".join(names)}" pbc="F F F" length_unit=angstrom other_units=SI'
     )
-    table = np.column_stack([grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment]).tolist()
-    rows = [
-        f"{symbols[k]} " + " ".join(f"{v:.17g}" for v in row) + f" {k}"
-        for k, row in zip(grains.material.tolist(), table, strict=True)
-    ]
-    return "\n".join([str(len(grains)), head, *rows]) + "\n"
+    columns = [grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment, grains.material]
+    return xyz_frame(names, grains.material, head, columns, "%.17g " * 7 + "%d")
 
 
 def is_xyz(lines: list[str]) -> bool:
