@@ -282,18 +282,22 @@ def _refuse_extremes(path: str | Path, content: dict[str, Any]) -> None:
         raise BadInput(f"{path}: tables and lists are nested more than {DEEPEST} deep")
 
 
+WRITTEN = "# Written by SAND:"
+"""Beginning of the first line of case files in the folders of runs and jobs."""
+
+
 def was_written_by_sand(path: Path) -> bool:
     """Whether a case file in a folder was written by a run or job, and not by the user: its first line says so."""
     try:
         first = path.read_text("utf-8").partition("\n")[0]
     except (OSError, UnicodeDecodeError):
         return False
-    return first.startswith("# sand ") or "as understood by SAND" in first
+    return first.startswith(WRITTEN)
 
 
 def write_toml(path: Path, content: dict[str, Any], comment: str) -> None:
     """Write a case file with a comment at its top."""
     import tomli_w
 
-    text = "".join(f"# {line}\n" for line in comment.splitlines()) + "\n" + tomli_w.dumps(content)
+    text = f"{WRITTEN} {comment}\n\n{tomli_w.dumps(content)}"
     replace_file(path, text.encode())

@@ -84,7 +84,7 @@ class RunWriter:
         if (until, last_step) != self._ends:
             self._ends = (until, last_step)
             self._case = case_of(simulation, until, last_step)
-            text = "as understood by SAND, all defaults filled in, SI units"
+            text = "the complete case in SI units, with all defaults"
             write_toml(self.folder / files.CASE, self._case, text)
         if self._trajectory is not None:
             return
