@@ -125,7 +125,7 @@ def resume_collision(
     first = _first_frame(Path(folder) / TRAJECTORY)
     for name in ("position", "velocity") if first is not None else ():
         ours, theirs = getattr(start.grains, name), getattr(first, name)
-        # a trajectory holds single precision
+        # trajectories are stored in single precision
         if ours.shape != theirs.shape or not np.allclose(ours, theirs, rtol=0.0, atol=1e-6 * float(np.abs(ours).max())):
             changed.append(name)
     if changed:

@@ -20,7 +20,7 @@ class Approach(NamedTuple):
 
     target: Grains
     projectile: Grains
-    grains: Grains  # of both, the target's first
+    grains: Grains  # grains of both, target first
     flight: float  # approximate time of the earliest possible contact [s]
     speed: float  # [m/s]
     seed: int | None

@@ -108,12 +108,12 @@ class GrowthResult(NamedTuple):
     """Growth laws of an ensemble; a law that cannot be fitted is None, with the reason in `missing`."""
 
     time: np.ndarray  # (K,) [s], common to all boxes
-    sizes: np.ndarray  # (boxes, K): S(t)
-    window: tuple[float, float]  # of S, for z
+    sizes: np.ndarray  # S(t), (boxes, K)
+    window: tuple[float, float]  # range of S of the fit of z
     z: RateLaw | None  # dS/dt ∝ S^λ, S = (1 + t/zτ)^z
-    slope: PowerLawFit | None  # the straight line S ∝ t^slope
+    slope: PowerLawFit | None  # fit S ∝ t^slope
     moment: PowerLawFit | None  # μ/μ1 = N^γ
-    moment_without_rings: PowerLawFit | None  # the same, of aggregates without rings
+    moment_without_rings: PowerLawFit | None  # fit of μ for aggregates without rings
     dimension: Dimension | None  # N = k (r_g/a)^D
     missing: dict[str, str]
 

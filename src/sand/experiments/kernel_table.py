@@ -68,16 +68,16 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Col
         # without duplicates make K(m1, m2) equal to K(m2, m1) in all bits.
         pairs = np.stack([np.minimum(m1, m2), np.maximum(m1, m2)], axis=-1).reshape(-1, 2)
         once, where = np.unique(pairs, axis=0, return_inverse=True)
-        asked = np.log(once)
-        edge = _to_boundary(asked, centre, inside)
-        beyond = np.abs(edge - asked).max(axis=-1) > 1e-6
+        query = np.log(once)
+        edge = _to_boundary(query, centre, inside)
+        beyond = np.abs(edge - query).max(axis=-1) > 1e-6
         if beyond.any() and not extrapolate:
-            first, second = np.exp(asked[np.argmax(beyond)])
+            first, second = np.exp(query[np.argmax(beyond)])
             raise BadInput(
                 f"masses {first:.4g} and {second:.4g} kg are outside the measured range ({np.exp(points.min()):.4g} to "
                 f"{np.exp(points.max()):.4g} kg); add measurements, or set extrapolate=True"
             )
-        return np.exp(inside(edge) + (asked - edge) @ slopes)[where.reshape(-1)].reshape(np.shape(m1))
+        return np.exp(inside(edge) + (query - edge) @ slopes)[where.reshape(-1)].reshape(np.shape(m1))
 
     return CollisionKernel(f"measured, {len(table)} rows", function)
 
@@ -188,14 +188,14 @@ def _slopes(points: np.ndarray, values: np.ndarray) -> np.ndarray:
     return found[:2]
 
 
-def _to_boundary(asked: np.ndarray, centre: np.ndarray, inside: Any) -> np.ndarray:
+def _to_boundary(query: np.ndarray, centre: np.ndarray, inside: Any) -> np.ndarray:
     """Each point, or the point at which the line from the centre to it leaves the measured region, by bisection."""
-    low, high = np.zeros(len(asked)), np.ones(len(asked))
-    known = np.isfinite(inside(asked)).ravel()
+    low, high = np.zeros(len(query)), np.ones(len(query))
+    known = np.isfinite(inside(query)).ravel()
     low[known] = 1.0
     # a point on the boundary may be classified as outside because of rounding; bisection moves it inside by 1e-12
     for _ in range(40):
         middle = 0.5 * (low + high)
-        within = np.isfinite(inside(centre + middle[:, None] * (asked - centre))).ravel()
+        within = np.isfinite(inside(centre + middle[:, None] * (query - centre))).ravel()
         low, high = np.where(within, middle, low), np.where(within, high, middle)
-    return np.where(known[:, None], asked, centre + low[:, None] * (asked - centre))
+    return np.where(known[:, None], query, centre + low[:, None] * (query - centre))

@@ -127,7 +127,7 @@ def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarr
 
 def _largest(bonds: np.ndarray, ranks: int) -> np.ndarray:
     """Indices of the largest connected cluster among the first `ranks` grains."""
-    from scipy.sparse import csr_array  # slow to load, and few runs begin with a deposit
+    from scipy.sparse import csr_array  # slow to import, and rarely used
     from scipy.sparse.csgraph import connected_components
 
     inside = bonds[(bonds < ranks).all(axis=1)]

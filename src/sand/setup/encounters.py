@@ -30,7 +30,7 @@ class Encounter(NamedTuple):
 @checked
 def turned_at_random(body: Grains, rng: np.random.Generator) -> Grains:
     """Rotate a body by a random rotation about its centre of mass, with velocities, spins and moments."""
-    from scipy.spatial.transform import Rotation  # slow to load
+    from scipy.spatial.transform import Rotation  # slow to import
 
     return turned(body, Rotation.random(random_state=rng))
 

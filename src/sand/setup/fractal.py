@@ -96,7 +96,7 @@ def _merge_order(count: int) -> list[tuple[int, int, int]]:
 def check_feasible(sample: Population, dimension: float, prefactor: float) -> None:
     """Raise BadInput, with the reason, if no aggregate of these grains has this dimension and prefactor."""
     count, unit = len(sample.radius), float(sample.radius.mean())
-    asked = f"{count} grains with dimension {dimension:g} and prefactor {prefactor:g}"
+    request = f"{count} grains with dimension {dimension:g} and prefactor {prefactor:g}"
     if dimension > MOST:
         raise BadInput(
             f"dimension = {dimension:g} must not exceed {MOST}: denser clusters would have to interpenetrate to merge; "
@@ -113,14 +113,14 @@ def check_feasible(sample: Population, dimension: float, prefactor: float) -> No
     chain = unit * math.sqrt((count**2 - 1) / 3.0)
     if size > chain * (float(sample.radius.max()) / unit):
         raise BadInput(
-            f"{asked} would have a radius of gyration of {size / unit:.4g} mean radii, but a straight chain has only "
+            f"{request} would have a radius of gyration of {size / unit:.4g} mean radii, but a straight chain has only "
             f"{chain / unit:.4g}; use a larger dimension or prefactor"
         )
     volume = float((sample.radius**3).sum())
     ball = math.sqrt(0.6) * (volume / DENSEST) ** (1.0 / 3.0)
     if size < ball * (1.0 - 2.0 / count):
         raise BadInput(
-            f"{asked} would have a radius of gyration of {size / unit:.4g} mean radii, but a random close packing has "
+            f"{request} would have a radius of gyration of {size / unit:.4g} mean radii, but random close packing has "
             f"{ball / unit:.4g}; use a smaller dimension or prefactor"
         )
 

@@ -164,8 +164,8 @@ class Population(NamedTuple):
     """Radii and materials of N grains."""
 
     radius: np.ndarray  # (N,) [m]
-    material: list[Material]  # N of them
-    grain_set: GrainSet  # the same for kernels
+    material: list[Material]  # material of each grain
+    grain_set: GrainSet  # properties for the kernels
 
 
 def population(count: int, radius: Any, material: Any, rng: np.random.Generator) -> Population:

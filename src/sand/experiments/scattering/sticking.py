@@ -45,7 +45,7 @@ def sticks(setup: Flight, state: np.ndarray) -> bool:
     if any(setup.field):
         forces.append(Field(setup.field))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # issued before
+        warnings.simplefilter("ignore")  # the warnings were issued when the flight was set up
         sim = Simulation(grains, forces)
     period, periods_in_contact = slowest_period(setup), 0
     for _ in range(MOST_CHECKS):
