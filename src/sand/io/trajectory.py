@@ -247,13 +247,9 @@ class Frames(FrameSequence):
     def head(self, index: int) -> tuple[float, int, int]:
         """Time [s], step and number of contacts of a frame ≥ 0.  Raises BadInput if it is incomplete."""
         with self._reading(index):
-            file = self._file.file
-            time = float(file.read_chunk(index, "log/time")[0])
-            return (
-                time,
-                gsd_index.read_number(file, index, "configuration/step"),
-                gsd_index.read_number(file, index, "bonds/N"),
-            )
+            time = float(self._file.file.read_chunk(index, "log/time")[0])
+            contacts = gsd_index.read_number(self._file.file, index, "bonds/N")
+            return time, gsd_index.step_of(self._file, index), contacts
 
     @property
     def times(self) -> np.ndarray:
