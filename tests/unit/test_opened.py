@@ -7,7 +7,6 @@ import pytest
 
 import sand
 from sand.cli.main import main
-from sand.io.trajectory import Frames
 
 
 @pytest.mark.compiled("fields")
@@ -82,21 +81,6 @@ def test_no_run_there(tmp_path):
     (tmp_path / "case.toml").write_text("")
     with pytest.raises(sand.BadInput, match="wait until its run has written a frame"):
         sand.open(tmp_path)
-
-
-@pytest.mark.compiled("fields")
-def test_an_old_trajectory_without_forces_and_check_sum(looked_at, tmp_path):
-    """Files of before are read: forces are NaN."""
-    import gsd.hoomd
-
-    with gsd.hoomd.open(str(looked_at[0] / "trajectory.gsd"), "r") as file:
-        frame = file[2]
-    del frame.log["crc32"], frame.log["bonds/force"]
-    with gsd.hoomd.open(str(tmp_path / "old.gsd"), "w") as file:
-        file.append(frame)
-    (old,) = Frames(tmp_path / "old.gsd")
-    assert np.isnan(old.force).all()
-    assert old.force.shape == (len(old.pair), 3)
 
 
 @pytest.mark.compiled("fields")

@@ -47,8 +47,3 @@ def set_aside(path: Path, *, copy: bool = False) -> Path:
     else:
         path.replace(aside)
     return aside
-
-
-def set_aside_in(folder: Path, names: tuple[str, ...]) -> list[Path]:
-    """Files renamed by `set_aside` whose original names match these names or patterns."""
-    return [path for name in names for path in folder.glob(f"{name}{DAMAGED}*")]

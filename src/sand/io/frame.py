@@ -20,10 +20,9 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
 | log/bonds/share | stretch, slide, roll and twist as shares of their limits |
-| log/crc32 | checksum of all numbers of a frame but its step; a second one also covers step and material names |
+| log/crc32 | checksum of step, material names and all numbers of a frame |
 
-Vectors are in the laboratory frame. Files of development versions lack some of the last rows and the second checksum;
-they can be read as well.
+Vectors are in the laboratory frame.
 """
 
 from __future__ import annotations
@@ -42,24 +41,6 @@ from ..grains import Grains
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
-LOGGED = (
-    "time",
-    "scale/length",
-    "periodic",
-    "particles/moment",
-    "particles/spin",
-    "bonds/overlap",
-    "bonds/formed",
-    "bonds/force",
-    "lengths",
-    "bonds/slide",
-    "bonds/roll",
-    "bonds/twist",
-    "bonds/share",
-    "particles/position",
-    "particles/radius",
-)
-"""Logged arrays covered by the checksum, in its order."""
 MODES = ("stretch", "slide", "roll", "twist")
 """Columns of log/bonds/share."""
 
@@ -106,34 +87,24 @@ def stored_frame(
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
-    frame.log["crc32"] = np.array([_crc32(frame, b""), _crc32(frame, _head_of(frame))], dtype=np.uint32)
+    frame.log["crc32"] = np.array([_crc32(frame)], dtype=np.uint32)
     return frame
 
 
 def code_of(stored: Any) -> int:
-    """The stored checksum of the numbers of a frame.  Raises KeyError if there is none."""
-    return int(stored.log["crc32"][0])
+    """The stored checksum of a frame.  Raises KeyError if there is none."""
+    return int(stored.log["crc32"][-1])
 
 
-def _refuse_changed(stored: Any) -> None:
-    """Raise ValueError if a checksum does not match; files of the first development versions have none."""
-    codes = stored.log.get("crc32", ())
-    if any(int(code) != _crc32(stored, head) for code, head in zip(codes, (b"", _head_of(stored)), strict=False)):
-        raise ValueError("its check sum is wrong")
-
-
-def _head_of(stored: Any) -> bytes:
-    """Step and material names."""
-    return f"{int(stored.configuration.step)} {list(stored.particles.types)}".encode()
-
-
-def _crc32(stored: Any, head: bytes) -> int:
-    """CRC-32 of `head` and of all numbers of a frame as stored."""
-    p, code = stored.particles, zlib.crc32(head)
+def _crc32(stored: Any) -> int:
+    """CRC-32 of step, material names and all numbers of a frame as stored."""
+    p = stored.particles
+    code = zlib.crc32(f"{int(stored.configuration.step)} {list(p.types)}".encode())
     single = (p.position, p.diameter, p.velocity, p.mass, p.charge, p.orientation)
     parts = [np.asarray(part, np.float32) for part in single]
     parts += [np.asarray(part, np.uint32) for part in (p.typeid, stored.bonds.group)]
-    for part in [*parts, *(stored.log[name] for name in LOGGED if name in stored.log)]:
+    parts += [stored.log[name] for name in sorted(stored.log) if name != "crc32"]
+    for part in parts:
         # + 0 makes −0 and 0 equal, which GSD does not distinguish
         with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
             code = zlib.crc32((np.ascontiguousarray(part) + np.zeros(1, part.dtype)).tobytes(), code)
@@ -144,12 +115,12 @@ class Frame:
     """One stored frame in SI units, with arrays (N, …) named as the quantities of grains.
 
     `material` (N,) holds indices into the names `materials`. Arrays of contacts: `pair` (C, 2), `overlap` [m],
-    `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`;
-    NaN where the file lacks them.
+    `formed` [s], `twist` [rad] (C,), `force` [N], `slide`, `roll` [m] (C, 3), and `share` (C, 4) with columns `MODES`.
     """
 
     def __init__(self, stored: Any):
-        _refuse_changed(stored)
+        if code_of(stored) != _crc32(stored):
+            raise ValueError("its check sum is wrong")
         self.step = int(stored.configuration.step)
         self.time = float(stored.log["time"][0])
         scale = float(stored.log["scale/length"][0])
@@ -164,17 +135,11 @@ class Frame:
         self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
         self.orientation = np.roll(np.asarray(p.orientation), -1, axis=1)
         self.pair = np.asarray(stored.bonds.group).reshape(-1, 2)
-        self.overlap, self.formed = stored.log["bonds/overlap"], stored.log["bonds/formed"]
-
-        def of_contacts(name: str, *width: int) -> np.ndarray:
-            missing = np.full((len(self.pair), *width), np.nan)
-            return np.asarray(stored.log.get(f"bonds/{name}", missing), np.float64)
-
-        self.force, self.slide, self.roll = (of_contacts(name, 3) for name in ("force", "slide", "roll"))
-        self.twist, self.share = of_contacts("twist"), of_contacts("share", len(MODES))
-        periodic = stored.log["periodic"].astype(bool)
-        rounded = np.asarray(stored.configuration.box[:3], dtype=np.float64) * scale
-        lengths = stored.log.get("lengths", rounded)
+        self.overlap, self.formed, self.force, self.slide, self.roll, self.twist, self.share = (
+            np.asarray(stored.log[f"bonds/{name}"], np.float64)
+            for name in ("overlap", "formed", "force", "slide", "roll", "twist", "share")
+        )
+        periodic, lengths = stored.log["periodic"].astype(bool), stored.log["lengths"]
         x, y, z = (float(v) if on else None for v, on in zip(lengths, periodic, strict=True))
         self.box = Box((x, y, z))
         self.drawn = tuple(float(v) for v in lengths)

@@ -191,7 +191,7 @@ def repair_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dic
         complete = repair(path, step)
         with gsd.hoomd.open(str(path), "r") as file:
             present = _frames_until(file, step)
-            first = _step(file, 0) if present else step + 1
+            first = step_of(file, 0) if present else step + 1
             if not len(file) and holds_data(path):
                 raise BadInput(f"{path} has no complete frame")
     except (BadInput, RuntimeError):
@@ -211,15 +211,20 @@ def repair_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dic
 def _frames_until(file: Any, step: int) -> int:
     """Number of frames up to a step."""
     number = len(file)
-    while number > 0 and _step(file, number - 1) > step:
+    while number > 0 and step_of(file, number - 1) > step:
         number -= 1
     return number
 
 
-def _step(file: Any, number: int) -> int:
+def read_number(file: Any, frame: int, chunk: str) -> int:
+    """An integer of a frame; GSD omits values equal to those of the first frame, and zeros in the first."""
+    at = next((k for k in (frame, 0) if file.chunk_exists(k, chunk)), None)
+    return 0 if at is None else int(file.read_chunk(at, chunk)[0])
+
+
+def step_of(file: Any, frame: int) -> int:
     """Step of a frame."""
-    chunk = "configuration/step"  # missing where it is 0
-    return int(file.file.read_chunk(number, chunk)[0]) if file.file.chunk_exists(number, chunk) else 0
+    return read_number(file.file, frame, "configuration/step")
 
 
 def cut(path: Path, frame: int) -> None:

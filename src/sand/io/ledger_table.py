@@ -8,9 +8,9 @@ import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ..errors import BadInput, FilesFailed
+from ..errors import BadInput
 from .damage import set_aside
-from .run_folder import LEDGER, SUMMARY, read_json, read_text, replace_file
+from .run_folder import LEDGER, SUMMARY, append_text, read_json, read_text, replace_file
 
 ROUNDING = 1e-14
 """Difference between a total and the sum of its columns, relative to the sum of their magnitudes, due to rounding."""
@@ -37,31 +37,27 @@ class LedgerFile:
         self.path, self.columns = path, list(columns)
         given = list(rows)
         text = _text(self.columns, given)
-        replace_file(path, text)
-        self._rows, self._digest = len(given), hashlib.sha256(text)
+        replace_file(path, text.encode())
+        self._rows, self._digest = len(given), hashlib.sha256(text.encode())
 
     def append(self, row: Row) -> None:
         """Append a row.  Raises FilesFailed."""
         line = _line(self.columns, row)
-        try:
-            with open(self.path, "ab") as file:
-                file.write(line)
-        except OSError as error:
-            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
+        append_text(self.path, line)
         self._rows += 1
-        self._digest.update(line)
+        self._digest.update(line.encode())
 
     def described(self) -> dict[str, int | str]:
         """Number of rows and digest of the text written, for summary.json."""
         return {ROWS: self._rows, ROWS_DIGEST: self._digest.hexdigest()}
 
 
-def _line(columns: Sequence[str], row: Row) -> bytes:
-    return (",".join(repr(row[name]) for name in columns) + "\n").encode()
+def _line(columns: Sequence[str], row: Row) -> str:
+    return ",".join(repr(row[name]) for name in columns) + "\n"
 
 
-def _text(columns: Sequence[str], rows: Iterable[Row]) -> bytes:
-    return (",".join(columns) + "\n").encode() + b"".join(_line(columns, row) for row in rows)
+def _text(columns: Sequence[str], rows: Iterable[Row]) -> str:
+    return ",".join(columns) + "\n" + "".join(_line(columns, row) for row in rows)
 
 
 def keep_if_damaged(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> None:
@@ -78,10 +74,10 @@ def keep_if_damaged(path: Path, columns: Sequence[str], rows: Sequence[Row]) -> 
         return
     expected = _text(columns, rows)
     try:
-        found = read_text(path).encode()
+        found = read_text(path)
     except BadInput:
-        found = b"\0\n"
-    if found.startswith(expected) or expected.startswith(found[: found.rfind(b"\n") + 1]):
+        found = "\0\n"
+    if found.startswith(expected) or expected.startswith(found[: found.rfind("\n") + 1]):
         return
     aside = set_aside(path)
     warnings.warn(
@@ -171,7 +167,7 @@ def _missing_rows(path: Path, lines: Sequence[str]) -> str:
     except BadInput:  # reported when the summary itself is read
         return ""
     count, digest = summary.get(ROWS), summary.get(ROWS_DIGEST)
-    if not isinstance(count, int) or digest is None:  # written by an earlier version
+    if not isinstance(count, int) or digest is None:
         return ""
     if len(lines) - 1 < count:
         return f"{path} has {len(lines) - 1} of the {count} rows that the run had written"

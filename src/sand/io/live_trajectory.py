@@ -91,11 +91,12 @@ class LiveTrajectory(FrameSequence):
             old, before = self._frames, (len(self), self.generation)
             known = self.times, self.steps, self.contacts, self.incomplete
             self._frames = frames
-            if len(self) and not self._continues(len(self) - 1):
+            last = self._head(len(self) - 1)
+            if last is None or last[:2] != (self.times[-1], self.steps[-1]):
                 self.generation += 1
                 self.times, self.steps, self.contacts = self.times[:0], self.steps[:0], self.contacts[:0]
             self._read_new()
-            if before[0] and not len(self):  # replaced by a file without a frame: keep the old frames until it has one
+            if not len(self):  # replaced by a file without a frame: keep the old frames until it has one
                 self._frames, self.generation = old, before[1]
                 self.times, self.steps, self.contacts, self.incomplete = known
                 frames.close()
@@ -113,13 +114,8 @@ class LiveTrajectory(FrameSequence):
         except OSError:
             return 0.0
 
-    def _continues(self, last: int) -> bool:
-        """Whether the last known frame is still in the file."""
-        head = self._head(last) if last < len(self._frames) else None
-        return head is not None and head[:2] == (self.times[last], self.steps[last])
-
     def _head(self, number: int) -> tuple[float, int, int] | None:
-        """Time, step and number of contacts of a frame; None if it is incomplete."""
+        """Time, step and number of contacts of a frame; None if it is missing or incomplete."""
         try:
             return self._frames.head(number)
         except BadInput:

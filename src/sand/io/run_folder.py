@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInput, FilesFailed
-from .damage import DIGEST, digest_of, set_aside_in
+from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
 CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW, GROWTH = (
@@ -96,8 +96,8 @@ def make_folder(path: str | Path, *, overwrite: bool = False, shared: bool = Fal
                     "or allow it to be overwritten (--overwrite, in Python overwrite=True)"
                 )
             with writing(folder):
-                damaged = set_aside_in(folder, (*OWN_FILES, "checkpoint-*.npz"))
-                own = [*(folder / name for name in OWN_FILES), *folder.glob("checkpoint-*.npz"), *damaged]
+                names = (*OWN_FILES, "checkpoint-*.npz")
+                own = [path for name in names for end in ("", f"{DAMAGED}*") for path in folder.glob(name + end)]
                 # begin with the file that readers keep open: if Windows refuses to remove it, all files stay
                 for old in [folder / TRAJECTORY, *own]:
                     old.unlink(missing_ok=True)
@@ -138,6 +138,15 @@ def replace_file(path: Path, content: bytes) -> None:
             temporary.unlink(missing_ok=True)
         left = "the old content is untouched" if path.parent.is_dir() else "its folder has been removed"
         raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error
+
+
+def append_text(path: Path, text: str) -> None:
+    """Append to a file.  Raises FilesFailed."""
+    try:
+        with open(path, "ab") as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise FilesFailed(f"cannot write {path}: {error.strerror}") from error
 
 
 def _sync_names(folder: Path) -> None:

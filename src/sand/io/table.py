@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import BadInput, FilesFailed
-from .run_folder import read_text, replace_file
+from ..errors import BadInput
+from .run_folder import append_text, read_text, replace_file
 
 
 def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
@@ -18,8 +18,7 @@ def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     out = io.StringIO()
     writer = csv.DictWriter(out, list(rows[0]) if rows else [], lineterminator="\n")
     writer.writeheader()
-    for row in rows:
-        writer.writerow({k: repr(v) if isinstance(v, float) else v for k, v in row.items()})
+    writer.writerows(rows)
     replace_file(path, out.getvalue().encode())
 
 
@@ -60,12 +59,7 @@ class GrowingTable:
 
     def add(self, rows: Iterable[Sequence[float]]) -> None:
         """Append rows; integers are written without a decimal point.  Raises FilesFailed."""
-        text = "".join(",".join(_shortest(value) for value in row) + "\n" for row in rows)
-        try:
-            with open(self.path, "a", encoding="utf-8", newline="") as file:
-                file.write(text)
-        except OSError as error:
-            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
+        append_text(self.path, "".join(",".join(_shortest(value) for value in row) + "\n" for row in rows))
 
     def sort(self) -> None:
         """Sort the lines by their numbers, so that the file does not depend on the order of completion."""
@@ -111,11 +105,7 @@ class GrowingOutcomes:
 
     def add(self, seed: int, outcome: dict[str, Any]) -> None:
         """Append one outcome; its numbers are stored to full precision.  Raises FilesFailed."""
-        try:
-            with open(self.path, "a", encoding="utf-8", newline="") as file:
-                file.write(json.dumps({"seed": seed, "outcome": outcome}) + "\n")
-        except OSError as error:
-            raise FilesFailed(f"cannot write {self.path}: {error.strerror}") from error
+        append_text(self.path, json.dumps({"seed": seed, "outcome": outcome}) + "\n")
 
 
 def _shortest(value: float) -> str:

@@ -16,18 +16,9 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput, FilesFailed
 from ..grains import Grains
+from . import gsd_index
 from .damage import set_aside
 from .frame import Frame, FrameSequence, code_of, stored_frame
-from .gsd_index import (
-    CHUNKS,
-    cut,
-    holds_data,
-    read_index,
-    refuse_impossible_sizes,
-    repair,
-    repair_or_keep,
-    reserve_space,
-)
 
 FLUSH_EVERY = 1.0
 """Wall time [s] between flushes; GSD buffers, and unflushed frames are lost if the process is killed."""
@@ -71,13 +62,13 @@ class TrajectoryWriter:
         try:
             if resume_at is not None and path.exists():
                 try:
-                    self._later, lost = repair_or_keep(path, resume_at, written)
+                    self._later, lost = gsd_index.repair_or_keep(path, resume_at, written)
                 except (BadInput, RuntimeError):
                     lost = f"{path} cannot be repaired; it is now {set_aside(path).name}, and a new one begins"
                 if lost:
                     warnings.warn(lost, stacklevel=2)
             self._file = _open_file(path, resume_at is not None and path.exists())
-            self._entries = len(read_index(path)[1])
+            self._entries = len(gsd_index.read_index(path)[1])
         except OSError as error:
             raise FilesFailed(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -101,7 +92,7 @@ class TrajectoryWriter:
         frame = stored_frame(step, time, grains, box, contacts, exact=exact)
         if self._is_stored(step, code_of(frame)):
             return
-        self._waiting, self._entries = self._waiting + 1, self._entries + CHUNKS
+        self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
         try:
             if self._file is None:
@@ -121,7 +112,7 @@ class TrajectoryWriter:
         others = [later for later, _ in self._later.values()] + [number] * (number >= 0)
         if others:
             self.close()
-            cut(self.path, min(others))
+            gsd_index.cut(self.path, min(others))
             self._later = {}
         return False
 
@@ -136,7 +127,7 @@ class TrajectoryWriter:
         if self._file is None:
             return
         try:
-            reserve_space(self.path, self._entries, self._pending)
+            gsd_index.reserve_space(self.path, self._entries, self._pending)
             self._file.flush()
             if sync:
                 with open(self.path, "r+b") as same:  # Windows does not sync a file that is open for reading only
@@ -152,7 +143,7 @@ class TrajectoryWriter:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file.file))
         self._abandoned = True
         with contextlib.suppress(OSError, RuntimeError, BadInput):
-            repair(self.path, self._whole_until)
+            gsd_index.repair(self.path, self._whole_until)
         return FilesFailed(f"cannot write {self.path}: {error.strerror or error}")
 
     def rescue(self) -> None:
@@ -198,13 +189,13 @@ class Frames(FrameSequence):
         if not self.path.exists():
             raise BadInput(f"there is no file {path}")
         try:
-            refuse_impossible_sizes(self.path)
+            gsd_index.refuse_impossible_sizes(self.path)
             self._file = gsd.hoomd.open(str(path), "r")
         except BadInput:
             raise
         except (OSError, RuntimeError, ValueError, MemoryError) as error:
             raise BadInput(f"{path} is not a trajectory of SAND ({error})") from error
-        if not len(self._file) and holds_data(self.path):
+        if not len(self._file) and gsd_index.holds_data(self.path):
             self._file.close()
             raise BadInput(
                 f"{path} holds data but no frame: its index is damaged, or its first frame is being written; "
@@ -246,10 +237,10 @@ class Frames(FrameSequence):
         """
         file = self._file.file
         with self._reading(index):
-            count = self._number(index, "bonds/N")
+            count = gsd_index.read_number(file, index, "bonds/N")
             at = index if file.chunk_exists(index, "bonds/group") else 0
             pair = file.read_chunk(at, "bonds/group").reshape(count, 2) if count else np.zeros((0, 2), np.uint32)
-            if pair.size and int(pair.max()) >= (grains := self._number(index, "particles/N")):
+            if pair.size and int(pair.max()) >= (grains := gsd_index.read_number(file, index, "particles/N")):
                 raise ValueError(f"a contact of grain {pair.max()}, of {grains} grains")
             return pair
 
@@ -257,13 +248,8 @@ class Frames(FrameSequence):
         """Time [s], step and number of contacts of a frame ≥ 0.  Raises BadInput if it is incomplete."""
         with self._reading(index):
             time = float(self._file.file.read_chunk(index, "log/time")[0])
-            return time, self._number(index, "configuration/step"), self._number(index, "bonds/N")
-
-    def _number(self, index: int, chunk: str) -> int:
-        """An integer of a frame; GSD omits values equal to those of the first frame, and zeros in the first."""
-        file = self._file.file
-        at = next((k for k in (index, 0) if file.chunk_exists(k, chunk)), None)
-        return 0 if at is None else int(file.read_chunk(at, chunk)[0])
+            contacts = gsd_index.read_number(self._file.file, index, "bonds/N")
+            return time, gsd_index.step_of(self._file, index), contacts
 
     @property
     def times(self) -> np.ndarray:

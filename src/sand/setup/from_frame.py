@@ -93,10 +93,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     )
     moved = float(np.abs(frame.box.nearest(position - frame.position)).max())
     kept = f"{len(pair)} contact{'s' * (len(pair) != 1)} kept"
-    known = not np.isnan(frame.twist).any()
-    if len(pair) and not known:
-        kept += " unstrained, because the file does not contain their displacements"
-    bonds = Bonds(pair, *(np.nan_to_num(given) for given in (frame.slide, frame.roll, frame.twist)))
+    bonds = Bonds(pair, frame.slide, frame.roll, frame.twist)
     note = f"step {frame.step}, {format_quantity(frame.time, 's')}, of an earlier run; {kept}"
     if moved > 0.0:
         note += f", positions corrected by at most {moved:.2g} m to restore the overlaps"
