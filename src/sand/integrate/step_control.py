@@ -84,23 +84,24 @@ def load_step(force, torque, mass, inertia, criteria):
 def grain_step(grains, long_range, start, criteria, i):
     """Largest step [s] allowed by the motion of grain i, and largest cycle of the long-range loads.
 
-    Grains in contact oscillate at contact frequencies, which limit the step elsewhere: only their flight and spin count
-    here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The load criterion
-    uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no energy error.
+    Grains in contact oscillate at contact frequencies, which the contact step resolves: only their flight, spin and
+    moment count here.  Free grains limit the cycle by the same criteria as the step, except the flight distance.  The
+    load criterion uses the long-range loads, whose energy sets the scale: a uniform load such as gravity causes no
+    energy error.
     """
     v, w = load(grains.velocity, i), load(grains.spin, i)
     speed, rotation = math.sqrt(dot(v, v)), math.sqrt(dot(w, w))
-    spin = MAX_SPIN_ANGLE / rotation if rotation > 0.0 else math.inf
+    by_spin = MAX_SPIN_ANGLE / rotation if rotation > 0.0 else math.inf
     inertia = grains.inertia[i]
-    swing = field_step(load(grains.moment, i), load(grains.field, i), criteria.outer_field, inertia)
-    smooth = math.inf
+    by_field = field_step(load(grains.moment, i), load(grains.field, i), criteria.outer_field, inertia)
+    by_loads = math.inf
     if long_range.force.shape[1] > 0:  # empty without long-range forces
-        smooth = load_step(load(long_range.force, i), load(long_range.torque, i), grains.mass[i], inertia, criteria)
+        by_loads = load_step(load(long_range.force, i), load(long_range.torque, i), grains.mass[i], inertia, criteria)
     bound = start[i + 1] != start[i]
-    smooth = math.inf if bound else smooth
-    cycle = min(min(spin, swing), smooth)
-    flight = FLIGHT_FRACTION * criteria.reach / speed if speed > 0.0 else math.inf
-    return min(cycle, flight), math.inf if bound else cycle
+    by_loads = math.inf if bound else by_loads
+    cycle = min(min(by_spin, by_field), by_loads)
+    by_flight = FLIGHT_FRACTION * criteria.reach / speed if speed > 0.0 else math.inf
+    return min(cycle, by_flight), math.inf if bound else cycle
 
 
 @loop
@@ -145,13 +146,13 @@ def pair_step(grains, pair_list, span, criteria, p):
     # in contact only the normal velocity strains the contact; rotation of the pair does not
     speed = abs(closing) if touching else math.sqrt(dot(relative, relative))
     pair_type = pair_type_index(pair_list, p)
-    need, length = pair_list.step[pair_type], pair_list.length[pair_type]
-    fast = (length > 0.0) & (speed * need > criteria.impact * length)
-    need = criteria.impact * length / speed if fast else need
+    required, length = pair_list.step[pair_type], pair_list.length[pair_type]
+    fast = (length > 0.0) & (speed * required > criteria.impact * length)
+    required = criteria.impact * length / speed if fast else required
     gap = distance - grains.radius[i] - grains.radius[j]
-    free = max(need, CLOSING_FRACTION * gap / closing) if closing > 0.0 else math.inf
+    free = max(required, CLOSING_FRACTION * gap / closing) if closing > 0.0 else math.inf
     # slow pairs in contact are resolved by the contact step
-    bound = need if fast else math.inf
+    bound = required if fast else math.inf
     return bound if touching else free
 
 
