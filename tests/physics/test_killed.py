@@ -51,7 +51,7 @@ pressure = "1 mbar"
 def sand_command(*words):
     """A `sand` process that writes checkpoints all the time."""
     script = (
-        "import sys; import sand.simulation.run_writer as r; r.CHECKPOINT_EVERY = 0.05; r.Record.draw = lambda *_: None; "
+        "import sys; import sand.simulation.run_writer as r; r.CHECKPOINT_EVERY = 0.05; r.RunWriter.draw = lambda *_: None; "
         "from sand.cli.main import main; sys.exit(main(sys.argv[1:]))"
     )
     return subprocess.Popen([sys.executable, "-c", script, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
