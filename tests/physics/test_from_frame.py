@@ -162,7 +162,7 @@ def test_a_frame_without_numbers(crash):
     frame = copy.copy(frames[4])
     frame.velocity = frame.velocity.copy()
     frame.velocity[3] = np.nan
-    with pytest.raises(sand.BadInput, match=f"step {frame.step}: velocity .* not finite; take an earlier frame"):
+    with pytest.raises(sand.BadInput, match=f"step {frame.step}: velocity .* not finite; use an earlier frame"):
         sand.setup.from_frame(frame, {"silica": sand.SILICA})
 
 

@@ -78,7 +78,7 @@ def boxes(
     Raises
     ------
     BadInput
-        as `experiments.boxes.grow`; or a worker process has died.
+        as `experiments.growth_boxes.grow`; or a worker process has died.
     """
     from concurrent.futures import BrokenExecutor
 
