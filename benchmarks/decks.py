@@ -20,11 +20,12 @@ def law(grains: sand.Grains, twisting: str = "marshall") -> str:
 
     Rolling has the stiffness of SAND's and its limit ξ_c, as LAMMPS takes it: μ × (|F| + 2 F_c) at rest.
     """
-    grain_set, reduced = grains.materials[0], 0.5 * float(grains.radius[0])
-    pull = 3.0 * math.pi * grain_set.surface_energy * reduced
+    material, reduced = grains.materials[0], 0.5 * float(grains.radius[0])
+    pull = 3.0 * math.pi * material.surface_energy * reduced
     roll = roll_stiffness(pull, reduced)
-    friction = roll * grain_set.rolling_limit / (2.0 * pull)
-    normal = f"jkr {1e-3 * grain_set.young_modulus:.10g} 6700.0 {grain_set.poisson_ratio} {1e3 * grain_set.surface_energy:.10g}"
+    friction = roll * material.rolling_limit / (2.0 * pull)
+    energy = 1e3 * material.surface_energy
+    normal = f"jkr {1e-3 * material.young_modulus:.10g} 6700.0 {material.poisson_ratio} {energy:.10g}"
     rolling = f"rolling sds {1e3 * roll:.8g} 0.0 {friction:.8g}"
     return f"{normal} tangential mindlin NULL 0.0 0.5 {rolling} twisting {twisting} damping viscoelastic"
 

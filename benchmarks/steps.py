@@ -95,7 +95,8 @@ def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict
 def dipole_step(quick: bool) -> dict[str, Any]:
     """Dipoles of all pairs in a whole step.
 
-    A pair takes 81 operations (`forces.pair.dipole_formulas.pair_load` without its energy, and `forces.pair.dipole_loops.rows_of`):
+    A pair takes 81 operations (`pair_load` of `forces.pair.dipole_formulas` without its energy, and `rows_of` of
+    `forces.pair.dipole_loops`):
     3 for r, 5 for r², 1/r² and √ 1 each, 2 for k/r³, 15 for three products, 2 for 3k/r⁵, 2 for the product over r²,
     1 each for a and b; the force 9 + 3 + 6, each field 9; 12 to add up two forces and two fields.
     """

@@ -20,7 +20,8 @@ from .io.trajectory import Frame, Frames
 from .setup.from_frame import from_frame
 from .simulation.simulation import Simulation
 from .units import si
-from .viewer.simulation_view import read_field, view_folder
+from .viewer.external_field import read_field
+from .viewer.simulation_view import view_folder
 
 if TYPE_CHECKING:
     from .plotting.render.still import Still

@@ -20,7 +20,7 @@ from sand.io.run_folder import LEDGER, SUMMARY, TRAJECTORY, write_json
 from sand.io.trajectory import TrajectoryWriter
 from sand.material import IRON, SILICA
 from sand.state.state import LOST
-from sand.viewer.simulation_view import FieldDescription
+from sand.viewer.external_field import FieldDescription
 
 R = 10e-9
 """Radius of a grain [m]."""

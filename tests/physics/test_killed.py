@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from sand.cli.main import DONE, INTERRUPTED
+from sand.cli.exits import DONE, INTERRUPTED
 from sand.io.checkpoint import newest_checkpoint
 from sand.io.trajectory import read_frames
 

@@ -102,7 +102,7 @@ def test_public_names_have_docstrings():
 
 
 def test_the_compiler_is_one_that_was_tried():
-    """An untested numba is slow and single-threaded: try `compiler/lowering.py` with it, then raise jit.TESTED_NUMBA."""
+    """An untested numba is slow and single-threaded: test `compiler/` with it, then raise jit.TESTED_NUMBA."""
     import numba
 
     from sand.compiler.jit import HAS_NOINLINE, TESTED_NUMBA
@@ -126,7 +126,7 @@ def test_numba_is_imported_in_one_package():
 
 @pytest.mark.slow
 def test_only_io_opens_files_and_only_cli_prints():
-    """`open`, `read_text`, `write_text` and the like are called in io/ (and for the digest of the sources); print in cli/."""
+    """`open`, `read_text`, `write_text` are called in io/ (and for the digest of sources) alone; print in cli/."""
     for path in SOURCES:
         package = package_of(path)
         for node in ast.walk(tree_of(path)):

@@ -107,7 +107,7 @@ def test_the_blows_scatter_as_the_friction_demands(accommodation):
 
 
 def test_what_the_linear_law_lacks_at_half_the_molecular_speed():
-    """At v = v̄/2 the drag is 6.2 % above −f_t v for mirrors and 4.5 % for diffuse walls, as forces/gas/model.py says."""
+    """At v = v̄/2 the drag is 6.2 % above −f_t v for mirrors and 4.5 % for diffuse walls, see forces/gas/model.py."""
     velocity = np.array([0.0, 0.0, 0.5 * SPEED])
     for accommodation, excess in ((0.0, 0.062), (1.0, 0.045)):
         force = impacts(velocity, np.zeros(3), accommodation)[0]

@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.viewer.dataset import run_dataset
-from sand.viewer.simulation_view import describe_field, read_field
+from sand.viewer.external_field import describe_field, read_field
 
 
 @pytest.mark.compiled("fields")

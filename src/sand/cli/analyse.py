@@ -92,7 +92,8 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
             [
                 (
                     "ln S",
-                    f"differ by {comparison['sigma']:.3g} standard errors at {format_quantity(comparison['time'], 's')}",
+                    f"differ by {comparison['sigma']:.3g} standard errors "
+                    f"at {format_quantity(comparison['time'], 's')}",
                 ),
                 ("S", f"differ by {comparison['sigma_of_size']:.3g}"),
             ],

@@ -11,7 +11,7 @@ import click
 from ..arguments import MOST_GRAINS
 from ..errors import BadInput
 from . import options, report
-from .main import DONE
+from .exits import DONE
 
 KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")
 

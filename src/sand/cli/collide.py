@@ -11,7 +11,7 @@ import click
 from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .main import DONE, INTERRUPTED
+from .exits import DONE, INTERRUPTED
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""

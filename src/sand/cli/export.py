@@ -8,7 +8,7 @@ import click
 
 from ..errors import BadInput
 from . import options, report
-from .main import DONE
+from .exits import DONE
 
 FORMATS = ("xyz", "lammps-dump", "lammps-data", "vtk")
 

@@ -12,7 +12,7 @@ from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
 from .collide import read_seeds
-from .main import DONE, INTERRUPTED
+from .exits import DONE, INTERRUPTED
 
 DEFAULT_SEEDS = list(range(1, 9))
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..simulation.observers import Observer
 from ..simulation.signals import STOPS
-from .main import Interrupts
+from .interrupts import Interrupts
 
 
 class InterruptObserver(Interrupts, Observer):

@@ -15,8 +15,8 @@ from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
 from ..units import format_quantity
 from . import report
+from .exits import DONE, INTERRUPTED, PHYSICS
 from .interrupt import InterruptObserver
-from .main import DONE, INTERRUPTED, PHYSICS
 from .progress import Progress
 
 

@@ -9,7 +9,7 @@ import click
 
 from ..errors import BadInput, did_you_mean
 from . import options, report
-from .main import DONE
+from .exits import DONE
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")

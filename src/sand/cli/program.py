@@ -11,7 +11,7 @@ import click
 from ..errors import SandError
 from ..version import __version__
 from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
-from .main import BAD_INPUT, DONE, FAILED, INTERRUPTED
+from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
 COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
 """One module per command, with a click command named `command`."""

@@ -24,7 +24,7 @@ from ..io.run_folder import (
 )
 from ..threads import set_threads
 from . import options, report
-from .main import DONE
+from .exits import DONE
 
 JOB_FILES = {OUTCOMES, COLLISION, GROWTH, SCATTERING, TRAJECTORY}
 """Files that show that SAND wrote to a folder."""
@@ -82,7 +82,8 @@ def _kind(folder: Path) -> str:
     is_job = was_written_by_sand(case) or any(name in JOB_FILES or name.startswith("checkpoint-") for name in others)
     if kind not in (None, "run") and not is_job:
         raise BadInput(
-            f"{folder} is not the folder of a run or job: {case.name} in it is a case file; to start it: sand {kind} {case}"
+            f"{folder} is not the folder of a run or job: {case.name} in it is a case file; "
+            f"to start it: sand {kind} {case}"
         )
     return kind or "run"
 

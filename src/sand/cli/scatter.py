@@ -10,7 +10,7 @@ import click
 
 from ..errors import BadInput
 from . import options, report
-from .main import DONE, INTERRUPTED
+from .exits import DONE, INTERRUPTED
 
 
 @click.command("scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.")

@@ -14,8 +14,8 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
 from . import options, report
+from .exits import DONE
 from .export import chosen
-from .main import DONE
 
 LARGE = 100e6
 """Size [B] above which a page takes long to open."""
@@ -87,8 +87,8 @@ def command(
 def _open_dataset(path: Path, verbose: bool) -> Any:
     """Open a run as soon as it has a frame.  Raises BadInput if it does not get one within WAIT."""
     from ..viewer.dataset import run_dataset
+    from ..viewer.external_field import read_field
     from ..viewer.run_files import find_run_folder
-    from ..viewer.simulation_view import read_field
 
     begun = time.monotonic()
     noted = -NOTE_EVERY

@@ -202,7 +202,8 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         raise BadInput(f"there is no folder {place}")
     if not any(place.glob("checkpoint-*.npz")):
         raise BadInput(
-            f"{place} holds no checkpoint to resume from; to start a new run from its last frame: sand run --from {place}"
+            f"{place} holds no checkpoint to resume from; "
+            f"to start a new run from its last frame: sand run --from {place}"
         )
     with writing(place):
         arrays, meta = newest_checkpoint(place)

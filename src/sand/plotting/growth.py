@@ -26,8 +26,8 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
     Parameters
     ----------
     ensembles : Sequence[tuple[str, GrowthResult, dict]]
-        For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with `unit_moment`
-        [A m²] and `unit_radius` [m], the moment and radius of one grain.
+        For each ensemble its name, its `experiments.growth.GrowthResult`, and the aggregates of all boxes with
+        `unit_moment` [A m²] and `unit_radius` [m], the moment and radius of one grain.
     """
     with plot_style():
         figure = Figure(figsize=(9.6, 3.3), layout="constrained")

@@ -65,15 +65,10 @@ def _overlaps(body: Grains) -> list[str]:
 
 def _gaps(body: Grains) -> list[str]:
     """Messages about grains outside the largest cluster, with their nearest neighbour in it."""
-    from scipy.sparse import csr_array  # slow to import, and used for bodies from files only
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
+    from scipy.spatial import cKDTree  # slow to import, and used for bodies from files only
 
-    pairs, _ = _pairs(body)
-    count = len(body)
-    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
-    main = label == np.bincount(label).argmax()
+    main = np.zeros(len(body), dtype=bool)
+    main[largest_cluster(_pairs(body)[0], len(body))] = True
     outside = np.flatnonzero(~main)
     if not len(outside):
         return []
@@ -84,3 +79,14 @@ def _gaps(body: Grains) -> list[str]:
         f"{max(d - body.radius[i] - body.radius[j], 0.0):.3g} m to grain {j}; close it, or leave the grain out"
         for i, j, d in zip(outside, neighbours, distance, strict=True)
     ]
+
+
+def largest_cluster(pairs: np.ndarray, count: int) -> np.ndarray:
+    """Indices of the largest connected cluster among the first `count` grains."""
+    from scipy.sparse import csr_array  # slow to import
+    from scipy.sparse.csgraph import connected_components
+
+    inside = pairs[(pairs < count).all(axis=1)]
+    graph = csr_array((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    return np.flatnonzero(label == np.bincount(label).argmax())

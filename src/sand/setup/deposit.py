@@ -15,6 +15,7 @@ from ..errors import BadInput
 from ..grains import Grains
 from ..material import Material
 from ._kernels.deposition import deposit
+from .checks import largest_cluster
 from .growing import CELL, TRIES, empty_hash_grid, require_all_placed
 from .moments import assign_moments
 from .population import (
@@ -61,36 +62,36 @@ def rbd(
         As for `bpca`.
     """
     count, rng = grain_count(grains, "grains of an aggregate"), random_streams(seed)
-    law = radii_of(radius)
-    if isinstance(law, np.ndarray) or not isinstance(material, (str, Material, Mapping)):
+    distribution = radii_of(radius)
+    if isinstance(distribution, np.ndarray) or not isinstance(material, (str, Material, Mapping)):
         raise BadInput(
             "an rbd is cut from a deposit of more grains; give one radius or a distribution, and no list of materials"
         )
     for doublings in range(DOUBLINGS):
         spare = SPARE * 2**doublings
-        every, side = _of_deposit(count, law, material, rng.population, spare)
-        columns = max(3, int(side / (CELL * every.grain_set.largest)))
-        position, grid = np.zeros((3, len(every.radius))), empty_hash_grid(every.grain_set, side / columns)
-        done = deposit(grid, position, every.grain_set, side, columns, rng.positions, TRIES)
-        require_all_placed(done, len(every.radius), f"grain {done} of the deposit")
-        kept = cut_sphere(position.T, every.radius, count)
+        heap, side = _deposit_grains(count, distribution, material, rng.population, spare)
+        columns = max(3, int(side / (CELL * heap.grain_set.largest)))
+        position, grid = np.zeros((3, len(heap.radius))), empty_hash_grid(heap.grain_set, side / columns)
+        done = deposit(grid, position, heap.grain_set, side, columns, rng.positions, TRIES)
+        require_all_placed(done, len(heap.radius), f"grain {done} of the deposit")
+        kept = cut_sphere(position.T, heap.radius, count)
         if len(kept):
             break
     else:
         raise BadInput(f"no deposit contained a connected cluster of {count} grains; try another seed")
-    kinds = [every.material[k] for k in kept]
-    cut = Population(every.radius[kept], kinds, grain_set_of(every.radius[kept], kinds))
+    kinds = [heap.material[k] for k in kept]
+    cut = Population(heap.radius[kept], kinds, grain_set_of(heap.radius[kept], kinds))
     return assign_moments(centred_grains(position.T[kept], cut), moment, moments, magnetic, rng.moments)
 
 
-def _of_deposit(
-    count: int, law: float | Lognormal | PowerLaw, material: Any, rng: np.random.Generator, spare: float
+def _deposit_grains(
+    count: int, distribution: float | Lognormal | PowerLaw, material: Any, rng: np.random.Generator, spare: float
 ) -> tuple[Population, float]:
     """Grains of a cubic deposit of `spare` times the volume of the sphere plus a margin, and its side [m]."""
-    few = population(max(count, 100), law, material, rng)
-    volume = 4.0 / 3.0 * math.pi * float((few.radius**3).mean())
-    side = (spare * count * volume / FILLING) ** (1.0 / 3.0) + 3.0 * CELL * few.grain_set.largest
-    return population(int(FILLING * side**3 / volume) + 10, law, material, rng), side
+    sample = population(max(count, 100), distribution, material, rng)
+    volume = 4.0 / 3.0 * math.pi * float((sample.radius**3).mean())
+    side = (spare * count * volume / FILLING) ** (1.0 / 3.0) + 3.0 * CELL * sample.grain_set.largest
+    return population(int(FILLING * side**3 / volume) + 10, distribution, material, rng), side
 
 
 def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarray:
@@ -109,31 +110,20 @@ def cut_sphere(position: np.ndarray, radius: np.ndarray, count: int) -> np.ndarr
         Indices (count,); empty if no cluster is that large.
     """
     pairs = Box.open().close_pairs(position, 2.0 * float(radius.max()))
-    apart = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
-    pairs = pairs[apart < radius[pairs].sum(axis=1) * (1.0 + 1e-9)]
-    centre = np.median(position[_largest(pairs, len(position))], axis=0)
+    distance = np.linalg.norm(position[pairs[:, 0]] - position[pairs[:, 1]], axis=1)
+    pairs = pairs[distance < radius[pairs].sum(axis=1) * (1.0 + 1e-9)]
+    centre = np.median(position[largest_cluster(pairs, len(position))], axis=0)
     order = np.argsort(np.linalg.norm(position - centre, axis=1), kind="stable")
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     bonds = rank[pairs]  # grains are numbered by their distance from the centre
     low, high = count, len(order)
-    if len(_largest(bonds, high)) < count:
+    if len(largest_cluster(bonds, high)) < count:
         return np.zeros(0, dtype=np.int64)
     while low < high:  # bisection for the smallest sphere with a cluster of `count` grains
         trial = (low + high) // 2
-        low, high = (low, trial) if len(_largest(bonds, trial)) >= count else (trial + 1, high)
-    return np.sort(order[_trimmed(bonds, _largest(bonds, high), count)])
-
-
-def _largest(bonds: np.ndarray, ranks: int) -> np.ndarray:
-    """Indices of the largest connected cluster among the first `ranks` grains."""
-    from scipy.sparse import csr_array  # slow to import, and rarely used
-    from scipy.sparse.csgraph import connected_components
-
-    inside = bonds[(bonds < ranks).all(axis=1)]
-    graph = csr_array((np.ones(len(inside)), (inside[:, 0], inside[:, 1])), shape=(ranks, ranks))
-    _, label = connected_components(graph, directed=False)
-    return np.flatnonzero(label == np.bincount(label).argmax())
+        low, high = (low, trial) if len(largest_cluster(bonds, trial)) >= count else (trial + 1, high)
+    return np.sort(order[_trimmed(bonds, largest_cluster(bonds, high), count)])
 
 
 def _trimmed(bonds: np.ndarray, cluster: np.ndarray, count: int) -> np.ndarray:

@@ -208,9 +208,9 @@ def _new_state(
 def _longest_displacement(grains: Grains, box: Box, found: ChosenSearch) -> float:
     """Longest displacement [m] of a grain in one Runge–Kutta step for which no pair can be missed.
 
-    With a Verlet list: Δr/4, derived in `integrate.event_location.first_contact_time`. In a periodic box, two grains must also
-    not touch through an image other than the nearest, which is half a box side away: together they may approach by
-    that distance minus r1 + r2. A tenth is subtracted for positions between two stages.
+    With a Verlet list: Δr/4, derived in `integrate.event_location.first_contact_time`. In a periodic box, two grains
+    must also not touch through an image other than the nearest, which is half a box side away: together they may
+    approach by that distance minus r1 + r2. A tenth is subtracted for positions between two stages.
     """
     images = 0.9 * 0.5 * (0.5 * box.shortest - 2.0 * float(grains.radius.max()))
     return min(images, 0.9 * 0.25 * found.search.margin) if found.search.listed else images

@@ -24,7 +24,7 @@ from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, sta
 from .series import series_from_frames, series_from_ledger
 
 if TYPE_CHECKING:
-    from .simulation_view import FieldDescription
+    from .external_field import FieldDescription
 
 FORMAT = 1
 MAX_TRACKED = 8_000_000

@@ -12,7 +12,7 @@ from .dataset import RunDataset
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
-    from .simulation_view import FieldDescription
+    from .external_field import FieldDescription
 
 
 class Snapshot:
