@@ -282,7 +282,7 @@ def test_impact_parameters_that_cannot_be():
         (("seed = 3", 'spins = ["none"]'), "is for job = 'trajectories'"),
         (("seed = 3", "seed = 18446744073709551616"), "seed"),
         (("relative_error = 0.05", "relative_error = 5"), "relative_error"),
-        (('start = "4 b_max"', 'start = "12 nm"'), "is inside r1 + r2"),
+        (('start = "4 b_max"', 'start = "12 nm"'), "is inside r1"),
         (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
     ],
 )
