@@ -110,8 +110,8 @@ def _case_name(case: str | None, source: Path | None) -> str:
     return str(source.parent / CASE)
 
 
-def _usual_folder(told: str | None, case: Path, source: Path | None, frame: int | None) -> Path:
+def _usual_folder(given: str | None, case: Path, source: Path | None, frame: int | None) -> Path:
     """Folder for the files without --out: from the case, or its name; never that of the earlier run."""
     if source is None:
-        return Path(told or case.stem)
+        return Path(given or case.stem)
     return Path(f"{source.parent.name}-from-{'last' if frame is None or frame < 0 else frame}")

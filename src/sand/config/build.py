@@ -97,10 +97,10 @@ def _of_file(case: Case) -> Start:
             start = from_trajectory(path, section.frame, case.materials_by_name())
     except BadInput as error:
         raise error.at("grains") from None
-    told = section.material if isinstance(section.material, list) else [section.material]
+    given = section.material if isinstance(section.material, list) else [section.material]
     there = [m.name for m in start.grains.materials]
-    if "material" in section.model_fields_set and set(told) != set(there):
-        raise BadInput(f"grains.material: the file has {', '.join(there)}, not {', '.join(told)}; leave material out")
+    if "material" in section.model_fields_set and set(given) != set(there):
+        raise BadInput(f"grains.material: the file has {', '.join(there)}, not {', '.join(given)}; leave material out")
     if case.box.periodic is not None and not same_box(case.box.periodic, start.box):
         raise BadInput(
             f"box: it is {case.box.periodic.describe()} here, but {start.box.describe()} in {section.file}; "

@@ -47,16 +47,19 @@ def put4(array, i, v):
 
 @formula
 def add(u, v):
+    """Sum u + v."""
     return u[0] + v[0], u[1] + v[1], u[2] + v[2]
 
 
 @formula
 def sub(u, v):
+    """Difference u − v."""
     return u[0] - v[0], u[1] - v[1], u[2] - v[2]
 
 
 @formula
 def scale(s, v):
+    """Product s v of a number and a vector."""
     return s * v[0], s * v[1], s * v[2]
 
 
@@ -68,11 +71,13 @@ def axpy(s, u, v):
 
 @formula
 def dot(u, v):
+    """Scalar product u · v."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 
 @formula
 def cross(u, v):
+    """Vector product u × v."""
     return (
         u[1] * v[2] - u[2] * v[1],
         u[2] * v[0] - u[0] * v[2],
@@ -82,6 +87,7 @@ def cross(u, v):
 
 @formula
 def norm(v):
+    """Length |v|."""
     return math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
 
 

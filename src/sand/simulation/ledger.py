@@ -131,6 +131,6 @@ class Ledger(LedgerColumns):
         # this form is also true for NaN
         return not change <= RUNAWAY * (energies + dissipated_in(row))
 
-    def drift_per_kT(self, temperature: float, grains: int) -> float:
+    def drift_per_kT(self, temperature: float, grains: int) -> float:  # noqa: N802, a name that scripts count on
         """Change of the total energy over N k_B T; NaN for T = 0."""
         return self._change() / (grains * BOLTZMANN * temperature) if temperature > 0.0 else math.nan

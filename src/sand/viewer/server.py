@@ -207,7 +207,7 @@ class _Handler(BaseHTTPRequestHandler):
         except Exception as error:
             self._send(500, JSON, _json({"error": f"internal error ({type(error).__name__}: {error})"}))
 
-    do_HEAD = do_GET
+    do_HEAD = do_GET  # noqa: N815, a name of http.server
 
     def _checked_address(self) -> tuple[str, str]:
         """Address below the token and query of the request; HTTPError if length, host or token are wrong."""
