@@ -64,6 +64,10 @@ class Run:
                     f"{folder} holds many collisions, which keep no trajectories; for the frames of one give its seed "
                     "and a folder: sand collide CASE.toml --seeds SEED --out DIR"
                 )
+            if any((self.folder / name).exists() for name in (files.SCATTERING, files.FLIGHTS)):
+                raise BadInput(f"{folder} holds a job of sand scatter, which keeps no trajectories of grains")
+            if any(self.folder.glob("seed-*")):
+                raise BadInput(f"{folder} holds the boxes of sand grow; give the folder of one of them, such as seed-1")
             if (self.folder / files.CASE).exists():
                 raise BadInput(f"{folder} has no {files.TRAJECTORY} yet; wait until its run has written a frame")
             raise BadInput(f"{folder} is not the folder of a run: there is no {files.TRAJECTORY} in it")

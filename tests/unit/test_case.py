@@ -10,7 +10,9 @@ import tomli_w
 import sand
 from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
+from sand.config.errors import validate
 from sand.errors import BadInput
+from sand.experiments.growth_case import GrowSection
 from sand.simulation.serialise import case_of
 
 GOOD = tomllib.loads("""
@@ -233,3 +235,23 @@ def test_case_and_script_are_the_same_physics():
         simulation.run(steps=3000)
     assert from_case.time == from_script.time > 0.0
     assert same_bits(from_case, from_script)
+
+
+def test_an_empty_name_of_a_material_is_refused():
+    """An empty string is not the same as no key: it is an unknown material."""
+    with pytest.raises(sand.BadInput, match=r"grains.material: unknown material ''"):
+        check_case(
+            {
+                "run": {"steps": 10},
+                "box": {"periodic": "1 um"},
+                "grains": {"number": 2, "radius": "10 nm", "material": ""},
+            },
+            "c",
+        )
+
+
+def test_an_index_of_a_list_is_named():
+    """Entry 0 of a list is named like the others."""
+    for seeds, place in (([-1, 2], "grow.seeds.0"), ([2, -1], "grow.seeds.1")):
+        with pytest.raises(sand.BadInput, match=place):
+            validate(GrowSection, {"seeds": seeds}, "c", table="grow")

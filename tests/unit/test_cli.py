@@ -162,7 +162,7 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
         (["run", "small.toml", "--seed", "1.5"], "--seed"),
         (["run", "small.toml", "--out", "small.toml"], "small.toml is a file"),
         (["run", "small.toml", "--out", "small.toml/deeper"], "small.toml is a file"),
-        (["run", "."], "sand resume ."),
+        (["run", "."], ". is a folder"),
         (["resume", "nowhere"], "there is no folder nowhere"),
         (["resume", "."], "no checkpoint"),
         (["info", "nowhere"], "there is no file or folder nowhere"),

@@ -336,3 +336,17 @@ def test_a_folder_of_case_files_is_no_job(tmp_path, capsys):
     assert main(["resume", str(tmp_path)]) == 2
     assert "to start it: sand collide" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["collision.toml"]
+
+
+def test_advice_can_be_followed(tmp_path, capsys, monkeypatch):
+    """What `sand collide`, `sand run` and `sand resume` advise about a folder depends on what it holds."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own").mkdir()
+    shutil.copy(Path(__file__).parents[2] / "examples" / "collision.toml", tmp_path / "own" / "case.toml")
+    assert main(["collide", "own/case.toml", "--out", "own"]) == 2
+    assert "sand resume" not in capsys.readouterr().err
+    assert main(["run", "own"]) == 2
+    assert "sand run own/case.toml" in capsys.readouterr().err.replace("\\", "/")
+    (tmp_path / "empty").mkdir()
+    assert main(["resume", "empty"]) == 2
+    assert "--from" not in capsys.readouterr().err

@@ -17,7 +17,7 @@ import click
 
 from ..config.commands import command_for
 from ..errors import BadInput
-from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, plain, read_toml
+from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, is_job, plain, read_toml
 
 T = TypeVar("T")
 Rows = list[tuple[str, str]]
@@ -112,10 +112,12 @@ def how_to_continue(folder: Path) -> str:
 
 def is_resumable(folder: Path) -> bool:
     """Whether `sand resume` can continue the content of a folder."""
-    if checkpoints(folder) or (folder / ONE_COLLISION).exists():
+    if checkpoints(folder):
         return True
+    one = folder / ONE_COLLISION
+    case = one if one.exists() else folder / CASE
     try:
-        return command_for(read_toml(folder / CASE)) not in (None, "run")
+        return case.exists() and is_job(folder, case) and command_for(read_toml(case)) not in (None, "run")
     except BadInput:
         return False
 
@@ -143,7 +145,7 @@ def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows
     every = simulation.frame_every
     if every is None:  # the default of `run`
         every = (end - simulation.time) / 200.0
-    several = every <= end - simulation.time
+    several = math.isfinite(every) and every <= end - simulation.time
     frames = f"a frame every {format_quantity(every, 's')}" if several else "frames at start and end"
     ends = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
     ends += [f"step {int(last_step)}"] if math.isfinite(last_step) else []

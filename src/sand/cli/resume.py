@@ -15,19 +15,15 @@ from ..io.run_folder import (
     COLLISION,
     GROWTH,
     ONE_COLLISION,
-    OUTCOMES,
     SCATTERING,
-    TRAJECTORY,
+    is_job,
     read_json,
     read_toml,
-    was_written_by_sand,
 )
 from ..threads import set_threads
 from . import options, report
 from .exits import DONE
 
-JOB_FILES = {OUTCOMES, COLLISION, GROWTH, SCATTERING, TRAJECTORY}
-"""Files that show that SAND wrote to a folder."""
 RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 """Results file of a finished job, by command."""
 
@@ -78,9 +74,7 @@ def _kind(folder: Path) -> str:
     one = folder / ONE_COLLISION
     case = one if one.exists() else folder / CASE
     kind = command_for(read_toml(case)) if case.exists() else None
-    others = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
-    is_job = was_written_by_sand(case) or any(name in JOB_FILES or name.startswith("checkpoint-") for name in others)
-    if kind not in (None, "run") and not is_job:
+    if kind not in (None, "run") and not is_job(folder, case):
         raise BadInput(
             f"{folder} is not the folder of a run or job: {case.name} in it is a case file; "
             f"to start it: sand {kind} {case}"

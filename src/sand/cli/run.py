@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import click
@@ -53,10 +54,12 @@ def command(
     end = options.seconds(until)
     set_threads(threads)
     if case is not None and Path(case).is_dir():
-        raise BadInput(
-            f"{case} is a folder; to go on with a run: sand resume {case}; to start from its last frame: "
-            f"sand run --from {case}"
-        )
+        folder = Path(case)
+        if report.is_resumable(folder):
+            raise BadInput(f"{case} is a folder; to continue its run: {report.resume_line(folder)}")
+        if (folder / CASE).exists():
+            raise BadInput(f"{case} is a folder; to run its case: sand run {shlex.quote(str(folder / CASE))}")
+        raise BadInput(f"{case} is a folder; give a case file: sand run CASE.toml")
     from ..config.build import simulation_of
     from ..config.case import GrainsSection, read_case
     from .launch import End, launch, refuse_folder

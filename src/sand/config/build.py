@@ -201,10 +201,12 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
     if not any(place.glob("checkpoint-*.npz")):
-        raise BadInput(
-            f"{place} holds no checkpoint to resume from; "
-            f"to start a new run from its last frame: sand run --from {place}"
-        )
+        advice = ""
+        if (place / TRAJECTORY).exists():
+            advice = f"; to start a new run from its last frame: sand run --from {place}"
+        elif (place / CASE).exists():
+            advice = f"; to start the run: sand run {place / CASE}"
+        raise BadInput(f"{place} holds no checkpoint to resume from{advice}")
     with writing(place):
         arrays, meta = newest_checkpoint(place)
     case = _case_of_checkpoint(place, meta)

@@ -199,7 +199,7 @@ class Case(Section):
         return {**PRESETS, **{name: section.build(name) for name, section in self.materials.items()}}
 
 
-def material_errors(content: dict[str, Any], tables: Iterable[str], default: str = "") -> list[str]:
+def material_errors(content: dict[str, Any], tables: Iterable[str], default: str | None = None) -> list[str]:
     """Error messages for numbers in [materials], and for materials that do not exist.
 
     Parameters
@@ -209,7 +209,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
     tables : Iterable[str]
         Tables with a key `material`.
     default : str, optional
-        Value of this key where it is missing.
+        Value of this key where it is missing; None if there is none.
     """
     problems: list[str] = []
     materials = content.get("materials", {})
@@ -225,7 +225,7 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
     for table in tables:
         section = content.get(table)
         given = section.get("material", default) if isinstance(section, dict) else default
-        for name in given if isinstance(given, list) else [given] if given != "" else []:
+        for name in given if isinstance(given, list) else [] if given is None else [given]:
             if isinstance(name, str) and name not in known:
                 problems.append(f"{table}.material: unknown material '{name}'; {did_you_mean(name, known)}")
     return problems

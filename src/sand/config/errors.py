@@ -47,13 +47,14 @@ def validate(model: type[Model], content: Any, name: str, problems: Iterable[str
 def _messages(slip: Any, model: type, table: str) -> list[str]:
     """Messages for one entry of `ValidationError.errors()`."""
     kind, path, given = slip["type"], slip["loc"], slip["input"]
-    place = ".".join(str(part) for part in (table, *path) if part and not str(part).startswith("function-"))
+    parts = [str(part) for part in ((table,) if table else ()) + tuple(path)]
+    place = ".".join(part for part in parts if not part.startswith("function-"))
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         return [f"{place}: there is no such key; {did_you_mean(str(path[-1]), _keys_at(model, path[:-1]))}"]
     if kind == "missing":
         return [f"{place} is missing; add it"]
     if kind == "value_error":  # messages of settings classes may begin with the key already
-        return [f"{place}: {line.removeprefix(f'{path[-1]}: ')}" for line in str(slip["ctx"]["error"]).splitlines()]
+        return [f"{place}: {line.removeprefix(f'{parts[-1]}: ')}" for line in str(slip["ctx"]["error"]).splitlines()]
     if kind in ("dataclass_type", "model_type"):
         return [f"{place} = {given!r}: it must be a table, [{place}]"]
     return [f"{place} = {given!r}: {slip['msg'][0].lower()}{slip['msg'][1:]}"]

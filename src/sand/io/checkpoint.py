@@ -5,8 +5,8 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | array | meaning |
 |---|---|
 | meta.json | JSON as bytes: `format`, `version`, `sha256` of all arrays, step, time, planned end, case, choices |
-| clock | time, steps and the rest of the r-RESPA cycle [s]; meta.json names the entries of this and of the next two |
-| count | numbers of steps, contacts, pairs, made, broken, moved; counters of lists |
+| clock | time and step [s], remaining length of the r-RESPA cycle [s], …; meta.json names entries of clock, count, lost |
+| count | numbers of steps, contacts, candidate pairs, contacts formed and broken, slip events; builds of the lists |
 | lost | energy lost per channel [J] |
 | ledger | all rows so far, (K, columns of ledger.csv) |
 | grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |

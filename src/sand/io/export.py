@@ -141,7 +141,7 @@ def export_frames(
         "xyz", "lammps-dump", "lammps-data" or "vtk".
     clusters : Callable
         Function of the number of grains and the contacts (C, 2) that returns cluster labels (N,), such as
-        `analysis.cluster_labels`.
+        `analysis.clusters.cluster_labels`.
 
     Returns
     -------

@@ -298,15 +298,26 @@ WRITTEN = "# Written by SAND:"
 def was_written_by_sand(path: Path) -> bool:
     """Whether a case file in a folder was written by a run or job, and not by the user: its first line says so."""
     try:
-        first = path.read_text("utf-8").partition("\n")[0]
+        first = path.read_text("utf-8-sig").partition("\n")[0]
     except (OSError, UnicodeDecodeError):
         return False
     return first.startswith(WRITTEN)
+
+
+def is_job(folder: Path, case: Path) -> bool:
+    """Whether SAND works or worked in a folder with a case file, and the case file is not just one of the user."""
+    names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    results = {COLLISION, FLIGHTS, GROWTH, OUTCOMES, SCATTERING, TRAJECTORY}
+    return (
+        was_written_by_sand(case)
+        or bool(results & names)
+        or any(name.startswith(("checkpoint-", "seed-")) for name in names)
+    )
 
 
 def write_toml(path: Path, content: dict[str, Any], comment: str) -> None:
     """Write a case file with a comment at its top."""
     import tomli_w
 
-    text = f"{WRITTEN} {comment}\n\n{tomli_w.dumps(content)}"
+    text = f"{WRITTEN} {' '.join(comment.split())}\n\n{tomli_w.dumps(content)}"
     replace_file(path, text.encode())

@@ -206,12 +206,12 @@ class Frames(FrameSequence):
         return len(self._file)
 
     @contextlib.contextmanager
-    def _reading(self, index: int) -> Iterator[None]:
+    def _reading(self, index: int, problem: str = "is not one of SAND") -> Iterator[None]:
         """Turn exceptions of the reader into BadInput; gsd raises various ones for broken files."""
         try:
             yield
         except Exception as error:
-            raise BadInput(f"frame {index} of {self.path} is not one of SAND ({error})") from error
+            raise BadInput(f"frame {index} of {self.path} {problem} ({error})") from error
 
     def _frame(self, number: int) -> Frame:
         with self._reading(number):
@@ -224,7 +224,7 @@ class Frames(FrameSequence):
 
     def stored(self, index: int) -> Any:
         """A frame as stored by GSD.  Raises BadInput if it is incomplete."""
-        with self._reading(index):
+        with self._reading(index, "cannot be read"):
             return self._file[index % len(self._file)]
 
     def pairs(self, index: int) -> np.ndarray:

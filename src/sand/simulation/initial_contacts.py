@@ -51,8 +51,6 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | None
     """
     if contacts is None or not len(contacts.pair):
         return NO_OVERLAPS.pair
-    if contacts is None or not len(contacts.pair):
-        return NO_OVERLAPS.pair
     count, pair = len(engine.state.grains), np.asarray(contacts.pair)
     if contact is None:
         raise BadInput(f"{len(pair)} contacts are given, but there is no sand.Contact() among the forces; add it")

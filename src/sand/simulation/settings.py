@@ -12,7 +12,7 @@ from .stop import duration
 
 ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "contacts", "out")
 """Arguments of a simulation that are fixed once it is built."""
-RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound")
+RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound", "wall_seconds")
 """Attributes of a simulation that follow from the run."""
 
 
@@ -89,7 +89,7 @@ class ReadOnlySettings:
         "frame_every": read_frame_interval,
         "observers": read_observers,
     }
-    INTERNAL = ("recipe", "origin", "planned", "wall_seconds")
+    INTERNAL = ("recipe", "origin", "planned")
     """Attributes that SAND itself assigns later."""
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -115,7 +115,11 @@ class Server(ThreadingHTTPServer):
     def process_request(self, request: Any, client_address: Any) -> None:
         """Serve a connection in a thread of its own, up to MAX_CONNECTIONS at a time."""
         if self._free_connections.acquire(blocking=False):
-            super().process_request(request, client_address)
+            try:
+                super().process_request(request, client_address)
+            except BaseException:  # the thread could not be started
+                self._free_connections.release()
+                raise
         else:
             self.shutdown_request(request)
 
