@@ -12,7 +12,7 @@ from sand.contact.gather import BLOCK, DENSE_FROM, LARGEST_CLASS, gather, resort
 from sand.integrate.motion import gather_and_kick, kick, kick_and_drift_for
 from sand.integrate.task_queue import GRAINS_PER_BLOCK
 from sand.state.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_arrays
-from sand.state.state import CONTACTS, COUNT, LARGEST_SPEED, LARGEST_SPIN
+from sand.state.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 
 GRAINS = GATHER_ORDER_FROM + 37
 """Enough for an order of their own, and a last block that is not full."""
@@ -144,8 +144,8 @@ def test_the_fastest_grain_of_all_blocks_is_known(moved):
     sim.run(steps=3)
     watch, v, w = sim.state.pair_list.skin, sim.grains.velocity, sim.grains.spin
     assert GRAINS > GRAINS_PER_BLOCK and (v**2).sum(axis=1).argmax() == moved
-    assert watch[LARGEST_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
-    assert watch[LARGEST_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[LARGEST_SPIN] > 0.0
+    assert watch[SQUARED_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
+    assert watch[SQUARED_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[SQUARED_SPIN] > 0.0
 
 
 @pytest.mark.validate

@@ -264,9 +264,9 @@ def test_steps_are_counted_through_growing_arrays():
 @pytest.mark.parametrize(
     ("far", "there", "not_there"),
     [
-        ("impulse", ("slow_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "cell_of")),
-        ("taylor", ("torque_rate", "past_position", "past_moment"), ("slow_force", "path", "order", "cell_start")),
-        ("every step", ("force", "torque"), ("slow_torque", "force_rate", "past_position", "order")),
+        ("impulse", ("constant_force", "past_position", "path"), ("force_rate", "past_moment", "anchor", "cell_of")),
+        ("taylor", ("torque_rate", "past_position", "past_moment"), ("constant_force", "path", "order", "cell_start")),
+        ("every step", ("force", "torque"), ("constant_torque", "force_rate", "past_position", "order")),
     ],
 )
 def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):

@@ -6,17 +6,17 @@ import pytest
 import sand
 from sand.integrate.kernel_spec import Stop
 from sand.integrate.step_parts import INNER_SKIN_FRACTION
-from sand.neighbours.skin import largest_displacement, largest_speeds
+from sand.neighbours.skin import largest_displacement, largest_squared_speeds
 from sand.simulation import assemble as translate
 from sand.state.state import (
     BROKEN,
     INNER_SKIN,
-    LARGEST_SPEED,
-    LARGEST_SPIN,
     LONG_RANGE_SKIN,
     MADE,
     PAIR_LIST_SKIN,
     REBUILT,
+    SQUARED_SPEED,
+    SQUARED_SPIN,
 )
 
 
@@ -79,8 +79,8 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
             assert w.pair_list.skin[place] <= limit - strayed + 1e-12 * limit
             spared += w.pair_list.skin[place] > 0.0
         speeds = np.linalg.norm(sim.grains.velocity, axis=1).max(), np.linalg.norm(sim.grains.spin, axis=1).max()
-        assert np.sqrt(w.pair_list.skin[[LARGEST_SPEED, LARGEST_SPIN]]) == pytest.approx(speeds, rel=1e-14)
-        assert np.sqrt(largest_speeds(w.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
+        assert np.sqrt(w.pair_list.skin[[SQUARED_SPEED, SQUARED_SPIN]]) == pytest.approx(speeds, rel=1e-14)
+        assert np.sqrt(largest_squared_speeds(w.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
     assert spared > 10
 
 
@@ -159,7 +159,7 @@ def test_what_is_no_number_is_the_largest(sign):
     arrays = crowd().grains.copy().arrays
     anchor, span = arrays.position.copy(), sand.Box.open().span
     arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
-    assert np.isnan(largest_speeds(arrays)[0]) and np.isfinite(largest_speeds(arrays)[1])
+    assert np.isnan(largest_squared_speeds(arrays)[0]) and np.isfinite(largest_squared_speeds(arrays)[1])
     assert np.isnan(largest_displacement(arrays, anchor, span))
 
 

@@ -102,7 +102,8 @@ def bond_between(pairing, r1, r2, m1, m2):
     radius = a0 if adhesive else HERTZ_CONTACT_RADIUS * reduced
     k_n = jkr.normal_stiffness(a0, pairing.modulus) if adhesive else 2.0 * pairing.modulus * radius
     damping = pairing.damping + pairing.damping_per_radius * radius
-    # squared frequencies of the four modes of the free pair; I = (2/5) m r²
+    # squared frequencies of the four modes of the free pair; I = (2/5) m r². Sliding: r²/I = 5/(2m) adds 5/2 to each
+    # 1/m, hence 7/2; rolling (stiffness k_r R²) and twisting: 1/I1 + 1/I2
     inverse_mass = 1.0 / m1 + 1.0 / m2
     inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
     squared_frequency = max(k_n * inverse_mass, 3.5 * k_s * inverse_mass)
@@ -344,10 +345,10 @@ def breaking_loss(bond):
 def contact_speed_gain(overlap, closing, reduced, bond, dt):
     """Increase w′ − w of the closing speed [m/s] by the contact force between first touch and this overlap.
 
-    ½ m̄ w′² + U(δ) + dt² (k w′²/12 − F²/(24 m̄)) = ½ m̄ w² + U(0), k = dF/dδ: the left-hand side is the quantity that
-    velocity Verlet conserves in the contact (Hairer, Lubich & Wanner 2006, IX.1).  Without the terms in dt² the mean
-    energy of the oscillation that follows is (ω dt)²/8 too low.  w′ = 0 where no kinetic energy is left (no adhesion,
-    grazing contact).
+    ½ m̄ w′² + U(δ) + dt² (k w′²/12 − F²/(24 m̄)) = ½ m̄ w² + U(0), k = dF/dδ: the left-hand side is the modified
+    energy that velocity Verlet conserves (shadow Hamiltonian; Hairer, Lubich & Wanner 2006, IX.1).  Without the terms
+    in dt² the mean energy of the oscillation that follows is too low by a fraction (ω dt)²/8.  w′ = 0 where no kinetic
+    energy is left (no adhesion, grazing contact).
 
     Parameters
     ----------

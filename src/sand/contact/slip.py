@@ -1,9 +1,10 @@
-"""First pass over contacts, with slip: blocks of contacts use the plain loop or a branch-free one.
+"""First pass over contacts: per block, a loop that only flags contacts beyond a limit, or one that lets them slip.
 
-The plain loop (`update.contact_loop`) only flags contacts beyond a limit, and `events.update_flagged_contacts` handles
+The first loop (`update.contact_loop`) only flags contacts beyond a limit, and `events.update_flagged_contacts` handles
 them one by one.  In strongly excited aggregates most contacts slip in every step.  Blocks in which more than 10 % of
-the contacts slipped in the last step therefore use a branch-free kernel that updates slipping contacts in place, with
-selections instead of branches, so that it vectorises.  Both give the same results.
+the contacts were flagged in the last step therefore use `_loop_with_slip`, which computes slip for every contact and
+selects the result where a limit is exceeded.  Both loops are free of branches, so that they vectorise, and give the
+same results.
 """
 
 import math
@@ -91,8 +92,8 @@ def _add_to_contact_losses(losses, c, slid, rolled, twisted):
 
 
 @loop
-def _branch_free_loop(grains, contacts, first, last, column, span, law, dt):
-    """Branch-free version of `contact_loop` in which contacts beyond a limit slip.
+def _loop_with_slip(grains, contacts, first, last, column, span, law, dt):
+    """Version of `contact_loop` in which contacts beyond a limit slip.
 
     Contacts that break, or are compressed beyond the range of the JKR polynomial, are only flagged.
     """
@@ -160,7 +161,7 @@ def contact_pass(grains, contacts, first, last, span, law, dt):
         for k in range(end - begin):
             slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
         if slipped_before > SLIP_FRACTION * (end - begin) and not law.follow:
-            part = _branch_free_loop(grains, contacts, begin, end, column, span, law, dt)
+            part = _loop_with_slip(grains, contacts, begin, end, column, span, law, dt)
             pending += part.pending
             slipped += part.slipped
             slid += part.slid

@@ -32,7 +32,8 @@ this step in the pass over contacts.
 def uniform_contacts(contacts):
     """Whether one set of constants serves all contacts.
 
-    With exactly BLOCK contacts allocated the answer is False, which is harmless: all columns are then equal.
+    Uniform constants are stored as BLOCK identical columns, individual ones as one column per allocated contact.
+    If BLOCK contacts are allocated the two cannot be distinguished; the answer False is then also correct.
     """
     return contacts.bond.shape[1] != contacts.flag.size
 
@@ -182,10 +183,10 @@ def write_loads(grains, contacts, span, law, c):
 
 @rare
 def contact_step(contacts, pair_list, count, n, clock, per_period):
-    """Set the longest step [s] allowed by contacts: shortest period / per_period, less above 6 contacts per grain.
+    """Set the longest step [s] allowed by contacts: shortest period / per_period, times √(6/z) for z > 6 contacts.
 
-    Candidate pairs count as well, so that a contact between small grains never begins at the step of large grains.  The
-    step is infinite without contacts: then the closing speeds of pairs are examined in every step.
+    Contact candidates are included, so that the step is short enough before two small grains touch.  The step is
+    infinite without contacts: then the closing speeds of pairs are examined in every step.
     """
     squared_frequency, most_contacts = 0.0, 0
     for c in range(count[CONTACTS]):

@@ -15,20 +15,20 @@ from ..contact.events import count_new_contacts
 from ..forces.external.loops import external_loads
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE
 from ..neighbours.skin import consume_skins, invalidate_speeds, reset_skins
-from ..state.state import CONTACTS, CYCLE, LARGEST_SPEED, LARGEST_SPIN, LEFT, LONG_RANGE_SUMS, STAGE, STEP, STEPS, TIME
+from ..state.state import CONTACTS, CYCLE, LEFT, LONG_RANGE_SUMS, SQUARED_SPEED, SQUARED_SPIN, STAGE, STEP, STEPS, TIME
 from .kernel_spec import KernelSpec, Stop
 from .motion import kick
 from .parallel_loops import large_loops
 from .respa import (
+    add_constant_loads,
     add_extrapolated_loads,
     add_long_range_loads,
-    add_slow_loads,
     apply_impulse,
     clear_long_range_loads,
     contact_pair_loops,
     correct_angular_momentum,
     integrate_displacement,
-    update_slow_loads,
+    update_constant_loads,
 )
 from .step_control import cycle_steps
 from .step_parts import (
@@ -73,14 +73,14 @@ def _no_impulse_at_early_end(grains, long_range, span, clock, elapsed):
 @loop
 def _impulse_at_start(grains, long_range, clock, dt):
     """First impulse of a cycle; the kick dt/2 of its first step already contains dt/2 of the long-range loads."""
-    update_slow_loads(grains, long_range)
+    update_constant_loads(grains, long_range)
     if clock[CYCLE] > dt:
         apply_impulse(grains, long_range, 0.5 * (clock[CYCLE] - dt))
 
 
 @loop
 def _impulse_within(grains, long_range, span, clock, dt):
-    """Between two steps of a cycle, of clock[STEP] and dt seconds: accumulate the path of the slow force."""
+    """Between two steps of a cycle, of clock[STEP] and dt seconds: accumulate the path of the constant force."""
     integrate_displacement(grains, long_range, span, 0.5 * (clock[STEP] + dt))
 
 
@@ -95,7 +95,7 @@ def _impulse_at_end(grains, long_range, span, clock, elapsed, dt):
 
 @loop
 def _impulse_at_early_end(grains, long_range, span, clock, elapsed):
-    """Second impulse between two steps: the last half kick contained the slow loads only."""
+    """Second impulse between two steps: the last half kick contained the constant loads only."""
     apply_impulse(grains, long_range, 0.5 * clock[STEP])
     _impulse_at_end(grains, long_range, span, clock, elapsed, clock[STEP])
 
@@ -133,7 +133,7 @@ def loads_loop(spec: KernelSpec) -> Callable:
     add_external = external_loads(spec.external)
     gather_all, long_range_loads = large_loops(spec).gather, large_loops(spec).long_range_loads
     add_within_cycle = (
-        add_extrapolated_loads if spec.taylor else add_slow_loads if spec.impulse else _no_loads_within_cycle
+        add_extrapolated_loads if spec.taylor else add_constant_loads if spec.impulse else _no_loads_within_cycle
     )
     subtract_contact_pairs = contact_pair_loops(spec.long_range.pair)[1] if spec.split else _no_reassignment
 
@@ -182,7 +182,7 @@ def loads_and_kick_loop(spec: KernelSpec) -> Callable:
 def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
     """The two halves of a velocity Verlet step.
 
-    The second half of a step of 0 s finds pairs and existing contacts and computes the loads.
+    See `driver_for` for the step of length 0 at the start of a run.
     """
     drift_with_work = drift_with_work_for(spec.external, large_loops(spec).drift)
     sum_loads, loads_and_kick = loads_loop(spec), loads_and_kick_loop(spec)
@@ -244,7 +244,7 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
         due = clock[LEFT] == 0.0 or broken or formed > 0
         add_contact_pairs(grains, contacts, count, parameters.span, parameters.long_range)
         fastest, fastest_spin = loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed)
-        pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN] = fastest, fastest_spin
+        pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN] = fastest, fastest_spin
         if due:
             impulse_at_end(grains, long_range, parameters.span, clock, elapsed, dt)
             reassign_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
@@ -267,7 +267,8 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
 def driver_for(spec: KernelSpec) -> Callable:
     """Compile the driver `advance` for one specification.
 
-    A run starts at STAGE 1 with a step of 0 s, whose counters and energies are discarded.
+    A run starts in the middle of a step of length 0 (STAGE 1): its second half builds the lists, finds grains that
+    overlap already and sums the loads; its counters and energies are discarded.
     """
     first_half, second_half = half_steps_for(spec)
     join = join_workers if spec.queue else no_workers

@@ -1,4 +1,11 @@
-"""Multiple time stepping: impulses (r-RESPA) or Taylor extrapolation of the long-range loads within a cycle."""
+"""Multiple time stepping of the long-range loads: r-RESPA (Tuckerman et al. 1992) or Taylor extrapolation.
+
+With r-RESPA the long-range force F of a grain is summed at both ends of a cycle of length T and split:
+1. forces between grains in contact are evaluated in every step (`contact_pair_loops`);
+2. a constant part F̄, updated rarely (`update_constant_loads`), acts in every step;
+3. the remainder F − F̄ acts as an impulse ½T (F − F̄) at each end of the cycle.
+Loads are forces and torques; both are treated in the same way.  See docs/physics/long-range.md.
+"""
 
 import functools
 from collections.abc import Callable
@@ -11,11 +18,11 @@ from ..contact.update import BROKEN_FLAG, padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..state.state import CONTACTS
 
-SLOW_FORCE_CHANGE = 0.5
-"""Relative change of a grain's long-range load at which its slow part is set to the present load.
+CONSTANT_PART_CHANGE = 0.5
+"""Relative change of a grain's long-range load at which its constant part is set to the present load.
 
-Tested on a chain of 20 grains, at rest and vibrating, in cycles of 70 steps with 0.2, 0.5 and 1 (no slow part): with
-0.2 the energy of the vibrating chain drifts, with 1 the impulses excite the chain at rest; see
+Tested on a chain of 20 grains, at rest and vibrating, in cycles of 70 steps with 0.2, 0.5 and 1 (no constant part):
+with 0.2 the energy of the vibrating chain drifts, with 1 the impulses excite the chain at rest; see
 docs/physics/long-range.md.
 """
 
@@ -37,34 +44,34 @@ def add_long_range_loads(grains, long_range):
 
 
 @loop
-def add_slow_loads(grains, long_range, since):
-    """Add the slow part of the long-range loads, which acts in every step.
+def add_constant_loads(grains, long_range, since):
+    """Add the constant part of the long-range loads, which acts in every step.
 
     A constant load can be split off without error, and impulses of the remainder excite a cluster at rest much less.
     """
     for i in range(grains.mass.size):
-        accrue(grains.force, i, load(long_range.slow_force, i))
-        accrue(grains.torque, i, load(long_range.slow_torque, i))
+        accrue(grains.force, i, load(long_range.constant_force, i))
+        accrue(grains.torque, i, load(long_range.constant_torque, i))
 
 
 @loop
-def update_slow_loads(grains, long_range):
-    """At the start of a cycle: update slow loads that differ too much from present loads, reset the path integral."""
+def update_constant_loads(grains, long_range):
+    """At the start of a cycle: update constant loads that differ too much from present ones, reset ∫(x − x_n) dt."""
     for i in range(grains.mass.size):
         force, torque = load(long_range.force, i), load(long_range.torque, i)
-        change = sub(force, load(long_range.slow_force, i))
-        if dot(change, change) > SLOW_FORCE_CHANGE**2 * dot(force, force):
-            put(long_range.slow_force, i, force)
-        change = sub(torque, load(long_range.slow_torque, i))
-        if dot(change, change) > SLOW_FORCE_CHANGE**2 * dot(torque, torque):
-            put(long_range.slow_torque, i, torque)
+        change = sub(force, load(long_range.constant_force, i))
+        if dot(change, change) > CONSTANT_PART_CHANGE**2 * dot(force, force):
+            put(long_range.constant_force, i, force)
+        change = sub(torque, load(long_range.constant_torque, i))
+        if dot(change, change) > CONSTANT_PART_CHANGE**2 * dot(torque, torque):
+            put(long_range.constant_torque, i, torque)
         put(long_range.past_position, i, load(grains.position, i))
         put(long_range.path, i, (0.0, 0.0, 0.0))
 
 
 @loop
 def integrate_displacement(grains, long_range, span, weight):
-    """Accumulate ∫(x − x_n) dt, x_n at the start of the cycle, where the slow force acts for `weight` seconds."""
+    """Accumulate ∫(x − x_n) dt, x_n at the start of the cycle, where the constant force acts for `weight` seconds."""
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
         accrue(long_range.path, i, scale(weight, moved))
@@ -72,9 +79,9 @@ def integrate_displacement(grains, long_range, span, weight):
 
 @loop
 def correct_angular_momentum(grains, long_range, span, weight):
-    """Correct the spins so that the slow forces leave the total angular momentum unchanged.
+    """Correct the spins so that the constant forces leave the total angular momentum unchanged.
 
-    The long-range loads conserve L at the positions x_n and x_{n+1}, where they are summed.  The slow force F̄ of a
+    The long-range loads conserve L at the positions x_n and x_{n+1}, where they are summed.  The constant force F̄ of a
     grain also acts at the positions in between, and the impulse of weight w that compensates it at the end of the
     cycle acts at x_{n+1}.  The excess angular momentum is
 
@@ -82,7 +89,7 @@ def correct_angular_momentum(grains, long_range, span, weight):
     """
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
-        excess = cross(axpy(-weight, moved, load(long_range.path, i)), load(long_range.slow_force, i))
+        excess = cross(axpy(-weight, moved, load(long_range.path, i)), load(long_range.constant_force, i))
         accrue(grains.spin, i, scale(-1.0 / grains.inertia[i], excess))
 
 
@@ -96,10 +103,10 @@ def add_extrapolated_loads(grains, long_range, since):
 
 @loop
 def apply_impulse(grains, long_range, dt):
-    """v += ΔF dt/m, ω += ΔM dt/I, with the difference of the long-range loads from their slow part."""
+    """v += ΔF dt/m, ω += ΔM dt/I, with the difference of the long-range loads from their constant part."""
     for i in range(grains.mass.size):
-        force = sub(load(long_range.force, i), load(long_range.slow_force, i))
-        torque = sub(load(long_range.torque, i), load(long_range.slow_torque, i))
+        force = sub(load(long_range.force, i), load(long_range.constant_force, i))
+        torque = sub(load(long_range.torque, i), load(long_range.constant_torque, i))
         accrue(grains.velocity, i, scale(dt / grains.mass[i], force))
         accrue(grains.spin, i, scale(dt / grains.inertia[i], torque))
 

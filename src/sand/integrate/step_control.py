@@ -17,13 +17,13 @@ from ..state.state import (
     CYCLE,
     GRAIN1,
     GRAIN2,
-    LARGEST_SPEED,
     LEFT,
     LEVEL,
     LONG_RANGE_LEVEL,
     NEEDED,
     PAIRS,
     SAFE_SPEED,
+    SQUARED_SPEED,
     STEP,
     STEP_INCREASES,
     STEPS,
@@ -157,10 +157,10 @@ def pair_step(grains, pair_list, span, criteria, p):
 
 
 @loop
-def _safe_speed(pair_list, criteria):
-    """Whether the relative speed of any two grains is too low to need a step below that of the contacts."""
+def _all_speeds_safe(pair_list, criteria):
+    """Whether no two grains are fast enough (twice the largest speed) to need a step below that of the contacts."""
     impact = criteria.impact * pair_list.skin[SAFE_SPEED]
-    return 4.0 * pair_list.skin[LARGEST_SPEED] < impact * impact
+    return 4.0 * pair_list.skin[SQUARED_SPEED] < impact * impact
 
 
 @loop
@@ -217,7 +217,7 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
             if not clock[CALM] > 0.0:
                 return 0.0
             clock[LONG_RANGE_LEVEL] = quantise_step(clock[LONG_RANGE_LEVEL], cycle, may_grow)
-        slow = not no_contacts and _safe_speed(pair_list, criteria)
+        slow = not no_contacts and _all_speeds_safe(pair_list, criteria)
         wanted = clock[CALM] if slow else closing_step(grains, pair_list, count, span, criteria, clock[CALM])
         if not wanted > 0.0:
             return 0.0

@@ -23,12 +23,12 @@ from ..state.state import (
     GRAIN2,
     INNER_SKIN,
     KICKED,
-    LARGEST_SPEED,
-    LARGEST_SPIN,
     LEFT,
     LONG_RANGE_SKIN,
     OUTSIDE,
     PAIR_LIST_SKIN,
+    SQUARED_SPEED,
+    SQUARED_SPIN,
     STEP,
     STEPS,
     TIME,
@@ -85,7 +85,7 @@ def possible_step(grains, contacts, pair_list, long_range, clock, count, paramet
     if clock[TIME] + dt == clock[TIME]:
         find_limiting_grains(grains, long_range, contacts.start, pair_list, count, parameters.span, parameters.criteria)
         return 0.0, Stop.NO_STEP
-    stop = _moves_too_far(pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN], parameters.criteria.reach, dt)
+    stop = _moves_too_far(pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN], parameters.criteria.reach, dt)
     if stop != Stop.STEPS_DONE:
         count[GRAIN1] = _first_too_fast(grains, parameters.criteria.reach, dt, stop)
         return 0.0, stop

@@ -36,7 +36,7 @@ class Verlet:
         (|U_min| for dipoles); above 0, below 1.
     far : str, optional
         Integration of long-range forces while there are contacts. "impulse": r-RESPA; the forces are summed once per
-        cycle of steps, their slow part acts in every step and the difference as impulses at both ends of the cycle;
+        cycle of steps, their constant part acts in every step and the difference as impulses at both ends of the cycle;
         forces between grains in contact act in every step. "taylor": extrapolated within the cycle by their
         first-order Taylor series, with the mean motion of grains in contact. "taylor-literal": as in the paper, with
         the instantaneous velocity and spin of all grains, contact oscillations included. "every step": summed in

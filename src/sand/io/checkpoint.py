@@ -5,7 +5,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | array | meaning |
 |---|---|
 | meta.json | JSON as bytes: `format`, `version`, `sha256` of all arrays, step, time, planned end, case, choices |
-| clock | time and step [s], remaining length of the r-RESPA cycle [s], …; meta.json names entries of clock, count, lost |
+| clock | time and step [s], remaining length of the r-RESPA cycle [s], …; meta.json names all entries |
 | count | numbers of steps, contacts, candidate pairs, contacts formed and broken, slip events; builds of the lists |
 | lost | energy lost per channel [J] |
 | ledger | all rows so far, (K, columns of ledger.csv) |

@@ -80,7 +80,7 @@ STORED = {
     "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
     **{
         f"long_range/{name}": ArraySpec("f8", (3, (0, "N")))
-        for name in ("force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
+        for name in ("force", "torque", "constant_force", "constant_torque", "past_position", "past_moment", "path")
     },
 }
 """All arrays of a checkpoint."""

@@ -67,7 +67,7 @@ def cells_on_axis(low, high, length, reach):
 
 @loop
 def choose_grid(anchor, span, reach):
-    """Grid of cells at least `reach` wide, with at most CELLS_PER_GRAIN cells per grain (but 27 are always allowed).
+    """Grid of cells at least `reach` wide, with at most CELLS_PER_GRAIN · N + 27 cells.
 
     An open axis extends between the outermost grains.  Along x, cells are subdivided into up to MAX_SUBDIVISION, until
     there is a cell per grain.

@@ -17,7 +17,7 @@ from ..compiler.jit import loop
 from ..contact.pair_types import pair_type_count
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..numerics.vec import dot, load, sub
-from ..state.state import INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED
+from ..state.state import INNER_SKIN, LONG_RANGE_SKIN, PAIR_LIST_SKIN, SAFE_SPEED, SQUARED_SPEED, SQUARED_SPIN
 
 UNKNOWN = -1.0
 """Marks a speed that must be recomputed, and a skin that is used up."""
@@ -28,7 +28,7 @@ SKIN_SAFETY = 0.999
 @loop
 def invalidate_speeds(pair_list):
     """Mark the largest speeds as unknown, after velocities were changed without updating them."""
-    pair_list.skin[LARGEST_SPEED] = pair_list.skin[LARGEST_SPIN] = UNKNOWN
+    pair_list.skin[SQUARED_SPEED] = pair_list.skin[SQUARED_SPIN] = UNKNOWN
 
 
 @loop
@@ -55,7 +55,7 @@ def reset_skins(pair_list, count):
 
 
 @loop
-def largest_speeds(grains):
+def largest_squared_speeds(grains):
     """Squares of the largest speed [m²/s²] and spin [1/s²]."""
     fastest = fastest_spin = float_bits(0.0)
     for i in range(grains.mass.size):
@@ -75,8 +75,8 @@ def consume_skins(pair_list, displacement):
 @loop
 def update_speeds(grains, pair_list):
     """Recompute the largest speeds if they are unknown."""
-    if pair_list.skin[LARGEST_SPEED] < 0.0:
-        pair_list.skin[LARGEST_SPEED], pair_list.skin[LARGEST_SPIN] = largest_speeds(grains)
+    if pair_list.skin[SQUARED_SPEED] < 0.0:
+        pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN] = largest_squared_speeds(grains)
 
 
 @loop

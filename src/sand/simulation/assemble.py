@@ -159,7 +159,7 @@ def _kernel_spec(
     grains: Grains, forces: ForcesByType, external: Callable, sums: LongRangeSums, verlet: Verlet, adaptive: bool
 ) -> KernelSpec:
     """Specification from which the driver is compiled."""
-    # without contacts, or with cycles of one step, there is neither extrapolation nor a slow force
+    # without contacts, or with cycles of one step, there is neither extrapolation nor a constant force
     scheme = verlet.far if forces.long_range and forces.contact and verlet.max_cycle_steps > 1 else "every step"
     return KernelSpec(
         external,

@@ -69,8 +69,8 @@ class LongRangeArrays(NamedTuple):
     source: np.ndarray  # (3, V) moments, or charges in the first row; (1, P) if no force needs them
     force: np.ndarray  # (3, N) long-range forces [N]; (3, 0) if there are none
     torque: np.ndarray  # (3, N) long-range torques [N m]; likewise
-    slow_force: np.ndarray  # (3, N) slow force: the part that acts in every step of an r-RESPA cycle [N]
-    slow_torque: np.ndarray  # (3, N) [N m]
+    constant_force: np.ndarray  # (3, N) constant force: the part that acts in every step of an r-RESPA cycle [N]
+    constant_torque: np.ndarray  # (3, N) [N m]
     force_rate: np.ndarray  # (3, N) time derivatives of the loads (Taylor scheme) [N/s]
     torque_rate: np.ndarray  # (3, N) [N m/s]
     past_position: np.ndarray  # (3, N) positions at the last summation, or the one before [m]
@@ -87,12 +87,21 @@ class StageArrays(NamedTuple):
     power: np.ndarray  # (7,) power of the external forces at each stage [W]
 
 
-SAVED_LONG_RANGE = ("anchor", "force", "torque", "slow_force", "slow_torque", "past_position", "past_moment", "path")
+SAVED_LONG_RANGE = (
+    "anchor",
+    "force",
+    "torque",
+    "constant_force",
+    "constant_torque",
+    "past_position",
+    "past_moment",
+    "path",
+)
 """Long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
 CELL_ARRAYS = ("order", "cell_of", "cell_start", "source")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
-RESPA_ARRAYS = ("slow_force", "slow_torque", "past_position", "path")
+RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
 """Long-range arrays needed only with long-range forces, cells, a Verlet list, r-RESPA cycles or Taylor series."""
 UNIFORM_ARRAYS = ("bond", "step", "length")

@@ -61,7 +61,7 @@ COUNT = (
 )
 
 # --- indices of PairList.skin (float64), see neighbours.skin ------------------------------------------------
-LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, LARGEST_SPEED, LARGEST_SPIN, SAFE_SPEED, INNER_COUNT = range(7)
+LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, SQUARED_SPEED, SQUARED_SPIN, SAFE_SPEED, INNER_COUNT = range(7)
 
 # --- indices of State.lost (float64): energy dissipated or transferred, per channel [J] ---------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
