@@ -13,6 +13,7 @@ import numpy as np
 
 from sand.io.trajectory import read_frames
 from sand.viewer.dataset import run_dataset
+from sand.viewer.external_field import FieldDescription
 from sand.viewer.html import write_page
 from sand.viewer.server import Server
 
@@ -73,8 +74,8 @@ class Shows:
             server.stop()
 
 
-def _field() -> Any:
-    return "5 mT, constant", lambda time: (3e-3, 0.0, 4e-3)
+def _field() -> FieldDescription:
+    return FieldDescription("5 mT, constant", lambda time: (3e-3, 0.0, 4e-3))
 
 
 class View:
