@@ -32,7 +32,7 @@ CHANGES = """async ([from, count]) => {
     await sandView.frames.get(k);
     await new Promise((on) => setTimeout(on, 600));
     const begun = performance.now();
-    await sandView.go(k);
+    await sandView.navigation.go(k);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     spent.push(performance.now() - begun);
   }
@@ -40,7 +40,7 @@ CHANGES = """async ([from, count]) => {
 }"""
 """Changes to frames that are there already, as they are when a run is played: ms each."""
 ALL_LOOKED_AT = """async () => {
-  for (let k = 0; k < sandView.manifest.times.length; k++) await sandView.go(k);
+  for (let k = 0; k < sandView.manifest.times.length; k++) await sandView.navigation.go(k);
   return sandView.manifest.bytes;
 }"""
 FEWER = 7

@@ -220,7 +220,7 @@ def test_clusters_are_whole_at_first_as_in_still_pictures(page, shows, source):
     assert page.evaluate("() => sandView.state.setting('whole').initial")
     for k in FRAMES["hundred"]:
         frame = view.go(k)
-        places = np.array(page.evaluate("() => [...sandView.picture.place]")).reshape(-1, 3) * view.shown.unit
+        places = np.array(page.evaluate("() => [...sandView.picture.positions]")).reshape(-1, 3) * view.shown.unit
         drawn, side = make_scene(frame, frame.pair, frame.box).position, np.array(frame.drawn)
         boxes = (places - drawn) / side
         assert np.abs(boxes - np.rint(boxes)).max() < 1e-6
