@@ -77,7 +77,7 @@ def command(
 
 
 def _check_options(
-    source: Path, what: str | None, out: str | None, form: str, overwrite: bool, how: dict[str, Any]
+    source: Path, selection: str | None, out: str | None, form: str, overwrite: bool, how: dict[str, Any]
 ) -> tuple[Path, list[str]]:
     """Folder to write to and names of what to draw; converts `how` for the picture.  Raises BadInput, all errors."""
     from ..analysis.quantities import GRAIN_NAMES
@@ -87,13 +87,15 @@ def _check_options(
     problems: list[str] = []
     is_trajectory = source.is_file()
     default = (STILL,) if is_trajectory else (*HISTORY, STILL)
-    names = list(dict.fromkeys(part.strip() for part in what.split(","))) if what is not None else list(default)
+    names = (
+        list(dict.fromkeys(part.strip() for part in selection.split(","))) if selection is not None else list(default)
+    )
     allowed = (*HISTORY, STILL, *GRAIN_NAMES)
     problems += [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
     if is_trajectory:
         missing = [name for name in names if name in HISTORY]
         problems += [f"--what {name}: {source} has no ledger; give a run's folder" for name in missing]
-    if how["cluster"] is not None and what is not None and (others := [name for name in names if name != STILL]):
+    if how["cluster"] is not None and selection is not None and (others := [name for name in names if name != STILL]):
         problems.append(
             f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
         )

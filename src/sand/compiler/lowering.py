@@ -218,9 +218,9 @@ class _Lowering(typed.NativeLowering):
 
 
 class KernelCompiler(CompilerBase):
-    """Compiler for kernels: numba's passes without those that have no effect on SAND's code."""
+    """Compiler for kernels: numba's passes, except passes that have no effect on SAND's code."""
 
-    library_class: Any = KernelLibrary
+    code_library_class: Any = KernelLibrary
     passes = (
         untyped.TranslateByteCode,
         untyped.FixupArgs,
@@ -247,7 +247,7 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         """Set up library and passes."""
         self.state.targetctx.__class__ = Context  # the context is a copy made for this function
-        library = self.library_class(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        library = self.code_library_class(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         library.enable_object_caching()
         self.state["library"] = library
         manager = PassManager("sand")
@@ -260,16 +260,16 @@ class KernelCompiler(CompilerBase):
 class LongVectorCompiler(KernelCompiler):
     """Compiler for kernels with long loops."""
 
-    library_class = LongVectorKernelLibrary
+    code_library_class = LongVectorKernelLibrary
 
 
 class FunctionCompiler(KernelCompiler):
     """Compiler for functions that only kernels call."""
 
-    library_class = FunctionLibrary
+    code_library_class = FunctionLibrary
 
 
 class NoinlineCompiler(KernelCompiler):
     """Compiler for functions that must not be inlined."""
 
-    library_class = NoinlineLibrary
+    code_library_class = NoinlineLibrary

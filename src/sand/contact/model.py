@@ -101,7 +101,7 @@ class Contact:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
-        """Settings in SI units; those that are None are omitted."""
+        """Settings in SI units; settings that are None are omitted."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     def pairing(self, a: Material, b: Material) -> Pairing:

@@ -96,7 +96,7 @@ def _run_all(
     on_result: Callable[[int, str], None] | None,
     observers: Sequence[Any],
 ) -> None:
-    """Run the boxes of `grow`. Raises BadInput for those that stopped for physical reasons."""
+    """Run the boxes of `grow`. Raises BadInput for boxes that stopped for physical reasons."""
     jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
     if executor is None:
         outcomes: Any = (run_box(*job, observers) for job in jobs)

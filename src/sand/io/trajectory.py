@@ -39,8 +39,8 @@ class TrajectoryWriter:
     path : Path
         The file; created if missing.
     resume_at : int or None, optional
-        Step at which the run is resumed: later frames in the file are not written twice, but incomplete ones and
-        those that differ from the resumed run are deleted.
+        Step at which the run is resumed: later frames in the file are not written twice; incomplete frames and
+        frames that differ from the resumed run are deleted.
     written : Sequence[float], optional
         Steps of the frames that the run has written up to that step.
 

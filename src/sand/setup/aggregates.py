@@ -186,7 +186,7 @@ def build(
     seed : int, optional
         Seed of the random numbers.
     **given
-        Other arguments of the builder; those that are None keep its default.
+        Other arguments of the builder; arguments that are None keep its default.
 
     Raises
     ------

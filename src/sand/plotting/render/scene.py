@@ -218,7 +218,7 @@ def _draw_image(
 
 
 def _draw_box(axes: Axes, scene: Scene) -> None:
-    """Draw the edges of the box; those that end in the farthest corner lie behind the grains."""
+    """Draw the edges of the box; edges that end in the farthest corner lie behind the grains."""
     for start, end, axis, behind in scene.edges():
         line = np.array([start, end]) @ camera_rotation().T
         axes.plot(
