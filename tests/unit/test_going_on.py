@@ -350,3 +350,12 @@ def test_advice_can_be_followed(tmp_path, capsys, monkeypatch):
     (tmp_path / "empty").mkdir()
     assert main(["resume", "empty"]) == 2
     assert "--from" not in capsys.readouterr().err
+
+
+def test_an_interrupted_job_says_how_to_continue_to_machines_too(place, capsys, monkeypatch):
+    """With --json, Ctrl-C gives one object with the line of the terminal and the exit code."""
+    with monkeypatch.context() as patch:
+        interrupt(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
+        assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--json"]) == 130
+    told = json.loads(capsys.readouterr().out)
+    assert told == {"error": ["interrupted; continue with: sand resume cut"], "exit_code": 130}

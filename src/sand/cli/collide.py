@@ -11,7 +11,7 @@ import click
 from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .exits import DONE, INTERRUPTED
+from .exits import DONE
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""
@@ -57,24 +57,11 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: 
     BadInput
         As the job; or if a worker process has died.
     """
-    from concurrent.futures import BrokenExecutor
+    from .job import running_job
 
-    from ..experiments.executors import executor_for
-    from .interrupt import InterruptObserver
-
-    many = len(job.case.impact.seeds) > 1
-    try:
-        with (
-            report.compiling(as_json or quiet),
-            InterruptObserver() as interrupts,
-            executor_for(workers if many else 1, threads=threads) as executor,
-        ):
-            content = report.with_notes(lambda: job.run(executor, [interrupts]))
-    except KeyboardInterrupt:
-        report.note(f"interrupted; {report.how_to_continue(job.folder)}")
-        return INTERRUPTED
-    except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.how_to_continue(job.folder)}") from None
+    processes = workers if len(job.case.impact.seeds) > 1 else 1
+    with running_job(job.folder, processes, threads=threads, quiet=as_json or quiet) as (executor, interrupts):
+        content = report.with_notes(lambda: job.run(executor, [interrupts]))
     if as_json:
         report.emit(content)
     elif not quiet:

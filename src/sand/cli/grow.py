@@ -12,7 +12,7 @@ from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
 from .collide import read_seeds
-from .exits import DONE, INTERRUPTED
+from .exits import DONE
 
 DEFAULT_SEEDS = list(range(1, 9))
 
@@ -86,11 +86,8 @@ def boxes(
     BadInput
         As `experiments.growth_boxes.grow`; or if a worker process has died.
     """
-    from concurrent.futures import BrokenExecutor
-
-    from ..experiments.executors import executor_for
     from ..experiments.growth_boxes import grow
-    from .interrupt import InterruptObserver
+    from .job import running_job
 
     outcomes: dict[int, str] = {}
 
@@ -99,18 +96,8 @@ def boxes(
         if not (quiet or as_json):
             report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
 
-    try:
-        with (
-            report.compiling(quiet),
-            InterruptObserver() as interrupts,
-            executor_for(workers, scheduler, threads) as executor,
-        ):
-            report.with_notes(lambda: grow(content, seeds, folder, executor, finished, [interrupts]))
-    except KeyboardInterrupt:
-        report.note(f"interrupted; {report.how_to_continue(folder)}")
-        return INTERRUPTED
-    except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
+    with running_job(folder, workers, scheduler, threads, quiet=quiet) as (executor, interrupts):
+        report.with_notes(lambda: grow(content, seeds, folder, executor, finished, [interrupts]))
     if as_json:
         report.emit({"folder": str(folder), "seeds": seeds, "outcomes": outcomes})
     elif not quiet:

@@ -65,8 +65,8 @@ def _call(words: list[str], interrupted: Callable[[], bool]) -> int:
         return stop.exit_code
     except BrokenPipeError:
         raise
-    except (KeyboardInterrupt, click.Abort):
-        return _fail(["interrupted"], INTERRUPTED, words)
+    except (KeyboardInterrupt, click.Abort) as stop:
+        return _fail([str(stop) or "interrupted"], INTERRUPTED, words)
     except Exception as error:
         if interrupted() and not isinstance(error, (SandError, click.ClickException)):
             return _fail(["interrupted"], INTERRUPTED, words)  # an interrupted import can raise anything

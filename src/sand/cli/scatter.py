@@ -10,7 +10,7 @@ import click
 
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE, INTERRUPTED
+from .exits import DONE
 
 
 @click.command("scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.")
@@ -81,28 +81,19 @@ def scatter(
     BadInput
         If the folder belongs to another case, or a worker process has died.
     """
-    from concurrent.futures import BrokenExecutor
-
-    from ..experiments.executors import executor_for
     from ..experiments.scattering.job import Job
     from ..io.lock import writing
     from ..io.run_folder import make_folder, read_toml
-    from .interrupt import InterruptObserver
+    from .job import running_job
 
     bar = _Bar(not (quiet or as_json))
     try:
-        with report.compiling(quiet), InterruptObserver(), executor_for(workers, scheduler) as executor:
+        with running_job(folder, workers, scheduler, quiet=quiet) as (executor, _):
             if not resume:
                 make_folder(folder, overwrite=overwrite)
             with writing(folder):
                 job = Job(*read, read_toml(case), folder, resume)
                 content = report.with_notes(lambda: job.run(executor, bar.update))
-    except KeyboardInterrupt:
-        bar.close()
-        report.note(f"interrupted; {report.how_to_continue(folder)}")
-        return INTERRUPTED
-    except BrokenExecutor:
-        raise BadInput(f"a worker process died; {report.how_to_continue(folder)}") from None
     finally:
         bar.close()
     if as_json:
