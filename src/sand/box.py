@@ -53,13 +53,17 @@ class Box:
     Raises
     ------
     BadInput
-        If a length is not positive.
+        If a length is not positive and finite.
     """
 
     lengths: tuple[float | None, float | None, float | None] = (None, None, None)
 
     def __post_init__(self) -> None:
-        if not all(length is None or (isinstance(length, (int, float)) and length > 0.0) for length in self.lengths):
+        if not all(
+            length is None
+            or (isinstance(length, (int, float)) and not isinstance(length, bool) and 0.0 < length < float("inf"))
+            for length in self.lengths
+        ):
             raise BadInput(f"lengths = {shown(self.lengths)} must be lengths in m or None; see sand.Box.periodic")
 
     @classmethod

@@ -127,6 +127,17 @@ def test_the_automatic_cutoff_reaches_beyond_the_grains():
     assert chosen.startswith("60 nm (smooth, two grain diameters, more than 1.5 b_max")
 
 
+@pytest.mark.parametrize(
+    ("moment", "reason"), [(1e-21, "less than two grain diameters"), (0.0, "no grain has a magnetic")]
+)
+def test_the_automatic_cutoff_in_a_small_box_reaches_beyond_contact(moment, reason):
+    """L < 10.8 r: two diameters do not fit, and (L/2)/1.35 is taken, never a capture radius within a grain."""
+    grains = pair(moment=[0, 0, moment], velocity=[[900.0, 0, 0], [0, 0, 0]])
+    choice = sand.Dipoles().choose(grains, sand.Box.periodic("0.1 um"))
+    assert choice.radius == pytest.approx(0.5 * 1e-7 / 1.35, rel=1e-12) and reason in choice.reason
+    assert choice.radius > 2e-8  # the distance of two grains in contact
+
+
 @pytest.mark.compiled("contacts")
 def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
     """A fixed step in which a grain flies more than half its radius: an Outcome and a checkpoint."""

@@ -29,7 +29,8 @@ def private_folder(name: str) -> Path:
 
     The cache is `$SAND_CACHE`, by default the system's folder for user caches (`~/.cache/sand` on Linux).  If that
     cannot be used, it is a folder of this user among the temporary files; if that is unsafe, too, it is a new temporary
-    folder that is deleted at the end of the process.  A warning gives the reason.
+    folder that is deleted at the end of the process.  A warning gives the reason, unless
+    the default folder merely cannot be written and the folder among the temporary files serves.
 
     Parameters
     ----------

@@ -134,10 +134,10 @@ noinline = _registered(**_NO_WRAPPERS, **_NOINLINE, **_NO_ALIASES, forceinline=F
 
 
 _COMPILED = (
-    "analysis/projection.py", "box.py", "compiler", "contact", "experiments/scattering", "forces", "integrate",
-    "neighbours", "numerics", "setup/_kernels", "state",
+    "analysis/projection.py", "box.py", "compiler", "contact", "experiments/scattering", "forces", "grains.py",
+    "integrate", "neighbours", "numerics", "setup/_kernels", "state",
 )  # fmt: skip
-"""Packages and files with compiled functions."""
+"""Packages and files with compiled functions, or with named tuples that compiled functions take."""
 
 
 def _digest() -> str:

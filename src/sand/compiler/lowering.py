@@ -168,7 +168,7 @@ _SLOW_GATHER = _target()[0].startswith("znver")
 """AMD Zen: scalar loads are faster than gather instructions (measured on Zen 4)."""
 
 FAST_512_BIT = _fast_512_bit(*_target())
-"""Processors, Intel's since Sapphire Rapids, that are fast at 512 bits, although LLVM uses 256 bits by default."""
+"""Whether this processor is fast at 512 bits (Intel since Sapphire Rapids), although LLVM uses 256 bits by default."""
 
 
 class _Lower(Lower):

@@ -49,15 +49,20 @@ class Dipoles(CutoffForce):
     references: ClassVar[str] = "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975"
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
-        """The thermal capture radius, at least two grain diameters, if that fits into the box."""
+        """The thermal capture radius, at least two grain diameters, at most `largest`."""
         capture = CAPTURE_RADII * thermal_capture(grains)
         shortest = 4.0 * float(grains.radius.max())
         full = f"{CAPTURE_RADII} b_max = {format_quantity(capture, 'm')}"
-        if 0.0 < capture < shortest < largest:
+        half = f"{self.cut}, half the box / {HALF_BOX_RATIO}"
+        if capture == 0.0:
+            return CutoffChoice(largest, f"{half}, no grain has a magnetic moment")
+        if capture >= largest:
+            return CutoffChoice(largest, f"{half}, less than {full}")
+        if shortest >= largest:
+            return CutoffChoice(largest, f"{half}, less than two grain diameters")
+        if capture < shortest:
             return CutoffChoice(shortest, f"{self.cut}, two grain diameters, more than {full}")
-        if 0.0 < capture < largest:
-            return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max at the grains' thermal speed")
-        return CutoffChoice(largest, f"{self.cut}, half the box / {HALF_BOX_RATIO}, less than {full}")
+        return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max at the grains' thermal speed")
 
     def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
