@@ -1,7 +1,6 @@
 """Plant single-line faults in a copy of a source tree, one at a time, and report which test catches each of them.
 
     python -m tests.faults.plant                                 # this checkout
-    python -m tests.faults.plant --tree ../start --before        # an older tree, with the tests it had
     python -m tests.faults.plant --only "forgotten image" --jobs 2 --out table.md
 
 For each fault of tests/faults/faults.py the tests that should catch it run first and stop at the first failure.  The
@@ -33,7 +32,7 @@ from pathlib import Path
 from .faults import FAULTS, SOURCES, Fault
 
 HERE = Path(__file__).parents[2]
-BUILT = Path(SOURCES) / "view" / "page"
+BUILT = Path(SOURCES) / "viewer" / "page"
 """Made by a build and not in git, but tests need it."""
 MISSED, TIMEOUT, CRASH = "MISSED", "TIMEOUT", "CRASH"
 SUITE = "the whole suite"
@@ -143,9 +142,9 @@ def verdict(code: int | None, output: str) -> str | None:
 
 
 @contextlib.contextmanager
-def planted(copy: Path, fault: Fault, before: bool = False) -> Iterator[None]:
+def planted(copy: Path, fault: Fault) -> Iterator[None]:
     """The fault is in the copy for as long as the block lasts; afterwards the file is as it was, its times included."""
-    file, old, new = fault.line(before)
+    file, old, new = fault.file, fault.old, fault.new
     path = copy / SOURCES / file
     times = path.stat()
     text = path.read_text(encoding="utf-8")
@@ -162,8 +161,8 @@ def planted(copy: Path, fault: Fault, before: bool = False) -> Iterator[None]:
 def examine(fault: Fault, copy: Path, options: argparse.Namespace) -> Finding:
     """Plant one fault and look for a test that fails."""
     begun = time.monotonic()
-    with planted(copy, fault, options.before):
-        ran = fault.named(options.before)
+    with planted(copy, fault):
+        ran = fault.named
         found = verdict(*run(copy, pytest_words([ran]), options.timeout))
         if found is None and not options.named_only:
             ran, found = SUITE, verdict(*run(copy, pytest_words(REST, options.workers), options.suite_timeout))
@@ -179,7 +178,7 @@ def prepare(tree: Path, place: Path, faults: Sequence[Fault], options: argparse.
     code, output = run(copies[0], ["-c", "import sand; print(sand.__file__)"], 300.0)
     if code != 0 or not Path(output.strip().splitlines()[-1]).is_relative_to(copies[0]):
         raise SystemExit(f"the copy of {tree} is not what Python imports:\n{output}")
-    tests = sorted({fault.named(options.before) for fault in faults})
+    tests = sorted({fault.named for fault in faults})
     begun = time.monotonic()
     found = verdict(*run(copies[0], pytest_words(tests), options.timeout * max(len(faults), 1)))
     if found is not None:
@@ -267,9 +266,6 @@ def parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     """The options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tree", type=Path, default=HERE, help="checkout to copy (default: this one)")
-    parser.add_argument(
-        "--before", action="store_true", help="use the lines and the names of tests of the starting commit"
-    )
     parser.add_argument("--only", nargs="+", default=[], metavar="WORD", help="faults with one of these words")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="copies that work at the same time")
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="for the named tests of one fault")

@@ -8,8 +8,10 @@ from collections import Counter
 
 import pytest
 
+from sand.io import page_bundle
+
 from .faults import AREAS, FAULTS, KINDS, SOURCES, Fault
-from .plant import CRASH, HERE, MISSED, TIMEOUT, Finding, as_markdown, chosen, copy_of, planted, verdict
+from .plant import BUILT, CRASH, HERE, MISSED, TIMEOUT, Finding, as_markdown, chosen, copy_of, planted, verdict
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
@@ -19,7 +21,7 @@ def test_a_fault_fits_its_file_and_names_a_test_that_exists(fault):
     assert text.count(fault.old) == 1
     assert fault.old != fault.new and "\n" not in fault.old.rstrip("\n")
     compile(text.replace(fault.old, fault.new), fault.file, "exec")
-    file, *parts = fault.named(before=False).split("::")
+    file, *parts = fault.named.split("::")
     found = ast.parse((HERE / file).read_text(encoding="utf-8")).body
     assert parts
     for part in parts:
@@ -62,10 +64,10 @@ def test_a_run_without_a_failed_test_is_no_catch(code):
 def test_planting_changes_a_copy_for_a_while(tmp_path):
     """The copy has the fault inside the block and the old file, with its times, after it; the tree is never touched."""
     tree = tmp_path / "tree"
-    (tree / "src/sand/view/page").mkdir(parents=True)
+    (tree / BUILT).mkdir(parents=True)
     (tree / SOURCES / "one.py").write_text("x = 1\n", encoding="utf-8")
     (tree / "built.js").write_text("ignored")
-    (tree / "src/sand/view/page/page.js").write_text("built")
+    (tree / BUILT / "page.js").write_text("built")
     (tree / ".gitignore").write_text("built.js\npage/\n")
     subprocess.run(["git", "init", "-q"], cwd=tree, check=True)
     copy = copy_of(tree, tmp_path / "copy")
@@ -92,3 +94,8 @@ def test_the_script_lists_its_faults():
     words = [sys.executable, "-m", "tests.faults.plant", "--list", "--only", "command"]
     done = subprocess.run(words, cwd=HERE, capture_output=True, text=True, check=True)
     assert len(done.stdout.splitlines()) == 3
+
+
+def test_the_built_page_is_where_the_program_reads_it():
+    """The copy in which faults are planted needs the page, which is not in git."""
+    assert HERE / BUILT == page_bundle.PAGE

@@ -40,8 +40,8 @@ REPLACED = {
 
 
 def names_in(path: Path) -> set[str]:
-    """Names of modules, functions, classes, arguments, variables and attributes in a file."""
-    found = {path.stem}
+    """Names of packages, modules, functions, classes, arguments, variables and attributes in a file."""
+    found = set(path.relative_to(SOURCE).with_suffix("").parts)
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         for key in ("name", "id", "arg", "attr"):
             value = getattr(node, key, None)
