@@ -69,7 +69,9 @@ def compare(revision: str, rounds: int) -> list[dict[str, Any]]:
         given = Path(revision)
         other = given.absolute() if given.is_dir() else Path(folder) / "before"
         if not given.is_dir():
-            subprocess.run(["git", "-C", str(TOP), "worktree", "add", "--detach", str(other), revision], check=True)
+            words = ["git", "-C", str(TOP), "worktree", "add", "--quiet", "--detach", str(other), revision]
+            if subprocess.run(words, stdout=sys.stderr, check=False).returncode:
+                raise SystemExit(f"--compare {revision}: neither a revision that git knows nor a folder")
         try:
             (Path(folder) / "lammps.py").write_text('raise ImportError("no peers here")\n', "utf-8")
             found: dict[str, list[dict[str, dict[str, Any]]]] = {"before": [], "now": []}
@@ -80,7 +82,7 @@ def compare(revision: str, rounds: int) -> list[dict[str, Any]]:
                     print(f"round {number + 1} of {rounds}: {name}", file=sys.stderr, flush=True)
         finally:
             if not given.is_dir():
-                subprocess.run(["git", "-C", str(TOP), "worktree", "remove", "--force", str(other)], check=True)
+                subprocess.run(["git", "-C", str(TOP), "worktree", "remove", "--force", str(other)], stdout=sys.stderr)
     return _ratios(found["before"], found["now"])
 
 
@@ -96,6 +98,9 @@ def _rows(tree: Path, folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _ratios(before: list[dict[str, dict[str, Any]]], now: list[dict[str, dict[str, Any]]]) -> list[dict[str, Any]]:
+    alone = sorted(set(before[0]) ^ set(now[0]))
+    if alone:
+        print("not compared, in one revision only: " + "; ".join(alone), file=sys.stderr)
     rows = []
     for name in now[0]:
         pairs = [(b[name]["ours"], n[name]["ours"]) for b, n in zip(before, now, strict=True) if name in b]
@@ -108,9 +113,9 @@ def _ratios(before: list[dict[str, dict[str, Any]]], now: list[dict[str, dict[st
 
 
 def show(rows: list[dict[str, Any]], most: float = 1.05) -> None:
-    """Print the rows; those whose interval ends above `most` are marked."""
+    """Print the rows; rows are marked that are slower (interval above 1), or may be slower than `most`."""
     print(f"{'what':44} {'before':>9} {'now':>9}  {'unit':16} {'ratio':>6}  95 % interval of the median")
     for row in rows:
-        mark = "  SLOWER" if row["high"] > most else ""
+        mark = "  SLOWER" if row["low"] > 1.0 else f"  MAY EXCEED {most:g}" if row["high"] > most else ""
         cost = f"{row['before']:9.3g} {row['now']:9.3g}  {row['unit']:16}"
         print(f"{row['name']:44} {cost} {row['ratio']:6.3f}  {row['low']:.3f} to {row['high']:.3f}{mark}")

@@ -10,7 +10,7 @@ import pytest
 import sand
 
 table = pytest.importorskip("benchmarks.table", reason="benchmarks are not beside the tests")
-from benchmarks import decks, main_job, pieces, scaling, timing, worlds  # noqa: E402
+from benchmarks import decks, main_job, pieces, scaling, steps, timing, worlds  # noqa: E402
 from benchmarks.compare import median_interval  # noqa: E402
 
 
@@ -116,3 +116,16 @@ def test_the_interval_of_a_median_covers_it():
         inside = np.mean([low <= 1.0 <= high for _, low, high in map(median_interval, sets)])
         assert abs(inside - expected) < 4.0 * 0.0035
     assert median_interval([3.0, 1.0, 2.0, 9.0, 5.0]) == (3.0, -np.inf, np.inf)
+
+
+@pytest.mark.compiled("contacts")
+def test_bytes_that_a_step_touches_count_arrays_with_columns():
+    """Per contact: pair 8, pointers 48, twist 8, loads 72, flag 1, side 4 bytes; constants only if they differ.
+
+    A lattice of 3 x 3 x 3 grains has 54 contacts.
+    """
+    sim = worlds.lattice(3)
+    per_grain = sum(a.nbytes for a in sim.state.grains.arrays) / 27
+    constants = 0 if sim.state.uniform_contacts else 8 * sim.state.contacts.bond.shape[0]
+    side = sim.state.contacts.side.nbytes / sim.state.contacts.side.size
+    assert steps.touched_bytes(sim) == pytest.approx(54 * (137 + side + constants) + 27 * per_grain)
