@@ -22,7 +22,7 @@ from sand.setup.growing import empty_hash_grid
 from sand.setup.population import Lognormal, PowerLaw, grain_set_of
 
 R, M = 3e-7, sand.SILICA
-STEP_INCREASES = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}
+GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fractal, "rbd": rbd}
 MIXED = {"radius": "lognormal(0.1 um, 0.4)", "material": {"silica": 0.6, "ice": 0.4}}
 
 
@@ -52,17 +52,17 @@ def size_of(body):
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("what", [{"radius": R, "material": M}, {"radius": "12 nm", "material": "iron"}, MIXED])
-@pytest.mark.parametrize("kind", list(STEP_INCREASES))
+@pytest.mark.parametrize("kind", list(GROWN))
 def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
     """Every pair that touches is at r1 + r2 − δ0, to the rounding of coordinates of ten diameters and ten turns,
     1e-13; one cluster; trees but for rbd; the centre of mass at the origin; the same seed gives the same bits."""
-    body = STEP_INCREASES[kind](150, seed=7, **what)
+    body = GROWN[kind](150, seed=7, **what)
     pairs, distance, rest = touching(body)
     assert np.abs(distance / rest - 1.0).max() < 1e-13
     assert pieces(body, pairs) == 1
     assert len(pairs) == 149 if kind != "rbd" else len(pairs) > 200
     assert np.abs(np.average(body.position, axis=0, weights=body.mass)).max() < 1e-12 * size_of(body)
-    again, other = (STEP_INCREASES[kind](150, seed=s, **what) for s in (7, 8))
+    again, other = (GROWN[kind](150, seed=s, **what) for s in (7, 8))
     assert (again.position == body.position).all() and (again.radius == body.radius).all()
     assert (other.position != body.position).any()
 
@@ -90,10 +90,10 @@ def test_spheres_are_cut_in_one_piece(make):
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
-@pytest.mark.parametrize("kind", list(STEP_INCREASES))
+@pytest.mark.parametrize("kind", list(GROWN))
 def test_few_grains(kind, count):
     """One, two, three grains make an aggregate, too."""
-    body = STEP_INCREASES[kind](count, radius=R, material=M)
+    body = GROWN[kind](count, radius=R, material=M)
     pairs, _, _ = touching(body)
     assert len(body) == count and pieces(body, pairs) == 1
 

@@ -274,5 +274,5 @@ def test_step_and_materials_are_inside_the_check(tmp_path):
                     frame.particles.types = ["silica"]
                 file.append(frame)
                 frame.configuration.step, frame.particles.types = step, types
-        with pytest.raises(sand.BadInput, match="check sum"):
+        with pytest.raises(sand.BadInput, match="checksum"):
             Frames(other)[number]

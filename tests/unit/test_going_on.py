@@ -327,6 +327,7 @@ def test_the_summary_of_an_interrupted_run_is_that_of_its_last_step(tmp_path):
     summary = json.loads((tmp_path / "run" / "summary.json").read_text("utf-8"))
     assert summary["contacts"] == len(sim.contacts["pair"]) > sim.ledger.rows[-1]["contacts"]
     assert len(sim.ledger.rows) == 1
+    assert summary["drift"] != 0.0 == sim.ledger.drift
     assert summary["time"] == sim.time > sim.ledger.rows[-1]["time"]
 
 
@@ -344,12 +345,21 @@ def test_advice_can_be_followed(tmp_path, capsys, monkeypatch):
     (tmp_path / "own").mkdir()
     shutil.copy(Path(__file__).parents[2] / "examples" / "collision.toml", tmp_path / "own" / "case.toml")
     assert main(["collide", "own/case.toml", "--out", "own"]) == 2
-    assert "sand resume" not in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "own exists and is not empty" in err and "sand resume" not in err
+    assert main(["info", "own"]) == 0
+    out = capsys.readouterr().out
+    assert "sand collide own" in out and "sand resume" not in out
     assert main(["run", "own"]) == 2
     assert "sand run own/case.toml" in capsys.readouterr().err.replace("\\", "/")
     (tmp_path / "empty").mkdir()
     assert main(["resume", "empty"]) == 2
-    assert "--from" not in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "empty holds no checkpoint to resume from" in err and "--from" not in err
+    (tmp_path / "begun").mkdir()
+    (tmp_path / "begun" / "checkpoint-000000000000001.npz").touch()
+    assert main(["run", "begun"]) == 2
+    assert "sand resume begun" in capsys.readouterr().err
 
 
 def test_an_interrupted_job_says_how_to_continue_to_machines_too(place, capsys, monkeypatch):

@@ -213,7 +213,7 @@ def test_a_damaged_frame_spoils_no_other(tmp_path):
         story = run_dataset(path)
         told = story.manifest()
         assert len(told["times"]) == 3 and told["colours"]["named"] == {"0": 0}
-        with pytest.raises(sand.BadInput, match="check sum"):
+        with pytest.raises(sand.BadInput, match="checksum"):
             story.frame(damaged)
         with pytest.raises(sand.BadInput, match="contact of grain"):
             story.frames.pairs(damaged)

@@ -43,7 +43,7 @@ def test_the_nearer_of_two_balls_wins_everywhere(w):
 
 @pytest.mark.parametrize("w", [0.0, 1 / 400.0])
 def test_rods_are_met_where_they_are(w):
-    """Points on a cone and a cylinder fulfil their equations: distance to the axis grows as the end_radii does.
+    """Points on a cone and a cylinder fulfil their equations: the radius changes linearly between the ends.
 
     Tolerance 0.01 samples: the depth has 24 bits of some hundred samples.
     """

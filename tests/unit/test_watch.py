@@ -57,8 +57,8 @@ def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(
 
 @pytest.mark.validate
 @pytest.mark.parametrize("blocks", [False, True])
-def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
-    """Leeway + the largest displacement ≤ the limit of each list, after any number of steps; both speeds are exact.
+def test_no_grain_is_farther_than_its_skin_allows(monkeypatch, blocks):
+    """Remaining skin + the largest displacement ≤ the limit of each list, after any number of steps; speeds are exact.
 
     Also where loops are cut into blocks for threads.
     """
@@ -86,9 +86,9 @@ def test_no_grain_is_farther_than_its_leeway_allows(monkeypatch, blocks):
 
 @pytest.mark.validate
 def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
-    """Leeway + the largest displacement since the pick, in the first step of a call, ≤ INNER_SKIN_FRACTION reach.
+    """Remaining skin + the largest displacement since the build, in the first step of a call, ≤ its part of the reach.
 
-    A contact that forms ends the leeway, and so does one that breaks: 2000 steps are as many calls of one step, which
+    A contact that forms uses up the skin, and so does one that breaks: 2000 steps are as many calls of one step, which
     pick in each.
     """
     sim, twin = crowd(), crowd()

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("bundle")
 
 @pytest.mark.compiled("fields")
 def test_messages_of_the_widget(looked_at):
-    """Each kind is answer_message with what the story tells, echoed so that the page knows what it asked for."""
+    """Each message is answered from the run dataset, with its id, so that the page knows what it asked for."""
     story = run_dataset(looked_at[0])
     assert answer_message(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
     assert answer_message(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
@@ -51,7 +51,7 @@ def test_wrong_messages(looked_at, content):
 
 @pytest.mark.compiled("fields")
 def test_what_nobody_thought_of(looked_at, monkeypatch):
-    """An error of any kind is answer_message with a sentence, so that the page does not wait for ever."""
+    """Any error is answered with a sentence, so that the page does not wait for ever."""
     story = run_dataset(looked_at[0])
     monkeypatch.setattr(story, "frame", lambda k: 1 / 0)
     told, buffers = answer_message(story, {"kind": "frame", "k": 1, "id": 3})

@@ -85,6 +85,10 @@ def describe_job_folder(path: Path) -> Description | None:
     if command not in JOBS:
         return None
     name, kind = JOBS[command]
+    case = path / (files.ONE_COLLISION if single else files.CASE)
+    if not files.is_job(path, case):
+        rows = [("state", "not started"), *listed, ("run it with", f"sand {command} {shlex.quote(str(case))}")]
+        return f"{path}: {name}", rows, {"kind": kind, "folder": str(path), "finished": False}
     if command == "grow":
         ends = [files.read_json(summary).get("outcome") for summary in path.glob(f"seed-*/{files.SUMMARY}")]
         listed.append(("boxes", f"{ends.count('finished')} finished"))

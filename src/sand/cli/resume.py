@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,7 @@ def _kind(folder: Path) -> str:
     if kind not in (None, "run") and not is_job(folder, case):
         raise BadInput(
             f"{folder} is not the folder of a run or job: {case.name} in it is a case file; "
-            f"to start it: sand {kind} {case}"
+            f"to start it: sand {kind} {shlex.quote(str(case))}"
         )
     return kind or "run"
 

@@ -57,6 +57,8 @@ def command(
         folder = Path(case)
         if report.is_resumable(folder):
             raise BadInput(f"{case} is a folder; to continue its run: {report.resume_line(folder)}")
+        if (folder / TRAJECTORY).exists():
+            raise BadInput(f"{case} is a folder; to start from its last frame: sand run --from {shlex.quote(case)}")
         if (folder / CASE).exists():
             raise BadInput(f"{case} is a folder; to run its case: sand run {shlex.quote(str(folder / CASE))}")
         raise BadInput(f"{case} is a folder; give a case file: sand run CASE.toml")

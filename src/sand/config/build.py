@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from .case import Case, check_case
 
 ENDS = (("run", "until"), ("run", "steps"))
 """Keys that may be changed in the case.toml of a resumed run."""
-BODIES = (".xyz", ".extxyz", ".txt", ".dat")
+TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
 """Suffixes of text files with a body; all other files are read as trajectories."""
 
 
@@ -91,7 +92,7 @@ def _of_gas(case: Case) -> Start:
 def _of_file(case: Case) -> Start:
     section, path = case.grains, Path(case.grains.file or "")
     try:
-        if path.suffix in BODIES:
+        if path.suffix in TEXT_SUFFIXES:
             start = _of_body(case, path)
         else:
             start = from_trajectory(path, section.frame, case.materials_by_name())
@@ -169,7 +170,7 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
         if fixed(begun, name) != fixed(there, name) and not meant:
             raise BadInput(
                 f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; restore it, "
-                f"or start a new run from the last frame: sand run CASE.toml --from {folder}"
+                f"or start a new run from the last frame: sand run CASE.toml --from {shlex.quote(str(folder))}"
             )
     meta["until"], meta["last_step"] = case.run.until, case.run.steps
     return case
@@ -203,9 +204,9 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     if not any(place.glob("checkpoint-*.npz")):
         advice = ""
         if (place / TRAJECTORY).exists():
-            advice = f"; to start a new run from its last frame: sand run --from {place}"
+            advice = f"; to start a new run from its last frame: sand run --from {shlex.quote(str(place))}"
         elif (place / CASE).exists():
-            advice = f"; to start the run: sand run {place / CASE}"
+            advice = f"; to start the run: sand run {shlex.quote(str(place / CASE))}"
         raise BadInput(f"{place} holds no checkpoint to resume from{advice}")
     with writing(place):
         arrays, meta = newest_checkpoint(place)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import MOST_GRAINS
 from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import ROUNDING, Grains
@@ -19,7 +20,6 @@ from .frame import MODES
 from .run_folder import read_text, replace_file
 from .trajectory import Frames, TrajectoryWriter
 
-MOST_GRAINS = 1_000_000
 NAMED = 10
 """Grains or lines that are named one by one in a message."""
 SUFFIXES = (".xyz", ".extxyz", ".gsd")
@@ -152,6 +152,8 @@ def _read_columns(path: str | Path, lines: list[str]) -> Columns:
         rows.append(row)
         if len(problems) == NAMED or len(rows) > MOST_GRAINS:
             break
+    if len(rows) > MOST_GRAINS:
+        problems.append(f"{path} holds more than {MOST_GRAINS:.0e} grains")
     if problems or not rows:
         raise BadInput(problems or f"{path} holds no grain")
     table = np.array(rows)

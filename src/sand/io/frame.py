@@ -92,7 +92,9 @@ def stored_frame(
 
 
 def code_of(stored: Any) -> int:
-    """The stored checksum of a frame.  Raises KeyError if there is none."""
+    """The stored checksum of a frame.  Raises ValueError if there is none."""
+    if "crc32" not in stored.log:
+        raise ValueError("it has no checksum: another program or a development version of SAND wrote it")
     return int(stored.log["crc32"][-1])
 
 
@@ -120,7 +122,7 @@ class Frame:
 
     def __init__(self, stored: Any):
         if code_of(stored) != _crc32(stored):
-            raise ValueError("its check sum is wrong")
+            raise ValueError("its checksum is wrong")
         self.step = int(stored.configuration.step)
         self.time = float(stored.log["time"][0])
         scale = float(stored.log["scale/length"][0])

@@ -100,6 +100,8 @@ def grains_figure(frame: Any, name: str, field: np.ndarray | None = None, dark: 
     """
     what = quantity(name)
     values = measured(frame, name, field)
+    if not np.isfinite(values).any():
+        raise BadInput(f"{name}: no grain has a finite value")
     with plot_style():
         figure, axes = _figure()
         if name == "cluster":

@@ -30,6 +30,7 @@ COMPRESSION = 6
 _PNG: dict[str, Any] = {
     "format": "png",
     "dpi": DPI,
+    "facecolor": "auto",  # that of the figure, also with a dark background
     "metadata": {"Software": "SAND"},
     "pil_kwargs": {"compress_level": COMPRESSION},
 }

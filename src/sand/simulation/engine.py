@@ -181,7 +181,7 @@ class Engine:
             self._workers.start((state.grains.arrays, state.contacts, state.long_range, state.count, parameters))
         return parameters
 
-    def seed(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
+    def add_contacts(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
         """Add contacts before the first step; array shapes (C, …).
 
         Returns

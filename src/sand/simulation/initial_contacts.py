@@ -62,7 +62,7 @@ def add_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | None
     given = np.unique(np.sort(pair.astype(np.int64), axis=1), axis=0)
     if len(given) < len(pair) or not all(np.isfinite(part).all() for part in contacts):
         raise BadInput("contacts: a pair is given twice, or a displacement is not finite")
-    wrong = engine.seed(pair, contacts.slide, contacts.roll, contacts.twist)
+    wrong = engine.add_contacts(pair, contacts.slide, contacts.roll, contacts.twist)
     if wrong >= 0:
         i, j = pair[wrong]
         raise BadInput(

@@ -192,7 +192,8 @@ class Simulation(ReadOnlySettings):
         """
         self._begin()
         row = self._log_row()
-        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *self._engine.force_energies()))
+        own = [*(f.column for f, _, _ in self._engine.long_range), *(f.name for f in self._engine.external)]
+        names = dict.fromkeys(("normal", "sliding", "rolling", "twisting", "magnetic", *own))
         return {
             "force": self.grains.force.copy(),
             "torque": self.grains.torque.copy(),
