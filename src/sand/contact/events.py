@@ -66,7 +66,7 @@ def log_slip_losses(contact_losses, lost, c, energies):
 
 @loop
 def store_damping_force(contacts, c, force):
-    """Store the damping force [N] of contact c; without damping there is no array for it."""
+    """Store the damping force [N] of contact c, if the contact law has an array for it (`ContactArrays.damped`)."""
     if contacts.damped.size > 0:
         contacts.damped[c] = force
 
@@ -141,8 +141,8 @@ def apply_pair_impulse(grains, i, j, n, impulse):
 def break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt):
     """Log the energy of a contact that broke within the step, and flag it as broken.
 
-    The pull-off force −(5/9) F_c ended a time τ before the end of the step, but velocity Verlet applied it for half a
-    step: the difference is applied as an impulse.
+    The contact force, −(5/9) F_c just before the break, ended a time τ before the end of the step, but velocity Verlet
+    applied it for half a step: the difference is applied as an impulse.
     """
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     overlap = grains.radius[i] + grains.radius[j] - pose.distance

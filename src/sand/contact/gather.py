@@ -17,7 +17,8 @@ BLOCK = 64
 LARGEST_CLASS = math.isqrt(GATHER_CLASSES) - 1
 """Contact counts of this number and more, separately as grain 1 and as grain 2, share a class."""
 DENSE_FROM = 3
-"""Contacts per grain from which most grains have equally many contacts, so that sorting brings nothing."""
+"""Number of contacts over number of grains, half the mean coordination number, from which most grains have equally
+many contacts, so that sorting brings nothing."""
 
 
 @loop

@@ -45,7 +45,7 @@ CONTACT_ROWS = (
     ("slide", "m", "size of the sliding displacement ζ"),
     ("roll", "m", "size of the rolling displacement ξ"),
     ("twist", "rad", "twisting angle φ"),
-    ("stretch_share", "1", "−δ/δ_c, 1 where the contact breaks; negative in compression"),
+    ("stretch_share", "1", "−δ/δ_c, 1 where the contact breaks; negative in compression; −δ/R without adhesion"),
     ("slide_share", "1", "|ζ|/ζ_c"),
     ("roll_share", "1", "|ξ|/ξ_c"),
     ("twist_share", "1", "|φ|/φ_c"),

@@ -33,7 +33,7 @@ from .update import (
 BLOCK = np.uint64(CONTACTS_PER_BLOCK)
 """Contacts per block."""
 SLIP_FRACTION = 0.1
-"""Fraction of slipped contacts in the last step above which a block uses the branch-free kernel."""
+"""Fraction of a block's contacts flagged in the last step, above which the block uses `_loop_with_slip`."""
 
 
 class SlipSums(NamedTuple):

@@ -128,7 +128,7 @@ _NO_IMPULSES = (_no_impulse_at_start, _no_impulse_within, _no_impulse_at_end, _n
 def loads_loop(spec: KernelSpec) -> Callable:
     """The loop that sums forces and torques at the end of a step.
 
-    Long-range loads are summed if `due`; within a cycle the slow or extrapolated loads replace them.
+    Long-range loads are summed if `due`; within a cycle their constant part or extrapolation replaces them.
     """
     add_external = external_loads(spec.external)
     gather_all, long_range_loads = large_loops(spec).gather, large_loops(spec).long_range_loads

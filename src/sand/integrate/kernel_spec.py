@@ -29,7 +29,7 @@ class KernelSpec(NamedTuple):
     external: Callable = nothing  # formula of the external forces, composed
     long_range: LongRangeSums = NO_LONG_RANGE_FORCE  # loops of the long-range forces, composed
     split: bool = False  # long-range forces between grains in contact are evaluated in every step
-    impulse: bool = False  # r-RESPA: fast part of the long-range forces as impulses at both ends of a cycle
+    impulse: bool = False  # r-RESPA: long-range forces, less a constant part, as impulses at both ends of a cycle
     taylor: bool = False  # long-range forces extrapolated within a cycle by their first-order Taylor series
     gas: bool = False  # drag and Brownian kicks
     adaptive: bool = False  # Runge–Kutta steps while there are no contacts

@@ -26,7 +26,7 @@ FULL = -1
 MAX_SUBDIVISION = 16
 """Most cells along x per cell width along y or z; more would hardly shorten the ranges."""
 MIN_PERIODIC_CELLS = 3
-"""Fewest cells on a subdivided periodic axis, so that the two neighbours of a cell differ."""
+"""Fewest cells on a divided periodic axis, so that the two neighbours of a cell differ; with fewer it is one cell."""
 REACH_TOLERANCE = 1e-6
 """Relative increase of the squared reach when ranges are chosen, so that rounding excludes no pair."""
 CELL_TOLERANCE = 1e-6

@@ -73,14 +73,15 @@ class Neighbours:
     Parameters
     ----------
     search : str, optional
-        "cells": a cell list, and a Verlet list of the pairs closer than the cut-off plus a margin.  "all pairs": every
-        pair is examined in every step.  "auto": cells from 64 grains on, if initially at most 0.4 of the other grains
-        are within reach of a grain, on average.
+        "cells": a cell list, and a Verlet list of the pairs closer than the cut-off plus a margin.  "all pairs": all
+        pairs are examined, in every long-range sum and whenever the candidate pairs for contacts are listed.  "auto":
+        cells from 64 grains on, if initially at most 0.4 of the other grains are within reach of a grain, on average.
     margin : float or str, optional
         Skin of the Verlet list Δr [m] > 0, or "auto": 0.1 of the cut-off, or 0.35 with adaptive (Runge–Kutta) steps,
         whose length the skin limits.  The list is rebuilt when a grain has moved by more than Δr/2; a large margin
         makes lists longer, but rebuilds rarer.  If no force has a cut-off, "auto" builds no Verlet list: candidate
-        pairs for contacts are found with the cells.
+        pairs for contacts are found with the cells.  With adaptive steps it builds one all the same; its skin is then
+        half the largest gap of candidate pairs.
     order : str, optional
         Order of grains in memory while stepping.  "curve": Morton order, renewed every 2000 steps, so that neighbours
         in space are neighbours in memory; "as given": the user's order; "auto": "curve" from 4000 grains on.  Input and

@@ -26,7 +26,7 @@ def turned_back(q, v):
 
 @formula
 def rotation_by(angle):
-    """Quaternion of a rotation by the vector `angle` [rad], |ϱ| = 1 to 1e-7.
+    """Quaternion of a rotation by the vector `angle` [rad]; |ϱ| = 1 to 1e-7 for angles up to 0.4 rad.
 
     sin and cos of half the angle, h, are series to h⁵ and h⁴; the error of the angle is h⁷/420, 2e-12 for 0.1 rad.
     """

@@ -27,7 +27,7 @@ class ContactArrays(NamedTuple):
     formed: np.ndarray  # (C,) time of formation [s]; the start time for initial contacts
     bond: np.ndarray  # (K, C) constants of the contact law; (K, BLOCK) identical columns if they are uniform
     lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 channels of state.RECORDED
-    damped: np.ndarray  # (C,) damping force in the last step [N], along n on grain 1; (0,) without damping
+    damped: np.ndarray  # (C,) damping force in the last step [N], along n on grain 1; (0,) if L = 4
     push: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
@@ -45,7 +45,7 @@ class PairList(NamedTuple):
     pair: np.ndarray  # (2, P) uint32: grains
     touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
     step: np.ndarray  # (P,) time step that the contact needs [s]; (1,) if uniform
-    length: np.ndarray  # (P,) δ_c of the contact [m]; (1,) if uniform
+    length: np.ndarray  # (P,) −δ at which the contact breaks [m]: δ_c, 0 without adhesion; (1,) if uniform
     anchor: np.ndarray  # (3, N) positions when the list was built [m]; a buffer while it is built from cells
     # (P/8,) uint32: inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
     inner: np.ndarray

@@ -175,7 +175,7 @@ class State:
                 _copy_into(array[..., :n], saved, key)
         for name in SAVED_LONG_RANGE:
             if name == "anchor" and saved.get("long_range/anchor", self.long_range.anchor).size == 0:
-                continue  # saved without a Verlet list: the list is built at the next step
+                continue  # saved without a Verlet list: Engine.load_state builds one
             _copy_into(getattr(self.long_range, name), saved, f"long_range/{name}")
 
 

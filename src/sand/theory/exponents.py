@@ -27,7 +27,7 @@ class ExponentFit(NamedTuple):
     low: float  # limits of z from those of λ (Student's t); infinite for λ ≥ 1
     high: float
     degree: float  # λ
-    degree_error: float  # standard error of λ, see `exponent_fit`
+    degree_error: float  # error of λ, the largest of those in `exponent_fit`
     half_width: float  # half-width of the 95 % interval of λ
     points: int  # number of outputs fitted
 

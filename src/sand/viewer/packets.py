@@ -85,6 +85,8 @@ def decode(packet: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     if packet[:8] != MAGIC:
         raise BadInput("these bytes are not a packet of SAND")
     start = 12 + int.from_bytes(packet[8:12], "little")
+    if len(packet) < 12 or start > len(packet):
+        raise BadInput("the packet is truncated in its header")
     header = json.loads(packet[12:start])
     arrays = {}
     for entry in header["arrays"]:

@@ -43,7 +43,7 @@ class Snapshot:
 def snapshot_dataset(simulation: Simulation, field: FieldDescription | None) -> RunDataset:
     """Present state of a simulation and its ledger so far; later steps do not change the dataset."""
     state = simulation.state
-    stored: Any = stored_frame(state.steps, state.time, state.grains, state.box, simulation.contacts)
+    stored: Any = stored_frame(state.steps, state.time, state.grains.copy(), state.box, simulation.contacts)
     ledger = LedgerColumns(simulation.ledger.columns, simulation.ledger.rows)
     frames = Snapshot(Frame(stored))
     dataset = RunDataset(frames, "simulation", "in memory", ledger=lambda: ledger, summary=dict, field=field)
