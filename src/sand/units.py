@@ -198,16 +198,17 @@ def si(
     if number is None or np.ndim(number) != 0:
         raise _wrong_unit(value, unit, name)
     label = f"{name} = {shown(value)}"
+    in_units = "" if unit == "1" else f" {unit}"
     if not math.isfinite(number):
-        raise BadInput(f"{label} is not finite; give a number in {unit}")
+        raise BadInput(f"{label} is not finite; give a number{in_units and f' in{in_units}'}")
     if number != 0.0 and not LEAST < abs(number) < MOST:
-        raise BadInput(f"{label} is not between {LEAST:g} and {MOST:g} {unit}, the range of the computation")
+        raise BadInput(f"{label} is not between {LEAST:g} and {MOST:g}{in_units}, the range of the computation")
     if above is not None and not number > above:
-        raise BadInput(f"{label} must be above {above:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{label} must be above {above:g}{in_units}")
     if least is not None and not number >= least:
-        raise BadInput(f"{label} must be at least {least:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{label} must be at least {least:g}{in_units}")
     if below is not None and not number < below:
-        raise BadInput(f"{label} must be below {below:g} {unit}".removesuffix(" 1"))
+        raise BadInput(f"{label} must be below {below:g}{in_units}")
     if unit == "m/s" and below is None and not abs(number) < LIGHT:
         raise BadInput(f"{label} is not below the speed of light, {LIGHT:.4g} m/s")
     if unit == "K" and number > HOTTEST:

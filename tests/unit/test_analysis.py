@@ -324,6 +324,7 @@ def test_a_census_across_the_faces():
         (lambda: gyration_radius(np.zeros((0, 3))), "N ≥ 1"),
         (lambda: correlation_dimension(np.zeros((10, 3))), "at least 32 grains"),
         (lambda: box_dimension(ROD.repeat(9, axis=0) + RNG.normal(size=(81, 3)), (2.0, 1.0)), "is empty"),
+        (lambda: box_dimension(RNG.normal(size=(81, 3)), seed=-1), "seed = -1"),
         (lambda: ensemble_dimension([8, 8], [1, 1], 1.0), "at least 3 times"),
         (lambda: ensemble_dimension([5, 20], [1, 1], 1.0), "do not grow"),
         (lambda: power_law([1, 2], [1, -2]), "above 0"),

@@ -199,3 +199,9 @@ def test_bad_bodies(tmp_path, text, message):
     with pytest.raises(sand.BadInput, match=message) as caught:
         read_body(path, sand.SILICA)
     assert len(caught.value.problems) <= 10
+
+
+def test_a_negative_seed_of_the_orientations_is_refused():
+    """`collide(seed=-1)` raises BadInput that names the seed, before anything runs."""
+    with pytest.raises(sand.BadInput, match="seed = -1"):
+        collide(*two(0), speed=1.0, seed=-1)

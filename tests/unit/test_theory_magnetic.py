@@ -106,6 +106,8 @@ def test_sizes_and_moments():
         (lambda: theory.dynamic_exponent(0.9, 0.2), "below 1"),
         (lambda: theory.growth_exponents(reading="papr"), "did you mean 'paper'"),
         (lambda: theory.mean_size([0.5]), "at least 1"),
+        (lambda: theory.mean_size([1, 2], [1, math.inf]), "finite"),
+        (lambda: theory.alignment_time(1.0, 1.0, 1.0, "3 m"), "angle"),
         (lambda: theory.aggregate_moment(MOMENT, 0), "grains"),
     ],
 )

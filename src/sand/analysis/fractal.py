@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..arguments import checked
 from ..errors import BadInput
+from ..units import seed_given
 from .fits import PowerLawFit, power_law
 from .shape import gyration_radius
 
@@ -157,7 +158,7 @@ def box_dimension(position: np.ndarray, window: tuple[float, float] | None = Non
     """
     position, unit, size = _one(position)
     low, high = window or (BOXES[0] * unit, max(BOXES[1] * size, 2.0 * BOXES[0] * unit))
-    sides, rng = _spaced(low, high), np.random.default_rng(seed)
+    sides, rng = _spaced(low, high), np.random.default_rng(seed_given(seed))
     needed = np.full((SHIFTS, len(sides)), np.inf)
     for shift in range(SHIFTS):
         turned = position @ np.linalg.qr(rng.normal(size=(3, 3)))[0]

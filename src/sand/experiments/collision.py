@@ -23,7 +23,7 @@ from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
 from ..simulation.serialise import case_of
 from ..simulation.simulation import Simulation
-from ..units import si
+from ..units import seed_given, si
 from .collision_outcome import Approach, Collision, classify_collision
 
 QUIET = 3
@@ -85,7 +85,7 @@ def approach(
     """Bodies of a collision before contact, with the arguments of `collide`. Raises BadInput."""
     v = si(speed, "m/s", "speed", above=0.0)
     if seed is not None:
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(seed_given(seed))
         target, projectile = turned_at_random(target, rng), turned_at_random(projectile, rng)
     pair = encounter(target, projectile, speed=v, impact_parameter=impact_parameter, along=along)
     return Approach(target, projectile, pair.grains, pair.flight, v, seed)

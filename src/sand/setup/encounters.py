@@ -75,7 +75,7 @@ def encounter(
     Raises
     ------
     BadInput
-        If an argument is invalid, or a body contains overlapping grains.
+        If an argument is invalid.
     """
     v = si(speed, "m/s", "speed", above=0.0)
     direction = _direction(along)

@@ -83,6 +83,8 @@ def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np
         raise BadInput("sizes and numbers must be numbers") from None
     if s.ndim != 1 or s.shape != n.shape or not (s >= 1.0).all() or not (n >= 0.0).all() or not n.sum() > 0.0:
         raise BadInput("sizes must be at least 1; numbers must be at least 0, not all 0, and one for each size")
+    if not (s * s * n).sum() < math.inf:
+        raise BadInput("sizes and numbers must be finite")
     return float((s * s * n).sum() / (s * n).sum())
 
 
@@ -177,7 +179,7 @@ def alignment_exponent(exponent: float = REMANENCE) -> float:
 
 
 @checked
-def alignment_time(inertia: Any, moment: Any, flux_density: Any, angle: float = 0.5 * math.pi) -> float:
+def alignment_time(inertia: Any, moment: Any, flux_density: Any, angle: Any = 0.5 * math.pi) -> float:
     """Time τ = √(2φ I/(μB)) [s] to rotate by φ from rest under the largest torque μB; Eq. 23 omits the factor √2.
 
     Parameters
@@ -188,8 +190,8 @@ def alignment_time(inertia: Any, moment: Any, flux_density: Any, angle: float = 
         μ [A m²] > 0.
     flux_density : float or str
         B [T] > 0.
-    angle : float, optional
-        φ [rad] > 0.
+    angle : float or str, optional
+        φ > 0 [rad], or text with a unit, such as "90 deg".
 
     Raises
     ------
@@ -197,4 +199,4 @@ def alignment_time(inertia: Any, moment: Any, flux_density: Any, angle: float = 
         If a parameter is out of range.
     """
     torque = si(moment, "A m^2", "moment", above=0.0) * si(flux_density, "T", "flux_density", above=0.0)
-    return math.sqrt(2.0 * si(angle, "1", "angle", above=0.0) * si(inertia, "kg m^2", "inertia", above=0.0) / torque)
+    return math.sqrt(2.0 * si(angle, "rad", "angle", above=0.0) * si(inertia, "kg m^2", "inertia", above=0.0) / torque)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arguments import checked
-from ..errors import BadInput, SandError, did_you_mean
+from ..errors import BadInput, SandError, did_you_mean, shown
 from ..units import si
 from .kinetics import KernelFunction
 from .size_distribution import COMPLETED, MASS_LOST, SIZE_REACHED, SizeDistribution
@@ -114,8 +114,8 @@ def coagulate(
     may_lose : float, optional
         Fraction of the mass that may leave the grid at the largest size before the solution ends; above 0, below 1.
     accuracy : float, optional
-        Relative error of n_k per step, 1e-12 … 1e-2. The absolute error is 1e-4 of that times the density of all
-        grains, divided by x_k, so that small n_k of large sizes neither affect S nor reduce the step.
+        Relative error of n_k per step, 1e-12 … 1e-2. The absolute error of the mass fraction x_k n_k/Σ x n is 1e-4 of
+        that, divided by x_k, so that small n_k of large sizes neither affect S nor reduce the step.
     method : str, optional
         "BDF": implicit, for any kernel; collisions of small with large clusters make the equation stiff. "DOP853":
         explicit, much faster for hundreds of sizes and growth by a few decades.
@@ -137,9 +137,10 @@ def coagulate(
     grain = si(mass, "kg", "mass", above=0.0)
     x, n, t = _sizes(sizes), _densities(numbers, np.size(sizes)), _times(times)
     largest_mean = math.inf if until_size is None else si(until_size, "1", "until_size", above=0.0)
-    loss, tolerance = si(may_lose, "1", "may_lose", above=0.0), si(accuracy, "1", "accuracy")
-    if not loss < 1.0 or not 1e-12 <= tolerance <= 1e-2:
-        raise BadInput(f"may_lose = {may_lose!r} must be below 1, and accuracy = {accuracy!r} must be in 1e-12 … 1e-2")
+    loss = si(may_lose, "1", "may_lose", above=0.0, below=1.0)
+    tolerance = si(accuracy, "1", "accuracy", least=1e-12)
+    if tolerance > 1e-2:
+        raise BadInput(f"accuracy = {shown(accuracy)} must be at most 0.01")
     return _solve(_Problem(kernel, x, n, grain, largest_mean, loss, tolerance, method), t)
 
 

@@ -16,7 +16,7 @@ from ...forces.vectors import three
 from ...grains import Grains
 from ...material import Material, as_material
 from ...theory.magnetic import thermal_speed
-from ...units import format_quantity, in_unit, si
+from ...units import format_quantity, in_unit, is_word, si
 from .encounters import Flight, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 
@@ -151,7 +151,9 @@ def _checked(given: dict[str, Any]) -> Flight:
     tolerance = errors.take(lambda: si(given["tolerance"], "1", "tolerance", above=0.0), 1e-8)
     if not 1e-13 <= tolerance <= 1e-3:
         errors.problems.append(f"tolerance = {given['tolerance']!r} must lie in 1e-13 … 1e-3")
-    escape = errors.take(lambda: 0.0 if given["escape"] == "auto" else si(given["escape"], "m", "escape", above=0.0))
+    escape = errors.take(
+        lambda: 0.0 if is_word(given["escape"], "auto") else si(given["escape"], "m", "escape", above=0.0)
+    )
     speed_si = errors.take(lambda: _speed(given["speed"], given["speed_unit"], heat, first))
     distance: Any = None
     if first is not None and second is not None and speed_si is not None:

@@ -23,7 +23,7 @@ from .hash_grid import (
 DIRECTION, OFFSET, START, STEPS, RETURN, SIDEWAYS, TURN1, TURN2 = range(8)
 """Purposes of random numbers."""
 TOUCH = 1e-3
-"""Gap, in radii of the largest grain, at which a walk ends; the grains are then length into contact."""
+"""Gap, in radii of the largest grain, at which a walk ends; the grains are then moved into contact."""
 MOST_STEPS = 100_000
 """Largest number of steps of one walk."""
 
@@ -233,7 +233,7 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
 
 @loop
 def pull_to_rest(position, grain_set, x, offset, b, j):
-    """Centre of a body at x length so that its grain b, at `offset`, is at its equilibrium distance from grain j."""
+    """Centre of a body at x, moved so that its grain b, at `offset`, is at its equilibrium distance from grain j."""
     separation = sub(add(x, offset), load(position, j))
     distance = norm(separation)
     return axpy((pair_rest_distance(grain_set, b, j) - distance) / distance, separation, x)

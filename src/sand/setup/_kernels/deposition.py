@@ -74,7 +74,7 @@ def roll_to_second_contact(grid, position, grain_set, b, x, neighbour, side, cou
     Returns
     -------
     place : tuple of float
-        New centre [m]; x if image is none.
+        New centre [m]; x if there is none.
     second : int
         The second grain, or EMPTY.
     """
