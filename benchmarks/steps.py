@@ -28,7 +28,15 @@ FAR = {"every step": {2: 3.0, 20: 5.0, 100: 8.0}, "impulse": {1000: 100.0}}
 def touched_bytes(sim: sand.Simulation) -> float:
     """Bytes of the arrays that each step reads or writes, at least: grains, and contacts but for their books."""
     w, contacts = sim.state, len(sim.contacts["pair"])
-    idle = ("formed", "lost", "damped", "bonded", "start", "gather_order", *(("bond",) if w.uniform_contacts else ()))
+    idle = (
+        "formed",
+        "lost",
+        "damped",
+        "every_step",
+        "start",
+        "gather_order",
+        *(("constants",) if w.uniform_contacts else ()),
+    )
     per_contact = sum(a.nbytes / a.shape[-1] for k, a in w.contacts._asdict().items() if k not in idle)
     per_grain = sum(a.nbytes for a in w.grains.arrays) / len(w.grains)
     return contacts * per_contact + len(w.grains) * per_grain

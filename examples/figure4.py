@@ -19,9 +19,9 @@ from sand.plotting.run_figure import save
 warnings.filterwarnings("ignore", message="contacts of iron")
 
 POSITIONS = np.linspace(-1.1, 0.3, 29)
-RELEASE = sand.Contact(beyond="release")  # as in the paper: displacements beyond the critical value are reset to zero
+RESET = sand.Contact(slip="reset")  # as in the paper: displacements beyond the critical value are reset to zero
 CASES = (
-    ("20 nm iron, release", sand.IRON, "10 nm", RELEASE, range(100, 320, 20), 100),
+    ("20 nm iron, reset", sand.IRON, "10 nm", RESET, range(100, 320, 20), 100),
     ("20 nm iron, clamp", sand.IRON, "10 nm", sand.Contact(), range(100, 320, 20), 100),
     ("0.2 um silica, damped", sand.SILICA, "0.1 um", sand.Contact(damping="viscoelastic"), (8, 16, 24, 32), 25),
     ("0.2 um ice, clamp", sand.ICE, "0.1 um", sand.Contact(), (5, 8, 10, 12, 14, 16, 20, 25), 25),
@@ -31,7 +31,7 @@ CASES = (
 def main(out: str = "figure4.png") -> None:
     """Simulate one impact, compute the maps, and draw the figure."""
     speed, position = 240.0, -0.6
-    hit = chain_impact.strike(sand.IRON, "10 nm", speed=speed, place=position, contact=RELEASE)
+    hit = chain_impact.strike(sand.IRON, "10 nm", speed=speed, place=position, contact=RESET)
     shape = chain_impact.shape_of(hit)
     stuck = chain_impact.stick_at_first_touch(sand.IRON, 1e-8, position)
     print(

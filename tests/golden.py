@@ -70,7 +70,7 @@ def contacts_open(folder: Path) -> dict[str, Any]:
 @golden
 def contacts_options(folder: Path) -> dict[str, Any]:
     """Reset on slip, springs that follow the contact radius, viscoelastic and constant damping, two materials."""
-    contact = sand.Contact(beyond="release", stiffness="dt97", damping="viscoelastic", viscous_time="1e-11 s")
+    contact = sand.Contact(slip="reset", stiffness="dt97", damping="viscoelastic", viscous_time="1e-11 s")
     sim = sand.Simulation(impact()[0], [contact], box="4 um")
     sim.run(steps=6000)
     mixed = sand.setup.bpca(12, radius="0.1 um", material="ice", seed=1)

@@ -391,11 +391,13 @@ def test_what_no_step_can_follow_stops_the_run():
 def test_settings():
     """Every mistake, one line each."""
     with pytest.raises(BadInput) as caught:
-        sand.Adaptive(tolerance=0, position_error="1 s", velocity_error=-1, turn_error="tight", touching="verlet")
+        sand.Adaptive(
+            tolerance=0, position_error="1 s", velocity_error=-1, turn_error="tight", contact_stepping="verlet"
+        )
     lines = caught.value.problems
     assert len(lines) == 5
     for key, line in zip(
-        ("tolerance", "position_error", "velocity_error", "turn_error", "touching"), lines, strict=True
+        ("tolerance", "position_error", "velocity_error", "turn_error", "contact_stepping"), lines, strict=True
     ):
         assert f"stepping: {key}" in line
     settled = flight(sand.Grains([[0, 0, 0], [1e-7, 0, 0]], R, sand.IRON, moment=1e-28 * np.eye(3)[:2])).stepping
@@ -423,17 +425,20 @@ method = "adaptive"
 
 def test_case_files():
     """[stepping] method = "adaptive" there and back; unknown words are told apart by method."""
-    content = tomllib.loads(CASE + 'spin_error = "1e3 rad/s"\n[stepping.touching]\nsteps_per_period = 50\n')
+    content = tomllib.loads(CASE + 'spin_error = "1e3 rad/s"\n[stepping.contact_stepping]\nsteps_per_period = 50\n')
     sim = simulation_of(check_case(content, "some.toml"), None)
     assert sim.stepping.spin_error == 1e3
-    assert sim.stepping.touching == sand.Verlet(steps_per_period=50)
+    assert sim.stepping.contact_stepping == sand.Verlet(steps_per_period=50)
     again = check_case(tomllib.loads(tomli_w.dumps(case_of(sim, 1e-9, math.inf))), "case.toml")
     assert again.stepping == sim.stepping
     for text, said in (
         ("tolerence = 1e-9", ["stepping.tolerence", "did you mean 'tolerance'?"]),
         ("step = 1e-9", ["stepping.step", "no such key"]),
         ("tolerance = -1", ["stepping: tolerance = -1 must be above 0"]),
-        ("[stepping.touching]\nfar_stepps = 3", ["stepping.touching.far_stepps", "did you mean 'far_steps'?"]),
+        (
+            "[stepping.contact_stepping]\nfar_stepps = 3",
+            ["stepping.contact_stepping.far_stepps", "did you mean 'far_steps'?"],
+        ),
     ):
         with pytest.raises(BadInput) as caught:
             check_case(tomllib.loads(CASE + text), "some.toml")

@@ -99,8 +99,8 @@ def test_a_struck_chain_closes_its_books():
 
 
 @pytest.mark.compiled("contacts")
-@pytest.mark.parametrize("beyond", ["clamp", "release"])
-def test_unequal_grains_of_two_materials_close_their_books(beyond):
+@pytest.mark.parametrize("slip", ["clamp", "reset"])
+def test_unequal_grains_of_two_materials_close_their_books(slip):
     """Two aggregates of unequal silica and ice grains collide at 20 m/s; error ≤ 1e-3 of the impact energy."""
     left = random_aggregate(12, 5, radii=(2e-8, 8e-8))
     right = random_aggregate(12, 6, radii=(2e-8, 8e-8))
@@ -111,7 +111,7 @@ def test_unequal_grains_of_two_materials_close_their_books(beyond):
     material = [sand.SILICA] * 12 + [sand.SILICA.but(name="soft", young_modulus="7 GPa")] * 12
     # the second aggregate's distances were made for silica: let it relax its overlaps in the impact
     grains = sand.Grains(position, radius, material, velocity=speed)
-    sim = sand.Simulation(grains, [sand.Contact(beyond=beyond)], stepping=sand.Verlet(steps_per_period=50))
+    sim = sand.Simulation(grains, [sand.Contact(slip=slip)], stepping=sand.Verlet(steps_per_period=50))
     sim.run(until=1.2 * shift[0] / 20.0)
     last = sim.ledger.rows[-1]
     assert last["made"] > 0
@@ -200,7 +200,7 @@ def test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls(speed, side
 
 def beyond_energy(sim):
     """k w²/12 − F²/(24 m̄) [J/s²] of a single pair, k from differences of F."""
-    bond = sand.contact.law.bond_between(
+    constants = sand.contact.law.contact_constants(
         sand.Contact().pairing(sand.IRON, sand.IRON), *sim.grains.radius, *sim.grains.mass
     )
     apart = sim.grains.position[1] - sim.grains.position[0]
@@ -208,10 +208,10 @@ def beyond_energy(sim):
     w = (sim.grains.velocity[1] - sim.grains.velocity[0]) @ apart / distance
 
     def force(overlap):
-        y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-        return contact_law.normal_force(overlap, y, bond)
+        y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
+        return contact_law.normal_force(overlap, y, constants)
 
-    overlap, h = sim.grains.radius.sum() - distance, 1e-4 * bond.pull_off_overlap
+    overlap, h = sim.grains.radius.sum() - distance, 1e-4 * constants.pull_off_overlap
     stiffness = (force(overlap + h) - force(overlap - h)) / (2.0 * h)
     return stiffness * w * w / 12.0 - force(overlap) ** 2 / (12.0 * sim.grains.mass[0])
 

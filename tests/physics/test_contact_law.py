@@ -30,24 +30,24 @@ def contact_of(ratio, materials=(SILICA, ICE)):
     r1, r2 = 1e-7, ratio * 1e-7
     a, b = materials
     masses = [m.density * 4 / 3 * math.pi * r**3 for m, r in zip(materials, (r1, r2), strict=True)]
-    return r1, r2, law.bond_between(Contact().pairing(a, b), r1, r2, *masses)
+    return r1, r2, law.contact_constants(Contact().pairing(a, b), r1, r2, *masses)
 
 
 class Pair:
     """Two grains that can be pushed and turned by hand; the pointers stay in their bodies."""
 
     def __init__(self, ratio, push, turn1, turn2, twist=0.3):
-        self.r1, self.r2, self.bond = contact_of(ratio)
+        self.r1, self.r2, self.constants = contact_of(ratio)
         self.n0 = unit((0.6, -0.3, 0.74))
-        rest = self.r1 + self.r2 - 0.5 * self.bond.pull_off_overlap
-        size = self.bond.slide_limit
+        rest = self.r1 + self.r2 - 0.5 * self.constants.pull_off_overlap
+        size = self.constants.slide_limit
         self.x1 = add(scale(rest, self.n0), scale(size, push))
         self.x2 = (0.0, 0.0, 0.0)
         identity = (0.0, 0.0, 0.0, 1.0)
-        angle = self.bond.slide_limit / self.r1
+        angle = self.constants.slide_limit / self.r1
         self.q1 = turn(identity, scale(angle, turn1))
         self.q2 = turn(identity, scale(angle, turn2))
-        self.twist = twist * self.bond.twist_limit
+        self.twist = twist * self.constants.twist_limit
 
     def pose(self):
         apart = sub(self.x1, self.x2)
@@ -60,13 +60,13 @@ class Pair:
         return self.r1 + self.r2 - self.pose().distance
 
     def energies(self):
-        return np.array(law.energies(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.bond))
+        return np.array(law.energies(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.constants))
 
     def y(self):
-        return jkr.root(jkr.stretch(self.overlap(), self.bond.pull_off_overlap))
+        return jkr.root(jkr.stretch(self.overlap(), self.constants.pull_off_overlap))
 
     def load(self):
-        return law.contact_load(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.bond)
+        return law.contact_load(self.pose(), self.overlap(), self.y(), self.r1, self.r2, self.constants)
 
 
 def slope(pair, change, h):
@@ -92,8 +92,8 @@ def test_the_force_is_minus_the_gradient(ratio, push, turn1, turn2):
     step of 1e-3 δc and one Richardson step: truncation 1e-12, rounding 1e-16·U/h·… below 1e-8 of k_s ζ_c.
     """
     pair = Pair(ratio, push, turn1, turn2)
-    h = 1e-3 * pair.bond.pull_off_overlap
-    scale_of_force = pair.bond.slide_stiffness * pair.bond.slide_limit + pair.bond.pull_off_force
+    h = 1e-3 * pair.constants.pull_off_overlap
+    scale_of_force = pair.constants.slide_stiffness * pair.constants.slide_limit + pair.constants.pull_off_force
     force, _, _ = pair.load()
     for axis, e in enumerate(np.eye(3)):
 
@@ -111,9 +111,9 @@ def test_the_torque_is_minus_the_gradient(ratio, push, turn1, turn2, which):
     torque = pair.load()[which]
     sign = 1.0 if which == 1 else -1.0
     n, name = pair.pose().n, f"q{which}"
-    h = 1e-3 * pair.bond.slide_limit / pair.r1
-    size = pair.bond.slide_stiffness * pair.bond.slide_limit * pair.r1
-    size += pair.bond.twist_stiffness * pair.bond.twist_limit
+    h = 1e-3 * pair.constants.slide_limit / pair.r1
+    size = pair.constants.slide_stiffness * pair.constants.slide_limit * pair.r1
+    size += pair.constants.twist_stiffness * pair.constants.twist_limit
     for axis, e in enumerate(np.eye(3)):
 
         def move(t, e=tuple(e)):
@@ -128,7 +128,7 @@ def test_the_torque_is_minus_the_gradient(ratio, push, turn1, turn2, which):
 def test_each_mode_alone(ratio, push, turn1, turn2):
     """−dU_mode equals the mode's own work for a random small motion: every spring alone, not only their sum."""
     pair = Pair(ratio, push, turn1, turn2)
-    b, pose = pair.bond, pair.pose()
+    b, pose = pair.constants, pair.pose()
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, pair.r1, pair.r2)
     dx, d1, d2 = (0.3, -0.5, 0.2), (0.1, 0.7, -0.2), (-0.4, 0.2, 0.6)
     h = 1e-3 * b.slide_limit
@@ -165,7 +165,7 @@ def test_no_contact_spins_itself_up(ratio, push, turn1, turn2):
     pair = Pair(ratio, push, turn1, turn2)
     force, torque1, torque2 = pair.load()
     total = np.array(add(add(torque1, torque2), cross(sub(pair.x1, pair.x2), force)))
-    b = pair.bond
+    b = pair.constants
     size = b.slide_stiffness * b.slide_limit * pair.r1 + b.pull_off_force * pair.r1
     assert np.abs(total).max() < 1e-13 * size
 
@@ -177,8 +177,8 @@ def test_swapping_the_grains_swaps_the_loads(ratio, push, turn1, turn2):
     force, torque1, torque2 = pair.load()
     p = pair.pose()
     swapped = law.Pose(scale(-1.0, p.n), p.distance, p.n2, p.n1, p.twist)
-    y = jkr.root(jkr.stretch(pair.overlap(), pair.bond.pull_off_overlap))
-    back, other1, other2 = law.contact_load(swapped, pair.overlap(), y, pair.r2, pair.r1, pair.bond)
+    y = jkr.root(jkr.stretch(pair.overlap(), pair.constants.pull_off_overlap))
+    back, other1, other2 = law.contact_load(swapped, pair.overlap(), y, pair.r2, pair.r1, pair.constants)
     assert back == pytest.approx(scale(-1.0, force), rel=1e-9, abs=1e-22)
     assert other1 == pytest.approx(torque2, rel=1e-9, abs=1e-29)
     assert other2 == pytest.approx(torque1, rel=1e-9, abs=1e-29)
@@ -187,14 +187,14 @@ def test_swapping_the_grains_swaps_the_loads(ratio, push, turn1, turn2):
 @given(RATIOS, TRIPLE, TRIPLE)
 def test_pointers_land_on_their_target(ratio, slide, roll):
     """n1, n2 made for (ζ', ξ') have just these displacements, to 1e-12 of them, radii 1:1 to 1:20."""
-    r1, r2, bond = contact_of(ratio)
+    r1, r2, constants = contact_of(ratio)
     n = unit((0.2, 0.5, -0.8))
-    size = bond.slide_limit
+    size = constants.slide_limit
     wish_slide = scale(size, sub(slide, scale(dot(slide, n), n)))
     wish_roll = scale(size, sub(roll, scale(dot(roll, n), n)))
     n1, n2 = tangential.pointers_for(wish_slide, wish_roll, n, r1, r2)
     pose = law.Pose(n, r1 + r2, n1, n2, 0.0)
-    strain = law.displacements_of(pose, 0.0, r1, r2, bond)
+    strain = law.displacements_of(pose, 0.0, r1, r2, constants)
     across_n = sub(strain.roll, scale(dot(strain.roll, n), n))
     # rounding: coordinates of size r1 are subtracted
     assert strain.slide == pytest.approx(wish_slide, abs=1e-12 * size + 4e-16 * r1)
@@ -203,38 +203,40 @@ def test_pointers_land_on_their_target(ratio, slide, roll):
     assert dot(n2, n2) == pytest.approx(1.0, abs=1e-15)
 
 
-@pytest.mark.parametrize("release", [False, True])
+@pytest.mark.parametrize("reset", [False, True])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_limits_hold_on_both_sides(release, sign):
-    """Clamp leaves a displacement at its limit, release at 0; both signs of the twist."""
-    _, _, bond = contact_of(1.0)
+def test_limits_hold_on_both_sides(reset, sign):
+    """Clamp leaves a displacement at its limit, reset at 0; both signs of the twist."""
+    _, _, constants = contact_of(1.0)
     over = law.Displacements(
         0.0,
-        (0.0, sign * 2 * bond.slide_limit, 0.0),
-        (3 * bond.roll_limit, 0.0, 0.0),
-        sign * 2 * bond.twist_limit,
+        (0.0, sign * 2 * constants.slide_limit, 0.0),
+        (3 * constants.roll_limit, 0.0, 0.0),
+        sign * 2 * constants.twist_limit,
     )
-    assert law.exceeds_limits(over, UP, bond)
-    left = law.after_slip(over, UP, bond, release)
-    part = 0.0 if release else 1.0
-    assert left.slide[1] == pytest.approx(part * sign * bond.slide_limit, rel=1e-6, abs=0.0)
-    assert left.roll[0] == pytest.approx(part * bond.roll_limit, rel=1e-6, abs=0.0)
-    assert left.twist == pytest.approx(part * sign * bond.twist_limit, rel=1e-6, abs=0.0)
+    assert law.exceeds_limits(over, UP, constants)
+    left = law.after_slip(over, UP, constants, reset)
+    part = 0.0 if reset else 1.0
+    assert left.slide[1] == pytest.approx(part * sign * constants.slide_limit, rel=1e-6, abs=0.0)
+    assert left.roll[0] == pytest.approx(part * constants.roll_limit, rel=1e-6, abs=0.0)
+    assert left.twist == pytest.approx(part * sign * constants.twist_limit, rel=1e-6, abs=0.0)
     zero = (0.0, 0.0, 0.0)
     alone = (
-        law.Displacements(0.0, zero, zero, sign * 1.1 * bond.twist_limit),
-        law.Displacements(0.0, (0.0, sign * 1.1 * bond.slide_limit, 0.0), zero, 0.0),
-        law.Displacements(0.0, zero, (sign * 1.1 * bond.roll_limit, 0.0, 0.0), 0.0),
-        law.Displacements(-1.01 * bond.pull_off_overlap, zero, zero, 0.0),
+        law.Displacements(0.0, zero, zero, sign * 1.1 * constants.twist_limit),
+        law.Displacements(0.0, (0.0, sign * 1.1 * constants.slide_limit, 0.0), zero, 0.0),
+        law.Displacements(0.0, zero, (sign * 1.1 * constants.roll_limit, 0.0, 0.0), 0.0),
+        law.Displacements(-1.01 * constants.pull_off_overlap, zero, zero, 0.0),
     )
-    assert all(law.exceeds_limits(strain, UP, bond) for strain in alone)
-    within = law.Displacements(0.0, (0.0, 0.9 * bond.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * bond.twist_limit)
-    assert not law.exceeds_limits(within, UP, bond)
-    assert law.after_slip(within, UP, bond, release) == within
+    assert all(law.exceeds_limits(strain, UP, constants) for strain in alone)
+    within = law.Displacements(
+        0.0, (0.0, 0.9 * constants.slide_limit, 0.0), (0.0, 0.0, 0.0), sign * 0.9 * constants.twist_limit
+    )
+    assert not law.exceeds_limits(within, UP, constants)
+    assert law.after_slip(within, UP, constants, reset) == within
 
 
 def test_what_yielding_dissipates():
-    """½k(q_before + q_left)·(q_reached − q_left): clamped on the limit k q_c (|q| − q_c); released ½k q_before·q."""
+    """½k(q_before + q_left)·(q_reached − q_left): clamped on the limit k q_c (|q| − q_c); reset ½k q_before·q."""
     _, _, b = contact_of(1.0)
     c = b.slide_limit
     zero = (0.0, 0.0, 0.0)
@@ -242,8 +244,8 @@ def test_what_yielding_dissipates():
     reached = law.Displacements(0.0, (1.1 * c, 0.0, 0.0), zero, 0.0)
     clamped = law.slip_losses(before, reached, law.after_slip(reached, UP, b, False), b)
     assert clamped[0] == pytest.approx(b.slide_stiffness * c * 0.1 * c, rel=1e-12, abs=0.0)
-    released = law.slip_losses(before, reached, law.after_slip(reached, UP, b, True), b)
-    assert released[0] == pytest.approx(0.5 * b.slide_stiffness * c * 1.1 * c, rel=1e-12, abs=0.0)
+    reset = law.slip_losses(before, reached, law.after_slip(reached, UP, b, True), b)
+    assert reset[0] == pytest.approx(0.5 * b.slide_stiffness * c * 1.1 * c, rel=1e-12, abs=0.0)
 
 
 def test_constants_of_equal_grains():
@@ -266,7 +268,7 @@ def test_periods_of_20_nm_iron():
     """T_slide = 1.9e-11 s and T_n = 4.3e-11 s for 20 nm (diameter) iron: ω² = 7k_s/m and 2k_n/m."""
     r = 1e-8
     mass = IRON.density * 4 / 3 * math.pi * r**3
-    b = law.bond_between(Contact().pairing(IRON, IRON), r, r, mass, mass)
+    b = law.contact_constants(Contact().pairing(IRON, IRON), r, r, mass, mass)
     assert 2 * math.pi / math.sqrt(b.max_squared_frequency) == pytest.approx(1.9e-11, rel=0.02, abs=0.0)
     assert b.max_squared_frequency == pytest.approx(7 * b.slide_stiffness / mass, rel=1e-6, abs=0.0)
     same = Contact().pairing(IRON, IRON)

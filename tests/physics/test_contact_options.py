@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact.law import bond_between
+from sand.contact.law import contact_constants
 from sand.contact.mixing import MIXING
 from sand.state.state import LOST, RECORDED
 
@@ -20,9 +20,9 @@ def pair(distance, material=sand.SILICA, speed=0.0, r=R, **options):
     return sand.Grains([[0, 0, 0], [distance, 0, 0]], r, material, **({"velocity": velocity} | options))
 
 
-def bond_of(contact, material=sand.SILICA, r=R):
+def pair_constants(contact, material=sand.SILICA, r=R):
     mass = material.density * 4 / 3 * math.pi * r**3
-    return bond_between(contact.pairing(material, material), r, r, mass, mass), mass
+    return contact_constants(contact.pairing(material, material), r, r, mass, mass), mass
 
 
 @pytest.mark.compiled("contacts")
@@ -30,8 +30,8 @@ def bond_of(contact, material=sand.SILICA, r=R):
 def test_ringing_decays_as_the_oscillator_does(kind):
     """m̄ x¨ = −k_n x − c ẋ: energy falls as exp(−c t/m̄), c constant or (2 T_vis E*/ν²) a0; small amplitude, 2 %."""
     contact = sand.Contact(damping=kind, damping_constant="2e-9 kg/s", viscous_time="2e-14 s")
-    bond, mass = bond_of(contact)
-    c = bond.damping + bond.damping_per_radius * bond.rest_radius
+    constants, mass = pair_constants(contact)
+    c = constants.damping + constants.damping_per_radius * constants.rest_radius
     grains = pair(rest_distance(sand.SILICA, R, R), speed=0.005)
     sim = sand.Simulation(grains, [contact], stepping=sand.Verlet(steps_per_period=100))
     sim.run(until=0.7 * mass / 2 / c)
@@ -106,8 +106,8 @@ def test_each_contact_keeps_its_own_books():
 @pytest.mark.parametrize(("factor", "power"), [("slide_factor", 1.0), ("roll_factor", 1.0), ("twist_factor", 1.0)])
 def test_multipliers_scale_their_own_stiffness(factor, power):
     """k_s, k_r, k_t alone are multiplied; limits stay."""
-    plain, _ = bond_of(sand.Contact())
-    scaled, _ = bond_of(sand.Contact(**{factor: 2.5}))
+    plain, _ = pair_constants(sand.Contact())
+    scaled, _ = pair_constants(sand.Contact(**{factor: 2.5}))
     name = factor.replace("factor", "stiffness")
     for field in plain._fields:
         expected = 2.5 if field == name else 1.0

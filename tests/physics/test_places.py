@@ -220,12 +220,12 @@ def test_who_may_touch_soon_is_known_in_the_new_order():
     sim.run(steps=EVERY)
     listed = sim.state.count[REBUILT]
     sim._engine.advance(np.inf, 1)
-    w, reach = sim._engine._state, sim._engine.parameters.criteria.reach
+    w, reach = sim._engine._state, sim._engine.parameters.criteria.pair_gap
     assert w.count[ORDERED] == EVERY and w.count[REBUILT] == listed
     i, j = w.pair_list.pair[:, : w.count[PAIRS]].astype(int)
     apart = np.linalg.norm(w.grains.position[i] - w.grains.position[j], axis=1)
     close = (apart < w.grains.radius[i] + w.grains.radius[j] + INNER_SKIN_FRACTION * reach) & (
-        w.pair_list.touching[: i.size] == 0
+        w.pair_list.in_contact[: i.size] == 0
     )
     assert close.sum() > 5
     assert not inner_list_overflowed(w.pair_list, w.count)

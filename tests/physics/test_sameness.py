@@ -100,14 +100,14 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 @pytest.mark.compiled("contacts")
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
-    from sand.contact.law import Bond
+    from sand.contact.law import ContactConstants
     from sand.state.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
 
     ends = []
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.state.contacts = empty_contact_arrays(n, room, len(Bond._fields), uniform_contacts=alike)
+        sim.state.contacts = empty_contact_arrays(n, room, len(ContactConstants._fields), uniform_contacts=alike)
         sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=alike), alike
         rules = sim._engine.parameters
         sim._engine.parameters = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
@@ -199,7 +199,7 @@ def test_kernels_against_plain_python_loops():
     force, torque = np.zeros((40, 3)), np.zeros((40, 3))
     for c in range(w.count[CONTACTS]):
         i, j = (int(k) for k in w.contacts.pair[:, c])
-        bond = law.Bond(*w.contacts.bond[:, c])
+        constants = law.ContactConstants(*w.contacts.constants[:, c])
         apart = g.position[i] - g.position[j]
         distance = np.linalg.norm(apart)
         from scipy.spatial.transform import Rotation
@@ -208,8 +208,8 @@ def test_kernels_against_plain_python_loops():
         n2 = Rotation.from_quat(g.orientation[j]).apply(w.contacts.pointer2[:, c])
         pose = law.Pose(tuple(apart / distance), distance, tuple(n1), tuple(n2), w.contacts.twist[c])
         overlap = g.radius[i] + g.radius[j] - distance
-        y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-        f, t1, t2 = law.contact_load(pose, overlap, y, g.radius[i], g.radius[j], bond)
+        y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
+        f, t1, t2 = law.contact_load(pose, overlap, y, g.radius[i], g.radius[j], constants)
         force[i] += f
         force[j] -= f
         torque[i] += t1

@@ -14,10 +14,10 @@ R = 3e-7
 def _pair():
     contact = sand.Contact().pairing(sand.SILICA, sand.SILICA)
     mass = 4.0 / 3.0 * math.pi * R**3 * sand.SILICA.density
-    bond = sand.contact.law.bond_between(contact, R, R, mass, mass)
-    rest = bond.rest_radius**2 / (3.0 * bond.reduced_radius)
-    step = 2.0 * math.pi / math.sqrt(bond.max_squared_frequency) / sand.Verlet().steps_per_period
-    return bond, 2.0 * R - rest, step
+    constants = sand.contact.law.contact_constants(contact, R, R, mass, mass)
+    rest = constants.rest_radius**2 / (3.0 * constants.reduced_radius)
+    step = 2.0 * math.pi / math.sqrt(constants.max_squared_frequency) / sand.Verlet().steps_per_period
+    return constants, 2.0 * R - rest, step
 
 
 def _steps_of(sim, number):
@@ -39,12 +39,14 @@ def test_a_spinning_pair_does_not_ring_up():
     other, v_spin + v_ring, changes in time with the ringing: up to 0.8 % each time, of one sign, which adds up to 60 %.
     The three v_spin are those at which such a step changes, around δ_c a step.
     """
-    bond, distance, step = _pair()
-    ringing = 0.8 * bond.slide_limit
-    rate = 0.5 * ringing * math.sqrt(bond.max_squared_frequency) / R  # spin of both grains that slides them that far
-    stake = 0.5 * bond.slide_stiffness * ringing**2
+    constants, distance, step = _pair()
+    ringing = 0.8 * constants.slide_limit
+    rate = (
+        0.5 * ringing * math.sqrt(constants.max_squared_frequency) / R
+    )  # spin of both grains that slides them that far
+    stake = 0.5 * constants.slide_stiffness * ringing**2
     for part in (0.8, 0.9, 1.2):
-        turning = part * bond.pull_off_overlap / step / distance
+        turning = part * constants.pull_off_overlap / step / distance
         half = 0.5 * distance
         grains = sand.Grains(
             [[half, 0, 0], [-half, 0, 0]],
@@ -63,8 +65,8 @@ def test_a_spinning_pair_does_not_ring_up():
 @pytest.mark.compiled("contacts")
 def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
     """A grain about to touch needs no shorter a step than its contact will: the contacts' own, to the bit."""
-    bond, distance, step = _pair()
-    slow = 0.1 * bond.pull_off_overlap / step
+    constants, distance, step = _pair()
+    slow = 0.1 * constants.pull_off_overlap / step
     gap = 100 * slow * step
     position = [[0, 0, 0], [distance, 0, 0], [0, 5e-6, 0], [2 * R + gap, 5e-6, 0]]
     grains = sand.Grains(position, R, sand.SILICA, velocity=[[0, 0, 0]] * 3 + [[-slow, 0, 0]])
@@ -80,8 +82,8 @@ def test_a_shorter_step_is_held_for_ten_periods():
     """Two grains bounce beside a ringing pair: the step falls at once, and grows only HOLD_STEPS steps after that."""
     from sand.integrate.step_control import HOLD_STEPS
 
-    bond, distance, step = _pair()
-    fast = 4.0 * bond.pull_off_overlap / step
+    constants, distance, step = _pair()
+    fast = 4.0 * constants.pull_off_overlap / step
     position = [[0, 0, 0], [distance, 0, 0], [0, 5e-6, 0], [2 * R + 20 * fast * step, 5e-6, 0]]
     grains = sand.Grains(position, R, sand.SILICA, velocity=[[0, 0, 0]] * 3 + [[-fast, 0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()])

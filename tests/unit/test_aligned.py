@@ -32,5 +32,5 @@ def test_all_arrays_of_a_world_begin_with_a_line():
         one.grow_pairs()
         groups = (one.grains.arrays, one.contacts, one.pair_list, one.long_range, one.stages)
         assert all(begins(array) or array.size == 0 for group in groups for array in group)
-        assert one.contacts.flag.size % SIMD_WIDTH == one.pair_list.touching.size % SIMD_WIDTH == 0
+        assert one.contacts.flag.size % SIMD_WIDTH == one.pair_list.in_contact.size % SIMD_WIDTH == 0
     assert [padded_size(number) for number in (0, 1, 8, 9)] == [0, 8, 8, 16]

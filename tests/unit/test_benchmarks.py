@@ -126,6 +126,6 @@ def test_bytes_that_a_step_touches_count_arrays_with_columns():
     """
     sim = worlds.lattice(3)
     per_grain = sum(a.nbytes for a in sim.state.grains.arrays) / 27
-    constants = 0 if sim.state.uniform_contacts else 8 * sim.state.contacts.bond.shape[0]
+    constants = 0 if sim.state.uniform_contacts else 8 * sim.state.contacts.constants.shape[0]
     side = sim.state.contacts.side.nbytes / sim.state.contacts.side.size
     assert steps.touched_bytes(sim) == pytest.approx(54 * (137 + side + constants) + 27 * per_grain)

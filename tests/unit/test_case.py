@@ -85,7 +85,7 @@ def problems_of(content):
         ({"grains__material": "unobtainium"}, ["unknown material 'unobtainium'", "allowed: ice, silica"]),
         ({"grains__kind": "gass"}, ["grains.kind", "'gass'", "'gas'"]),
         ({"grains__spins": "kT"}, ["grains.spins", "did you mean 'kT/2'?"]),
-        ({"forces__contact__beyond": "clmp"}, ["forces.contact", "did you mean 'clamp'?"]),
+        ({"forces__contact__slip": "clmp"}, ["forces.contact", "did you mean 'clamp'?"]),
         ({"stepping__method": "verlett"}, ["stepping", "did you mean 'verlet'?"]),
         ({"materials__mine__densty": 1.0}, ["materials.mine.densty", "did you mean 'density'?"]),
         ({"materials__mine__like": "iorn"}, ["materials", "did you mean 'iron'?"]),

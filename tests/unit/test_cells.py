@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import sand
 from sand.box import Box, as_box
 from sand.compiler.jit import kernel
-from sand.contact.pair_types import bond_of
+from sand.contact.pair_types import pair_constants
 from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
 from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours import cell_list as cells
@@ -341,7 +341,7 @@ def test_rows_that_are_too_long_are_listed_with_more_room():
 
 @pytest.mark.compiled("contacts")
 def test_near_pairs_have_the_step_of_their_own_contact():
-    """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair are those of its bond, 1e-14."""
+    """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair follow from its constants, 1e-14."""
     rng = np.random.default_rng(4)
     block = sand.setup.lattice(5, radius="10 nm", material=sand.IRON)
     radius = rng.choice([1e-8, 9e-9, 5e-9], 125)
@@ -352,10 +352,10 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     pairs = sim.state.count[PAIRS]
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
-        bond = bond_of(a, law.pairings, i, j)
-        period = 2 * np.pi / np.sqrt(bond.max_squared_frequency)
+        constants = pair_constants(a, law.pairings, i, j)
+        period = 2 * np.pi / np.sqrt(constants.max_squared_frequency)
         assert near.step[p] == pytest.approx(period / law.per_period, rel=1e-14)
-        assert near.length[p] == pytest.approx(bond.break_overlap, rel=1e-14)
+        assert near.break_overlap[p] == pytest.approx(constants.break_overlap, rel=1e-14)
 
 
 @pytest.mark.validate

@@ -48,7 +48,7 @@ def test_the_papers_figure_4(place):
 
     Hit-and-stick gives a chain with one more grain; clamped rolling (twice the friction) gives no T there.
     """
-    hit = chain_impact.strike(sand.IRON, "10 nm", speed=240.0, place=place, contact=sand.Contact(beyond="release"))
+    hit = chain_impact.strike(sand.IRON, "10 nm", speed=240.0, place=place, contact=sand.Contact(slip="reset"))
     shape = chain_impact.shape_of(hit)
     assert shape.name == "T"
     assert shape.crossbar > 60.0

@@ -65,7 +65,7 @@ def test_what_may_touch_soon_is_what_is_close():
     Where they have no room (an array has one place more than that), all near pairs are looked at.
     """
     sim = crowd()
-    w, reach = sim.state, sim._engine.parameters.criteria.reach
+    w, reach = sim.state, sim._engine.parameters.criteria.pair_gap
     gap = 2.0 * INNER_SKIN_FRACTION * reach
 
     def picked(room):

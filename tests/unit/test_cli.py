@@ -95,10 +95,10 @@ def test_run_tells_what_it_does_and_what_came_of_it(place, capsys):
 
 def test_settings_that_differ_are_told(place, capsys):
     """Of each force its name and what the user has set."""
-    (place / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nbeyond = "release"'))
+    (place / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nslip = "reset"'))
     (place / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
     assert main(["info", "small.toml"]) == 0
-    assert "contact (beyond = release), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
+    assert "contact (slip = reset), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
 
 
 @pytest.mark.compiled("dipoles")

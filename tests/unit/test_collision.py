@@ -131,7 +131,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
         ('"2 m/s"', '"2 m"', "impact.speed: speed = '2 m' is not a quantity in m/s|impact.speed: "),
         ('"2 m/s"', '"0 m/s"', "above 0"),
         ("seeds = [1, 2]", "sedes = [1, 2]", "impact.sedes: there is no such key; did you mean 'seeds'?"),
-        ("[forces.contact]", '[forces.contact]\nbeyond = "clmp"', "did you mean 'clamp'"),
+        ("[forces.contact]", '[forces.contact]\nslip = "clmp"', "did you mean 'clamp'"),
         (
             'radius = "0.1 um"\n[impact]',
             'radius = "0.1 um"\nmaterial = "silicon"\n[impact]',

@@ -5,7 +5,7 @@ import pytest
 
 import sand
 from sand.contact import jkr, law
-from sand.contact.update import bond_at, pose_at
+from sand.contact.update import constants_at, pose_at
 from sand.simulation.contact_table import COLUMNS
 
 from ..physics.setups import random_aggregate
@@ -29,30 +29,32 @@ def test_every_column_row_by_row(stiffness):
     assert set(table) == {name for name, _, _ in COLUMNS}
     force = np.zeros((15, 3))
     for c, (i, j) in enumerate(table["pair"]):
-        plain = bond_at(w.contacts, c)
+        plain = constants_at(w.contacts, c)
         pose = pose_at(w.grains.arrays, w.contacts, sim.box.span, c, w.contacts.twist[c])
         r1, r2 = sim.grains.radius[i], sim.grains.radius[j]
         overlap = r1 + r2 - np.linalg.norm(sim.grains.position[i] - sim.grains.position[j])
         y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
-        bond = law.scaled_stiffness(plain, y, stiffness == "dt97")
+        constants = law.scaled_stiffness(plain, y, stiffness == "dt97")
         n = np.array(pose.n)
         d = r1 * np.array(pose.n1) - r2 * np.array(pose.n2)
         slide = np.linalg.norm(d - (d @ n) * n)
-        xi = bond.reduced_radius * (np.array(pose.n1) + np.array(pose.n2))
+        xi = constants.reduced_radius * (np.array(pose.n1) + np.array(pose.n2))
         roll = np.linalg.norm(xi - (xi @ n) * n)
         row = {name: table[name][c] for name in table}
         assert row["overlap"] == pytest.approx(overlap, rel=1e-6, abs=0.0)
-        assert row["contact_radius"] == pytest.approx(bond.rest_radius * y**2, rel=1e-6, abs=0.0)
-        assert row["slide_share"] == pytest.approx(slide / bond.slide_limit, rel=1e-6, abs=1e-9)
-        assert row["roll_share"] == pytest.approx(roll / bond.roll_limit, rel=1e-6, abs=1e-9)
-        assert row["twist_share"] == pytest.approx(abs(w.contacts.twist[c]) / bond.twist_limit, rel=1e-6, abs=0.0)
-        assert row["stretch_share"] == pytest.approx(-overlap / bond.pull_off_overlap, rel=1e-6, abs=0.0)
-        assert row["energy_sliding"] == pytest.approx(0.5 * bond.slide_stiffness * slide**2, rel=1e-6, abs=1e-28)
+        assert row["contact_radius"] == pytest.approx(constants.rest_radius * y**2, rel=1e-6, abs=0.0)
+        assert row["slide_share"] == pytest.approx(slide / constants.slide_limit, rel=1e-6, abs=1e-9)
+        assert row["roll_share"] == pytest.approx(roll / constants.roll_limit, rel=1e-6, abs=1e-9)
+        assert row["twist_share"] == pytest.approx(abs(w.contacts.twist[c]) / constants.twist_limit, rel=1e-6, abs=0.0)
+        assert row["stretch_share"] == pytest.approx(-overlap / constants.pull_off_overlap, rel=1e-6, abs=0.0)
+        assert row["energy_sliding"] == pytest.approx(0.5 * constants.slide_stiffness * slide**2, rel=1e-6, abs=1e-28)
         assert row["force"] @ n == pytest.approx(row["normal_force"], rel=1e-6, abs=0.0)
         across = row["force"] - (row["force"] @ n) * n
         assert np.linalg.norm(across) == pytest.approx(row["slide_force"], rel=1e-2, abs=1e-16)
-        assert row["twist_torque"] == pytest.approx(-bond.twist_stiffness * row["twist"], rel=1e-12, abs=0.0)
-        assert row["roll_torque"] == pytest.approx(bond.roll_stiffness * bond.reduced_radius * roll, rel=1e-6, abs=0.0)
+        assert row["twist_torque"] == pytest.approx(-constants.twist_stiffness * row["twist"], rel=1e-12, abs=0.0)
+        assert row["roll_torque"] == pytest.approx(
+            constants.roll_stiffness * constants.reduced_radius * roll, rel=1e-6, abs=0.0
+        )
         force[i] += row["force"]
         force[j] -= row["force"]
     assert force == pytest.approx(sim.grains.force, abs=1e-9 * np.abs(force).max())

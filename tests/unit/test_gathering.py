@@ -45,7 +45,7 @@ def some(per_grain, count=GRAINS):
     pair = rng.permutation(pair, axis=1)[:, : int(per_grain * count)]
     contacts, counters = empty_contact_arrays(count, pair.shape[1], 15), np.zeros(len(COUNT), np.int64)
     contacts.pair[:, : pair.shape[1]], counters[CONTACTS] = pair, pair.shape[1]
-    for loads in (contacts.push, contacts.torque1, contacts.torque2):
+    for loads in (contacts.force, contacts.torque1, contacts.torque2):
         loads[...] = 1e-9 * rng.normal(size=loads.shape)
     resort_contacts_by_grain(contacts, counters, count)
     return grains, contacts, pair
@@ -60,7 +60,7 @@ def test_sums_are_those_of_brute_force(per_grain, count):
     used = pair.shape[1]
     force, torque = np.zeros((3, count)), np.zeros((3, count))
     for end, sign, own in ((0, 1.0, contacts.torque1), (1, -1.0, contacts.torque2)):
-        np.add.at(force, (slice(None), pair[end]), sign * contacts.push[:, :used])
+        np.add.at(force, (slice(None), pair[end]), sign * contacts.force[:, :used])
         np.add.at(torque, (slice(None), pair[end]), own[:, :used])
     grains.force[...] = grains.torque[...] = np.nan
     gather_all(grains, contacts)

@@ -147,7 +147,7 @@ def test_a_collision_that_was_killed_goes_on(place, hit, capsys):
     [
         ('"2.0 m/s"', '"3 m/s"'),
         ("grains = 2", "grains = 3"),
-        ("[forces.contact]", "[forces.contact]\nbeyond = 'release'"),
+        ("[forces.contact]", "[forces.contact]\nslip = 'reset'"),
     ],
 )
 def test_a_collision_cannot_change_on_its_way(place, hit, capsys, old, new):

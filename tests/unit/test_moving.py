@@ -8,7 +8,7 @@ import pytest
 from sand.box import Box
 from sand.compiler.jit import kernel
 from sand.contact.events import update_flagged_contacts
-from sand.contact.law import Bond, bond_between, displacements_of
+from sand.contact.law import ContactConstants, contact_constants, displacements_of
 from sand.contact.model import Contact
 from sand.contact.slip import contact_pass, displacements_before, log_slip_sums
 from sand.contact.tangential import pointers_for
@@ -25,7 +25,7 @@ from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SL
 PAIRS = 403
 """Contacts of a test: whole blocks, and a rest that fills no vector."""
 STEP = 1e-11
-STATE = ("pointer1", "pointer2", "twist", "push", "torque1", "torque2", "lost")
+STATE = ("pointer1", "pointer2", "twist", "force", "torque1", "torque2", "lost")
 
 
 def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
@@ -56,7 +56,7 @@ def some_contacts(material, box, seed=1):
     pairing = Contact().pairing(material, material)
     r1, r2 = rng.uniform(5e-9, 2e-8, (2, PAIRS))
     mass = 4 / 3 * np.pi * 2000.0 * np.array([r1, r2]) ** 3
-    n, contacts = vectors(1.0), empty_contact_arrays(2 * PAIRS, PAIRS, len(Bond._fields))
+    n, contacts = vectors(1.0), empty_contact_arrays(2 * PAIRS, PAIRS, len(ContactConstants._fields))
     grains = GrainArrays(*(np.zeros_like(a) for a in Grains(np.zeros((2 * PAIRS, 3)), 1e-8, material).arrays))
     grains.orientation[:] = rng.normal(size=(4, 2 * PAIRS))
     grains.orientation[:] /= np.linalg.norm(grains.orientation, axis=0)
@@ -66,34 +66,34 @@ def some_contacts(material, box, seed=1):
     contacts.flag[:PAIRS] = 1.0  # much moved in the step before
     contacts.lost[:] = rng.uniform(0.0, 1e-20, contacts.lost.shape)
     for c in range(PAIRS):
-        bond = bond_between(pairing, r1[c], r2[c], *mass[:, c])
+        constants = contact_constants(pairing, r1[c], r2[c], *mass[:, c])
         across = [np.cross(n[c], v) for v in vectors(1.0)[:2]]
         slide, roll, twist = rng.uniform(0.0, 1.6, 3)
-        slide, roll = scale(slide * bond.slide_limit, across[0]), scale(roll * bond.roll_limit, across[1])
+        slide, roll = scale(slide * constants.slide_limit, across[0]), scale(roll * constants.roll_limit, across[1])
         n1, n2 = pointers_for(slide, roll, n[c], r1[c], r2[c])
         pressed = rng.uniform(-1.1, 2.0) if c % 10 else rng.uniform(5.0, 20.0)
         centre = rng.uniform(-1e-7, 1e-7, 3)
-        apart = r1[c] + r2[c] - pressed * bond.pull_off_overlap * (0.2 if bond.hertz > 0.0 else 1.0)
+        apart = r1[c] + r2[c] - pressed * constants.pull_off_overlap * (0.2 if constants.hertz > 0.0 else 1.0)
         put(grains.position, c, axpy(0.5 * apart, n[c], centre))
         put(grains.position, c + PAIRS, axpy(-0.5 * apart, n[c], centre))
         put(contacts.pointer1, c, turned_back(load4(grains.orientation, c), n1))
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, c + PAIRS), n2))
         contacts.pair[:, c] = c, c + PAIRS
-        contacts.twist[c] = twist * bond.twist_limit * rng.choice((-1.0, 1.0))
-        contacts.bond[:, c] = bond
+        contacts.twist[c] = twist * constants.twist_limit * rng.choice((-1.0, 1.0))
+        contacts.constants[:, c] = constants
     grains.position[:] = box.wrap(grains.position.T).T
     count = np.zeros(len(COUNT), np.int64)
     count[CONTACTS] = PAIRS
     return grains, contacts, empty_pair_list(2 * PAIRS, 16), count, np.zeros(len(LOST))
 
 
-def law_for(release=False, follow=False):
-    return ContactParameters(True, np.zeros((10, 1, 1)), release, follow, False, 25.0)
+def law_for(reset=False, follow=False):
+    return ContactParameters(True, np.zeros((10, 1, 1)), reset, follow, False, 25.0)
 
 
 OPTIONS = {
     "clamped": (SILICA, Box.open(), law_for()),
-    "released": (SILICA, Box.open(), law_for(release=True)),
+    "reset": (SILICA, Box.open(), law_for(reset=True)),
     "periodic": (SILICA, Box.periodic(2.2e-7, None, 3e-7), law_for()),
     "following": (SILICA, Box.open(), law_for(follow=True)),
     "hertzian": (SILICA.but(name="dry", surface_energy=0.0), Box.open(), law_for()),
@@ -123,7 +123,7 @@ def test_contacts_moved_in_the_pass_are_as_if_moved_one_by_one(option):
     assert ((flag == BROKEN_FLAG) == (waits == BROKEN_FLAG)).all() and ((flag > 0) == (waits > 0)).all()
     # there are all sorts of contacts, and it is the pass that moves them, but for those it must leave alone
     assert 0 < world[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
-    if option in ("clamped", "released", "periodic"):
+    if option in ("clamped", "reset", "periodic"):
         assert np.sum(flag == SLIPPED_FLAG) > PAIRS / 4 and np.sum(flag == PENDING_FLAG) > 0
         assert world[3][BROKEN] < waited < PAIRS / 3
         assert world[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAG)
@@ -141,12 +141,12 @@ def test_the_strain_before_a_step_is_that_of_grains_put_back():
     kick_and_drift_for(False)(back, span, -STEP)  # no loads act
     found, expected = [], []
     for c in range(PAIRS):
-        bond, radii = Bond(*contacts.bond[:, c]), (grains.radius[c], grains.radius[c + PAIRS])
+        constants, radii = ContactConstants(*contacts.constants[:, c]), (grains.radius[c], grains.radius[c + PAIRS])
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        found.append(np.hstack(displacements_before(grains, contacts, c, pose, bond, STEP)))
+        found.append(np.hstack(displacements_before(grains, contacts, c, pose, constants, STEP)))
         twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, STEP)
         then = pose_at(back, contacts, span, c, twist)
-        expected.append(np.hstack(displacements_of(then, sum(radii) - then.distance, *radii, bond)))
+        expected.append(np.hstack(displacements_of(then, sum(radii) - then.distance, *radii, constants)))
     found, expected = np.array(found), np.array(expected)
     assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
 

@@ -28,7 +28,7 @@ def pair(distance=3e-8, **options):
         (lambda: sand.Simulation(pair(), [sand.Contact()], box="50 nm"), r"too small: .* at least 6e-08 m"),
         (lambda: sand.Simulation(pair(distance=1.5e-8), [sand.Contact()]), r"grains 0 and 1 overlap|grains 1 and 0"),
         (lambda: sand.Simulation(pair(material=sand.MAGNETITE), [sand.Contact()]), r"magnetite.*no surface energy"),
-        (lambda: sand.Contact(beyond="clmp"), r"did you mean 'clamp'"),
+        (lambda: sand.Contact(slip="clmp"), r"did you mean 'clamp'"),
         (lambda: sand.Dipoles(cutoff="3 K"), r"cutoff = '3 K' is not a quantity in m"),
         (lambda: sand.Dipoles(cutoff=-1.0), r"cutoff = -1.0 must be above 0"),
         (
@@ -74,7 +74,7 @@ def test_contacts_that_are_held_may_overlap_by_more():
     wrong = [2 * k for k in range(31) if k % 2]
     first = [2, 10, 58]
     pairs = np.array([[2, 3], [11, 10], [59, 58]])
-    held = sand.setup.Bonds(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
+    held = sand.setup.StrainedContacts(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
     with pytest.raises(sand.BadInput) as caught:
         sand.Simulation(grains, [sand.Contact()], contacts=held)
     named = [f"grains {i} and {i + 1} overlap by {1.3 * limit:.3g} m at the start" for i in wrong if i not in first]

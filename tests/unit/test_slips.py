@@ -63,9 +63,9 @@ ARGUMENTS = [
     ("sand.Box.periodic(lenght='1 um')", "Box.periodic: there is no argument 'lenght'"),
     ("sand.Box('1 um')", "lengths = '1 um' must be lengths in m or None; see sand.Box.periodic"),
     ("sand.Box.periodic(sand.Box.open())", "is not a quantity in m"),
-    ("sand.Contact(beyond=np.array([1.0, 2.0]))", "beyond = array of shape (2,) must be text"),
-    ("sand.Contact(beyound='clamp')", "no argument 'beyound'; did you mean 'beyond'?"),
-    ("sand.Contact(None)", "contact: beyond = None; allowed: clamp, release"),
+    ("sand.Contact(slip=np.array([1.0, 2.0]))", "slip = array of shape (2,) must be text"),
+    ("sand.Contact(stifness='dt97')", "no argument 'stifness'; did you mean 'stiffness'?"),
+    ("sand.Contact(None)", "contact: slip = None; allowed: clamp, reset"),
     ("sand.Dipoles(cutoff=np.array([1e-7, 2e-7]))", "dipoles: cutoff = array of shape (2,) is not a quantity in m"),
     ("sand.Dipoles(cut_off='1 um')", "no argument 'cut_off'; did you mean 'cutoff'?"),
     ("sand.Field()", "Field: flux_density is missing"),
@@ -106,7 +106,7 @@ SIMULATIONS = [
     ("sand.Simulation(grains, observers=[7])", "observers: 7 is not a sand.Observer"),
     ("sand.Simulation(grains, observers=[sand.Observer])", "sand.Observer is a class; write sand.Observer()"),
     ("sand.Simulation(grains, observers=sand.Observer())", "must be a list"),
-    ("sand.Simulation(grains, contacts=[[0, 1]])", "contacts = [[0, 1]]; give sand.setup.Bonds(…)"),
+    ("sand.Simulation(grains, contacts=[[0, 1]])", "contacts = [[0, 1]]; give sand.setup.StrainedContacts(…)"),
     ("sand.Simulation(grains, frame_every='often')", "frame_every = 'often' is not a quantity in s"),
     ("sim.run('5 us', 100)", "takes 1 argument without a name (until), not 2"),
     ("sim.run(untill='5 us')", "no argument 'untill'; did you mean 'until'?"),
@@ -244,10 +244,10 @@ def test_tables_can_be_asked_for_a_name(known):
 def test_all_that_is_wrong_with_settings_is_told_at_once():
     """Kinds and ranges, one line each."""
     with pytest.raises(sand.BadInput) as caught:
-        sand.Contact(beyond=3, slide_factor=-1.0, roll_factor="x")
+        sand.Contact(slip=3, slide_factor=-1.0, roll_factor="x")
     assert len(caught.value.problems) == 3
     with pytest.raises(sand.BadInput) as caught:
-        sand.Adaptive(tolerance=-1.0, touching="verlet")
+        sand.Adaptive(tolerance=-1.0, contact_stepping="verlet")
     assert len(caught.value.problems) == 2
     with pytest.raises(sand.BadInput) as caught:
         sand.Grains([[0, 0, 0]], 1e-8, "iron", velocty=1, spim=2)

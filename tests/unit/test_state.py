@@ -52,7 +52,7 @@ def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
         "axis": good[None],
         "number": np.array(1, good.dtype),
     }
-    if good.shape[-1] > 1 or name not in ("contacts/bond", "pair_list/step", "pair_list/length"):
+    if good.shape[-1] > 1 or name not in ("contacts/constants", "pair_list/step", "pair_list/break_overlap"):
         changed["shape"] = np.concatenate([good, good], axis=-1) if good.size else np.zeros((3, 1))
     if good.size and good.dtype.kind == "f":
         changed["not a number"] = np.full_like(good, np.nan)
@@ -61,7 +61,7 @@ def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
         changed["beyond"].flat[-1] = FAR
     if name in ("grains/radius", "grains/mass", "grains/inertia"):
         changed["zero"], changed["below 0"] = 0.0 * good, -good
-    if name in ("contacts/bonded", "pair_list/touching"):
+    if name in ("contacts/every_step", "pair_list/in_contact"):
         changed["neither"] = np.full_like(good, 2)
     for what, array in changed.items():
         said = refused(tmp_path, {**WITH_ORDER, name: array})

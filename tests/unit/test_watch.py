@@ -67,7 +67,7 @@ def test_no_grain_is_farther_than_its_skin_allows(monkeypatch, blocks):
     control, search = sim._engine.parameters.criteria, sim._engine.parameters.search
     limits = {
         LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
-        PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.reach),
+        PAIR_LIST_SKIN: ("pair_list", "anchor", 0.25 * control.pair_gap),
     }
     sim.run(steps=1)
     spared = 0
@@ -92,7 +92,7 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     pick in each.
     """
     sim, twin = crowd(), crowd()
-    limit, span = INNER_SKIN_FRACTION * sim._engine.parameters.criteria.reach, sim._engine.parameters.span
+    limit, span = INNER_SKIN_FRACTION * sim._engine.parameters.criteria.pair_gap, sim._engine.parameters.span
     for each in (sim, twin):
         each.run(steps=1)
     looked_at = 0
@@ -165,7 +165,7 @@ def test_what_is_no_number_is_the_largest(sign):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(
-    "name", ["contacts/twist", "contacts/side", "contacts/bond", "pair_list/pair", "pair_list/step"]
+    "name", ["contacts/twist", "contacts/side", "contacts/constants", "pair_list/pair", "pair_list/step"]
 )
 @pytest.mark.parametrize("radius", [[1e-8, 1e-8, 1e-8], [1e-8, 1e-8, 9e-9]], ids=["alike", "unlike"])
 def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
@@ -177,7 +177,7 @@ def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
     assert world.uniform_contacts == (radius[2] == radius[0]) and len(sim.contacts["pair"]) == 2
     world.from_arrays(saved)
     fewer = saved | {name: saved[name][..., :1]}
-    if world.uniform_contacts and name in ("contacts/bond", "pair_list/step"):
+    if world.uniform_contacts and name in ("contacts/constants", "pair_list/step"):
         world.from_arrays(fewer)
     else:
         with pytest.raises(sand.BadInput, match=name):

@@ -39,9 +39,17 @@ from .law import (
     slip_losses,
     stiffness_loss,
 )
-from .pair_types import bond_of
+from .pair_types import pair_constants
 from .slip import displacements_before, loss_row
-from .update import BROKEN_FLAG, PENDING_FLAG, bond_at, pose_at, stored_damping_force, uniform_contacts, write_loads
+from .update import (
+    BROKEN_FLAG,
+    PENDING_FLAG,
+    constants_at,
+    pose_at,
+    stored_damping_force,
+    uniform_contacts,
+    write_loads,
+)
 
 
 @loop
@@ -85,7 +93,7 @@ def add_damping_force(grains, contacts, span, c, dt):
         Energy [J] dissipated in the step.
     """
     i, j = contacts.pair[0, c], contacts.pair[1, c]
-    bond = bond_at(contacts, c)
+    constants = constants_at(contacts, c)
     separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(separation, separation))
     n = scale(1.0 / distance, separation)
@@ -94,9 +102,9 @@ def add_damping_force(grains, contacts, span, c, dt):
     acceleration2 = scale(1.0 / grains.mass[j], load(grains.force, j))
     closing = -dot(axpy(0.5 * dt, sub(acceleration1, acceleration2), relative_velocity), n)
     overlap = grains.radius[i] + grains.radius[j] - distance
-    y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    force = damping_force(overlap, y, closing, bond)
-    accrue(contacts.push, c, scale(force, n))
+    y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
+    force = damping_force(overlap, y, closing, constants)
+    accrue(contacts.force, c, scale(force, n))
     start_separation = axpy(-dt, relative_velocity, separation)
     start_force = stored_damping_force(contacts, c) / math.sqrt(dot(start_separation, start_separation))
     store_damping_force(contacts, c, force)
@@ -115,19 +123,20 @@ def damp_contacts(grains, contacts, count, lost, span, dt):
 def log_stiffness_work(grains, contacts, count, lost, span, dt):
     """Log the energy that stiffnesses following a(δ) removed from the springs of all contacts in this step."""
     for c in range(count[CONTACTS]):
-        bond = bond_at(contacts, c)
+        constants = constants_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
-        start = displacements_before(grains, contacts, c, pose, bond, dt)
-        displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        start_bond, bond_now = scaled_to_overlap(start.overlap, bond), scaled_to_overlap(displacements.overlap, bond)
-        log_loss(contacts.lost, lost, c, STIFFNESS, stiffness_loss(start, displacements, start_bond, bond_now))
+        start = displacements_before(grains, contacts, c, pose, constants, dt)
+        displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
+        at_start = scaled_to_overlap(start.overlap, constants)
+        now = scaled_to_overlap(displacements.overlap, constants)
+        log_loss(contacts.lost, lost, c, STIFFNESS, stiffness_loss(start, displacements, at_start, now))
 
 
 @loop
-def scaled_to_overlap(overlap, bond):
+def scaled_to_overlap(overlap, constants):
     """Constants with the tangential stiffnesses at this overlap ("dt97")."""
-    return scaled_stiffness(bond, jkr.root(jkr.stretch(overlap, bond.pull_off_overlap)), True)
+    return scaled_stiffness(constants, jkr.root(jkr.stretch(overlap, constants.pull_off_overlap)), True)
 
 
 @loop
@@ -138,7 +147,7 @@ def apply_pair_impulse(grains, i, j, n, impulse):
 
 
 @rare
-def break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt):
+def break_contact(grains, contacts, pair_list, count, lost, c, pose, constants, dt):
     """Log the energy of a contact that broke within the step, and flag it as broken.
 
     The contact force, −(5/9) F_c just before the break, ended a time τ before the end of the step, but velocity Verlet
@@ -147,16 +156,16 @@ def break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt):
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     overlap = grains.radius[i] + grains.radius[j] - pose.distance
     opening = dot(sub(load(grains.velocity, i), load(grains.velocity, j)), pose.n)
-    stretched = -bond.break_overlap - overlap
+    stretched = -constants.break_overlap - overlap
     elapsed = min(stretched / opening, dt) if opening > 0.0 else 0.0
-    energy, force = breaking_loss(bond)
+    energy, force = breaking_loss(constants)
     apply_pair_impulse(grains, i, j, pose.n, (force + stored_damping_force(contacts, c)) * (0.5 * dt - elapsed))
     log_loss(contacts.lost, lost, c, BREAKING, energy)
     # the damping force acted until the break: half a step in the velocity Verlet kick, the rest in the impulse
     log_loss(contacts.lost, lost, c, DAMPING, -stored_damping_force(contacts, c) * opening * (dt - elapsed))
     count[BROKEN] += 1
     contacts.flag[c] = BROKEN_FLAG
-    put(contacts.push, c, (0.0, 0.0, 0.0))
+    put(contacts.force, c, (0.0, 0.0, 0.0))
     put(contacts.torque1, c, (0.0, 0.0, 0.0))
     put(contacts.torque2, c, (0.0, 0.0, 0.0))
     store_damping_force(contacts, c, 0.0)
@@ -178,26 +187,26 @@ def update_flagged_contacts(grains, contacts, pair_list, count, lost, span, law,
             continue
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
-        bond = bond_at(contacts, c)
+        constants = constants_at(contacts, c)
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, bond)
-        if exceeds_limits(displacements, pose.n, bond):
-            start = displacements_before(grains, contacts, c, pose, bond, dt)
-            y = jkr.root(jkr.stretch(displacements.overlap, bond.pull_off_overlap))
-            bond_now = scaled_stiffness(bond, y, law.follow)
-            if displacements.overlap < -bond.break_overlap:
+        displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
+        if exceeds_limits(displacements, pose.n, constants):
+            start = displacements_before(grains, contacts, c, pose, constants, dt)
+            y = jkr.root(jkr.stretch(displacements.overlap, constants.pull_off_overlap))
+            constants_now = scaled_stiffness(constants, y, law.follow)
+            if displacements.overlap < -constants.break_overlap:
                 zero = (0.0, 0.0, 0.0)
                 unloaded = Displacements(displacements.overlap, zero, zero, 0.0)
-                slid, rolled, twisted = slip_losses(start, displacements, unloaded, bond_now)
+                slid, rolled, twisted = slip_losses(start, displacements, unloaded, constants_now)
                 log_loss(contacts.lost, lost, c, BREAKING, slid + rolled + twisted)
-                break_contact(grains, contacts, pair_list, count, lost, c, pose, bond, dt)
+                break_contact(grains, contacts, pair_list, count, lost, c, pose, constants, dt)
                 broken = True
                 continue
-            target = after_slip(displacements, pose.n, bond, law.release)
+            target = after_slip(displacements, pose.n, constants, law.reset)
             n1, n2 = tangential.pointers_for(target.slide, target.roll, pose.n, r1, r2)
             new_pose = Pose(pose.n, pose.distance, n1, n2, target.twist)
-            left = displacements_of(new_pose, displacements.overlap, r1, r2, bond)
-            log_slip_losses(contacts.lost, lost, c, slip_losses(start, displacements, left, bond_now))
+            left = displacements_of(new_pose, displacements.overlap, r1, r2, constants)
+            log_slip_losses(contacts.lost, lost, c, slip_losses(start, displacements, left, constants_now))
             put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), n1))
             put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
             contacts.twist[c] = left.twist
@@ -219,19 +228,19 @@ def compact_contacts(contacts, count):
             for row in range(3):
                 contacts.pointer1[row, kept] = contacts.pointer1[row, c]
                 contacts.pointer2[row, kept] = contacts.pointer2[row, c]
-                contacts.push[row, kept] = contacts.push[row, c]
+                contacts.force[row, kept] = contacts.force[row, c]
                 contacts.torque1[row, kept] = contacts.torque1[row, c]
                 contacts.torque2[row, kept] = contacts.torque2[row, c]
             if not uniform_contacts(contacts):
-                for row in range(contacts.bond.shape[0]):
-                    contacts.bond[row, kept] = contacts.bond[row, c]
+                for row in range(contacts.constants.shape[0]):
+                    contacts.constants[row, kept] = contacts.constants[row, c]
             for row in range(contacts.lost.shape[0]):
                 contacts.lost[row, kept] = contacts.lost[row, c]
             store_damping_force(contacts, kept, stored_damping_force(contacts, c))
             contacts.twist[kept] = contacts.twist[c]
             contacts.formed[kept] = contacts.formed[c]
             contacts.flag[kept] = contacts.flag[c]
-            contacts.bonded[kept] = contacts.bonded[c]
+            contacts.every_step[kept] = contacts.every_step[c]
         kept += 1
     count[CONTACTS] = kept
 
@@ -242,7 +251,7 @@ def _is_new_contact(grains, pair_list, span, p):
     i, j = pair_list.pair[0, p], pair_list.pair[1, p]
     separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     radii = grains.radius[i] + grains.radius[j]
-    return 1 if (pair_list.touching[p] == 0) & (dot(separation, separation) <= radii * radii) else 0
+    return 1 if (pair_list.in_contact[p] == 0) & (dot(separation, separation) <= radii * radii) else 0
 
 
 @loop
@@ -272,16 +281,16 @@ def add_contact(grains, contacts, count, span, law, i, j, formed):
     contacts.twist[c] = 0.0
     contacts.formed[c] = formed
     contacts.flag[c] = 0
-    contacts.bonded[c] = 0
+    contacts.every_step[c] = 0
     store_damping_force(contacts, c, 0.0)
     for row in range(contacts.lost.shape[0]):
         contacts.lost[row, c] = 0.0
-    bond = bond_of(grains, law.pairings, i, j)
-    first, last = (0, contacts.bond.shape[1]) if law.uniform_contacts else (c, c + 1)
+    constants = pair_constants(grains, law.pairings, i, j)
+    first, last = (0, contacts.constants.shape[1]) if law.uniform_contacts else (c, c + 1)
     if c == 0 or not law.uniform_contacts:
-        for row in range(contacts.bond.shape[0]):
+        for row in range(contacts.constants.shape[0]):
             for k in range(first, last):
-                contacts.bond[row, k] = bond[row]
+                contacts.constants[row, k] = constants[row]
     write_loads(grains, contacts, span, law, c)
     return c
 
@@ -300,7 +309,7 @@ def form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt
         separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         radii = grains.radius[i] + grains.radius[j]
         squared_distance = dot(separation, separation)
-        if pair_list.touching[p] == 1 or squared_distance > radii * radii:
+        if pair_list.in_contact[p] == 1 or squared_distance > radii * radii:
             continue
         distance = math.sqrt(squared_distance)
         n = scale(1.0 / distance, separation)
@@ -312,11 +321,13 @@ def form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt
             log_loss(contacts.lost, lost, c, DAMPING, stored_damping_force(contacts, c) * closing * elapsed)
         reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
         # the step of 0 s at the start of a run finds grains that overlap already
-        gain = contact_speed_gain(radii - distance, closing, reduced, bond_at(contacts, c), dt) if dt > 0.0 else 0.0
+        gain = (
+            contact_speed_gain(radii - distance, closing, reduced, constants_at(contacts, c), dt) if dt > 0.0 else 0.0
+        )
         impulse = stored_damping_force(contacts, c) * elapsed - reduced * gain
-        apply_pair_impulse(grains, i, j, n, impulse - 0.5 * dt * dot(load(contacts.push, c), n))
-        log_loss(contacts.lost, lost, c, FORMING, forming_loss(bond_at(contacts, c)))
-        pair_list.touching[p] = 1
+        apply_pair_impulse(grains, i, j, n, impulse - 0.5 * dt * dot(load(contacts.force, c), n))
+        log_loss(contacts.lost, lost, c, FORMING, forming_loss(constants_at(contacts, c)))
+        pair_list.in_contact[p] = 1
         count[MADE] += 1
 
 
@@ -333,7 +344,7 @@ def mark_separated(pair_list, count, i, j):
     for p in range(count[PAIRS]):
         a, b = pair_list.pair[0, p], pair_list.pair[1, p]
         if (a == i and b == j) or (a == j and b == i):
-            pair_list.touching[p] = 0
+            pair_list.in_contact[p] = 0
             return
 
 
@@ -378,7 +389,7 @@ def add_initial_contacts(grains, contacts, count, span, law, pair, slide, roll, 
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), n2))
         contacts.twist[c] = twist[k]
         write_loads(grains, contacts, span, law, c)
-        if broken < 0 and r1 + r2 - distance < -bond_at(contacts, c).break_overlap:
+        if broken < 0 and r1 + r2 - distance < -constants_at(contacts, c).break_overlap:
             broken = k
     sort_contacts_by_grain(contacts, count, grains.mass.size)
     return broken

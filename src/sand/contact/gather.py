@@ -28,10 +28,10 @@ def _gather_at(grains, contacts, g):
     for s in range(contacts.start[g], contacts.start[g + 1]):
         c = contacts.side[s] >> 1
         if contacts.side[s] & 1:
-            force = sub(force, load(contacts.push, c))
+            force = sub(force, load(contacts.force, c))
             torque = add(torque, load(contacts.torque2, c))
         else:
-            force = add(force, load(contacts.push, c))
+            force = add(force, load(contacts.force, c))
             torque = add(torque, load(contacts.torque1, c))
     put(grains.force, g, force)
     put(grains.torque, g, torque)

@@ -13,8 +13,8 @@ from ..numerics.vec import across, add, axpy, cross, dot, scale, sub
 from . import jkr, tangential
 
 
-class Bond(NamedTuple):
-    """Constants of one contact, computed by `bond_between` and stored as a column of `ContactArrays.bond`."""
+class ContactConstants(NamedTuple):
+    """Constants of one contact, computed by `contact_constants` and stored as a column of `ContactArrays.constants`."""
 
     reduced_radius: float  # R [m]
     rest_radius: float  # a₀ [m]
@@ -74,7 +74,7 @@ DAMPING_FACTOR = 4.0
 
 
 @formula
-def bond_between(pairing, r1, r2, m1, m2):
+def contact_constants(pairing, r1, r2, m1, m2):
     """Constants of a contact between two grains.
 
     Parameters
@@ -88,7 +88,7 @@ def bond_between(pairing, r1, r2, m1, m2):
 
     Returns
     -------
-    Bond
+    ContactConstants
         Its `max_squared_frequency` is that of the fastest of the four modes of the free pair, or of the damping.
     """
     reduced = r1 * r2 / (r1 + r2)
@@ -108,7 +108,7 @@ def bond_between(pairing, r1, r2, m1, m2):
     inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
     squared_frequency = max(k_n * inverse_mass, 3.5 * k_s * inverse_mass)
     squared_frequency = max(squared_frequency, max(k_r * reduced * reduced, k_t) * inverse_inertia)
-    return Bond(
+    return ContactConstants(
         reduced,
         a0,
         pull_off,
@@ -129,53 +129,53 @@ def bond_between(pairing, r1, r2, m1, m2):
 
 
 @formula
-def scaled_stiffness(bond, y, follow):
-    """Bond with the tangential stiffnesses of the present contact radius, y = √(a/a₀).
+def scaled_stiffness(constants, y, follow):
+    """ContactConstants with the tangential stiffnesses of the present contact radius, y = √(a/a₀).
 
     With `follow` ("dt97") k_s ∝ a, k_r ∝ a^(3/2) and k_t ∝ a³; otherwise ("frozen") they are unchanged.
     """
     y2 = y * y
-    return Bond(
-        bond.reduced_radius,
-        bond.rest_radius,
-        bond.pull_off_force,
-        bond.pull_off_overlap,
-        bond.break_overlap,
-        bond.hertz,
-        bond.slide_stiffness * (y2 if follow else 1.0),
-        bond.roll_stiffness * (y2 * y if follow else 1.0),
-        bond.twist_stiffness * (y2 * y2 * y2 if follow else 1.0),
-        bond.slide_limit,
-        bond.roll_limit,
-        bond.twist_limit,
-        bond.damping,
-        bond.damping_per_radius,
-        bond.max_squared_frequency,
+    return ContactConstants(
+        constants.reduced_radius,
+        constants.rest_radius,
+        constants.pull_off_force,
+        constants.pull_off_overlap,
+        constants.break_overlap,
+        constants.hertz,
+        constants.slide_stiffness * (y2 if follow else 1.0),
+        constants.roll_stiffness * (y2 * y if follow else 1.0),
+        constants.twist_stiffness * (y2 * y2 * y2 if follow else 1.0),
+        constants.slide_limit,
+        constants.roll_limit,
+        constants.twist_limit,
+        constants.damping,
+        constants.damping_per_radius,
+        constants.max_squared_frequency,
     )
 
 
 @formula
-def normal_force(overlap, y, bond):
+def normal_force(overlap, y, constants):
     """Normal force [N], positive in compression: JKR, or Hertz F = (4/3) E* √R δ^(3/2) without adhesion."""
     pressed = max(overlap, 0.0)
-    return jkr.force_at(y, bond.pull_off_force) + bond.hertz * pressed * math.sqrt(pressed)
+    return jkr.force_at(y, constants.pull_off_force) + constants.hertz * pressed * math.sqrt(pressed)
 
 
 @formula
-def contact_radius(overlap, y, bond):
+def contact_radius(overlap, y, constants):
     """Contact radius [m]: a = a₀ y² (JKR) or √(R δ) (Hertz)."""
-    pressed = math.sqrt(bond.reduced_radius * max(overlap, 0.0))
-    return bond.rest_radius * y * y + (pressed if bond.hertz > 0.0 else 0.0)
+    pressed = math.sqrt(constants.reduced_radius * max(overlap, 0.0))
+    return constants.rest_radius * y * y + (pressed if constants.hertz > 0.0 else 0.0)
 
 
 @formula
-def damping_force(overlap, y, closing, bond):
+def damping_force(overlap, y, closing, constants):
     """Damping force [N] on grain 1 along n: (c + (c/a) a) dδ/dt, with dδ/dt = `closing` [m/s]."""
-    return (bond.damping + bond.damping_per_radius * contact_radius(overlap, y, bond)) * closing
+    return (constants.damping + constants.damping_per_radius * contact_radius(overlap, y, constants)) * closing
 
 
 @formula
-def contact_load(pose, overlap, y, r1, r2, bond):
+def contact_load(pose, overlap, y, r1, r2, constants):
     """Force on grain 1 [N] and torques on both grains [N m]; the force on grain 2 is the opposite.
 
         F1 = F_JKR n + k_s ((d·n)/D) ζ
@@ -194,35 +194,35 @@ def contact_load(pose, overlap, y, r1, r2, bond):
         √(a/a₀) at this overlap, from `jkr.root` or `jkr.polynomial_root`.
     r1, r2 : float
         Radii [m].
-    bond : Bond
+    constants : ContactConstants
         Constants with the present stiffnesses (see `scaled_stiffness`).
     """
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    normal = normal_force(overlap, y, bond)
-    force = axpy(normal, pose.n, scale(bond.slide_stiffness * along / pose.distance, zeta))
-    rolling_torque = scale(bond.reduced_radius**2 * bond.roll_stiffness, cross(pose.n1, pose.n2))
-    torque = axpy(bond.twist_stiffness * pose.twist, pose.n, rolling_torque)
-    torque1 = sub(scale(-r1 * bond.slide_stiffness, cross(pose.n1, zeta)), torque)
-    torque2 = add(scale(r2 * bond.slide_stiffness, cross(pose.n2, zeta)), torque)
+    normal = normal_force(overlap, y, constants)
+    force = axpy(normal, pose.n, scale(constants.slide_stiffness * along / pose.distance, zeta))
+    rolling_torque = scale(constants.reduced_radius**2 * constants.roll_stiffness, cross(pose.n1, pose.n2))
+    torque = axpy(constants.twist_stiffness * pose.twist, pose.n, rolling_torque)
+    torque1 = sub(scale(-r1 * constants.slide_stiffness, cross(pose.n1, zeta)), torque)
+    torque2 = add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
     return force, torque1, torque2
 
 
 @formula
-def displacements_of(pose, overlap, r1, r2, bond):
+def displacements_of(pose, overlap, r1, r2, constants):
     """Displacements of a contact in the given pose."""
     zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    return Displacements(overlap, zeta, tangential.rolling(pose.n1, pose.n2, bond.reduced_radius), pose.twist)
+    return Displacements(overlap, zeta, tangential.rolling(pose.n1, pose.n2, constants.reduced_radius), pose.twist)
 
 
 @formula
-def exceeds_limits(displacements, n, bond):
+def exceeds_limits(displacements, n, constants):
     """Whether a displacement exceeds its limit, so that the contact must slip or break."""
     xi = across(displacements.roll, n)
     return (
-        (displacements.overlap < -bond.break_overlap)
-        | (dot(displacements.slide, displacements.slide) > bond.slide_limit * bond.slide_limit)
-        | (dot(xi, xi) > bond.roll_limit * bond.roll_limit)
-        | (abs(displacements.twist) > bond.twist_limit)
+        (displacements.overlap < -constants.break_overlap)
+        | (dot(displacements.slide, displacements.slide) > constants.slide_limit * constants.slide_limit)
+        | (dot(xi, xi) > constants.roll_limit * constants.roll_limit)
+        | (abs(displacements.twist) > constants.twist_limit)
     )
 
 
@@ -235,52 +235,52 @@ def _slip_factor(size, limit, reset):
 
 
 @formula
-def after_slip(displacements, n, bond, reset):
+def after_slip(displacements, n, constants, reset):
     """Displacements after slip: those beyond a limit are set to the limit or, with `reset`, to 0 (paper, A.6).
 
     The returned `roll` is the tangential displacement ξ′ for which new contact pointers are computed.
     """
     xi = across(displacements.roll, n)
     slide_size = math.sqrt(dot(displacements.slide, displacements.slide))
-    slide = scale(_slip_factor(slide_size, bond.slide_limit, reset), displacements.slide)
-    roll = scale(_slip_factor(math.sqrt(dot(xi, xi)), bond.roll_limit, reset), xi)
-    twist = _slip_factor(abs(displacements.twist), bond.twist_limit, reset) * displacements.twist
+    slide = scale(_slip_factor(slide_size, constants.slide_limit, reset), displacements.slide)
+    roll = scale(_slip_factor(math.sqrt(dot(xi, xi)), constants.roll_limit, reset), xi)
+    twist = _slip_factor(abs(displacements.twist), constants.twist_limit, reset) * displacements.twist
     return Displacements(displacements.overlap, slide, roll, twist)
 
 
 @formula
-def normal_energy(overlap, y, bond):
+def normal_energy(overlap, y, constants):
     """Energy [J] of the normal mode: JKR, or Hertz (2/5)·(4/3) E* √R δ^(5/2); 0 for separated surfaces."""
     pressed = max(overlap, 0.0)
-    stored = jkr.energy_at(y, bond.pull_off_force, bond.pull_off_overlap)
-    return stored + 0.4 * bond.hertz * pressed * pressed * math.sqrt(pressed)
+    stored = jkr.energy_at(y, constants.pull_off_force, constants.pull_off_overlap)
+    return stored + 0.4 * constants.hertz * pressed * pressed * math.sqrt(pressed)
 
 
 @formula
-def normal_stiffness_at(overlap, y, bond):
+def normal_stiffness_at(overlap, y, constants):
     """dF/dδ [N/m] of the normal mode: JKR, or Hertz (3/2)·(4/3) E* √(R δ); 0 for separated surfaces."""
-    stiffness = jkr.stiffness_at(y, bond.pull_off_force, bond.pull_off_overlap)
-    return stiffness + 1.5 * bond.hertz * math.sqrt(max(overlap, 0.0))
+    stiffness = jkr.stiffness_at(y, constants.pull_off_force, constants.pull_off_overlap)
+    return stiffness + 1.5 * constants.hertz * math.sqrt(max(overlap, 0.0))
 
 
 @formula
-def energies(pose, overlap, y, r1, r2, bond):
+def energies(pose, overlap, y, r1, r2, constants):
     """Energies [J] stored in the normal, sliding, rolling and twisting modes.
 
     The rolling energy includes the normal part of n1 + n2: the torque −R² k_r n1×n2 is its exact gradient.
     """
     zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
-    xi = tangential.rolling(pose.n1, pose.n2, bond.reduced_radius)
+    xi = tangential.rolling(pose.n1, pose.n2, constants.reduced_radius)
     return (
-        normal_energy(overlap, y, bond),
-        0.5 * bond.slide_stiffness * dot(zeta, zeta),
-        0.5 * bond.roll_stiffness * dot(xi, xi),
-        0.5 * bond.twist_stiffness * pose.twist * pose.twist,
+        normal_energy(overlap, y, constants),
+        0.5 * constants.slide_stiffness * dot(zeta, zeta),
+        0.5 * constants.roll_stiffness * dot(xi, xi),
+        0.5 * constants.twist_stiffness * pose.twist * pose.twist,
     )
 
 
 @formula
-def slip_losses(start, end, left, bond):
+def slip_losses(start, end, left, constants):
     """Energies [J] dissipated in a step by sliding, rolling and twisting: ½k (q_start + q_left)·(q_end − q_left).
 
     This is the work done on the spring in the step minus the increase of its stored energy.  With work by the
@@ -294,21 +294,21 @@ def slip_losses(start, end, left, bond):
         Displacements at the start of the step, and at its end before slip.
     left : Displacements
         Displacements after slip.
-    bond : Bond
+    constants : ContactConstants
         Constants of the contact.
     """
     slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))
     roll = dot(add(start.roll, left.roll), sub(end.roll, left.roll))
     twist = (start.twist + left.twist) * (end.twist - left.twist)
     return (
-        0.5 * bond.slide_stiffness * slide,
-        0.5 * bond.roll_stiffness * roll,
-        0.5 * bond.twist_stiffness * twist,
+        0.5 * constants.slide_stiffness * slide,
+        0.5 * constants.roll_stiffness * roll,
+        0.5 * constants.twist_stiffness * twist,
     )
 
 
 @formula
-def stiffness_loss(start, end, start_bond, end_bond):
+def stiffness_loss(start, end, start_constants, end_constants):
     """Energy [J] that changing stiffnesses remove from the springs in a step: ½ (k_start − k_end) q_start·q_end.
 
     It is zero for frozen stiffnesses and negative where the springs stiffen: "dt97" is not conservative, and this is
@@ -318,31 +318,31 @@ def stiffness_loss(start, end, start_bond, end_bond):
     ----------
     start, end : Displacements
         Displacements at the start and at the end of the step.
-    start_bond, end_bond : Bond
+    start_constants, end_constants : ContactConstants
         Constants with the stiffnesses at those times.
     """
-    slide = (start_bond.slide_stiffness - end_bond.slide_stiffness) * dot(start.slide, end.slide)
-    roll = (start_bond.roll_stiffness - end_bond.roll_stiffness) * dot(start.roll, end.roll)
-    twist = (start_bond.twist_stiffness - end_bond.twist_stiffness) * start.twist * end.twist
+    slide = (start_constants.slide_stiffness - end_constants.slide_stiffness) * dot(start.slide, end.slide)
+    roll = (start_constants.roll_stiffness - end_constants.roll_stiffness) * dot(start.roll, end.roll)
+    twist = (start_constants.twist_stiffness - end_constants.twist_stiffness) * start.twist * end.twist
     return 0.5 * (slide + roll + twist)
 
 
 @formula
-def forming_loss(bond):
+def forming_loss(constants):
     """Energy [J] dissipated when a contact forms: U jumps from 0 to −0.846614 F_c δ_c; 0 without adhesion."""
-    return -jkr.energy_at(jkr.ROOT_AT_TOUCH, bond.pull_off_force, bond.pull_off_overlap)
+    return -jkr.energy_at(jkr.ROOT_AT_TOUCH, constants.pull_off_force, constants.pull_off_overlap)
 
 
 @formula
-def breaking_loss(bond):
+def breaking_loss(constants):
     """Energy [J] dissipated when a contact breaks, (4/45) F_c δ_c, and the force just before, −(5/9) F_c [N]."""
     y = jkr.ROOT_AT_BREAK
-    lost = jkr.energy_at(y, bond.pull_off_force, bond.pull_off_overlap)
-    return lost, jkr.force_at(y, bond.pull_off_force)
+    lost = jkr.energy_at(y, constants.pull_off_force, constants.pull_off_overlap)
+    return lost, jkr.force_at(y, constants.pull_off_force)
 
 
 @formula
-def contact_speed_gain(overlap, closing, reduced, bond, dt):
+def contact_speed_gain(overlap, closing, reduced, constants, dt):
     """Increase w′ − w of the closing speed [m/s] by the contact force between first touch and this overlap.
 
     ½ m̄ w′² + U(δ) + dt² (k w′²/12 − F²/(24 m̄)) = ½ m̄ w² + U(0), k = dF/dδ: the left-hand side is the modified
@@ -358,16 +358,16 @@ def contact_speed_gain(overlap, closing, reduced, bond, dt):
         Closing speed w at first touch [m/s]; the gain is 0 for a pair that is not closing.
     reduced : float
         Reduced mass m̄ [kg].
-    bond : Bond
+    constants : ContactConstants
         Constants of the contact.
     dt : float
         Time step [s].
     """
     if not closing > 0.0:
         return 0.0
-    y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    energy_drop = -forming_loss(bond) - normal_energy(overlap, y, bond)
-    force = normal_force(overlap, y, bond) * dt / reduced
-    stiffness = normal_stiffness_at(overlap, y, bond) * dt * dt / reduced
+    y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
+    energy_drop = -forming_loss(constants) - normal_energy(overlap, y, constants)
+    force = normal_force(overlap, y, constants) * dt / reduced
+    stiffness = normal_stiffness_at(overlap, y, constants) * dt * dt / reduced
     square = (closing * closing + 2.0 * energy_drop / reduced + force * force / 12.0) / (1.0 + stiffness / 6.0)
     return math.sqrt(max(square, 0.0)) - closing

@@ -5,7 +5,7 @@ from ..numerics.vec import across, axpy, dot, load, norm
 from ..state.state import CONTACTS
 from . import jkr
 from .law import contact_load, contact_radius, displacements_of, energies, normal_force, scaled_stiffness
-from .update import bond_at, pose_at, stored_damping_force
+from .update import constants_at, pose_at, stored_damping_force
 
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
 """Energies [J] that `measure_energies` computes."""
@@ -32,9 +32,9 @@ def measure_energies(grains, contacts, count, span, follow, out):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, bond = r1 + r2 - pose.distance, bond_at(contacts, c)
-        y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-        stored = energies(pose, overlap, y, r1, r2, scaled_stiffness(bond, y, follow))
+        overlap, constants = r1 + r2 - pose.distance, constants_at(contacts, c)
+        y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
+        stored = energies(pose, overlap, y, r1, r2, scaled_stiffness(constants, y, follow))
         for mode in range(4):
             out[2 + mode] += stored[mode]
 
@@ -74,26 +74,26 @@ def measure_contacts(grains, contacts, count, span, follow, out):
         i, j = contacts.pair[0, c], contacts.pair[1, c]
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, frozen = r1 + r2 - pose.distance, bond_at(contacts, c)
+        overlap, frozen = r1 + r2 - pose.distance, constants_at(contacts, c)
         y = jkr.root(jkr.stretch(overlap, frozen.pull_off_overlap))
-        bond = scaled_stiffness(frozen, y, follow)
-        displacements = displacements_of(pose, overlap, r1, r2, bond)
+        constants = scaled_stiffness(frozen, y, follow)
+        displacements = displacements_of(pose, overlap, r1, r2, constants)
         xi = across(displacements.roll, pose.n)
         slide, roll = norm(displacements.slide), norm(xi)
-        stored = energies(pose, overlap, y, r1, r2, bond)
-        out[0, c], out[1, c] = overlap, contact_radius(overlap, y, bond)
+        stored = energies(pose, overlap, y, r1, r2, constants)
+        out[0, c], out[1, c] = overlap, contact_radius(overlap, y, constants)
         out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
-        out[5, c] = -overlap / bond.pull_off_overlap
-        out[6, c] = slide / bond.slide_limit if bond.slide_limit > 0.0 else 0.0
-        out[7, c] = roll / bond.roll_limit
-        out[8, c] = abs(displacements.twist) / bond.twist_limit
-        out[9, c] = normal_force(overlap, y, bond) + stored_damping_force(contacts, c)
-        out[10, c] = bond.slide_stiffness * slide
-        out[11, c] = bond.reduced_radius * bond.roll_stiffness * roll
-        out[12, c] = -bond.twist_stiffness * displacements.twist
+        out[5, c] = -overlap / constants.pull_off_overlap
+        out[6, c] = slide / constants.slide_limit if constants.slide_limit > 0.0 else 0.0
+        out[7, c] = roll / constants.roll_limit
+        out[8, c] = abs(displacements.twist) / constants.twist_limit
+        out[9, c] = normal_force(overlap, y, constants) + stored_damping_force(contacts, c)
+        out[10, c] = constants.slide_stiffness * slide
+        out[11, c] = constants.reduced_radius * constants.roll_stiffness * roll
+        out[12, c] = -constants.twist_stiffness * displacements.twist
         for mode in range(4):
             out[13 + mode, c] = stored[mode]
-        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond)
+        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, constants)
         force = axpy(stored_damping_force(contacts, c), pose.n, force)
         for axis in range(3):
             out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]

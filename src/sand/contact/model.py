@@ -18,7 +18,7 @@ from .jkr import rest_radius
 from .law import Pairing
 from .mixing import MIXING, pairing_between
 
-LIMIT_RULES = ("clamp", "release")
+LIMIT_RULES = ("clamp", "reset")
 STIFFNESS = ("frozen", "dt97")
 DAMPING = ("none", "constant", "viscoelastic")
 JKR_LIMIT = 0.3
@@ -32,8 +32,8 @@ class Contact:
 
     Parameters
     ----------
-    beyond : str, optional
-        Rule for a tangential displacement beyond its limit.  "clamp" sets it to the limit; "release" sets it to 0, as
+    slip : str, optional
+        Rule for a tangential displacement beyond its limit.  "clamp" sets it to the limit; "reset" sets it to 0, as
         in the SAND paper (A.6), which halves rolling friction.
     stiffness : str, optional
         Tangential stiffnesses.  "frozen": evaluated at the equilibrium radius a0, so that forces are exact gradients of
@@ -60,7 +60,7 @@ class Contact:
         If a setting is unknown or out of range; one line for each.
     """
 
-    beyond: str = "clamp"
+    slip: str = "clamp"
     stiffness: str = "frozen"
     slide_factor: Any = 1.0
     roll_factor: Any = 1.0
@@ -77,7 +77,7 @@ class Contact:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        words = {"beyond": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
+        words = {"slip": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
         for key, allowed in words.items():
             if getattr(self, key) not in allowed:
                 given = getattr(self, key)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiler.jit import loop
 from ..state.state import PAIRS
-from .law import Pairing, bond_between
+from .law import Pairing, contact_constants
 
 
 class PairType(NamedTuple):
@@ -15,7 +15,7 @@ class PairType(NamedTuple):
 
     grains: Any  # material, radius [m] and mass [kg] of both grains
     step: Any  # time step that a contact needs [s]
-    length: Any  # −δ at which the contact breaks [m]
+    break_overlap: Any  # −δ at which the contact breaks [m]
 
 
 NO_GRAIN_TYPE = (np.uint32(0), -1.0, -1.0)
@@ -40,10 +40,10 @@ def load_pairing(pairings, a, b):
 
 
 @loop
-def bond_of(grains, pairings, i, j):
+def pair_constants(grains, pairings, i, j):
     """Constants of a contact between grains i and j."""
     pairing = load_pairing(pairings, grains.material[i], grains.material[j])
-    return bond_between(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
+    return contact_constants(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
 
 
 @loop
@@ -54,12 +54,14 @@ def grain_type_of(grains, i):
 
 @loop
 def pair_type_of(grains, law, i, j, last):
-    """Pair type of grains i and j; `last` is reused if equal, because the powers in `bond_between` are expensive."""
+    """Pair type of grains i and j; `last` is reused if equal, because powers are expensive."""
     a, b = grain_type_of(grains, i), grain_type_of(grains, j)
     if (a, b) == last.grains:
         return last
-    bond = bond_of(grains, law.pairings, i, j)
-    return PairType((a, b), 2.0 * math.pi / math.sqrt(bond.max_squared_frequency) / law.per_period, bond.break_overlap)
+    constants = pair_constants(grains, law.pairings, i, j)
+    return PairType(
+        (a, b), 2.0 * math.pi / math.sqrt(constants.max_squared_frequency) / law.per_period, constants.break_overlap
+    )
 
 
 @loop

@@ -23,7 +23,7 @@ from .update import (
     PENDING_FLAG,
     SLIPPED_FLAG,
     contact_loop,
-    load_bond,
+    load_constants,
     padded_contact_count,
     pose_at_step_end,
     twist_increment,
@@ -47,7 +47,7 @@ class SlipSums(NamedTuple):
 
 
 @loop
-def _displacements_at_step_start(grains, contacts, c, pose, twist, bond, dt):
+def _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt):
     """Displacements at the start of the step that led to this pose; `twist` is the twist at that time."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
@@ -61,14 +61,14 @@ def _displacements_at_step_start(grains, contacts, c, pose, twist, bond, dt):
         twist,
     )
     r1, r2 = grains.radius[i], grains.radius[j]
-    return displacements_of(start_pose, r1 + r2 - distance, r1, r2, bond)
+    return displacements_of(start_pose, r1 + r2 - distance, r1, r2, constants)
 
 
 @loop
-def displacements_before(grains, contacts, c, pose, bond, dt):
+def displacements_before(grains, contacts, c, pose, constants, dt):
     """Displacements at the start of the step, for a contact whose stored twist is that at the end."""
     twist = pose.twist - twist_increment(grains, contacts, c, pose, dt)
-    return _displacements_at_step_start(grains, contacts, c, pose, twist, bond, dt)
+    return _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt)
 
 
 @formula
@@ -101,33 +101,33 @@ def _loop_with_slip(grains, contacts, first, last, column, span, law, dt):
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = load_bond(contacts.bond, column + k)
+        constants = load_constants(contacts.constants, column + k)
         r1, r2 = grains.radius[i], grains.radius[j]
         pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
         pose = pose_at_step_end(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
-        s = jkr.stretch(overlap, bond.pull_off_overlap)
+        s = jkr.stretch(overlap, constants.pull_off_overlap)
         y = jkr.polynomial_root(s)
-        bond_now = scaled_stiffness(bond, y, law.follow)
-        displacements = displacements_of(pose, overlap, r1, r2, bond)
-        needs_event = (overlap < -bond.break_overlap) | (s > jkr.POLYNOMIAL_RANGE)
-        slips = exceeds_limits(displacements, pose.n, bond) & (not needs_event)
+        constants_now = scaled_stiffness(constants, y, law.follow)
+        displacements = displacements_of(pose, overlap, r1, r2, constants)
+        needs_event = (overlap < -constants.break_overlap) | (s > jkr.POLYNOMIAL_RANGE)
+        slips = exceeds_limits(displacements, pose.n, constants) & (not needs_event)
         # both cases are computed and selected from at the end: branches and conditional stores prevent vectorisation
-        start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], bond, dt)
-        target = after_slip(displacements, pose.n, bond, law.release)
+        start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, dt)
+        target = after_slip(displacements, pose.n, constants, law.reset)
         n1, n2 = tangential.pointers_for(target.slide, target.roll, pose.n, r1, r2)
         body1 = turned_back(load4(grains.orientation, i), n1)
         body2 = turned_back(load4(grains.orientation, j), n2)
         n1, n2 = _select(slips, n1, pose.n1), _select(slips, n2, pose.n2)
         new_pose = Pose(pose.n, pose.distance, n1, n2, target.twist if slips else pose.twist)
-        left = displacements_of(new_pose, overlap, r1, r2, bond)
-        lost = slip_losses(start, displacements, left, bond_now)
+        left = displacements_of(new_pose, overlap, r1, r2, constants)
+        lost = slip_losses(start, displacements, left, constants_now)
         lost = _select(slips, lost, (0.0, 0.0, 0.0))
-        force, torque1, torque2 = contact_load(new_pose, overlap, y, r1, r2, bond_now)
+        force, torque1, torque2 = contact_load(new_pose, overlap, y, r1, r2, constants_now)
         put(contacts.pointer1, c, _select(slips, body1, pointer1))
         put(contacts.pointer2, c, _select(slips, body2, pointer2))
         contacts.twist[c] = new_pose.twist
-        put(contacts.push, c, force)
+        put(contacts.force, c, force)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
         contacts.flag[c] = PENDING_FLAG if needs_event else SLIPPED_FLAG if slips else 0

@@ -17,7 +17,7 @@ from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import across, dot, load, load4, put, scale, sub
 from ..state.state import CONTACT_STEP, CONTACTS
 from . import jkr, tangential
-from .law import Bond, Pose, contact_load, displacements_of, exceeds_limits, scaled_stiffness
+from .law import ContactConstants, Pose, contact_load, displacements_of, exceeds_limits, scaled_stiffness
 from .pair_types import pair_type_count
 
 MIN_REMAINDER = 4
@@ -35,13 +35,13 @@ def uniform_contacts(contacts):
     Uniform constants are stored as BLOCK identical columns, individual ones as one column per allocated contact.
     If BLOCK contacts are allocated the two cannot be distinguished; the answer False is then also correct.
     """
-    return contacts.bond.shape[1] != contacts.flag.size
+    return contacts.constants.shape[1] != contacts.flag.size
 
 
 @loop
-def bond_at(contacts, c):
+def constants_at(contacts, c):
     """Constants of contact c."""
-    return load_bond(contacts.bond, 0 if uniform_contacts(contacts) else c)
+    return load_constants(contacts.constants, 0 if uniform_contacts(contacts) else c)
 
 
 @loop
@@ -51,9 +51,9 @@ def stored_damping_force(contacts, c):
 
 
 @loop
-def load_bond(b, c):
+def load_constants(b, c):
     """Constants in column c of a (K, …) array."""
-    return Bond(
+    return ContactConstants(
         b[0, c],
         b[1, c],
         b[2, c],
@@ -136,18 +136,18 @@ def contact_loop(grains, contacts, first, last, used, column, span, law, dt):
     for k in range(last - first):
         c = first + k
         i, j = contacts.pair[0, c], contacts.pair[1, c]
-        bond = load_bond(contacts.bond, column + k)
+        constants = load_constants(contacts.constants, column + k)
         r1, r2 = grains.radius[i], grains.radius[j]
         pose = pose_at_step_end(grains, contacts, span, c, dt)
         overlap = r1 + r2 - pose.distance
-        s = jkr.stretch(overlap, bond.pull_off_overlap)
+        s = jkr.stretch(overlap, constants.pull_off_overlap)
         y = jkr.polynomial_root(s)
-        bond_now = scaled_stiffness(bond, y, law.follow)
-        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond_now)
-        displacements = displacements_of(pose, overlap, r1, r2, bond)
-        exceeded = exceeds_limits(displacements, pose.n, bond) | (s > jkr.POLYNOMIAL_RANGE)
+        constants_now = scaled_stiffness(constants, y, law.follow)
+        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, constants_now)
+        displacements = displacements_of(pose, overlap, r1, r2, constants)
+        exceeded = exceeds_limits(displacements, pose.n, constants) | (s > jkr.POLYNOMIAL_RANGE)
         contacts.twist[c] = pose.twist
-        put(contacts.push, c, force)
+        put(contacts.force, c, force)
         put(contacts.torque1, c, torque1)
         put(contacts.torque2, c, torque2)
         contacts.flag[c] = PENDING_FLAG if exceeded else 0
@@ -170,13 +170,13 @@ def write_loads(grains, contacts, span, law, c):
     """Compute the loads of one contact from its stored pointers and twist, at any compression."""
     i, j = contacts.pair[0, c], contacts.pair[1, c]
     r1, r2 = grains.radius[i], grains.radius[j]
-    bond = bond_at(contacts, c)
+    constants = constants_at(contacts, c)
     pose = pose_at(grains, contacts, span, c, contacts.twist[c])
     overlap = r1 + r2 - pose.distance
-    y = jkr.root(jkr.stretch(overlap, bond.pull_off_overlap))
-    bond_now = scaled_stiffness(bond, y, law.follow)
-    force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, bond_now)
-    put(contacts.push, c, force)
+    y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
+    constants_now = scaled_stiffness(constants, y, law.follow)
+    force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, constants_now)
+    put(contacts.force, c, force)
     put(contacts.torque1, c, torque1)
     put(contacts.torque2, c, torque2)
 
@@ -190,7 +190,7 @@ def contact_step(contacts, pair_list, count, n, clock, per_period):
     """
     squared_frequency, most_contacts = 0.0, 0
     for c in range(count[CONTACTS]):
-        squared_frequency = max(squared_frequency, bond_at(contacts, c).max_squared_frequency)
+        squared_frequency = max(squared_frequency, constants_at(contacts, c).max_squared_frequency)
     for g in range(n):
         most_contacts = max(most_contacts, int(contacts.start[g + 1]) - int(contacts.start[g]))
     coordination = max(1.0, most_contacts / 6.0)

@@ -51,7 +51,7 @@ class Adaptive:
     spin_error : float or str, optional
         Largest error of a spin [rad/s]. Scale: the largest initial spin or √(U/I), whichever is larger, U the larger
         of the long-range energy in contact and μB, I the largest moment of inertia; at least 1 rad per longest step.
-    touching : Verlet, optional
+    contact_stepping : Verlet, optional
         Integrator while grains are in contact; in a case file a table of its keys.
 
     Raises
@@ -65,7 +65,7 @@ class Adaptive:
     velocity_error: Any = "auto"
     turn_error: Any = "auto"
     spin_error: Any = "auto"
-    touching: Verlet = field(default_factory=Verlet)
+    contact_stepping: Verlet = field(default_factory=Verlet)
 
     __pydantic_config__ = FORBID_EXTRA
     name = "adaptive"
@@ -80,16 +80,16 @@ class Adaptive:
                 object.__setattr__(self, key, si(getattr(self, key), unit, f"stepping: {key}", above=0.0, **bounds))
             except BadInput as error:
                 problems.extend(error.problems)
-        if not isinstance(self.touching, Verlet):
-            problems.append(f"stepping: touching = {shown(self.touching)}; give sand.Verlet(…)")
+        if not isinstance(self.contact_stepping, Verlet):
+            problems.append(f"stepping: contact_stepping = {shown(self.contact_stepping)}; give sand.Verlet(…)")
         if problems:
             raise BadInput(problems)
 
     def parameters(self) -> dict[str, Any]:
         """Settings in SI units, as in a case file."""
-        touching = {k: v for k, v in self.touching.parameters().items() if k != "method"}
+        contact_stepping = {k: v for k, v in self.contact_stepping.parameters().items() if k != "method"}
         own = {key: getattr(self, key) for key in ("tolerance", *ERRORS)}
-        return {"method": self.name, **own, "touching": touching}
+        return {"method": self.name, **own, "contact_stepping": contact_stepping}
 
     def resolved(self, grains: Grains, criteria: StepCriteria) -> Adaptive:
         """A copy in which every "auto" is replaced by a number, from the initial grains."""

@@ -129,7 +129,7 @@ def adaptive_step_for(spec: KernelSpec) -> Callable:
                 contact_time = NEVER
             if contact_time >= 1.0 or attempts == MAX_ATTEMPTS:
                 clock[FLIGHT] = min(proposed, parameters.criteria.longest)
-                return dt, contact_time <= 1.0, Stop.STEPS_DONE
+                return dt, contact_time <= 1.0, Stop.NONE
             dt *= contact_time
             attempts += 1
 
@@ -149,7 +149,7 @@ def free_flight_for(spec: KernelSpec) -> Callable:
             return Stop.LIST_FULL
         before = energy(grains, clock[TIME], parameters.external) if parameters.external_work.time_dependent else 0.0
         dt, in_contact, stop = adaptive_step(grains, contacts, long_range, stages, clock, count, parameters)
-        if stop != Stop.STEPS_DONE:
+        if stop != Stop.NONE:
             return stop
         normalise_all(grains)
         invalidate_speeds(pair_list)
@@ -169,11 +169,11 @@ def free_flight_for(spec: KernelSpec) -> Callable:
             clock[FLIGHT] = 0.0
             count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
             count[STAGE] = 1
-            return Stop.STEPS_DONE
+            return Stop.NONE
         clock[STEP] = dt
         count[STEPS] += 1
         apply_gas(grains, clock, count, lost, parameters)
-        return Stop.STEPS_DONE
+        return Stop.NONE
 
     return free_flight
 
@@ -190,20 +190,20 @@ def adaptive_driver_for(spec: KernelSpec) -> Callable:
         """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
         reset_skins(pair_list, count)
         while True:
-            stop = Stop.STEPS_DONE
+            stop = Stop.NONE
             if count[STAGE] == 0:
                 if clock[LEFT] == 0.0:
                     if clock[TIME] >= until:
                         return Stop.TIME_REACHED
                     if count[STEPS] >= last:
-                        return Stop.STEPS_DONE
+                        return Stop.NONE
                 if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
                     stop = free_flight(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters)
                 else:
                     stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop == Stop.STEPS_DONE and count[STAGE] == 1:
+            if stop == Stop.NONE and count[STAGE] == 1:
                 stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop != Stop.STEPS_DONE:
+            if stop != Stop.NONE:
                 return stop
 
     def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):

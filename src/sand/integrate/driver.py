@@ -209,9 +209,9 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
 
     @loop
     def first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters):
-        """Choose the step, kick dt/2 and drift; no step was taken unless STEPS_DONE is returned."""
+        """Choose the step, kick dt/2 and drift; no step was taken unless `Stop.NONE` is returned."""
         dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, parameters)
-        if stop != Stop.STEPS_DONE:
+        if stop != Stop.NONE:
             close_open_cycle(grains, contacts, long_range, clock, count, parameters)
             return stop
         if clock[LEFT] == 0.0:
@@ -225,13 +225,13 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
         clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
         clock[STEP] = dt
         count[STAGE] = 1
-        return Stop.STEPS_DONE
+        return Stop.NONE
 
     @loop
     def second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters):
         """Update lists and contacts, sum the loads, kick dt/2; called again after an array was enlarged."""
         stop, list_rebuilt = update_lists(grains, contacts, pair_list, long_range, count, parameters)
-        if stop != Stop.STEPS_DONE:
+        if stop != Stop.NONE:
             return stop
         formed = count_new_contacts(grains, pair_list, count, parameters.span)
         if count[CONTACTS] + formed > contacts.pair.shape[1]:
@@ -258,7 +258,7 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
             apply_gas(grains, clock, count, lost, parameters)
             if speeds_change_between_steps:
                 invalidate_speeds(pair_list)
-        return Stop.STEPS_DONE
+        return Stop.NONE
 
     return first_half, second_half
 
@@ -283,12 +283,12 @@ def driver_for(spec: KernelSpec) -> Callable:
                     if clock[TIME] >= until:
                         return Stop.TIME_REACHED
                     if count[STEPS] >= last:
-                        return Stop.STEPS_DONE
+                        return Stop.NONE
                 stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-                if stop != Stop.STEPS_DONE:
+                if stop != Stop.NONE:
                     return stop
             stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop != Stop.STEPS_DONE:
+            if stop != Stop.NONE:
                 return stop
 
     def advance(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last):

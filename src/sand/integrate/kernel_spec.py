@@ -11,7 +11,7 @@ from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums
 class Stop(IntEnum):
     """Why the driver returned to Python."""
 
-    STEPS_DONE = 0
+    NONE = 0  # no reason to stop early: continue, or all steps asked for are done
     TIME_REACHED = 1
     CONTACTS_FULL = 2
     PAIRS_FULL = 3
@@ -49,7 +49,7 @@ class ContactParameters(NamedTuple):
 
     on: bool  # False: grains overlap without interaction
     pairings: Any  # (10, M, M) constants of each pair of materials
-    release: bool  # slip: False clamps the displacement at its limit, True resets it
+    reset: bool  # slip: False clamps the displacement at its limit, True resets it
     follow: bool  # stiffnesses: False for the equilibrium radius a₀, True for the instantaneous contact radius
     damped: bool  # whether normal motion is damped
     per_period: float  # steps per fastest contact period

@@ -130,22 +130,22 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     subtract_contact_pairs : Callable
         Subtracts them from the long-range loads just summed.
     reassign_contact_pairs : Callable
-        Between two cycles: new contacts (`bonded` 0) leave the long-range loads, broken ones (flag BROKE) return.
+        Between two cycles: new contacts (`every_step` 0) leave the long-range loads, broken ones (flag BROKE) return.
     """
 
     @loop
     def add_contact_pairs(grains, contacts, count, span, parameters):
         for c in range(padded_contact_count(contacts, np.uint64(count[CONTACTS]))):
             force, torque1, torque2 = pair(grains, span, parameters, contacts.pair[0, c], contacts.pair[1, c])
-            part = 1.0 if contacts.bonded[c] == 1 else 0.0
-            accrue(contacts.push, c, scale(part, force))
+            part = 1.0 if contacts.every_step[c] == 1 else 0.0
+            accrue(contacts.force, c, scale(part, force))
             accrue(contacts.torque1, c, scale(part, torque1))
             accrue(contacts.torque2, c, scale(part, torque2))
 
     @loop
     def subtract_contact_pairs(grains, contacts, count, long_range, span, parameters):
         for c in range(count[CONTACTS]):
-            if contacts.bonded[c] == 1:
+            if contacts.every_step[c] == 1:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, parameters, i, j)
                 accrue(long_range.force, i, scale(-1.0, force))
@@ -157,16 +157,16 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     def reassign_contact_pairs(grains, contacts, count, long_range, span, parameters):
         for c in range(count[CONTACTS]):
             broken = contacts.flag[c] == BROKEN_FLAG
-            if broken or contacts.bonded[c] == 0:
+            if broken or contacts.every_step[c] == 0:
                 i, j = contacts.pair[0, c], contacts.pair[1, c]
                 force, torque1, torque2 = pair(grains, span, parameters, i, j)
                 sign = 1.0 if broken else -1.0
-                if not (broken and contacts.bonded[c] == 0):
+                if not (broken and contacts.every_step[c] == 0):
                     accrue(long_range.force, i, scale(sign, force))
                     accrue(long_range.force, j, scale(-sign, force))
                     accrue(long_range.torque, i, scale(sign, torque1))
                     accrue(long_range.torque, j, scale(sign, torque2))
-                contacts.bonded[c] = 1
+                contacts.every_step[c] = 1
 
     return add_contact_pairs, subtract_contact_pairs, reassign_contact_pairs
 

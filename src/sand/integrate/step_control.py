@@ -50,14 +50,14 @@ CLOSING_FRACTION = 0.2
 IMPACT_DISPLACEMENT = 25.0
 """Largest relative displacement of an approaching pair, or along n in contact, per step, in δ_c / steps_per_period."""
 FLIGHT_FRACTION = 1.0 / 16.0
-"""Largest flight of a grain in one step in units of the reach of the pair list, so that the list cannot be too old."""
+"""Largest flight of a grain in one step in units of the gap of the pair list, so that the list stays valid."""
 
 
 class StepCriteria(NamedTuple):
     """Parameters of the step-size criteria."""
 
     fixed: float  # step set by the user [s]; 0: automatic
-    reach: float  # of the list of contact candidates: the smallest radius [m]
+    pair_gap: float  # largest gap of the pairs in the pair list: the smallest radius [m]
     energy_scale: float  # largest energy of a long-range pair, |U_min| for dipoles [J]; 0: no such force
     accuracy: float  # allowed energy error of a step, in units of energy_scale
     outer_field: float  # magnitude of the external flux density [T]
@@ -100,7 +100,7 @@ def grain_step(grains, long_range, start, criteria, i):
     bound = start[i + 1] != start[i]
     by_loads = math.inf if bound else by_loads
     cycle = min(min(by_spin, by_field), by_loads)
-    by_flight = FLIGHT_FRACTION * criteria.reach / speed if speed > 0.0 else math.inf
+    by_flight = FLIGHT_FRACTION * criteria.pair_gap / speed if speed > 0.0 else math.inf
     return min(cycle, by_flight), math.inf if bound else cycle
 
 
@@ -142,13 +142,13 @@ def pair_step(grains, pair_list, span, criteria, p):
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
     distance = math.sqrt(dot(apart, apart))
     closing = -dot(relative, apart) / distance
-    touching = pair_list.touching[p] == 1
+    touching = pair_list.in_contact[p] == 1
     # in contact only the normal velocity strains the contact; rotation of the pair does not
     speed = abs(closing) if touching else math.sqrt(dot(relative, relative))
     pair_type = pair_type_index(pair_list, p)
-    required, length = pair_list.step[pair_type], pair_list.length[pair_type]
-    fast = (length > 0.0) & (speed * required > criteria.impact * length)
-    required = criteria.impact * length / speed if fast else required
+    required, overlap = pair_list.step[pair_type], pair_list.break_overlap[pair_type]
+    fast = (overlap > 0.0) & (speed * required > criteria.impact * overlap)
+    required = criteria.impact * overlap / speed if fast else required
     gap = distance - grains.radius[i] - grains.radius[j]
     free = max(required, CLOSING_FRACTION * gap / closing) if closing > 0.0 else math.inf
     # slow pairs in contact are resolved by the contact step

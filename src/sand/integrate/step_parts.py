@@ -40,22 +40,22 @@ from .step_control import CHECK_INTERVAL, choose_step, find_limiting_grains
 MAX_TURN = 0.5
 """Largest rotation in one step [rad] for which `quaternion.turn` is accurate."""
 INNER_SKIN_FRACTION = 0.05
-"""Displacement, in units of the reach of the pair list, after which the inner list of candidates is rebuilt."""
+"""Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
 
 
 @loop
-def _moves_too_far(fastest, fastest_spin, reach, dt):
-    """TOO_FAST for a displacement above reach/2, SPINS_TOO_FAST for a rotation above MAX_TURN; from squared speeds."""
-    moved_too_far, turned_too_far = dt * dt * fastest > 0.25 * reach * reach, dt * dt * fastest_spin > MAX_TURN**2
-    return Stop.TOO_FAST if moved_too_far else Stop.SPINS_TOO_FAST if turned_too_far else Stop.STEPS_DONE
+def _moves_too_far(fastest, fastest_spin, max_gap, dt):
+    """TOO_FAST if a grain moves by more than max_gap/2, SPINS_TOO_FAST if it turns by more than MAX_TURN, per step."""
+    moved_too_far, turned_too_far = dt * dt * fastest > 0.25 * max_gap * max_gap, dt * dt * fastest_spin > MAX_TURN**2
+    return Stop.TOO_FAST if moved_too_far else Stop.SPINS_TOO_FAST if turned_too_far else Stop.NONE
 
 
 @rare
-def _first_too_fast(grains, reach, dt, stop):
+def _first_too_fast(grains, max_gap, dt, stop):
     """Index of the first grain for which `_moves_too_far` gives this stop, or −1."""
     for i in range(grains.mass.size):
         v, w = load(grains.velocity, i), load(grains.spin, i)
-        if _moves_too_far(dot(v, v), dot(w, w), reach, dt) == stop:
+        if _moves_too_far(dot(v, v), dot(w, w), max_gap, dt) == stop:
             return i
     return -1
 
@@ -74,7 +74,7 @@ def _first_overcompressed(grains, contacts, count, span):
 
 @loop
 def possible_step(grains, contacts, pair_list, long_range, clock, count, parameters):
-    """The next step [s] and STEPS_DONE, or 0 and the reason why no step is possible."""
+    """The next step [s] and `Stop.NONE`, or 0 and the reason why no step is possible."""
     count[GRAIN1] = count[GRAIN2] = -1
     update_speeds(grains, pair_list)
     dt = choose_step(grains, long_range, contacts.start, pair_list, clock, count, parameters.span, parameters.criteria)
@@ -85,24 +85,24 @@ def possible_step(grains, contacts, pair_list, long_range, clock, count, paramet
     if clock[TIME] + dt == clock[TIME]:
         find_limiting_grains(grains, long_range, contacts.start, pair_list, count, parameters.span, parameters.criteria)
         return 0.0, Stop.NO_STEP
-    stop = _moves_too_far(pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN], parameters.criteria.reach, dt)
-    if stop != Stop.STEPS_DONE:
-        count[GRAIN1] = _first_too_fast(grains, parameters.criteria.reach, dt, stop)
+    stop = _moves_too_far(pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN], parameters.criteria.pair_gap, dt)
+    if stop != Stop.NONE:
+        count[GRAIN1] = _first_too_fast(grains, parameters.criteria.pair_gap, dt, stop)
         return 0.0, stop
     if count[STEPS] % CHECK_INTERVAL == 0:
         c = _first_overcompressed(grains, contacts, count, parameters.span)
         if c >= 0:
             count[GRAIN1], count[GRAIN2] = contacts.pair[0, c], contacts.pair[1, c]
             return 0.0, Stop.OVERCOMPRESSED
-    return dt, Stop.STEPS_DONE
+    return dt, Stop.NONE
 
 
 @loop
 def update_lists(grains, contacts, pair_list, long_range, count, parameters):
-    """Rebuild stale lists; returns STEPS_DONE or the array that is full, and whether the pair list was stale."""
-    span, search, reach = parameters.span, parameters.search, parameters.criteria.reach
+    """Rebuild stale lists; returns `Stop.NONE` or the array that is full, and whether the pair list was stale."""
+    span, search, max_gap = parameters.span, parameters.search, parameters.criteria.pair_gap
     stale = parameters.contact.on and list_is_stale(
-        grains, pair_list.anchor, span, 0.25 * reach, pair_list.skin, PAIR_LIST_SKIN
+        grains, pair_list.anchor, span, 0.25 * max_gap, pair_list.skin, PAIR_LIST_SKIN
     )
     verlet_stale = search.listed and list_is_stale(
         grains, long_range.anchor, span, 0.5 * search.margin, pair_list.skin, LONG_RANGE_SKIN
@@ -111,7 +111,7 @@ def update_lists(grains, contacts, pair_list, long_range, count, parameters):
         return Stop.LIST_FULL, stale
     if stale:
         law = parameters.contact
-        result = build_pair_list(grains, contacts, pair_list, long_range, count, span, reach, law, search)
+        result = build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, law, search)
         if result == FULL:
             return Stop.PAIRS_FULL, stale
         if result == ROW_FULL:
@@ -119,8 +119,8 @@ def update_lists(grains, contacts, pair_list, long_range, count, parameters):
         update_safe_speed(pair_list, count)
     # written so that a skin that is not a number counts as used up
     if parameters.contact.on and (stale or not pair_list.skin[INNER_SKIN] > 0.0):
-        build_inner_list(grains, pair_list, count, span, 2.0 * INNER_SKIN_FRACTION * reach)
-    return Stop.STEPS_DONE, stale
+        build_inner_list(grains, pair_list, count, span, 2.0 * INNER_SKIN_FRACTION * max_gap)
+    return Stop.NONE, stale
 
 
 @loop

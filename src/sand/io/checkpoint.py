@@ -39,8 +39,8 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 5
-"""Version of the file format; other versions are refused. Versions before 5 were never released."""
+VERSION = 6
+"""Version of the file format; other versions are refused. Versions before 6 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
 _META = "meta.json"

@@ -30,10 +30,10 @@ NO_GRID = Grid((0, 0, 0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0, 0.0, 0.0)
 
 
 @loop
-def within_reach(grains, span, reach, i, j):
-    """Whether the gap between two grains is below `reach` [m]."""
+def gap_below(grains, span, max_gap, i, j):
+    """Whether the gap between two grains is below `max_gap` [m]."""
     separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-    limit = grains.radius[i] + grains.radius[j] + reach
+    limit = grains.radius[i] + grains.radius[j] + max_gap
     return dot(separation, separation) < limit * limit
 
 
@@ -49,8 +49,8 @@ def candidates(pair_list, long_range, grid, span, search, k):
 
 
 @rare
-def build_pair_list(grains, contacts, pair_list, long_range, count, span, reach, law, search):
-    """List the pairs with a gap below `reach` [m], selected from the Verlet list, from cells, or from all pairs.
+def build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, law, search):
+    """List the pairs with a gap below `max_gap` [m], selected from the Verlet list, from cells, or from all pairs.
 
     Returns
     -------
@@ -71,13 +71,13 @@ def build_pair_list(grains, contacts, pair_list, long_range, count, span, reach,
         i = long_range.order[k] if sorted_indices else np.uint32(k)
         for m in range(first, last):
             j = long_range.order[long_range.neighbour[m]] if sorted_indices else np.uint32(m)
-            if j < i and within_reach(grains, span, reach, i, j):
+            if j < i and gap_below(grains, span, max_gap, i, j):
                 if found < capacity:
                     pair_type = pair_type_of(grains, law, i, j, pair_type)
                     pair_list.pair[0, found], pair_list.pair[1, found] = i, j
-                    pair_list.touching[found] = 1 if in_contact(contacts, i, j) else 0
+                    pair_list.in_contact[found] = 1 if in_contact(contacts, i, j) else 0
                     index = pair_type_index(pair_list, found)
-                    pair_list.step[index], pair_list.length[index] = pair_type.step, pair_type.length
+                    pair_list.step[index], pair_list.break_overlap[index] = pair_type.step, pair_type.break_overlap
                 found += 1
     count[PAIRS] = found
     if found > capacity:
@@ -102,6 +102,6 @@ def build_inner_list(grains, pair_list, count, span, gap):
         separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
         limit = grains.radius[i] + grains.radius[j] + gap
         pair_list.inner[min(found, capacity)] = p
-        found += 1 if (pair_list.touching[p] == 0) & (dot(separation, separation) < limit * limit) else 0
+        found += 1 if (pair_list.in_contact[p] == 0) & (dot(separation, separation) < limit * limit) else 0
     pair_list.skin[INNER_COUNT] = found if found <= capacity else count[PAIRS]
     pair_list.skin[INNER_SKIN] = SKIN_SAFETY * 0.5 * gap

@@ -132,7 +132,7 @@ class Neighbours:
         return Neighbours(method, search.margin or "auto", order)  # a margin would request a Verlet list
 
     def choose(
-        self, grains: Grains, box: Box, reach: float, cutoffs: Sequence[float], *, adaptive_steps: bool = False
+        self, grains: Grains, box: Box, pair_gap: float, cutoffs: Sequence[float], *, adaptive_steps: bool = False
     ) -> ChosenSearch:
         """Choose the search method for these grains.
 
@@ -142,7 +142,7 @@ class Neighbours:
             The grains.
         box : Box
             The box.
-        reach : float
+        pair_gap : float
             Gap [m] up to which pairs are candidates for contacts.
         cutoffs : Sequence[float]
             Cut-off radii [m] of the long-range forces that have one.
@@ -154,13 +154,13 @@ class Neighbours:
         ChosenSearch
             The method and the reason for it.
         """
-        contact_reach = 2.0 * float(grains.radius.max()) + reach
+        contact_reach = 2.0 * float(grains.radius.max()) + pair_gap
         widest = max(cutoffs, default=0.0)
-        # candidate pairs are found with cells, or in the Verlet list; without a cut-off the skin is half their reach
+        # candidate pairs are found with cells, or in the Verlet list; without a cut-off the skin is half their gap
         celled = widest == 0.0 and self.margin == "auto" and not adaptive_steps
         margin = 0.0 if celled else self.margin
         if margin == "auto":
-            margin = (ADAPTIVE_MARGIN if adaptive_steps else MARGIN) * widest if widest > 0.0 else 0.5 * reach
+            margin = (ADAPTIVE_MARGIN if adaptive_steps else MARGIN) * widest if widest > 0.0 else 0.5 * pair_gap
         list_reach = max(widest, contact_reach) + margin
         all_pairs, distance = Search(False, list_reach, margin), format_quantity(list_reach, "m")
         if self.search == "all pairs":

@@ -42,7 +42,9 @@ def update_safe_speed(pair_list, count):
     """Set the smallest speed [m/s], over all candidate pairs, that moves a pair by δ_c in one contact step."""
     safe_speed = math.inf
     for k in range(pair_type_count(pair_list, count)):
-        safe_speed = min(safe_speed, pair_list.length[k] / pair_list.step[k] if pair_list.length[k] > 0.0 else math.inf)
+        safe_speed = min(
+            safe_speed, pair_list.break_overlap[k] / pair_list.step[k] if pair_list.break_overlap[k] > 0.0 else math.inf
+        )
     pair_list.skin[SAFE_SPEED] = safe_speed
 
 

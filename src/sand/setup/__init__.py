@@ -7,7 +7,7 @@ from .deposit import rbd
 from .diffusion import dla, dlca
 from .encounters import Encounter, encounter, turned, turned_at_random
 from .fractal import fractal
-from .from_frame import Bonds, Start, from_frame
+from .from_frame import Start, StrainedContacts, from_frame
 from .gas import gas
 from .moments import magnetic_energy, relaxed
 from .population import Lognormal, PowerLaw
@@ -17,11 +17,11 @@ pca = bpca
 
 __all__ = [
     "KINDS",
-    "Bonds",
     "Encounter",
     "Lognormal",
     "PowerLaw",
     "Start",
+    "StrainedContacts",
     "bcca",
     "bpca",
     "build",

@@ -21,7 +21,7 @@ SINGLE = 6e-8
 """Relative rounding error of single precision, in which diameters and masses are stored."""
 
 
-class Bonds(NamedTuple):
+class StrainedContacts(NamedTuple):
     """Initial contacts with their displacements, in the laboratory frame.
 
     Overlapping grains are in contact anyway, without displacements; bonds add stretched and strained contacts.
@@ -37,7 +37,7 @@ class Start(NamedTuple):
     """Arguments of a `Simulation`: `grains`, `contacts` and `box`."""
 
     grains: Grains
-    contacts: Bonds | None
+    contacts: StrainedContacts | None
     box: Box
     note: str  # origin and corrections
 
@@ -93,7 +93,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
     )
     moved = float(np.abs(frame.box.nearest(position - frame.position)).max())
     kept = f"{len(pair)} contact{'s' * (len(pair) != 1)} kept"
-    bonds = Bonds(pair, frame.slide, frame.roll, frame.twist)
+    bonds = StrainedContacts(pair, frame.slide, frame.roll, frame.twist)
     note = f"step {frame.step}, {format_quantity(frame.time, 's')}, of an earlier run; {kept}"
     if moved > 0.0:
         note += f", positions corrected by at most {moved:.2g} m to restore the overlaps"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ..box import Box
-from ..contact.law import Bond
+from ..contact.law import ContactConstants
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
@@ -23,7 +23,7 @@ from ..integrate.task_queue import uses_task_queue
 from ..integrate.verlet import Verlet
 from ..material import SILICA
 from ..neighbours.settings import ChosenSearch, Neighbours
-from ..setup.from_frame import Bonds
+from ..setup.from_frame import StrainedContacts
 from ..state.arrays import (
     ALWAYS_RECORDED,
     CELL_ARRAYS,
@@ -76,7 +76,7 @@ def build_engine(
     seed: int = 0,
     *,
     fresh: bool = True,
-    contacts: Bonds | None = None,
+    contacts: StrainedContacts | None = None,
 ) -> Engine:
     """Check that grains, forces, box and settings fit together, and build the engine.
 
@@ -86,7 +86,7 @@ def build_engine(
         Seed of the random gas kicks.
     fresh : bool, optional
         Whether this is a new start, whose overlaps are checked; a resumed run may be in the middle of an impact.
-    contacts : Bonds or None, optional
+    contacts : StrainedContacts or None, optional
         Contacts present from the start, with their displacements.
 
     Raises
@@ -96,13 +96,13 @@ def build_engine(
     """
     warnings = _check_system(grains, forces, box, fresh=fresh)
     by_type = _forces_by_type(forces, grains)
-    reach = float(grains.radius.min())
+    pair_gap = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
     flights = isinstance(stepping, Adaptive)
-    found = neighbours.choose(grains, box, reach, [r for r in cutoffs if r is not None], adaptive_steps=flights)
+    found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], adaptive_steps=flights)
     long_range = _long_range_loops(by_type, grains, box, [found.search.listed and r is not None for r in cutoffs])
-    verlet = stepping.touching if isinstance(stepping, Adaptive) else stepping
-    control = _step_control(grains, verlet, by_type, reach)
+    verlet = stepping.contact_stepping if isinstance(stepping, Adaptive) else stepping
+    control = _step_control(grains, verlet, by_type, pair_gap)
     if isinstance(stepping, Adaptive):
         stepping = stepping.resolved(grains, control)
     external, external_numbers = compose(by_type.external)
@@ -192,7 +192,9 @@ def _new_state(
     return State(
         grains,
         box,
-        empty_contact_arrays(count, capacity, len(Bond._fields), uniform_contacts=uniform_contacts, channels=channels),
+        empty_contact_arrays(
+            count, capacity, len(ContactConstants._fields), uniform_contacts=uniform_contacts, channels=channels
+        ),
         empty_pair_list(count, capacity, uniform_contacts=uniform_contacts),
         empty_long_range_arrays(
             count,
@@ -250,13 +252,13 @@ def _check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: b
     return warnings + (find_warnings(grains, forces, box) if fresh else [])
 
 
-def _step_control(grains: Grains, stepping: Verlet, forces: ForcesByType, reach: float) -> StepCriteria:
+def _step_control(grains: Grains, stepping: Verlet, forces: ForcesByType, pair_gap: float) -> StepCriteria:
     """Parameters of the choice of the step size."""
     steps = [own() for f in forces.external if (own := getattr(f, "longest_step", None)) is not None]
     idle = IDLE * min(sound_crossing(grains, number) for number in range(len(grains.materials)))
     return StepCriteria(
         fixed=0.0 if stepping.step == "auto" else stepping.step,
-        reach=reach,
+        pair_gap=pair_gap,
         energy_scale=max((f.energy_scale(grains) for f in forces.long_range), default=0.0),
         accuracy=stepping.accuracy,
         outer_field=math.fsum(f.flux_density_size() for f in forces.external),
@@ -279,7 +281,7 @@ def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verle
     return ContactParameters(
         on=contact is not None,
         pairings=pairings,
-        release=law.beyond == "release",
+        reset=law.slip == "reset",
         follow=law.stiffness == "dt97",
         damped=law.damping != "none",
         per_period=stepping.steps_per_period,

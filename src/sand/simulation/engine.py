@@ -136,7 +136,7 @@ class Engine:
                 self._sort_in_space()
             renewed = self._state.count[ORDERED] + SORT_INTERVAL
             stop = self._drive(until, min(last, renewed))
-            if not (stop is Stop.STEPS_DONE and renewed <= self.steps < last):
+            if not (stop is Stop.NONE and renewed <= self.steps < last):
                 return stop
 
     def _drive(self, until: float, last: float) -> Stop:

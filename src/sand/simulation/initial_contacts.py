@@ -12,7 +12,7 @@ from ..contact.model import Contact
 from ..errors import BadInput
 from ..grains import Grains
 from ..setup.checks import most_overlap
-from ..setup.from_frame import Bonds
+from ..setup.from_frame import StrainedContacts
 from .engine import Engine
 
 NAMED = 10
@@ -36,7 +36,7 @@ def overlapping_pairs(grains: Grains, box: Box) -> OverlappingPairs:
     return OverlappingPairs(pair[overlap > 0.0], overlap[overlap > 0.0])
 
 
-def add_contacts(engine: Engine, contact: Contact | None, contacts: Bonds | None) -> np.ndarray:
+def add_contacts(engine: Engine, contact: Contact | None, contacts: StrainedContacts | None) -> np.ndarray:
     """Add contacts of an earlier run to the state.
 
     Returns

@@ -20,7 +20,7 @@ from ..integrate.adaptive import Adaptive
 from ..integrate.kernel_spec import Stop
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
-from ..setup.from_frame import Bonds
+from ..setup.from_frame import StrainedContacts
 from ..state.state import State
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
@@ -71,7 +71,7 @@ class Simulation(ReadOnlySettings):
         Objects that are called during the run (see `sand.Observer`); they must not change the simulation.
     frame_every : float or str, optional
         Time between frames [s]; by default 1/200 of the first `run`.
-    contacts : Bonds or None, optional
+    contacts : StrainedContacts or None, optional
         Initial contacts with their displacements, from `sand.setup.from_frame`.
     restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
         Arrays and metadata of a checkpoint in `out` from which to continue; used by `sand.resume`.
@@ -95,7 +95,7 @@ class Simulation(ReadOnlySettings):
         overwrite: bool = False,
         observers: Iterable[Observer] = (),
         frame_every: Any = None,
-        contacts: Bonds | None = None,
+        contacts: StrainedContacts | None = None,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
         self.forces = read_forces(forces)

@@ -25,14 +25,14 @@ class ContactArrays(NamedTuple):
     pointer2: np.ndarray  # (3, C) contact pointer of grain 2
     twist: np.ndarray  # (C,) φ [rad]
     formed: np.ndarray  # (C,) time of formation [s]; the start time for initial contacts
-    bond: np.ndarray  # (K, C) constants of the contact law; (K, BLOCK) identical columns if they are uniform
+    constants: np.ndarray  # (K, C) constants of the contact law; (K, BLOCK) identical columns if they are uniform
     lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 channels of state.RECORDED
     damped: np.ndarray  # (C,) damping force in the last step [N], along n on grain 1; (0,) if L = 4
-    push: np.ndarray  # (3, C) force on grain 1 [N]
+    force: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
     flag: np.ndarray  # (C,) uint8: 0 within all limits, else one of the flags of contact.update
-    bonded: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts in every step
+    every_step: np.ndarray  # (C,) uint8: 1 where the long-range force of the pair acts in every step
     side: np.ndarray  # (2C,) uint32: 2 × contact, plus 1 for grain 2; sorted by grain
     start: np.ndarray  # (N+1,) uint32: first entry of each grain in `side`
     # (N + GATHER_CLASSES,) uint32: grains in the order of contact.gather; (0,) for the order of their indices
@@ -43,9 +43,9 @@ class PairList(NamedTuple):
     """Candidate pairs for contacts: pairs that may touch soon; the first count[PAIRS] columns are in use."""
 
     pair: np.ndarray  # (2, P) uint32: grains
-    touching: np.ndarray  # (P,) uint8: 1 for pairs in contact
+    in_contact: np.ndarray  # (P,) uint8: 1 for pairs in contact
     step: np.ndarray  # (P,) time step that the contact needs [s]; (1,) if uniform
-    length: np.ndarray  # (P,) −δ at which the contact breaks [m]: δ_c, 0 without adhesion; (1,) if uniform
+    break_overlap: np.ndarray  # (P,) −δ at which the contact breaks [m]: δ_c, 0 without adhesion; (1,) if uniform
     anchor: np.ndarray  # (3, N) positions when the list was built [m]; a buffer while it is built from cells
     # (P/8,) uint32: inner list, the pairs that may touch next, skin[INNER_COUNT] of them; unused if there are too many
     inner: np.ndarray
@@ -104,7 +104,7 @@ LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
 RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
 """Long-range arrays needed only with long-range forces, cells, a Verlet list, r-RESPA cycles or Taylor series."""
-UNIFORM_ARRAYS = ("bond", "step", "length")
+UNIFORM_ARRAYS = ("constants", "step", "break_overlap")
 """Arrays of contacts and candidate pairs with identical columns if all grains are equal."""
 NOT_SAVED = ("inner", "skin", "gather_order")
 """Arrays of contacts and candidate pairs that are not in a checkpoint, but recomputed."""
@@ -151,7 +151,7 @@ def empty_long_range_arrays(
 
 
 def empty_contact_arrays(
-    grains: int, capacity: int, constants: int, *, uniform_contacts: bool = False, channels: int = 6
+    grains: int, capacity: int, constant_count: int, *, uniform_contacts: bool = False, channels: int = 6
 ) -> ContactArrays:
     """Allocate contact arrays.
 
@@ -161,7 +161,7 @@ def empty_contact_arrays(
         Number of grains.
     capacity : int
         Number of contacts to allocate.
-    constants : int
+    constant_count : int
         Constants of the contact law per contact.
     uniform_contacts : bool, optional
         Whether one set of constants serves all contacts.
@@ -169,13 +169,13 @@ def empty_contact_arrays(
         Number of loss channels recorded per contact.
     """
     c = padded_size(max(int(capacity), 16))
-    vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "push", "torque1", "torque2")}
+    vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "force", "torque1", "torque2")}
     numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS_RECORDED else 0)}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
-        bond=np.zeros((constants, BLOCK if uniform_contacts else c)),
+        constants=np.zeros((constant_count, BLOCK if uniform_contacts else c)),
         flag=np.zeros(c, np.uint8),
-        bonded=np.zeros(c, np.uint8),
+        every_step=np.zeros(c, np.uint8),
         lost=np.zeros((channels, c)),
         side=np.zeros(2 * c, np.uint32),
         start=np.zeros(grains + 1, np.uint32),
@@ -187,10 +187,10 @@ def empty_contact_arrays(
 def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = False) -> PairList:
     """Allocate a pair list.  The anchors are at infinity, so that the first step builds the list."""
     p, anchor = padded_size(max(int(capacity), 16)), np.full((3, grains), np.inf)
-    pair, touching = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8)
+    pair, in_contact = np.zeros((2, p), np.uint32), np.zeros(p, np.uint8)
     inner = np.zeros(p // PAIRS_PER_INNER_ENTRY, np.uint32)
     types = np.zeros((2, 1 if uniform_contacts else p))
-    return PairList(pair, touching, types[0], types[1], anchor, inner, np.full(7, -1.0))
+    return PairList(pair, in_contact, types[0], types[1], anchor, inner, np.full(7, -1.0))
 
 
 def stage_arrays(grains: int) -> StageArrays:
