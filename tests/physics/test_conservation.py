@@ -9,7 +9,6 @@ import pytest
 import sand
 from sand.constants import MAGNETIC
 from sand.contact import jkr
-from sand.contact import law as contact_law
 from sand.state.state import CONTACT_STEP
 
 from .setups import Imposed, random_aggregate, rest_distance, struck_chain
@@ -200,7 +199,7 @@ def test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls(speed, side
 
 def beyond_energy(sim):
     """k w²/12 − F²/(24 m̄) [J/s²] of a single pair, k from differences of F."""
-    constants = sand.contact.law.contact_constants(
+    constants = sand.contact.law.contact_constants(jkr.LAW)(
         sand.Contact().pairing(sand.IRON, sand.IRON), *sim.grains.radius, *sim.grains.mass
     )
     apart = sim.grains.position[1] - sim.grains.position[0]
@@ -208,10 +207,9 @@ def beyond_energy(sim):
     w = (sim.grains.velocity[1] - sim.grains.velocity[0]) @ apart / distance
 
     def force(overlap):
-        y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
-        return contact_law.normal_force(overlap, y, constants)
+        return jkr.LAW.force(overlap, jkr.LAW.radius_root(overlap, constants), constants)
 
-    overlap, h = sim.grains.radius.sum() - distance, 1e-4 * constants.pull_off_overlap
+    overlap, h = sim.grains.radius.sum() - distance, 1e-4 * constants.break_overlap
     stiffness = (force(overlap + h) - force(overlap - h)) / (2.0 * h)
     return stiffness * w * w / 12.0 - force(overlap) ** 2 / (12.0 * sim.grains.mass[0])
 

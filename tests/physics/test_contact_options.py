@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact.law import contact_constants
+from sand.contact.law import LAWS, contact_constants
 from sand.contact.mixing import MIXING
 from sand.state.state import LOST, RECORDED
 
@@ -22,7 +22,7 @@ def pair(distance, material=sand.SILICA, speed=0.0, r=R, **options):
 
 def pair_constants(contact, material=sand.SILICA, r=R):
     mass = material.density * 4 / 3 * math.pi * r**3
-    return contact_constants(contact.pairing(material, material), r, r, mass, mass), mass
+    return contact_constants(LAWS[contact.law])(contact.pairing(material, material), r, r, mass, mass), mass
 
 
 @pytest.mark.compiled("contacts")
@@ -109,7 +109,7 @@ def test_multipliers_scale_their_own_stiffness(factor, power):
     plain, _ = pair_constants(sand.Contact())
     scaled, _ = pair_constants(sand.Contact(**{factor: 2.5}))
     name = factor.replace("factor", "stiffness")
-    for field in plain._fields:
+    for field in plain._fields[:-1]:
         expected = 2.5 if field == name else 1.0
         if field != "max_squared_frequency":
             assert getattr(scaled, field) == pytest.approx(expected * getattr(plain, field), rel=1e-6, abs=0.0)

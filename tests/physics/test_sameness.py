@@ -100,14 +100,15 @@ def test_a_listed_run_goes_on_from_its_saved_state():
 @pytest.mark.compiled("contacts")
 def test_growing_arrays_changes_nothing():
     """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
-    from sand.contact.law import ContactConstants
+    from sand.contact.columns import constant_names
+    from sand.contact.jkr import LAW
     from sand.state.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
 
     ends = []
     for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.state.contacts = empty_contact_arrays(n, room, len(ContactConstants._fields), uniform_contacts=alike)
+        sim.state.contacts = empty_contact_arrays(n, room, len(constant_names(LAW)), uniform_contacts=alike)
         sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=alike), alike
         rules = sim._engine.parameters
         sim._engine.parameters = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
@@ -182,7 +183,8 @@ def test_the_compiler_changes_nothing_but_rounding(tmp_path):
 @pytest.mark.compiled("contacts")
 def test_kernels_against_plain_python_loops():
     """Pair list, contacts and gather of a random aggregate against double loops written out in NumPy."""
-    from sand.contact import jkr, law
+    from sand.contact import jkr, mechanics
+    from sand.contact.columns import column_loops
 
     grains = random_aggregate(40, 3, radii=(5e-9, 1.5e-8), velocity=5.0 * np.random.default_rng(1).normal(size=(40, 3)))
     sim = sand.Simulation(grains, [sand.Contact()])
@@ -199,17 +201,17 @@ def test_kernels_against_plain_python_loops():
     force, torque = np.zeros((40, 3)), np.zeros((40, 3))
     for c in range(w.count[CONTACTS]):
         i, j = (int(k) for k in w.contacts.pair[:, c])
-        constants = law.ContactConstants(*w.contacts.constants[:, c])
+        constants = column_loops(jkr.LAW).load(w.contacts.constants, c)
         apart = g.position[i] - g.position[j]
         distance = np.linalg.norm(apart)
         from scipy.spatial.transform import Rotation
 
         n1 = Rotation.from_quat(g.orientation[i]).apply(w.contacts.pointer1[:, c])
         n2 = Rotation.from_quat(g.orientation[j]).apply(w.contacts.pointer2[:, c])
-        pose = law.Pose(tuple(apart / distance), distance, tuple(n1), tuple(n2), w.contacts.twist[c])
+        pose = mechanics.Pose(tuple(apart / distance), distance, tuple(n1), tuple(n2), w.contacts.twist[c])
         overlap = g.radius[i] + g.radius[j] - distance
-        y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
-        f, t1, t2 = law.contact_load(pose, overlap, y, g.radius[i], g.radius[j], constants)
+        normal = jkr.LAW.force(overlap, jkr.LAW.radius_root(overlap, constants), constants)
+        f, t1, t2 = mechanics.contact_load(pose, normal, g.radius[i], g.radius[j], constants)
         force[i] += f
         force[j] -= f
         torque[i] += t1

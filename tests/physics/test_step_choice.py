@@ -14,7 +14,7 @@ R = 3e-7
 def _pair():
     contact = sand.Contact().pairing(sand.SILICA, sand.SILICA)
     mass = 4.0 / 3.0 * math.pi * R**3 * sand.SILICA.density
-    constants = sand.contact.law.contact_constants(contact, R, R, mass, mass)
+    constants = sand.contact.law.contact_constants(sand.contact.jkr.LAW)(contact, R, R, mass, mass)
     rest = constants.rest_radius**2 / (3.0 * constants.reduced_radius)
     step = 2.0 * math.pi / math.sqrt(constants.max_squared_frequency) / sand.Verlet().steps_per_period
     return constants, 2.0 * R - rest, step
@@ -46,7 +46,7 @@ def test_a_spinning_pair_does_not_ring_up():
     )  # spin of both grains that slides them that far
     stake = 0.5 * constants.slide_stiffness * ringing**2
     for part in (0.8, 0.9, 1.2):
-        turning = part * constants.pull_off_overlap / step / distance
+        turning = part * constants.break_overlap / step / distance
         half = 0.5 * distance
         grains = sand.Grains(
             [[half, 0, 0], [-half, 0, 0]],
@@ -66,7 +66,7 @@ def test_a_spinning_pair_does_not_ring_up():
 def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
     """A grain about to touch needs no shorter a step than its contact will: the contacts' own, to the bit."""
     constants, distance, step = _pair()
-    slow = 0.1 * constants.pull_off_overlap / step
+    slow = 0.1 * constants.break_overlap / step
     gap = 100 * slow * step
     position = [[0, 0, 0], [distance, 0, 0], [0, 5e-6, 0], [2 * R + gap, 5e-6, 0]]
     grains = sand.Grains(position, R, sand.SILICA, velocity=[[0, 0, 0]] * 3 + [[-slow, 0, 0]])
@@ -83,7 +83,7 @@ def test_a_shorter_step_is_held_for_ten_periods():
     from sand.integrate.step_control import HOLD_STEPS
 
     constants, distance, step = _pair()
-    fast = 4.0 * constants.pull_off_overlap / step
+    fast = 4.0 * constants.break_overlap / step
     position = [[0, 0, 0], [distance, 0, 0], [0, 5e-6, 0], [2 * R + 20 * fast * step, 5e-6, 0]]
     grains = sand.Grains(position, R, sand.SILICA, velocity=[[0, 0, 0]] * 3 + [[-fast, 0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()])

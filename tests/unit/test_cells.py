@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 import sand
 from sand.box import Box, as_box
 from sand.compiler.jit import kernel
-from sand.contact.pair_types import pair_constants
+from sand.contact.columns import column_loops
+from sand.contact.jkr import LAW as JKR
 from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
 from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours import cell_list as cells
@@ -352,7 +353,7 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     pairs = sim.state.count[PAIRS]
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):
-        constants = pair_constants(a, law.pairings, i, j)
+        constants = column_loops(JKR).of_pair(a, law.pairings, i, j)
         period = 2 * np.pi / np.sqrt(constants.max_squared_frequency)
         assert near.step[p] == pytest.approx(period / law.per_period, rel=1e-14)
         assert near.break_overlap[p] == pytest.approx(constants.break_overlap, rel=1e-14)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import sand
-from sand.contact import jkr, law
-from sand.contact.update import constants_at, pose_at
+from sand.contact import jkr, mechanics
+from sand.contact.columns import column_loops
+from sand.contact.update import pose_at
 from sand.simulation.contact_table import COLUMNS
 
 from ..physics.setups import random_aggregate
@@ -29,12 +30,12 @@ def test_every_column_row_by_row(stiffness):
     assert set(table) == {name for name, _, _ in COLUMNS}
     force = np.zeros((15, 3))
     for c, (i, j) in enumerate(table["pair"]):
-        plain = constants_at(w.contacts, c)
+        plain = column_loops(jkr.LAW).at(w.contacts, c)
         pose = pose_at(w.grains.arrays, w.contacts, sim.box.span, c, w.contacts.twist[c])
         r1, r2 = sim.grains.radius[i], sim.grains.radius[j]
         overlap = r1 + r2 - np.linalg.norm(sim.grains.position[i] - sim.grains.position[j])
-        y = jkr.root(jkr.stretch(overlap, plain.pull_off_overlap))
-        constants = law.scaled_stiffness(plain, y, stiffness == "dt97")
+        y = jkr.LAW.radius_root(overlap, plain)
+        constants = mechanics.scaled_stiffness(plain, y, stiffness == "dt97")
         n = np.array(pose.n)
         d = r1 * np.array(pose.n1) - r2 * np.array(pose.n2)
         slide = np.linalg.norm(d - (d @ n) * n)
@@ -46,7 +47,7 @@ def test_every_column_row_by_row(stiffness):
         assert row["slide_share"] == pytest.approx(slide / constants.slide_limit, rel=1e-6, abs=1e-9)
         assert row["roll_share"] == pytest.approx(roll / constants.roll_limit, rel=1e-6, abs=1e-9)
         assert row["twist_share"] == pytest.approx(abs(w.contacts.twist[c]) / constants.twist_limit, rel=1e-6, abs=0.0)
-        assert row["stretch_share"] == pytest.approx(-overlap / constants.pull_off_overlap, rel=1e-6, abs=0.0)
+        assert row["stretch_share"] == pytest.approx(-overlap / constants.break_overlap, rel=1e-6, abs=0.0)
         assert row["energy_sliding"] == pytest.approx(0.5 * constants.slide_stiffness * slide**2, rel=1e-6, abs=1e-28)
         assert row["force"] @ n == pytest.approx(row["normal_force"], rel=1e-6, abs=0.0)
         across = row["force"] - (row["force"] @ n) * n

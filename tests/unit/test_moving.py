@@ -7,12 +7,25 @@ import pytest
 
 from sand.box import Box
 from sand.compiler.jit import kernel
-from sand.contact.events import update_flagged_contacts
-from sand.contact.law import ContactConstants, contact_constants, displacements_of
+from sand.contact.columns import column_loops, constant_names
+from sand.contact.events import settle_loop
+from sand.contact.jkr import LAW as JKR
+from sand.contact.law import contact_constants
+from sand.contact.mechanics import displacements_of
 from sand.contact.model import Contact
-from sand.contact.slip import contact_pass, displacements_before, log_slip_sums
 from sand.contact.tangential import pointers_for
-from sand.contact.update import BROKEN_FLAG, PENDING_FLAG, SLIPPED_FLAG, contact_loop, pose_at, twist_increment
+from sand.contact.update import (
+    BROKEN_FLAG,
+    PENDING_FLAG,
+    SLIPPED_FLAG,
+    _flag_contact,
+    contact_loop,
+    contact_pass_loop,
+    displacements_before,
+    log_slip_sums,
+    pose_at,
+    twist_increment,
+)
 from sand.grains import GrainArrays, Grains
 from sand.integrate.kernel_spec import ContactParameters
 from sand.integrate.motion import kick_and_drift_for
@@ -26,6 +39,8 @@ PAIRS = 403
 """Contacts of a test: whole blocks, and a rest that fills no vector."""
 STEP = 1e-11
 STATE = ("pointer1", "pointer2", "twist", "force", "torque1", "torque2", "lost")
+contact_pass, update_flagged_contacts = contact_pass_loop(JKR), settle_loop(JKR)
+flag_contacts, columns = contact_loop(JKR, _flag_contact), column_loops(JKR)
 
 
 def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
@@ -41,7 +56,7 @@ pass_and_settle = kernel(_pass_and_update, cached=False)
 def one_by_one(grains, contacts, near, count, lost, span, law, dt):
     """The referee, in Python: a pass that moves nothing, then every contact beyond a limit by itself."""
     used = np.uint64(count[CONTACTS])
-    contact_loop(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
+    flag_contacts(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
     update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
 
 
@@ -56,7 +71,7 @@ def some_contacts(material, box, seed=1):
     pairing = Contact().pairing(material, material)
     r1, r2 = rng.uniform(5e-9, 2e-8, (2, PAIRS))
     mass = 4 / 3 * np.pi * 2000.0 * np.array([r1, r2]) ** 3
-    n, contacts = vectors(1.0), empty_contact_arrays(2 * PAIRS, PAIRS, len(ContactConstants._fields))
+    n, contacts = vectors(1.0), empty_contact_arrays(2 * PAIRS, PAIRS, len(constant_names(JKR)))
     grains = GrainArrays(*(np.zeros_like(a) for a in Grains(np.zeros((2 * PAIRS, 3)), 1e-8, material).arrays))
     grains.orientation[:] = rng.normal(size=(4, 2 * PAIRS))
     grains.orientation[:] /= np.linalg.norm(grains.orientation, axis=0)
@@ -66,21 +81,23 @@ def some_contacts(material, box, seed=1):
     contacts.flag[:PAIRS] = 1.0  # much moved in the step before
     contacts.lost[:] = rng.uniform(0.0, 1e-20, contacts.lost.shape)
     for c in range(PAIRS):
-        constants = contact_constants(pairing, r1[c], r2[c], *mass[:, c])
+        constants = contact_constants(JKR)(pairing, r1[c], r2[c], *mass[:, c])
         across = [np.cross(n[c], v) for v in vectors(1.0)[:2]]
         slide, roll, twist = rng.uniform(0.0, 1.6, 3)
         slide, roll = scale(slide * constants.slide_limit, across[0]), scale(roll * constants.roll_limit, across[1])
         n1, n2 = pointers_for(slide, roll, n[c], r1[c], r2[c])
         pressed = rng.uniform(-1.1, 2.0) if c % 10 else rng.uniform(5.0, 20.0)
         centre = rng.uniform(-1e-7, 1e-7, 3)
-        apart = r1[c] + r2[c] - pressed * constants.pull_off_overlap * (0.2 if constants.hertz > 0.0 else 1.0)
+        apart = (
+            r1[c] + r2[c] - pressed * constants.normal.pull_off_overlap * (0.2 if constants.normal.hertz > 0.0 else 1.0)
+        )
         put(grains.position, c, axpy(0.5 * apart, n[c], centre))
         put(grains.position, c + PAIRS, axpy(-0.5 * apart, n[c], centre))
         put(contacts.pointer1, c, turned_back(load4(grains.orientation, c), n1))
         put(contacts.pointer2, c, turned_back(load4(grains.orientation, c + PAIRS), n2))
         contacts.pair[:, c] = c, c + PAIRS
         contacts.twist[c] = twist * constants.twist_limit * rng.choice((-1.0, 1.0))
-        contacts.constants[:, c] = constants
+        columns.store(contacts.constants, c, constants)
     grains.position[:] = box.wrap(grains.position.T).T
     count = np.zeros(len(COUNT), np.int64)
     count[CONTACTS] = PAIRS
@@ -141,7 +158,7 @@ def test_the_strain_before_a_step_is_that_of_grains_put_back():
     kick_and_drift_for(False)(back, span, -STEP)  # no loads act
     found, expected = [], []
     for c in range(PAIRS):
-        constants, radii = ContactConstants(*contacts.constants[:, c]), (grains.radius[c], grains.radius[c + PAIRS])
+        constants, radii = columns.load(contacts.constants, c), (grains.radius[c], grains.radius[c + PAIRS])
         pose = pose_at(grains, contacts, span, c, contacts.twist[c])
         found.append(np.hstack(displacements_before(grains, contacts, c, pose, constants, STEP)))
         twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, STEP)

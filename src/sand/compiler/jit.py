@@ -24,7 +24,7 @@ from numba.extending import register_jitable
 from ..errors import warn
 from .cache import private_folder
 
-_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compiling formula kernel loop noinline rare"
+_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compiling formula is_builtin kernel loop noinline rare"
 __all__ = _NAMES.split()
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
@@ -179,6 +179,11 @@ def _load_without_compiler(compiled: Any) -> None:
             return load(signature, target)
 
     cache.load_overload = load_overload
+
+
+def is_builtin(function: Callable) -> bool:
+    """Whether a formula is part of SAND; compiled code with a user's own formula is not cached on disk."""
+    return str(function.__module__).startswith("sand.")
 
 
 def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long_vectors: bool = False) -> Callable:

@@ -1,4 +1,4 @@
-"""JKR theory: two adhesive elastic spheres (Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997).
+"""JKR contacts: two adhesive elastic spheres (Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997).
 
 All quantities are functions of y = √(a/a₀), where a is the contact radius and a₀ its equilibrium value:
 
@@ -8,11 +8,15 @@ All quantities are functions of y = √(a/a₀), where a is the contact radius a
 
 γ is the energy of one free surface (work of adhesion 2γ).  The overlap has its minimum −δ_c at y_m = (1/6)^(1/3), where
 da/dδ is infinite.  The variable s = √(1 + δ/δ_c) removes this singularity: y = y_m + s p(s) with a smooth function p.
+
+Without adhesion (γ = 0) a contact is Hertzian, F = (4/3) E* √R δ^(3/2), and has no tangential springs.
 """
 
 import math
+from typing import NamedTuple
 
 from ..compiler.jit import formula
+from .law import ContactLaw, NormalMode, register
 
 CUBE_ROOT_6 = 6.0 ** (1.0 / 3.0)
 ROOT_AT_BREAK = 1.0 / CUBE_ROOT_6
@@ -143,3 +147,112 @@ def rest_overlap(a0, reduced_radius):
 def normal_stiffness(a0, modulus):
     """Normal stiffness at equilibrium [N/m]: k_n = (6/5) E* a₀."""
     return 1.2 * modulus * a0
+
+
+HERTZ_CONTACT_RADIUS = 0.3
+"""a/R at which the highest frequency of a contact without adhesion is evaluated."""
+LARGEST_RATIO = 0.3
+"""a₀/R above which JKR theory, for contacts much smaller than the spheres, is an estimate."""
+
+
+class Constants(NamedTuple):
+    """Constants of a JKR contact."""
+
+    pull_off_force: float  # F_c [N]
+    pull_off_overlap: float  # δ_c [m]; R without adhesion, to keep the formulas finite
+    hertz: float  # (4/3) E* √R [N/m^1.5] without adhesion, else 0
+
+
+@formula
+def _normal_mode(surface_energy, modulus, reduced):
+    adhesive = surface_energy > 0.0
+    a0 = rest_radius(surface_energy, reduced, modulus)
+    delta_c = pull_off_overlap(a0, reduced) if adhesive else reduced
+    radius = a0 if adhesive else HERTZ_CONTACT_RADIUS * reduced
+    return NormalMode(
+        a0,
+        rest_overlap(a0, reduced),
+        delta_c if adhesive else 0.0,
+        radius,
+        normal_stiffness(a0, modulus) if adhesive else 2.0 * modulus * radius,
+        Constants(
+            pull_off_force(surface_energy, reduced),
+            delta_c,
+            0.0 if adhesive else 4.0 / 3.0 * modulus * math.sqrt(reduced),
+        ),
+    )
+
+
+@formula
+def _radius_root(overlap, c):
+    return root(stretch(overlap, c.normal.pull_off_overlap))
+
+
+@formula
+def _fast_radius_root(overlap, c):
+    s = stretch(overlap, c.normal.pull_off_overlap)
+    return polynomial_root(s), s <= POLYNOMIAL_RANGE
+
+
+@formula
+def _force(overlap, y, c):
+    pressed = max(overlap, 0.0)
+    return force_at(y, c.normal.pull_off_force) + c.normal.hertz * pressed * math.sqrt(pressed)
+
+
+@formula
+def _energy(overlap, y, c):
+    pressed = max(overlap, 0.0)
+    stored = energy_at(y, c.normal.pull_off_force, c.normal.pull_off_overlap)
+    return stored + 0.4 * c.normal.hertz * pressed * pressed * math.sqrt(pressed)
+
+
+@formula
+def _stiffness(overlap, y, c):
+    stiffness = stiffness_at(y, c.normal.pull_off_force, c.normal.pull_off_overlap)
+    return stiffness + 1.5 * c.normal.hertz * math.sqrt(max(overlap, 0.0))
+
+
+@formula
+def _contact_radius(overlap, y, c):
+    pressed = math.sqrt(c.reduced_radius * max(overlap, 0.0))
+    return c.rest_radius * y * y + (pressed if c.normal.hertz > 0.0 else 0.0)
+
+
+@formula
+def _at_touch(c):
+    """U jumps from 0 to −0.846614 F_c δ_c."""
+    return energy_at(ROOT_AT_TOUCH, c.normal.pull_off_force, c.normal.pull_off_overlap)
+
+
+@formula
+def _at_break(c):
+    """U = (4/45) F_c δ_c and F = −(5/9) F_c."""
+    energy = energy_at(ROOT_AT_BREAK, c.normal.pull_off_force, c.normal.pull_off_overlap)
+    return energy, force_at(ROOT_AT_BREAK, c.normal.pull_off_force)
+
+
+def _warning(surface_energy: float, modulus: float, reduced: float) -> str:
+    ratio = rest_radius(surface_energy, reduced, modulus) / reduced
+    if ratio <= LARGEST_RATIO:
+        return ""
+    return f"a0/R = {ratio:.2f}; JKR assumes a0/R below {LARGEST_RATIO}: take forces and energies as estimates"
+
+
+LAW = register(
+    ContactLaw(
+        name="jkr",
+        references="Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997",
+        constants_type=Constants,
+        normal_mode=_normal_mode,
+        radius_root=_radius_root,
+        fast_radius_root=_fast_radius_root,
+        force=_force,
+        energy=_energy,
+        stiffness=_stiffness,
+        contact_radius=_contact_radius,
+        at_touch=_at_touch,
+        at_break=_at_break,
+        warning=_warning,
+    )
+)

@@ -1,11 +1,15 @@
 """Energies, displacements and loads of contacts, measured between steps for the energy table and for output."""
 
-from ..compiler.jit import kernel, loop
+import functools
+from collections.abc import Callable
+
+from ..compiler.jit import is_builtin, kernel, loop
 from ..numerics.vec import across, axpy, dot, load, norm
 from ..state.state import CONTACTS
-from . import jkr
-from .law import contact_load, contact_radius, displacements_of, energies, normal_force, scaled_stiffness
-from .update import constants_at, pose_at, stored_damping_force
+from .columns import column_loops
+from .law import ContactLaw
+from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
+from .update import pose_at, stored_damping_force
 
 ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
 """Energies [J] that `measure_energies` computes."""
@@ -22,21 +26,28 @@ def _kinetic(grains):
     return translation, rotation
 
 
-@kernel
-def measure_energies(grains, contacts, count, span, follow, out):
-    """Fill `out` with the energies [J] listed in ENERGIES."""
-    out[0], out[1] = _kinetic(grains)
-    for mode in range(4):
-        out[2 + mode] = 0.0
-    for c in range(count[CONTACTS]):
-        i, j = contacts.pair[0, c], contacts.pair[1, c]
-        r1, r2 = grains.radius[i], grains.radius[j]
-        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, constants = r1 + r2 - pose.distance, constants_at(contacts, c)
-        y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
-        stored = energies(pose, overlap, y, r1, r2, scaled_stiffness(constants, y, follow))
+@functools.cache
+def energies_kernel(law: ContactLaw) -> Callable:
+    """The kernel that measures energies, for one contact law."""
+    constants_at, radius_root, normal_energy = column_loops(law).at, law.radius_root, law.energy
+
+    def measure_energies(grains, contacts, count, span, follow, out):
+        """Fill `out` with the energies [J] listed in ENERGIES."""
+        out[0], out[1] = _kinetic(grains)
         for mode in range(4):
-            out[2 + mode] += stored[mode]
+            out[2 + mode] = 0.0
+        for c in range(count[CONTACTS]):
+            i, j = contacts.pair[0, c], contacts.pair[1, c]
+            r1, r2 = grains.radius[i], grains.radius[j]
+            pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+            overlap, constants = r1 + r2 - pose.distance, constants_at(contacts, c)
+            y = radius_root(overlap, constants)
+            normal = normal_energy(overlap, y, constants)
+            stored = energies(pose, normal, r1, r2, scaled_stiffness(constants, y, follow))
+            for mode in range(4):
+                out[2 + mode] += stored[mode]
+
+    return kernel(measure_energies, cached=is_builtin(law.force))
 
 
 CONTACT_ROWS = (
@@ -67,35 +78,44 @@ CONTACT_LOADS = ("force", "torque1", "torque2")
 """Rows of `measure_contacts` after the scalars: CONTACT_VECTORS, then the loads including damping, three rows each."""
 
 
-@kernel
-def measure_contacts(grains, contacts, count, span, follow, out):
-    """Fill `out` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
-    for c in range(count[CONTACTS]):
-        i, j = contacts.pair[0, c], contacts.pair[1, c]
-        r1, r2 = grains.radius[i], grains.radius[j]
-        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-        overlap, frozen = r1 + r2 - pose.distance, constants_at(contacts, c)
-        y = jkr.root(jkr.stretch(overlap, frozen.pull_off_overlap))
-        constants = scaled_stiffness(frozen, y, follow)
-        displacements = displacements_of(pose, overlap, r1, r2, constants)
-        xi = across(displacements.roll, pose.n)
-        slide, roll = norm(displacements.slide), norm(xi)
-        stored = energies(pose, overlap, y, r1, r2, constants)
-        out[0, c], out[1, c] = overlap, contact_radius(overlap, y, constants)
-        out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
-        out[5, c] = -overlap / constants.pull_off_overlap
-        out[6, c] = slide / constants.slide_limit if constants.slide_limit > 0.0 else 0.0
-        out[7, c] = roll / constants.roll_limit
-        out[8, c] = abs(displacements.twist) / constants.twist_limit
-        out[9, c] = normal_force(overlap, y, constants) + stored_damping_force(contacts, c)
-        out[10, c] = constants.slide_stiffness * slide
-        out[11, c] = constants.reduced_radius * constants.roll_stiffness * roll
-        out[12, c] = -constants.twist_stiffness * displacements.twist
-        for mode in range(4):
-            out[13 + mode, c] = stored[mode]
-        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, constants)
-        force = axpy(stored_damping_force(contacts, c), pose.n, force)
-        for axis in range(3):
-            out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]
-            out[17 + axis, c] = displacements.slide[axis]
-            out[20 + axis, c] = xi[axis]
+@functools.cache
+def contacts_kernel(law: ContactLaw) -> Callable:
+    """The kernel that measures contacts, for one contact law."""
+    constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
+    normal_force, normal_energy = law.force, law.energy
+
+    def measure_contacts(grains, contacts, count, span, follow, out):
+        """Fill `out` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
+        for c in range(count[CONTACTS]):
+            i, j = contacts.pair[0, c], contacts.pair[1, c]
+            r1, r2 = grains.radius[i], grains.radius[j]
+            pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+            overlap, frozen = r1 + r2 - pose.distance, constants_at(contacts, c)
+            y = radius_root(overlap, frozen)
+            constants = scaled_stiffness(frozen, y, follow)
+            displacements = displacements_of(pose, overlap, r1, r2, constants)
+            xi = across(displacements.roll, pose.n)
+            slide, roll = norm(displacements.slide), norm(xi)
+            stored = energies(pose, normal_energy(overlap, y, constants), r1, r2, constants)
+            normal = normal_force(overlap, y, constants)
+            out[0, c], out[1, c] = overlap, contact_radius(overlap, y, constants)
+            out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
+            longest = constants.break_overlap if constants.break_overlap > 0.0 else constants.reduced_radius
+            out[5, c] = -overlap / longest
+            out[6, c] = slide / constants.slide_limit if constants.slide_limit > 0.0 else 0.0
+            out[7, c] = roll / constants.roll_limit
+            out[8, c] = abs(displacements.twist) / constants.twist_limit
+            out[9, c] = normal + stored_damping_force(contacts, c)
+            out[10, c] = constants.slide_stiffness * slide
+            out[11, c] = constants.reduced_radius * constants.roll_stiffness * roll
+            out[12, c] = -constants.twist_stiffness * displacements.twist
+            for mode in range(4):
+                out[13 + mode, c] = stored[mode]
+            force, torque1, torque2 = contact_load(pose, normal, r1, r2, constants)
+            force = axpy(stored_damping_force(contacts, c), pose.n, force)
+            for axis in range(3):
+                out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]
+                out[17 + axis, c] = displacements.slide[axis]
+                out[20 + axis, c] = xi[axis]
+
+    return kernel(measure_contacts, cached=is_builtin(law.force))

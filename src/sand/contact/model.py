@@ -14,21 +14,19 @@ from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..grains import Grains
 from ..material import Material
 from ..units import format_quantity, si
-from .jkr import rest_radius
-from .law import Pairing
+from . import dmt, jkr  # noqa: F401  # every contact law is registered by its import, here
+from .law import LAWS, ContactLaw, Pairing
 from .mixing import MIXING, pairing_between
 
 LIMIT_RULES = ("clamp", "reset")
 STIFFNESS = ("frozen", "dt97")
 DAMPING = ("none", "constant", "viscoelastic")
-JKR_LIMIT = 0.3
-"""a0/R above which the assumptions of JKR theory are violated."""
 
 
 @checked
 @dataclass(frozen=True)
 class Contact:
-    """Adhesive contacts: JKR normal force, and springs against sliding, rolling and twisting.
+    """Adhesive contacts: normal force of a contact law, and springs against sliding, rolling and twisting.
 
     Parameters
     ----------
@@ -53,6 +51,9 @@ class Contact:
         T_vis [s] ≥ 0, for "viscoelastic"; the default, 1.25e-11 s, is that of silica.
     mixing : str, optional
         γ_eff of unequal materials: "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
+    law : str, optional
+        Normal force, a registered contact law: "jkr", for soft, large, adhesive grains, or "dmt", for small Tabor
+        parameters.  See `sand.contact.law.ContactLaw` for a law of your own.
 
     Raises
     ------
@@ -70,6 +71,7 @@ class Contact:
     damping_constant: Any = 0.0
     viscous_time: Any = 1.25e-11
     mixing: str = "geometric"
+    law: str = "jkr"
 
     __pydantic_config__ = FORBID_EXTRA
     name = "contact"
@@ -77,7 +79,8 @@ class Contact:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        words = {"slip": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING, "mixing": tuple(MIXING)}
+        words = {"slip": LIMIT_RULES, "stiffness": STIFFNESS, "damping": DAMPING}
+        words |= {"mixing": tuple(MIXING), "law": tuple(LAWS)}
         for key, allowed in words.items():
             if getattr(self, key) not in allowed:
                 given = getattr(self, key)
@@ -104,6 +107,11 @@ class Contact:
         """Settings in SI units; settings that are None are omitted."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
+    @property
+    def contact_law(self) -> ContactLaw:
+        """The registered contact law of this name."""
+        return LAWS[self.law]
+
     def pairing(self, a: Material, b: Material) -> Pairing:
         """Contact parameters of two materials under these settings."""
         return pairing_between(
@@ -127,7 +135,7 @@ class Contact:
         Returns
         -------
         list of str
-            A warning for each pair of materials whose contact radius is too large for JKR theory.
+            A warning for each pair of materials for which the contact law is inaccurate.
 
         Raises
         ------
@@ -153,19 +161,15 @@ class Contact:
             text
             for k, a in enumerate(grains.materials)
             for j in range(k + 1)
-            if (text := self._too_wide(a, smallest[k], grains.materials[j], smallest[j]))
+            if (text := self._inaccurate(a, smallest[k], grains.materials[j], smallest[j]))
         ]
 
-    def _too_wide(self, a: Material, r1: float, b: Material, r2: float) -> str:
-        """A warning if contacts between these grains are too wide for JKR theory, else ""."""
-        reduced = r1 * r2 / (r1 + r2)
+    def _inaccurate(self, a: Material, r1: float, b: Material, r2: float) -> str:
+        """A warning if the contact law is inaccurate for contacts between these grains, else ""."""
         both = self.pairing(a, b)
-        ratio = rest_radius(both.surface_energy, reduced, both.modulus) / reduced
-        if ratio <= JKR_LIMIT:
+        reason = self.contact_law.warning(both.surface_energy, both.modulus, r1 * r2 / (r1 + r2))
+        if not reason:
             return ""
         names = a.name if a is b else f"{a.name} and {b.name}"
         radii = format_quantity(r1, "m") if r1 == r2 else f"{format_quantity(r1, 'm')} and {format_quantity(r2, 'm')}"
-        return (
-            f"contacts of {names} grains of radius {radii} have a0/R = {ratio:.2f}; "
-            f"JKR assumes a0/R below {JKR_LIMIT}: take forces and energies as estimates"
-        )
+        return f"contacts of {names} grains of radius {radii} have {reason}"

@@ -1,13 +1,16 @@
 """Contact parameters stored per candidate pair, or once where all grains are equal."""
 
+import functools
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..compiler.jit import loop
 from ..state.state import PAIRS
-from .law import Pairing, contact_constants
+from .columns import column_loops
+from .law import ContactLaw
 
 
 class PairType(NamedTuple):
@@ -23,45 +26,27 @@ NO_PAIR_TYPE = PairType((NO_GRAIN_TYPE, NO_GRAIN_TYPE), 0.0, 0.0)
 
 
 @loop
-def load_pairing(pairings, a, b):
-    """Parameters of materials a and b, from the (10, M, M) table."""
-    return Pairing(
-        pairings[0, a, b],
-        pairings[1, a, b],
-        pairings[2, a, b],
-        pairings[3, a, b],
-        pairings[4, a, b],
-        pairings[5, a, b],
-        pairings[6, a, b],
-        pairings[7, a, b],
-        pairings[8, a, b],
-        pairings[9, a, b],
-    )
-
-
-@loop
-def pair_constants(grains, pairings, i, j):
-    """Constants of a contact between grains i and j."""
-    pairing = load_pairing(pairings, grains.material[i], grains.material[j])
-    return contact_constants(pairing, grains.radius[i], grains.radius[j], grains.mass[i], grains.mass[j])
-
-
-@loop
 def grain_type_of(grains, i):
     """Properties of grain i that contact constants depend on."""
     return grains.material[i], grains.radius[i], grains.mass[i]
 
 
-@loop
-def pair_type_of(grains, law, i, j, last):
-    """Pair type of grains i and j; `last` is reused if equal, because powers are expensive."""
-    a, b = grain_type_of(grains, i), grain_type_of(grains, j)
-    if (a, b) == last.grains:
-        return last
-    constants = pair_constants(grains, law.pairings, i, j)
-    return PairType(
-        (a, b), 2.0 * math.pi / math.sqrt(constants.max_squared_frequency) / law.per_period, constants.break_overlap
-    )
+@functools.cache
+def pair_type_loop(law: ContactLaw) -> Callable:
+    """The loop that computes the pair type of two grains, for one contact law."""
+    constants_of_pair = column_loops(law).of_pair
+
+    @loop
+    def pair_type_of(grains, settings, i, j, last):
+        """Pair type of grains i and j; `last` is reused if equal, because powers are expensive."""
+        a, b = grain_type_of(grains, i), grain_type_of(grains, j)
+        if (a, b) == last.grains:
+            return last
+        constants = constants_of_pair(grains, settings.pairings, i, j)
+        step = 2.0 * math.pi / math.sqrt(constants.max_squared_frequency) / settings.per_period
+        return PairType((a, b), step, constants.break_overlap)
+
+    return pair_type_of
 
 
 @loop

@@ -1,75 +1,70 @@
-"""Contact forces, first pass: a vectorised loop over contacts that writes forces and torques per contact.
+"""Contact forces, first pass: one update of all contacts, in loops that vectorise, which stores loads per contact.
 
-Contacts are updated in two passes.  The pass over contacts (here and in `slip`) computes pose, displacements, force and
-torques of each contact from its two grains and stores them per contact; no two iterations write to the same memory, so
-the loop vectorises.  The gather pass over grains (`gather`) then sums the stored forces and torques of the contacts of
-each grain in a fixed order.  Contacts beyond a limit are flagged and handled one by one in `events`.
+Contacts are updated in two passes.  The pass over contacts computes pose, displacements, force and torques of each
+contact from its two grains and stores them per contact; no two iterations write to the same memory, so the loop
+vectorises.  The gather pass over grains (`gather`) then sums the stored forces and torques of the contacts of each
+grain in a fixed order.
+
+The update (`contact_loop`) exists in two variants that give the same results.  `_flag_contact` only flags contacts
+beyond a limit, which `events.settle_loop` then handles one by one.  In strongly excited aggregates most contacts slip
+in every step: blocks in which more than 10 % of the contacts were flagged in the last step use `_slip_contact`, which
+computes slip for every contact and selects the result where a limit is exceeded.  Both are free of branches.
 """
 
+import functools
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..box import nearest_image
-from ..compiler.jit import COMPILED, loop, rare
-from ..numerics.quaternion import turned
+from ..compiler.jit import COMPILED, formula, loop, rare
+from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.simd import round_up_to_simd_width
-from ..numerics.vec import across, dot, load, load4, put, scale, sub
-from ..state.state import CONTACT_STEP, CONTACTS
-from . import jkr, tangential
-from .law import ContactConstants, Pose, contact_load, displacements_of, exceeds_limits, scaled_stiffness
+from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
+from ..state.arrays import BLOCK as CONTACTS_PER_BLOCK
+from ..state.state import BREAKING, CONTACT_STEP, CONTACTS, ROLLING, SLIDING, SLIPPED, TWISTING
+from . import tangential
+from .columns import FASTEST_MODE, column_loops, uniform_contacts
+from .law import ContactLaw
+from .mechanics import (
+    Pose,
+    after_slip,
+    contact_load,
+    displacements_of,
+    exceeds_limits,
+    scaled_stiffness,
+    slip_losses,
+)
 from .pair_types import pair_type_count
 
+BLOCK = np.uint64(CONTACTS_PER_BLOCK)
+"""Contacts per block."""
+SLIP_FRACTION = 0.1
+"""Fraction of a block's contacts flagged in the last step, above which the block uses `_slip_contact`."""
 MIN_REMAINDER = 4
 """Remaining contacts from which a padded SIMD vector is faster than a scalar loop."""
 PENDING_FLAG, BROKEN_FLAG, SLIPPED_FLAG = 1, 2, 3
-"""Flags of contacts beyond a limit: to be handled by `events.update_flagged_contacts`; broken in this step; slipped in
-this step in the pass over contacts.
+"""Flags of contacts beyond a limit: to be handled by `events.settle_loop`; broken in this step; slipped in this step in
+the pass over contacts.
 """
 
 
-@loop
-def uniform_contacts(contacts):
-    """Whether one set of constants serves all contacts.
+class SlipSums(NamedTuple):
+    """Counts and energy losses of a pass over contacts."""
 
-    Uniform constants are stored as BLOCK identical columns, individual ones as one column per allocated contact.
-    If BLOCK contacts are allocated the two cannot be distinguished; the answer False is then also correct.
-    """
-    return contacts.constants.shape[1] != contacts.flag.size
-
-
-@loop
-def constants_at(contacts, c):
-    """Constants of contact c."""
-    return load_constants(contacts.constants, 0 if uniform_contacts(contacts) else c)
+    pending: float  # contacts to be handled one by one
+    slipped: float  # contacts that slipped
+    slid: float  # energies [J] dissipated by sliding, rolling and twisting
+    rolled: float
+    twisted: float
 
 
 @loop
 def stored_damping_force(contacts, c):
     """Damping force [N] stored for contact c, on grain 1 along n; 0 without damping."""
     return contacts.damped[c] if contacts.damped.size > 0 else 0.0
-
-
-@loop
-def load_constants(b, c):
-    """Constants in column c of a (K, …) array."""
-    return ContactConstants(
-        b[0, c],
-        b[1, c],
-        b[2, c],
-        b[3, c],
-        b[4, c],
-        b[5, c],
-        b[6, c],
-        b[7, c],
-        b[8, c],
-        b[9, c],
-        b[10, c],
-        b[11, c],
-        b[12, c],
-        b[13, c],
-        b[14, c],
-    )
 
 
 @loop
@@ -105,54 +100,150 @@ def pose_at_step_end(grains, contacts, span, c, dt):
 
 
 @loop
-def contact_loop(grains, contacts, first, last, used, column, span, law, dt):
-    """Update twist, loads and flag of the contacts first … last − 1.  Contacts beyond a limit are only flagged.
+def _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt):
+    """Displacements at the start of the step that led to this pose; `twist` is the twist at that time."""
+    i, j = contacts.pair[0, c], contacts.pair[1, c]
+    relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
+    separation = axpy(-dt, relative_velocity, scale(pose.distance, pose.n))
+    distance = math.sqrt(dot(separation, separation))
+    start_pose = Pose(
+        scale(1.0 / distance, separation),
+        distance,
+        turned_by(scale(-dt, load(grains.spin, i)), pose.n1),
+        turned_by(scale(-dt, load(grains.spin, j)), pose.n2),
+        twist,
+    )
+    r1, r2 = grains.radius[i], grains.radius[j]
+    return displacements_of(start_pose, r1 + r2 - distance, r1, r2, constants)
 
-    The loop has no branches, so that it vectorises.
 
-    Parameters
-    ----------
-    grains, contacts : GrainArrays, ContactArrays
-        Arrays of grains and contacts.
-    first, last : uint64
-        Range of contacts.
-    used : uint64
-        Number of contacts in use.  Columns beyond it may be computed as padding; they are never read.
-    column : uint64
-        Column of the constants of the first contact; those of the others follow.
-    span : Span
-        The box.
-    law : ContactParameters
-        Settings of the contact law.
-    dt : float
-        Time step [s].
+@loop
+def displacements_before(grains, contacts, c, pose, constants, dt):
+    """Displacements at the start of the step, for a contact whose stored twist is that at the end."""
+    twist = pose.twist - twist_increment(grains, contacts, c, pose, dt)
+    return _displacements_at_step_start(grains, contacts, c, pose, twist, constants, dt)
 
-    Returns
-    -------
-    float
-        Number of contacts in use that are beyond a limit.
+
+@formula
+def _select(condition, u, v):
+    """Vector u where the condition holds, else v."""
+    return u[0] if condition else v[0], u[1] if condition else v[1], u[2] if condition else v[2]
+
+
+@formula
+def loss_row(channel):
+    """Row of `ContactArrays.lost` for a loss channel other than breaking, which has no row."""
+    return channel - 1 if channel > BREAKING else channel
+
+
+@loop
+def _add_to_contact_losses(losses, c, slid, rolled, twisted):
+    """Add energies [J] dissipated by contact c to its losses."""
+    losses[loss_row(SLIDING), c] += slid
+    losses[loss_row(ROLLING), c] += rolled
+    losses[loss_row(TWISTING), c] += twisted
+
+
+@formula
+def slipped_pose(displacements, pose, r1, r2, constants, reset):
+    """Pose after slip: the pointers and the twist represent the displacements of `mechanics.after_slip`."""
+    target = after_slip(displacements, pose.n, constants, reset)
+    n1, n2 = tangential.pointers_for(target.slide, target.roll, pose.n, r1, r2)
+    return Pose(pose.n, pose.distance, n1, n2, target.twist)
+
+
+@loop
+def _flag_contact(grains, contacts, c, pose, displacements, constants, present, valid, settings, dt):
+    """Only flag a contact beyond a limit; returns its pose, the energies [J] dissipated by slip, and its flag."""
+    exceeded = exceeds_limits(displacements, pose.n, constants) | (not valid)
+    return pose, (0.0, 0.0, 0.0), PENDING_FLAG if exceeded else 0
+
+
+@loop
+def _slip_contact(grains, contacts, c, pose, displacements, constants, present, valid, settings, dt):
+    """As `_flag_contact`, but let a contact beyond a limit slip.
+
+    Contacts that break, or whose contact radius is not valid, are only flagged.
     """
-    pending = 0.0
-    for k in range(last - first):
-        c = first + k
-        i, j = contacts.pair[0, c], contacts.pair[1, c]
-        constants = load_constants(contacts.constants, column + k)
-        r1, r2 = grains.radius[i], grains.radius[j]
-        pose = pose_at_step_end(grains, contacts, span, c, dt)
-        overlap = r1 + r2 - pose.distance
-        s = jkr.stretch(overlap, constants.pull_off_overlap)
-        y = jkr.polynomial_root(s)
-        constants_now = scaled_stiffness(constants, y, law.follow)
-        force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, constants_now)
-        displacements = displacements_of(pose, overlap, r1, r2, constants)
-        exceeded = exceeds_limits(displacements, pose.n, constants) | (s > jkr.POLYNOMIAL_RANGE)
-        contacts.twist[c] = pose.twist
-        put(contacts.force, c, force)
-        put(contacts.torque1, c, torque1)
-        put(contacts.torque2, c, torque2)
-        contacts.flag[c] = PENDING_FLAG if exceeded else 0
-        pending += 1.0 if exceeded & (c < used) else 0.0
-    return pending
+    i, j = contacts.pair[0, c], contacts.pair[1, c]
+    r1, r2 = grains.radius[i], grains.radius[j]
+    pointer1, pointer2 = load(contacts.pointer1, c), load(contacts.pointer2, c)
+    needs_event = (displacements.overlap < -constants.break_overlap) | (not valid)
+    slips = exceeds_limits(displacements, pose.n, constants) & (not needs_event)
+    # both cases are computed and selected from at the end: branches and conditional stores prevent vectorisation
+    start = _displacements_at_step_start(grains, contacts, c, pose, contacts.twist[c], constants, dt)
+    slipped = slipped_pose(displacements, pose, r1, r2, constants, settings.reset)
+    body1 = turned_back(load4(grains.orientation, i), slipped.n1)
+    body2 = turned_back(load4(grains.orientation, j), slipped.n2)
+    n1, n2 = _select(slips, slipped.n1, pose.n1), _select(slips, slipped.n2, pose.n2)
+    new_pose = Pose(pose.n, pose.distance, n1, n2, slipped.twist if slips else pose.twist)
+    left = displacements_of(new_pose, displacements.overlap, r1, r2, constants)
+    lost = slip_losses(start, displacements, left, present)
+    lost = _select(slips, lost, (0.0, 0.0, 0.0))
+    put(contacts.pointer1, c, _select(slips, body1, pointer1))
+    put(contacts.pointer2, c, _select(slips, body2, pointer2))
+    _add_to_contact_losses(contacts.lost, c, lost[0], lost[1], lost[2])
+    return new_pose, lost, PENDING_FLAG if needs_event else SLIPPED_FLAG if slips else 0
+
+
+@functools.cache
+def contact_loop(law: ContactLaw, handle: Callable) -> Callable:
+    """The loop that updates a range of contacts, for a contact law and one of `_flag_contact`, `_slip_contact`."""
+    load_constants, radius_root, normal_force = column_loops(law).load, law.fast_radius_root, law.force
+
+    @loop
+    def update_contacts(grains, contacts, first, last, used, column, span, settings, dt):
+        """Update twist, loads and flag of the contacts first … last − 1.  The loop has no branches, so it vectorises.
+
+        Parameters
+        ----------
+        grains, contacts : GrainArrays, ContactArrays
+            Arrays of grains and contacts.
+        first, last : uint64
+            Range of contacts.
+        used : uint64
+            Number of contacts in use.  Columns beyond it may be computed as padding; they are never read.
+        column : uint64
+            Column of the constants of the first contact; those of the others follow.
+        span : Span
+            The box.
+        settings : ContactParameters
+            Settings of the contact model.
+        dt : float
+            Time step [s].
+
+        Returns
+        -------
+        SlipSums
+            Contacts that remain flagged, and contacts that slipped with their losses.
+        """
+        pending = slipped = slid = rolled = twisted = 0.0
+        for k in range(last - first):
+            c = first + k
+            i, j = contacts.pair[0, c], contacts.pair[1, c]
+            constants = load_constants(contacts.constants, column + k)
+            r1, r2 = grains.radius[i], grains.radius[j]
+            pose = pose_at_step_end(grains, contacts, span, c, dt)
+            overlap = r1 + r2 - pose.distance
+            y, valid = radius_root(overlap, constants)
+            present = scaled_stiffness(constants, y, settings.follow)
+            displacements = displacements_of(pose, overlap, r1, r2, constants)
+            pose, lost, flag = handle(grains, contacts, c, pose, displacements, constants, present, valid, settings, dt)
+            normal = normal_force(overlap, y, constants)
+            force, torque1, torque2 = contact_load(pose, normal, r1, r2, present)
+            contacts.twist[c] = pose.twist
+            put(contacts.force, c, force)
+            put(contacts.torque1, c, torque1)
+            put(contacts.torque2, c, torque2)
+            contacts.flag[c] = flag
+            pending += 1.0 if (flag == PENDING_FLAG) & (c < used) else 0.0
+            slipped += 1.0 if flag == SLIPPED_FLAG else 0.0
+            slid += lost[0]
+            rolled += lost[1]
+            twisted += lost[2]
+        return SlipSums(pending, slipped, slid, rolled, twisted)
+
+    return update_contacts
 
 
 @loop
@@ -165,20 +256,88 @@ def padded_contact_count(contacts, number):
     return padded if COMPILED and padded <= np.uint64(contacts.pair.shape[1]) else number
 
 
-@rare
-def write_loads(grains, contacts, span, law, c):
-    """Compute the loads of one contact from its stored pointers and twist, at any compression."""
-    i, j = contacts.pair[0, c], contacts.pair[1, c]
-    r1, r2 = grains.radius[i], grains.radius[j]
-    constants = constants_at(contacts, c)
-    pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-    overlap = r1 + r2 - pose.distance
-    y = jkr.root(jkr.stretch(overlap, constants.pull_off_overlap))
-    constants_now = scaled_stiffness(constants, y, law.follow)
-    force, torque1, torque2 = contact_load(pose, overlap, y, r1, r2, constants_now)
-    put(contacts.force, c, force)
-    put(contacts.torque1, c, torque1)
-    put(contacts.torque2, c, torque2)
+@functools.cache
+def contact_pass_loop(law: ContactLaw) -> Callable:
+    """The pass over a range of contacts, block by block, for one contact law."""
+    flag_contacts, slip_contacts = contact_loop(law, _flag_contact), contact_loop(law, _slip_contact)
+
+    @loop
+    def contact_pass(grains, contacts, first, last, span, settings, dt):
+        """Update the contacts first … last − 1 (uint64); arguments and result as for `contact_loop`.
+
+        With stiffnesses that follow a(δ) all contacts beyond a limit stay flagged: the work of the stiffness change
+        must be logged before they slip.
+        """
+        pending = slipped = slid = rolled = twisted = 0.0
+        for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
+            begin = first + b * BLOCK
+            end = begin + BLOCK if begin + BLOCK < last else last
+            column = np.uint64(0) if uniform_contacts(contacts) else begin
+            slipped_before = 0.0
+            for k in range(end - begin):
+                slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
+            if slipped_before > SLIP_FRACTION * (end - begin) and not settings.follow:
+                part = slip_contacts(grains, contacts, begin, end, end, column, span, settings, dt)
+                pending += part.pending
+                slipped += part.slipped
+                slid += part.slid
+                rolled += part.rolled
+                twisted += part.twisted
+            else:
+                padded = padded_contact_count(contacts, end)
+                part = flag_contacts(grains, contacts, begin, padded, end, column, span, settings, dt)
+                pending += part.pending
+        return SlipSums(pending, slipped, slid, rolled, twisted)
+
+    return contact_pass
+
+
+@loop
+def log_slip_sums(count, lost, sums):
+    """Add slip events and losses of a pass to the counters and to the energy table."""
+    count[SLIPPED] += int(sums.slipped)
+    lost[SLIDING] += sums.slid
+    lost[ROLLING] += sums.rolled
+    lost[TWISTING] += sums.twisted
+
+
+@loop
+def store_slip_sums(rows, b, sums):
+    """Store the sums of a pass in row b of a (B, ≥ 5) array."""
+    rows[b, 0] = sums.pending
+    rows[b, 1] = sums.slipped
+    rows[b, 2] = sums.slid
+    rows[b, 3] = sums.rolled
+    rows[b, 4] = sums.twisted
+
+
+@loop
+def load_slip_sums(rows, b):
+    """Sums stored in row b by `store_slip_sums`."""
+    return SlipSums(rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4])
+
+
+@functools.cache
+def single_contact_loop(law: ContactLaw) -> Callable:
+    """The function that computes the loads of one contact, for one contact law."""
+    constants_at, radius_root, normal_force = column_loops(law).at, law.radius_root, law.force
+
+    @rare
+    def write_loads(grains, contacts, span, settings, c):
+        """Compute the loads of contact c from its stored pointers and twist, at any compression."""
+        i, j = contacts.pair[0, c], contacts.pair[1, c]
+        r1, r2 = grains.radius[i], grains.radius[j]
+        constants = constants_at(contacts, c)
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        overlap = r1 + r2 - pose.distance
+        y = radius_root(overlap, constants)
+        present = scaled_stiffness(constants, y, settings.follow)
+        force, torque1, torque2 = contact_load(pose, normal_force(overlap, y, constants), r1, r2, present)
+        put(contacts.force, c, force)
+        put(contacts.torque1, c, torque1)
+        put(contacts.torque2, c, torque2)
+
+    return write_loads
 
 
 @rare
@@ -190,7 +349,8 @@ def contact_step(contacts, pair_list, count, n, clock, per_period):
     """
     squared_frequency, most_contacts = 0.0, 0
     for c in range(count[CONTACTS]):
-        squared_frequency = max(squared_frequency, constants_at(contacts, c).max_squared_frequency)
+        column = 0 if uniform_contacts(contacts) else c
+        squared_frequency = max(squared_frequency, contacts.constants[FASTEST_MODE, column])
     for g in range(n):
         most_contacts = max(most_contacts, int(contacts.start[g + 1]) - int(contacts.start[g]))
     coordination = max(1.0, most_contacts / 6.0)

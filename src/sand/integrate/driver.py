@@ -33,14 +33,14 @@ from .respa import (
 from .step_control import cycle_steps
 from .step_parts import (
     apply_drag_and_noise,
+    contact_events_loop,
     drift_with_work_for,
+    lists_loop,
     no_gas,
     no_rates,
     possible_step,
     rates_loop,
     remove_broken_contacts,
-    update_contacts,
-    update_lists,
 )
 from .task_queue import join_workers, no_workers
 
@@ -187,6 +187,7 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
     drift_with_work = drift_with_work_for(spec.external, large_loops(spec).drift)
     sum_loads, loads_and_kick = loads_loop(spec), loads_and_kick_loop(spec)
     pass_contacts = large_loops(spec).pass_contacts
+    update_lists, update_contacts = lists_loop(spec.law), contact_events_loop(spec.law)
     set_rates = rates_loop(spec.long_range.rates) if spec.taylor else no_rates
     add_contact_pairs, _, reassign_contact_pairs = (
         contact_pair_loops(spec.long_range.pair) if spec.split else (_no_contact_pairs, None, _no_reassignment)

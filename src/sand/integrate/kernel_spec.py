@@ -4,6 +4,8 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+from ..contact.jkr import LAW as JKR
+from ..contact.law import ContactLaw
 from ..forces.external.formulas import nothing
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums
 
@@ -26,6 +28,7 @@ class Stop(IntEnum):
 class KernelSpec(NamedTuple):
     """The code that a driver is composed of; each combination is compiled once."""
 
+    law: ContactLaw = JKR
     external: Callable = nothing  # formula of the external forces, composed
     long_range: LongRangeSums = NO_LONG_RANGE_FORCE  # loops of the long-range forces, composed
     split: bool = False  # long-range forces between grains in contact are evaluated in every step
@@ -48,7 +51,7 @@ class ContactParameters(NamedTuple):
     """Run-time parameters of the contact model."""
 
     on: bool  # False: grains overlap without interaction
-    pairings: Any  # (10, M, M) constants of each pair of materials
+    pairings: Any  # (10, M, M) contact.law.Pairing of each pair of materials
     reset: bool  # slip: False clamps the displacement at its limit, True resets it
     follow: bool  # stiffnesses: False for the equilibrium radius a₀, True for the instantaneous contact radius
     damped: bool  # whether normal motion is damped

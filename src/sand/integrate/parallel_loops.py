@@ -9,7 +9,7 @@ import numpy as np
 
 from ..compiler.jit import loop
 from ..contact.gather import gather_in_index_order
-from ..contact.slip import contact_pass, load_slip_sums, log_slip_sums
+from ..contact.update import contact_pass_loop, load_slip_sums, log_slip_sums
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..state.state import CONTACTS, STEP
 from .kernel_spec import KernelSpec
@@ -45,14 +45,6 @@ def large_loops(spec: KernelSpec) -> LargeLoops:
 
 
 @loop
-def _serial_pass(grains, contacts, long_range, clock, count, lost, parameters):
-    last = np.uint64(count[CONTACTS])
-    passed = contact_pass(grains, contacts, np.uint64(0), last, parameters.span, parameters.contact, clock[STEP])
-    log_slip_sums(count, lost, passed)
-    return passed.pending > 0.0
-
-
-@loop
 def _serial_gather(grains, contacts, long_range, count, parameters):
     gather_in_index_order(grains, contacts, np.uint64(0), np.uint64(grains.mass.size))
 
@@ -65,6 +57,14 @@ def _serial_gather_and_kick(grains, contacts, long_range, count, parameters, dt)
 
 def _serial_loops(spec: KernelSpec) -> LargeLoops:
     sum_long_range, kick_and_drift = spec.long_range.loads, kick_and_drift_for(spec.magnetic)
+    contact_pass = contact_pass_loop(spec.law)
+
+    @loop
+    def pass_contacts(grains, contacts, long_range, clock, count, lost, parameters):
+        last = np.uint64(count[CONTACTS])
+        passed = contact_pass(grains, contacts, np.uint64(0), last, parameters.span, parameters.contact, clock[STEP])
+        log_slip_sums(count, lost, passed)
+        return passed.pending > 0.0
 
     @loop
     def long_range_loads(grains, contacts, long_range, count, parameters):
@@ -74,7 +74,7 @@ def _serial_loops(spec: KernelSpec) -> LargeLoops:
     def drift(grains, contacts, long_range, count, parameters, dt):
         return kick_and_drift(grains, drift_span(parameters), dt)
 
-    return LargeLoops(_serial_pass, _serial_gather, _serial_gather_and_kick, long_range_loads, drift)
+    return LargeLoops(pass_contacts, _serial_gather, _serial_gather_and_kick, long_range_loads, drift)
 
 
 def _shared_loops(spec: KernelSpec) -> LargeLoops:

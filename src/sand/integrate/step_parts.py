@@ -6,13 +6,15 @@ from collections.abc import Callable
 
 from ..box import nearest_image
 from ..compiler.jit import loop, rare
-from ..contact.events import compact_contacts, damp_contacts, form_contacts, log_stiffness_work, update_flagged_contacts
+from ..contact.damping import damping_loops
+from ..contact.events import compact_contacts, forming_loops, settle_loop
 from ..contact.gather import sort_contacts_by_grain
+from ..contact.law import ContactLaw
 from ..contact.update import contact_step
 from ..forces.external.loops import external_energy, external_wrap
 from ..forces.gas.loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
-from ..neighbours.pair_list import ROW_FULL, build_inner_list, build_pair_list
+from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
 from ..neighbours.skin import list_is_stale, update_safe_speed, update_speeds
 from ..numerics.vec import dot, load, sub
 from ..state.state import (
@@ -97,47 +99,62 @@ def possible_step(grains, contacts, pair_list, long_range, clock, count, paramet
     return dt, Stop.NONE
 
 
-@loop
-def update_lists(grains, contacts, pair_list, long_range, count, parameters):
-    """Rebuild stale lists; returns `Stop.NONE` or the array that is full, and whether the pair list was stale."""
-    span, search, max_gap = parameters.span, parameters.search, parameters.criteria.pair_gap
-    stale = parameters.contact.on and list_is_stale(
-        grains, pair_list.anchor, span, 0.25 * max_gap, pair_list.skin, PAIR_LIST_SKIN
-    )
-    verlet_stale = search.listed and list_is_stale(
-        grains, long_range.anchor, span, 0.5 * search.margin, pair_list.skin, LONG_RANGE_SKIN
-    )
-    if verlet_stale and build_verlet_list(grains, long_range, count, span, search) == FULL:
-        return Stop.LIST_FULL, stale
-    if stale:
-        law = parameters.contact
-        result = build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, law, search)
-        if result == FULL:
-            return Stop.PAIRS_FULL, stale
-        if result == ROW_FULL:
+@functools.cache
+def lists_loop(law: ContactLaw) -> Callable:
+    """The loop that keeps the neighbour lists valid, for one contact law."""
+    build_pair_list = pair_list_loop(law)
+
+    @loop
+    def update_lists(grains, contacts, pair_list, long_range, count, parameters):
+        """Rebuild stale lists; returns `Stop.NONE` or the array that is full, and whether the pair list was stale."""
+        span, search, max_gap = parameters.span, parameters.search, parameters.criteria.pair_gap
+        stale = parameters.contact.on and list_is_stale(
+            grains, pair_list.anchor, span, 0.25 * max_gap, pair_list.skin, PAIR_LIST_SKIN
+        )
+        verlet_stale = search.listed and list_is_stale(
+            grains, long_range.anchor, span, 0.5 * search.margin, pair_list.skin, LONG_RANGE_SKIN
+        )
+        if verlet_stale and build_verlet_list(grains, long_range, count, span, search) == FULL:
             return Stop.LIST_FULL, stale
-        update_safe_speed(pair_list, count)
-    # written so that a skin that is not a number counts as used up
-    if parameters.contact.on and (stale or not pair_list.skin[INNER_SKIN] > 0.0):
-        build_inner_list(grains, pair_list, count, span, 2.0 * INNER_SKIN_FRACTION * max_gap)
-    return Stop.NONE, stale
+        if stale:
+            settings = parameters.contact
+            result = build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, settings, search)
+            if result == FULL:
+                return Stop.PAIRS_FULL, stale
+            if result == ROW_FULL:
+                return Stop.LIST_FULL, stale
+            update_safe_speed(pair_list, count)
+        # written so that a skin that is not a number counts as used up
+        if parameters.contact.on and (stale or not pair_list.skin[INNER_SKIN] > 0.0):
+            build_inner_list(grains, pair_list, count, span, 2.0 * INNER_SKIN_FRACTION * max_gap)
+        return Stop.NONE, stale
+
+    return update_lists
 
 
-@loop
-def update_contacts(grains, contacts, pair_list, clock, count, lost, parameters, stale, formed, flagged):
-    """Slip or break the contacts beyond a limit and form `formed` new ones; returns whether any contact broke."""
-    span, law, dt = parameters.span, parameters.contact, clock[STEP]
-    if law.follow:
-        log_stiffness_work(grains, contacts, count, lost, span, dt)
-    broken = flagged and update_flagged_contacts(grains, contacts, pair_list, count, lost, span, law, dt)
-    if law.damped:
-        damp_contacts(grains, contacts, count, lost, span, dt)
-    if formed > 0:
-        form_contacts(grains, contacts, pair_list, count, lost, clock, span, law, dt)
-        sort_contacts_by_grain(contacts, count, grains.mass.size)
-    if formed > 0 or stale:
-        contact_step(contacts, pair_list, count, grains.mass.size, clock, law.per_period)
-    return broken
+@functools.cache
+def contact_events_loop(law: ContactLaw) -> Callable:
+    """The loop of contact events, for one contact law."""
+    damping, settle, form_contacts = damping_loops(law), settle_loop(law), forming_loops(law).form
+    damp_contacts, log_stiffness_work = damping.damp, damping.log_stiffness_work
+
+    @loop
+    def update_contacts(grains, contacts, pair_list, clock, count, lost, parameters, stale, formed, flagged):
+        """Slip or break the contacts beyond a limit and form `formed` new ones; returns whether any contact broke."""
+        span, settings, dt = parameters.span, parameters.contact, clock[STEP]
+        if settings.follow:
+            log_stiffness_work(grains, contacts, count, lost, span, dt)
+        broken = flagged and settle(grains, contacts, pair_list, count, lost, span, settings, dt)
+        if settings.damped:
+            damp_contacts(grains, contacts, count, lost, span, dt)
+        if formed > 0:
+            form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, dt)
+            sort_contacts_by_grain(contacts, count, grains.mass.size)
+        if formed > 0 or stale:
+            contact_step(contacts, pair_list, count, grains.mass.size, clock, settings.per_period)
+        return broken
+
+    return update_contacts
 
 
 @loop

@@ -15,7 +15,7 @@ import numpy as np
 from ..compiler.atomics import fetch_add, read, write, yield_cpu
 from ..compiler.jit import HAS_NOINLINE, kernel, loop, noinline, rare
 from ..contact.gather import gather
-from ..contact.slip import contact_pass, store_slip_sums
+from ..contact.update import contact_pass_loop, store_slip_sums
 from ..forces.pair.loops import PARALLEL_FROM
 from ..grains import GrainArrays
 from ..numerics.simd import float_from_bits
@@ -56,7 +56,7 @@ class TaskQueue(NamedTuple):
 
     words: Any  # (24,) int64: task word and counters
     step: Any  # (1,) float64: length of the present step or kick [s]
-    passed: Any  # (B, 8) float64: slip sums of each block of contacts, contact.slip
+    passed: Any  # (B, 8) float64: slip sums of each block of contacts, contact.update
     speeds: Any  # (G, 2) float64: largest squares of speed [m²/s²] and spin [1/s²] in each block of grains
 
 
@@ -102,14 +102,15 @@ def has_block_left(word):
 def worker_loops(spec: KernelSpec) -> tuple[Callable, Callable]:
     """The function by which the driver shares a task among all threads, and the kernel that each worker runs."""
     long_range_block, drift_some = spec.long_range.blocked.block, drift_for(spec.magnetic)
+    contact_pass = contact_pass_loop(spec.law)
 
     @noinline
     def do_block(task, b, grains, contacts, long_range, count, parameters):
         if task == CONTACT_PASS:
             first = b * CONTACTS_PER_BLOCK
             last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
-            span, law, step = parameters.span, parameters.contact, parameters.queue.step[0]
-            found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, law, step)
+            span, settings, step = parameters.span, parameters.contact, parameters.queue.step[0]
+            found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, settings, step)
             store_slip_sums(parameters.queue.passed, b, found)
         elif task == GATHER:
             first = b * GRAINS_PER_BLOCK

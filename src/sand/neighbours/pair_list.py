@@ -1,12 +1,15 @@
 """List of candidate pairs for contacts, and the inner list of pairs that may touch soon."""
 
+import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from ..box import nearest_image
 from ..compiler.jit import loop, rare
-from ..contact.pair_types import NO_PAIR_TYPE, pair_type_index, pair_type_of
+from ..contact.law import ContactLaw
+from ..contact.pair_types import NO_PAIR_TYPE, pair_type_index, pair_type_loop
 from ..numerics.vec import dot, load, put, sub
 from ..state.state import INNER_COUNT, INNER_SKIN, PAIRS, REBUILT
 from .cell_list import FULL, Grid, append_neighbours, build_grid
@@ -48,45 +51,52 @@ def candidates(pair_list, long_range, grid, span, search, k):
     return np.int64(0), np.int64(k)
 
 
-@rare
-def build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, law, search):
-    """List the pairs with a gap below `max_gap` [m], selected from the Verlet list, from cells, or from all pairs.
+@functools.cache
+def pair_list_loop(law: ContactLaw) -> Callable:
+    """The loop that builds the pair list, for one contact law."""
+    pair_type_of = pair_type_loop(law)
 
-    Returns
-    -------
-    int
-        Number of pairs; FULL if the pair list is too short (the required length is then in count[PAIRS]); ROW_FULL if
-        the long-range arrays are too short for the neighbours of one grain.
-    """
-    found, pair_type, capacity = 0, NO_PAIR_TYPE, pair_list.pair.shape[1]
-    sorted_indices = search.celled or search.listed
-    grid = NO_GRID
-    if search.celled and law.on:  # the anchors, set at the end, serve as buffer for positions in sorted order
-        grid = build_grid(long_range, pair_list.anchor, grains.position, span, search.reach)
-    for k in range(grains.mass.size if law.on else 0):
-        first, last = candidates(pair_list, long_range, grid, span, search, k)
-        if last == FULL:
+    @rare
+    def build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, settings, search):
+        """List the pairs with a gap below `max_gap` [m], selected from the Verlet list, from cells, or from all pairs.
+
+        Returns
+        -------
+        int
+            Number of pairs; FULL if the pair list is too short (the required length is then in count[PAIRS]);
+            ROW_FULL if the long-range arrays are too short for the neighbours of one grain.
+        """
+        found, pair_type, capacity = 0, NO_PAIR_TYPE, pair_list.pair.shape[1]
+        sorted_indices = search.celled or search.listed
+        grid = NO_GRID
+        if search.celled and settings.on:  # the anchors, set at the end, serve as buffer for positions in sorted order
+            grid = build_grid(long_range, pair_list.anchor, grains.position, span, search.reach)
+        for k in range(grains.mass.size if settings.on else 0):
+            first, last = candidates(pair_list, long_range, grid, span, search, k)
+            if last == FULL:
+                pair_list.anchor[0, 0] = math.inf
+                return ROW_FULL
+            i = long_range.order[k] if sorted_indices else np.uint32(k)
+            for m in range(first, last):
+                j = long_range.order[long_range.neighbour[m]] if sorted_indices else np.uint32(m)
+                if j < i and gap_below(grains, span, max_gap, i, j):
+                    if found < capacity:
+                        pair_type = pair_type_of(grains, settings, i, j, pair_type)
+                        pair_list.pair[0, found], pair_list.pair[1, found] = i, j
+                        pair_list.in_contact[found] = 1 if in_contact(contacts, i, j) else 0
+                        index = pair_type_index(pair_list, found)
+                        pair_list.step[index], pair_list.break_overlap[index] = pair_type.step, pair_type.break_overlap
+                    found += 1
+        count[PAIRS] = found
+        if found > capacity:
             pair_list.anchor[0, 0] = math.inf
-            return ROW_FULL
-        i = long_range.order[k] if sorted_indices else np.uint32(k)
-        for m in range(first, last):
-            j = long_range.order[long_range.neighbour[m]] if sorted_indices else np.uint32(m)
-            if j < i and gap_below(grains, span, max_gap, i, j):
-                if found < capacity:
-                    pair_type = pair_type_of(grains, law, i, j, pair_type)
-                    pair_list.pair[0, found], pair_list.pair[1, found] = i, j
-                    pair_list.in_contact[found] = 1 if in_contact(contacts, i, j) else 0
-                    index = pair_type_index(pair_list, found)
-                    pair_list.step[index], pair_list.break_overlap[index] = pair_type.step, pair_type.break_overlap
-                found += 1
-    count[PAIRS] = found
-    if found > capacity:
-        pair_list.anchor[0, 0] = math.inf
-        return FULL
-    for i in range(grains.mass.size):
-        put(pair_list.anchor, i, load(grains.position, i))
-    count[REBUILT] += 1
-    return found
+            return FULL
+        for i in range(grains.mass.size):
+            put(pair_list.anchor, i, load(grains.position, i))
+        count[REBUILT] += 1
+        return found
+
+    return build_pair_list
 
 
 @rare

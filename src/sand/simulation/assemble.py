@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ..box import Box
-from ..contact.law import ContactConstants
+from ..compiler.jit import is_builtin
+from ..contact.columns import constant_names
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
-from ..forces.external.loops import is_builtin
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
@@ -161,7 +161,9 @@ def _kernel_spec(
     """Specification from which the driver is compiled."""
     # without contacts, or with cycles of one step, there is neither extrapolation nor a constant force
     scheme = verlet.far if forces.long_range and forces.contact and verlet.max_cycle_steps > 1 else "every step"
+    law = (forces.contact or Contact()).contact_law
     return KernelSpec(
+        law,
         external,
         sums,
         split=scheme == "impulse",
@@ -170,7 +172,7 @@ def _kernel_spec(
         gas=bool(forces.gas),
         adaptive=adaptive,
         queue=uses_task_queue(len(grains)),
-        keep=all(is_builtin(f.formula) for f in forces.external),
+        keep=is_builtin(law.force) and all(is_builtin(f.formula) for f in forces.external),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
     )
@@ -193,7 +195,7 @@ def _new_state(
         grains,
         box,
         empty_contact_arrays(
-            count, capacity, len(ContactConstants._fields), uniform_contacts=uniform_contacts, channels=channels
+            count, capacity, len(constant_names(spec.law)), uniform_contacts=uniform_contacts, channels=channels
         ),
         empty_pair_list(count, capacity, uniform_contacts=uniform_contacts),
         empty_long_range_arrays(

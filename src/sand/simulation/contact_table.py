@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, measure_contacts
+from ..contact.law import ContactLaw
+from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, contacts_kernel
 from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..state.state import CONTACTS, RECORDED, State
 
@@ -30,13 +31,13 @@ class ContactTable(Mapping[str, np.ndarray]):
     Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.
     """
 
-    def __init__(self, state: State, follow: bool):
+    def __init__(self, state: State, law: ContactLaw, follow: bool):
         used = int(state.count[CONTACTS])
         contacts = state.contacts
         scalars = len(CONTACT_ROWS)
         names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
         rows = np.zeros((scalars + 3 * len(names), used))
-        measure_contacts(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
+        contacts_kernel(law)(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
         self._columns: dict[str, np.ndarray] = {
             "pair": contacts.pair[:, :used].T.copy(),
             "formed": contacts.formed[:used].copy(),

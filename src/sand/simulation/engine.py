@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.events import add_initial_contacts
+from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
+from ..contact.law import ContactLaw
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.loops import external_energies_for
 from ..forces.pair.loops import long_range_energies_for
@@ -105,6 +106,11 @@ class Engine:
             self._is_sorted = False
 
     @property
+    def law(self) -> ContactLaw:
+        """The contact law."""
+        return self._kernel_spec.law
+
+    @property
     def time(self) -> float:
         """Simulation time [s]."""
         return self._state.time
@@ -195,7 +201,7 @@ class Engine:
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
         return int(
-            add_initial_contacts(
+            forming_loops(self.law).add_initial(
                 state.grains.arrays, state.contacts, state.count, state.box.span, self.parameters.contact, pairs, *given
             )
         )

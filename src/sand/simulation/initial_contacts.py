@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..box import Box
-from ..contact.jkr import rest_overlap, rest_radius
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..grains import Grains
@@ -90,7 +89,8 @@ def refuse_overlaps(grains: Grains, contact: Contact, found: OverlappingPairs, g
     count = np.int64(len(grains))
     reduced = radius[i] * radius[j] / (radius[i] + radius[j])
     gamma, modulus = contact.pairings(grains.materials)[:2, grains.material[i], grains.material[j]]
-    rest = rest_overlap(rest_radius(gamma, reduced, modulus), reduced)
+    normal_mode = contact.contact_law.normal_mode
+    rest = np.array([normal_mode(*one).rest_overlap for one in zip(gamma, modulus, reduced, strict=True)])
     limit = most_overlap(rest, np.minimum(radius[i], radius[j]))
     is_new = ~np.isin(i * count + j, given[:, 0] * count + given[:, 1])
     wrong = np.flatnonzero((found.overlap > limit) & is_new)

@@ -12,7 +12,8 @@ import numpy as np
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
-from ..contact.measure import ENERGIES, measure_energies
+from ..contact.law import ContactLaw
+from ..contact.measure import ENERGIES, energies_kernel
 from ..errors import BadInput
 from ..grains import Grains
 from ..state.state import BROKEN, CONTACTS, MADE, SLIPPED, State
@@ -27,11 +28,13 @@ WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
-def log_row(state: State, parameters: Any, forces: dict[str, float]) -> dict[str, float]:
+def log_row(state: State, law: ContactLaw, parameters: Any, forces: dict[str, float]) -> dict[str, float]:
     """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
 
     Parameters
     ----------
+    law : ContactLaw
+        The contact law.
     parameters : StepParameters
         Constants of the run, as the driver takes them.
     forces : dict[str, float]
@@ -39,7 +42,7 @@ def log_row(state: State, parameters: Any, forces: dict[str, float]) -> dict[str
     """
     energies = np.empty(len(ENERGIES))
     grains = state.grains.arrays
-    measure_energies(grains, state.contacts, state.count, state.box.span, parameters.contact.follow, energies)
+    energies_kernel(law)(grains, state.contacts, state.count, state.box.span, parameters.contact.follow, energies)
     contacts = int(state.count[CONTACTS])
     labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
     row: dict[str, float] = {"step": state.steps, "time": state.time}

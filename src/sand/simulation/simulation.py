@@ -165,7 +165,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.parameters.contact.follow)
+        return ContactTable(self.state, self._engine.law, self._engine.parameters.contact.follow)
 
     @property
     def choices(self) -> dict[str, str]:
@@ -305,7 +305,7 @@ class Simulation(ReadOnlySettings):
             self._record_output()
 
     def _log_row(self) -> dict[str, float]:
-        return log_row(self.state, self._engine.parameters, self._engine.force_energies())
+        return log_row(self.state, self._engine.law, self._engine.parameters, self._engine.force_energies())
 
     def _record_output(self) -> None:
         """Add a row to the ledger, write it with a frame, and call the observers."""

@@ -8,7 +8,8 @@ from typing import Any
 
 from ..arguments import checked
 from ..contact import jkr
-from ..contact.law import ContactConstants, contact_constants
+from ..contact.dmt import tabor_parameter
+from ..contact.law import ContactConstants, Pairing, contact_constants
 from ..contact.mixing import MIXING, pairing_between
 from ..errors import BadInput, did_you_mean
 from ..material import Material, as_material
@@ -27,6 +28,8 @@ class ContactNumbers:
         Contact radius at equilibrium, a0 = (9πγR²/E*)^(1/3) [m].
     jkr_ratio : float
         a0/R; JKR theory is valid below about 0.3.
+    tabor_parameter : float
+        (R (2γ)²/(E*² z0³))^(1/3) with z0 = 0.16 nm; JKR is accurate above about 5, DMT below about 0.1.
     pull_off_force : float
         F_c = 3πγR [N].
     rest_overlap, pull_off_overlap : float
@@ -60,6 +63,7 @@ class ContactNumbers:
     reduced_radius: float
     rest_radius: float
     jkr_ratio: float
+    tabor_parameter: float
     pull_off_force: float
     rest_overlap: float
     pull_off_overlap: float
@@ -148,20 +152,20 @@ def contact(
     limit = None if rolling_limit is None else si(rolling_limit, "m", "rolling_limit", above=0.0)
     pairing = pairing_between(a, b, mixing=mixing, rolling_limit=limit)
     m1, m2 = (m.density * 4.0 / 3.0 * math.pi * r**3 for m, r in ((a, r1), (b, r2)))
-    return _numbers(contact_constants(pairing, r1, r2, m1, m2), pairing.modulus, (r1, r2), (m1, m2))
+    return _numbers(contact_constants(jkr.LAW)(pairing, r1, r2, m1, m2), pairing, (r1, r2), (m1, m2))
 
 
 def _numbers(
-    constants: ContactConstants, modulus: float, radii: tuple[float, float], masses: tuple[float, float]
+    constants: ContactConstants, pairing: Pairing, radii: tuple[float, float], masses: tuple[float, float]
 ) -> ContactNumbers:
     """From the constants of the contact law."""
-    unit = constants.pull_off_force * constants.pull_off_overlap
+    unit = constants.normal.pull_off_force * constants.normal.pull_off_overlap
     at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
     cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
     inverse_mass = sum(1.0 / m for m in masses)
     inverse_inertia = sum(2.5 / (m * r * r) for m, r in zip(masses, radii, strict=True))
     inverse_slide = inverse_mass + sum(2.5 / m for m in masses)
-    k_n = jkr.normal_stiffness(constants.rest_radius, modulus)
+    k_n = jkr.normal_stiffness(constants.rest_radius, pairing.modulus)
     rolled = constants.roll_stiffness * constants.roll_limit * math.pi * constants.reduced_radius
     squared_frequencies = (
         k_n * inverse_mass,
@@ -174,9 +178,10 @@ def _numbers(
         reduced_radius=constants.reduced_radius,
         rest_radius=constants.rest_radius,
         jkr_ratio=constants.rest_radius / constants.reduced_radius,
-        pull_off_force=constants.pull_off_force,
+        tabor_parameter=tabor_parameter(pairing.surface_energy, pairing.modulus, constants.reduced_radius),
+        pull_off_force=constants.normal.pull_off_force,
         rest_overlap=jkr.rest_overlap(constants.rest_radius, constants.reduced_radius),
-        pull_off_overlap=constants.pull_off_overlap,
+        pull_off_overlap=constants.normal.pull_off_overlap,
         break_energy=unit * (at[jkr.ROOT_AT_BREAK] - at[1.0]),
         cycle_energy=cycle,
         normal_stiffness=k_n,

@@ -3,7 +3,7 @@
 import functools
 
 from ...box import nearest_image
-from ...compiler.jit import kernel, loop
+from ...compiler.jit import is_builtin, kernel, loop
 from ...numerics.vec import accrue, load, put
 from .formulas import GrainState
 
@@ -75,8 +75,3 @@ def external_energies_for(formula_of_grain):
             shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
 
     return kernel(fill_shares, cached=is_builtin(formula_of_grain))
-
-
-def is_builtin(formula_of_grain):
-    """Whether a formula is part of SAND; compiled code with a user's own formula is not cached on disk."""
-    return str(formula_of_grain.__module__).startswith("sand.")

@@ -1,0 +1,230 @@
+"""Mechanics of one contact, the same for every contact law: pose, displacements, springs, limits, slip and energies.
+
+By default the spring stiffnesses are constants, evaluated at the equilibrium contact radius a₀, so that all forces are
+exact gradients of the energy (Dominik & Tielens 1997; Dominik & Nübold 2002, appendix A.5).  Normal forces and energies
+come from the contact law (`law.ContactLaw`).
+"""
+
+import math
+from typing import NamedTuple
+
+from ..compiler.jit import formula
+from ..numerics.vec import across, add, axpy, cross, dot, scale, sub
+from . import tangential
+from .law import ContactConstants
+
+
+class Pose(NamedTuple):
+    """Relative position and orientation of two grains in contact."""
+
+    n: tuple  # unit vector from grain 2 to grain 1
+    distance: float  # D [m]
+    n1: tuple  # contact pointers: unit vectors from each centre to the contact, laboratory frame
+    n2: tuple
+    twist: float  # φ [rad]
+
+
+class Displacements(NamedTuple):
+    """The four displacements of a contact from its unstrained configuration."""
+
+    overlap: float  # δ [m]
+    slide: tuple  # ζ [m]
+    roll: tuple  # R (n1 + n2) [m]; its tangential part is ξ
+    twist: float  # φ [rad]
+
+
+@formula
+def scaled_stiffness(constants, y, follow):
+    """Constants with the tangential stiffnesses of the present contact radius, y = √(a/a₀).
+
+    With `follow` ("dt97") k_s ∝ a, k_r ∝ a^(3/2) and k_t ∝ a³; otherwise ("frozen") they are unchanged.
+    """
+    y2 = y * y
+    return ContactConstants(
+        constants.reduced_radius,
+        constants.rest_radius,
+        constants.break_overlap,
+        constants.slide_stiffness * (y2 if follow else 1.0),
+        constants.roll_stiffness * (y2 * y if follow else 1.0),
+        constants.twist_stiffness * (y2 * y2 * y2 if follow else 1.0),
+        constants.slide_limit,
+        constants.roll_limit,
+        constants.twist_limit,
+        constants.damping,
+        constants.damping_per_radius,
+        constants.max_squared_frequency,
+        constants.normal,
+    )
+
+
+@formula
+def damping_force(contact_radius, closing, constants):
+    """Damping force [N] on grain 1 along n: (c + (c/a) a) dδ/dt, with dδ/dt = `closing` [m/s]."""
+    return (constants.damping + constants.damping_per_radius * contact_radius) * closing
+
+
+@formula
+def contact_load(pose, normal, r1, r2, constants):
+    """Force on grain 1 [N] and torques on both grains [N m]; the force on grain 2 is the opposite.
+
+        F1 = F_n n + k_s ((d·n)/D) ζ
+        M1 = −r1 k_s n1×ζ − R² k_r n1×n2 − k_t φ n
+        M2 = +r2 k_s n2×ζ − R² k_r n2×n1 + k_t φ n
+
+    The factor (d·n)/D makes M1 + M2 + (x1−x2)×F1 = 0 exact.
+
+    Parameters
+    ----------
+    pose : Pose
+        Relative pose of the grains.
+    normal : float
+        Normal force F_n [N] of the contact law, positive in compression.
+    r1, r2 : float
+        Radii [m].
+    constants : ContactConstants
+        Constants with the present stiffnesses (see `scaled_stiffness`).
+    """
+    zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
+    force = axpy(normal, pose.n, scale(constants.slide_stiffness * along / pose.distance, zeta))
+    rolling_torque = scale(constants.reduced_radius**2 * constants.roll_stiffness, cross(pose.n1, pose.n2))
+    torque = axpy(constants.twist_stiffness * pose.twist, pose.n, rolling_torque)
+    torque1 = sub(scale(-r1 * constants.slide_stiffness, cross(pose.n1, zeta)), torque)
+    torque2 = add(scale(r2 * constants.slide_stiffness, cross(pose.n2, zeta)), torque)
+    return force, torque1, torque2
+
+
+@formula
+def displacements_of(pose, overlap, r1, r2, constants):
+    """Displacements of a contact in the given pose."""
+    zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
+    return Displacements(overlap, zeta, tangential.rolling(pose.n1, pose.n2, constants.reduced_radius), pose.twist)
+
+
+@formula
+def exceeds_limits(displacements, n, constants):
+    """Whether a displacement exceeds its limit, so that the contact must slip or break."""
+    xi = across(displacements.roll, n)
+    return (
+        (displacements.overlap < -constants.break_overlap)
+        | (dot(displacements.slide, displacements.slide) > constants.slide_limit * constants.slide_limit)
+        | (dot(xi, xi) > constants.roll_limit * constants.roll_limit)
+        | (abs(displacements.twist) > constants.twist_limit)
+    )
+
+
+@formula
+def _slip_factor(size, limit, reset):
+    """Factor that reduces a displacement of this size to its limit, or to 0."""
+    if size <= limit:
+        return 1.0
+    return 0.0 if reset else limit / size
+
+
+@formula
+def after_slip(displacements, n, constants, reset):
+    """Displacements after slip: those beyond a limit are set to the limit or, with `reset`, to 0 (paper, A.6).
+
+    The returned `roll` is the tangential displacement ξ′ for which new contact pointers are computed.
+    """
+    xi = across(displacements.roll, n)
+    slide_size = math.sqrt(dot(displacements.slide, displacements.slide))
+    slide = scale(_slip_factor(slide_size, constants.slide_limit, reset), displacements.slide)
+    roll = scale(_slip_factor(math.sqrt(dot(xi, xi)), constants.roll_limit, reset), xi)
+    twist = _slip_factor(abs(displacements.twist), constants.twist_limit, reset) * displacements.twist
+    return Displacements(displacements.overlap, slide, roll, twist)
+
+
+@formula
+def energies(pose, normal, r1, r2, constants):
+    """Energies [J] stored in the normal, sliding, rolling and twisting modes; `normal` is the first.
+
+    The rolling energy includes the normal part of n1 + n2: the torque −R² k_r n1×n2 is its exact gradient.
+    """
+    zeta, _ = tangential.sliding(pose.n1, pose.n2, pose.n, r1, r2)
+    xi = tangential.rolling(pose.n1, pose.n2, constants.reduced_radius)
+    return (
+        normal,
+        0.5 * constants.slide_stiffness * dot(zeta, zeta),
+        0.5 * constants.roll_stiffness * dot(xi, xi),
+        0.5 * constants.twist_stiffness * pose.twist * pose.twist,
+    )
+
+
+@formula
+def slip_losses(start, end, left, constants):
+    """Energies [J] dissipated in a step by sliding, rolling and twisting: ½k (q_start + q_left)·(q_end − q_left).
+
+    This is the work done on the spring in the step minus the increase of its stored energy.  With work by the
+    trapezoidal rule, as in velocity Verlet, the energy balance is exact.  A broken contact leaves q = 0.  For rolling,
+    q is the whole vector R (n1 + n2), as in the torque and the energy: its normal part matters where ξ_c is not small
+    compared with r.
+
+    Parameters
+    ----------
+    start, end : Displacements
+        Displacements at the start of the step, and at its end before slip.
+    left : Displacements
+        Displacements after slip.
+    constants : ContactConstants
+        Constants of the contact.
+    """
+    slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))
+    roll = dot(add(start.roll, left.roll), sub(end.roll, left.roll))
+    twist = (start.twist + left.twist) * (end.twist - left.twist)
+    return (
+        0.5 * constants.slide_stiffness * slide,
+        0.5 * constants.roll_stiffness * roll,
+        0.5 * constants.twist_stiffness * twist,
+    )
+
+
+@formula
+def stiffness_loss(start, end, start_constants, end_constants):
+    """Energy [J] that changing stiffnesses remove from the springs in a step: ½ (k_start − k_end) q_start·q_end.
+
+    It is zero for frozen stiffnesses and negative where the springs stiffen: "dt97" is not conservative, and this is
+    the energy that it creates or destroys.
+
+    Parameters
+    ----------
+    start, end : Displacements
+        Displacements at the start and at the end of the step.
+    start_constants, end_constants : ContactConstants
+        Constants with the stiffnesses at those times.
+    """
+    slide = (start_constants.slide_stiffness - end_constants.slide_stiffness) * dot(start.slide, end.slide)
+    roll = (start_constants.roll_stiffness - end_constants.roll_stiffness) * dot(start.roll, end.roll)
+    twist = (start_constants.twist_stiffness - end_constants.twist_stiffness) * start.twist * end.twist
+    return 0.5 * (slide + roll + twist)
+
+
+@formula
+def contact_speed_gain(energy_drop, force, stiffness, closing, reduced, dt):
+    """Increase w′ − w of the closing speed [m/s] by the contact force between first touch and the present overlap δ.
+
+    ½ m̄ w′² + U(δ) + dt² (k w′²/12 − F²/(24 m̄)) = ½ m̄ w² + U(0), k = dF/dδ: the left-hand side is the modified
+    energy that velocity Verlet conserves (shadow Hamiltonian; Hairer, Lubich & Wanner 2006, IX.1).  Without the terms
+    in dt² the mean energy of the oscillation that follows is too low by a fraction (ω dt)²/8.  w′ = 0 where no kinetic
+    energy is left (no adhesion, grazing contact).
+
+    Parameters
+    ----------
+    energy_drop : float
+        U(0) − U(δ) [J].
+    force : float
+        Normal force F(δ) [N].
+    stiffness : float
+        k [N/m].
+    closing : float
+        Closing speed w at first touch [m/s]; the gain is 0 for a pair that is not closing.
+    reduced : float
+        Reduced mass m̄ [kg].
+    dt : float
+        Time step [s].
+    """
+    if not closing > 0.0:
+        return 0.0
+    accelerated = force * dt / reduced
+    stiff = stiffness * dt * dt / reduced
+    square = closing * closing + 2.0 * energy_drop / reduced + accelerated * accelerated / 12.0
+    return math.sqrt(max(square / (1.0 + stiff / 6.0), 0.0)) - closing
