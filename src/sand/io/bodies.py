@@ -12,7 +12,7 @@ import numpy as np
 from ..arguments import MOST_GRAINS
 from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
-from ..grains import ROUNDING, Grains
+from ..grains import Grains
 from ..material import PRESETS, Material
 from ..units import in_unit
 from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
@@ -205,11 +205,8 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
 
 def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
     """Table of the unstrained contacts of grains in open space, by column, as `TrajectoryWriter.write` takes it."""
-    pair = Box.open().close_pairs(grains.position, 2.0 * float(grains.radius.max()) * (1.0 + ROUNDING))
-    overlap = grains.overlaps(pair, Box.open())
-    touching = overlap >= -ROUNDING * grains.radius[pair].sum(axis=1)
-    pair, overlap = pair[touching], np.maximum(overlap[touching], 0.0)
+    pair, overlap = grains.touching(Box.open())
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)
-    return {"pair": pair, "overlap": overlap, "formed": none, "twist": none, **vectors_of, **shares}
+    return {"pair": pair, "overlap": np.maximum(overlap, 0.0), "formed": none, "twist": none, **vectors_of, **shares}
