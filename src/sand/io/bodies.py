@@ -21,7 +21,7 @@ from .run_folder import read_text, replace_file
 from .trajectory import Frames, TrajectoryWriter
 
 NAMED = 10
-"""Grains or lines that are named one by one in a message."""
+"""Lines that are named one by one in a message."""
 SUFFIXES = (".xyz", ".extxyz", ".gsd")
 
 
@@ -60,8 +60,8 @@ def read_body(
     Raises
     ------
     BadInput
-        If the file is missing or foreign, has lines that are not numbers, grains with impossible numbers (the first
-        ten are named), no radii, or unknown materials.
+        If the file is missing or foreign, has lines that are not numbers (the first ten are named), grains with
+        impossible numbers, no radii, or unknown materials.
     """
     file = Path(path)
     found = _read_gsd(file) if file.suffix == ".gsd" else _read_lines(path)
@@ -69,29 +69,14 @@ def read_body(
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
     size = radius if found.radius is None else found.radius * unit
-    _refuse_numbers(path, found)
     own = _materials(path, found, material or (otherwise if found.names is None else None), materials)
-    body = Grains(found.position * unit, size, own, moment=found.moment)
+    try:
+        body = Grains(found.position * unit, size, own, moment=found.moment)
+    except BadInput as error:
+        raise error.at(str(path)) from None
     centre = np.average(body.position, axis=0, weights=body.mass)
     body.arrays.position[...] -= centre[:, None]
     return body
-
-
-def _refuse_numbers(path: str | Path, found: Columns) -> None:
-    """Raise BadInput with the first ten grains that have impossible numbers."""
-    parts = {"position": found.position, "radius": found.radius, "moment": found.moment}
-    problems = []
-    for name, values in parts.items():
-        if values is None:
-            continue
-        rows = values.reshape(len(values), -1)
-        wrong = ~np.isfinite(rows).all(axis=1) | ((rows <= 0.0).any(axis=1) if name == "radius" else False)
-        want = "a number above 0" if name == "radius" else "finite"
-        problems += [f"{path}: {name} of grain {k} is {values[k]}; it must be {want}" for k in np.flatnonzero(wrong)]
-    if len(problems) > NAMED:
-        problems[NAMED:] = [f"… and {len(problems) - NAMED} more"]
-    if problems:
-        raise BadInput(problems)
 
 
 def _materials(

@@ -10,8 +10,9 @@ import json
 import os
 import stat
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ..errors import BadInput, FilesFailed
 from .damage import DAMAGED, DIGEST, digest_of
@@ -118,7 +119,14 @@ def is_used(folder: Path) -> bool:
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Replace a file atomically: write a temporary file, sync, rename.
+    """Replace a file atomically.  Raises FilesFailed, as `replacing`."""
+    with replacing(path) as file:
+        file.write(content)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Replace a file atomically by what the block writes: write a temporary file, sync, rename.
 
     Raises
     ------
@@ -128,16 +136,17 @@ def replace_file(path: Path, content: bytes) -> None:
     temporary = path.with_name(f".{path.name}.new")
     try:
         with open(temporary, "wb") as file:
-            file.write(content)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
         _sync_names(path.parent)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
         left = "the old content is untouched" if path.parent.is_dir() else "its folder has been removed"
         raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def append_text(path: Path, text: str) -> None:

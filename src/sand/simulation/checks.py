@@ -10,7 +10,7 @@ from ..box import Box
 from ..contact.model import Contact
 from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
-from ..units import format_quantity, is_word
+from ..units import format_quantity
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
@@ -63,12 +63,7 @@ def _short_cutoffs(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
     problems = []
     for force in forces:
         cutoff = getattr(force, "cutoff", None)
-        if (
-            isinstance(force, LongRangeForce)
-            and cutoff is not None
-            and not is_word(cutoff, "auto")
-            and cutoff < diameter
-        ):
+        if isinstance(force, LongRangeForce) and isinstance(cutoff, float) and cutoff < diameter:
             problems.append(
                 f"{force.name}: cutoff = {format_quantity(cutoff, 'm')} ends within a grain, whose diameter is "
                 f"{format_quantity(diameter, 'm')}; give a longer one, or 'auto'"
@@ -91,14 +86,10 @@ def _overlaps(grains: Grains, box: Box) -> list[str]:
 
 def _nearest(grains: Grains, box: Box) -> np.ndarray:
     """Pairs (P, 2) of each grain with its nearest neighbours only: all overlapping pairs might be too many."""
-    from scipy.spatial import cKDTree  # slow to import
-
     count = len(grains)
     if count == 1:
         return np.zeros((0, 2), np.int64)
-    lengths = np.array([0.0 if v is None else v for v in box.lengths])
-    folded = np.where(lengths > 0.0, np.mod(grains.position, np.where(lengths > 0.0, lengths, 1.0)), grains.position)
-    folded = np.where((lengths > 0.0) & (folded >= lengths), 0.0, folded)
-    _, others = cKDTree(folded, boxsize=lengths).query(folded, min(count, NEAREST))
+    tree = box.tree(grains.position)
+    _, others = tree.query(tree.data, min(count, NEAREST))
     pairs = np.stack([np.repeat(np.arange(count), others.shape[1]), others.ravel()], axis=1)
     return np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
