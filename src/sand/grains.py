@@ -13,7 +13,7 @@ from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from .material import Material, as_material
-from .schema import BY_NAME, FIELDS, blank, public, stored
+from .schema import BY_NAME, FIELDS, public, stored
 from .units import in_unit
 
 ROUNDING = 1e-7
@@ -132,7 +132,7 @@ class Grains:
     ):
         count = _count(position)
         problems: list[str] = []
-        arrays = {field.name: blank(field, count) for field in FIELDS}
+        arrays = {f.name: np.zeros(count if f.width == 1 else (f.width, count)) for f in FIELDS}
         given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
         for name, values in given.items():
             if values is None and name not in ("position", "radius"):

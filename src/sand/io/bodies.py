@@ -14,7 +14,7 @@ from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
-from ..units import in_unit
+from ..units import si
 from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
 from .frame import MODES
 from .run_folder import read_text, replace_file
@@ -65,7 +65,7 @@ def read_body(
     """
     file = Path(path)
     found = _read_gsd(file) if file.suffix == ".gsd" else _read_lines(path)
-    unit = found.unit if length is None else _unit(length)
+    unit = found.unit if length is None else si(length, "m", "length", above=0.0)
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
     size = radius if found.radius is None else found.radius * unit
@@ -91,17 +91,9 @@ def _materials(
     return [known[name] for name in found.names]
 
 
-def _unit(length: str) -> float:
-    factor = in_unit(length, "m")
-    if factor is None or np.ndim(factor) != 0 or not 0.0 < factor < np.inf:
-        raise BadInput(f"length = {length!r} must be a length such as '1 nm'")
-    return float(factor)
-
-
 def _read_gsd(path: Path) -> Columns:
     """Read the last frame of a trajectory of SAND or of another program.  Raises BadInput."""
-    frames = Frames(path)
-    try:
+    with contextlib.closing(Frames(path)) as frames:
         if not len(frames):
             raise BadInput(f"{path} holds no frame")
         if frames.written_by_sand:
@@ -111,17 +103,13 @@ def _read_gsd(path: Path) -> Columns:
         stored = frames.stored(-1)
         size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
         return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)
-    finally:
-        frames.close()
 
 
 def _read_lines(path: str | Path) -> Columns:
+    """Read extended XYZ, or columns x y z or x y z r.  Raises BadInput."""
     lines = read_text(path).splitlines()
-    return read_xyz(path, lines) if is_xyz(lines) else _read_columns(path, lines)
-
-
-def _read_columns(path: str | Path, lines: list[str]) -> Columns:
-    """Read columns x y z or x y z r.  Raises BadInput."""
+    if is_xyz(lines):
+        return read_xyz(path, lines)
     rows: list[list[float]] = []
     problems: list[str] = []
     for number, line in enumerate(lines, start=1):

@@ -21,7 +21,7 @@ from ..io.run_folder import make_folder, plain, read_json, write_json, write_tom
 from ..io.trajectory import TrajectoryWriter
 from ..state.state import CLOCK, COUNT, LOST, STAGE
 from ..version import __version__
-from .displays import display
+from .displays import DISPLAYS
 from .ledger import Ledger
 from .outcome import Outcome, Result
 from .serialise import case_of
@@ -196,7 +196,7 @@ class RunWriter:
     def draw(self, simulation: Simulation) -> None:
         """Draw the figure of the run so far."""
         if simulation.ledger.rows:
-            display("save figure", simulation, self.folder / files.FIGURE)
+            DISPLAYS["save figure"](simulation, self.folder / files.FIGURE)
 
 
 def _stamp(path: Path) -> tuple[str, int]:
