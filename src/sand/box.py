@@ -10,7 +10,7 @@ import numpy as np
 from .arguments import checked
 from .compiler.jit import formula
 from .errors import BadInput, shown
-from .units import si
+from .units import format_quantity, si
 
 ALL_PAIRS_UP_TO = 200
 """Number of points up to which `Box.close_pairs` examines all pairs."""
@@ -167,8 +167,6 @@ class Box:
 
     def describe(self) -> str:
         """Description in one line, for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
-        from .units import format_quantity
-
         if self.is_open:
             return "open"
         return "periodic " + " x ".join("open" if v is None else format_quantity(v, "m") for v in self.lengths)

@@ -18,30 +18,27 @@ from ..errors import BadInput, FilesFailed
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
-CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW, GROWTH = (
+OWN_FILES = (
+    CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS, FLIGHTS, GROWTH,
+    VIEW,
+) = (
     "case.toml",
     "trajectory.gsd",
     "ledger.csv",
     "summary.json",
     "figure.png",
+    "collision.toml",  # the case of a collision with one seed, whose folder has the case of the simulation in case.toml
+    "collisions.jsonl",  # outcomes of the finished collisions of a job that is not finished
     "collision.json",
     "scattering.json",
     "results.csv",
     "flights.csv",
-    "view.html",
     "growth.json",
-)
-_NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
-"""Errors by which systems report that they cannot sync a folder."""
-ONE_COLLISION = "collision.toml"
-"""The case of a collision with one seed, whose folder has the case of the simulation in case.toml."""
-OUTCOMES = "collisions.jsonl"
-"""Outcomes of the finished collisions of a job that is not finished."""
-OWN_FILES = (
-    CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS, FLIGHTS, GROWTH,
-    VIEW,
+    "view.html",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
+_NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
+"""Errors by which systems report that they cannot sync a folder."""
 
 
 def checked_name(text: str, name: str) -> str:

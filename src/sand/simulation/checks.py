@@ -1,4 +1,4 @@
-"""Checks of grains, forces and box at a new start: impossible combinations are errors, unusual ones are warnings."""
+"""Checks of grains, forces and box: impossible combinations are errors, unusual ones are warnings."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..box import Box
 from ..contact.model import Contact
+from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
 from ..units import format_quantity
@@ -22,13 +23,44 @@ OVERLAP_TOLERANCE = 1e-3
 """Overlap, in radii of the smaller grain, that counts as rounding where there is no contact law."""
 
 
-def find_errors(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Error messages: grains outside a periodic box, and cut-offs smaller than a grain."""
-    return [*_outside_box(grains, box), *_short_cutoffs(grains, forces, box)]
+def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
+    """Check that grains, forces and box fit together.
+
+    Parameters
+    ----------
+    fresh : bool
+        Whether this is a new start, of which more is checked.
+
+    Returns
+    -------
+    list[str]
+        Warnings.
+
+    Raises
+    ------
+    BadInput
+        With all problems.
+    """
+    problems = [*_outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
+    warnings: list[str] = []
+    for force in forces:
+        try:
+            warnings += force.check(grains, box)
+        except BadInput as error:
+            problems += error.problems
+    least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
+    if box.shortest < least:
+        problems.append(
+            f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
+            "so that a grain interacts with only one image of each neighbour"
+        )
+    if problems:
+        raise BadInput(problems)
+    return warnings + (_start_warnings(grains, forces, box) if fresh else [])
 
 
-def find_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Warnings: very large grains, and overlaps without a contact law."""
+def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """Warnings about very large grains, and about overlaps without a contact law."""
     warnings = []
     contact = any(isinstance(force, Contact) for force in forces)
     largest = int(np.argmax(grains.radius))
