@@ -35,7 +35,7 @@ import numpy as np
 
 from ..errors import BadInput, FilesFailed
 from .damage import set_aside
-from .run_folder import replace_file
+from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
 VERSION = 5
@@ -106,6 +106,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         If it is not a checkpoint, is damaged, or has numbers that a state cannot have.
     """
     try:
+        refuse_devices(path)
         with zipfile.ZipFile(path) as archive:
             if archive.testzip():  # before NumPy allocates arrays of sizes that may be wrong
                 raise zipfile.BadZipFile
