@@ -10,7 +10,7 @@ import numpy as np
 from .arguments import checked
 from .compiler.jit import formula
 from .errors import BadInput, shown
-from .units import si
+from .units import format_quantity, si
 
 ALL_PAIRS_UP_TO = 200
 """Number of points up to which `Box.close_pairs` examines all pairs."""
@@ -153,18 +153,20 @@ class Box:
             separation = self.nearest(position[first] - position[second])
             return np.stack([first, second], axis=1)[(separation**2).sum(axis=1) <= reach**2]
 
+        pairs = self.tree(position).query_pairs(reach, output_type="ndarray")
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+    def tree(self, position: np.ndarray) -> Any:
+        """`scipy.spatial.cKDTree` of points (N, 3) [m], wrapped into 0 … L on periodic axes."""
         from scipy.spatial import cKDTree  # slow import
 
         lengths = np.array([0.0 if v is None else v for v in self.lengths])
         wrapped = np.where(lengths > 0.0, np.mod(position, np.where(lengths > 0.0, lengths, 1.0)), position)
         wrapped = np.where((lengths > 0.0) & (wrapped >= lengths), 0.0, wrapped)  # np.mod(−1e-300, L) is L
-        pairs = cKDTree(wrapped, boxsize=lengths).query_pairs(reach, output_type="ndarray")
-        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        return cKDTree(wrapped, boxsize=lengths)
 
     def describe(self) -> str:
         """Description in one line, for logs: 'periodic 1.2 um x 1.2 um x 1.2 um', 'open'."""
-        from .units import format_quantity
-
         if self.is_open:
             return "open"
         return "periodic " + " x ".join("open" if v is None else format_quantity(v, "m") for v in self.lengths)

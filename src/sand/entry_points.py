@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .simulation.displays import register_display
+from .simulation.displays import DISPLAYS
 
 TYPE_CHECKING = False  # typing takes as long to load as the whole of `import sand`
 if TYPE_CHECKING:
@@ -30,6 +30,4 @@ def _view(simulation: Any, path: Any) -> Any:
 
 def register() -> None:
     """Register all displays."""
-    register_display("figure", _figure)
-    register_display("save figure", _save_figure)
-    register_display("view", _view)
+    DISPLAYS.update({"figure": _figure, "save figure": _save_figure, "view": _view})

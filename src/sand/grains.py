@@ -13,7 +13,7 @@ from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from .material import Material, as_material
-from .schema import BY_NAME, FIELDS, blank, public, stored
+from .schema import BY_NAME, FIELDS, public, stored
 from .units import in_unit
 
 ROUNDING = 1e-7
@@ -21,9 +21,6 @@ ROUNDING = 1e-7
 
 SMALLEST = 1e-10
 """Smallest radius [m] of a grain, that of an atom."""
-
-NAMES = (*BY_NAME, "material", "id")
-"""Public quantities of `Grains`."""
 
 
 class GrainArrays(NamedTuple):
@@ -44,6 +41,10 @@ class GrainArrays(NamedTuple):
     field: np.ndarray
     material: np.ndarray  # index into Grains.materials, uint32
     id: np.ndarray  # the user's index of the grain, uint32
+
+
+NAMES = GrainArrays._fields
+"""Public quantities of `Grains`."""
 
 
 def materials_of(material: Any, count: int) -> tuple[tuple[Material, ...], np.ndarray]:
@@ -131,7 +132,7 @@ class Grains:
     ):
         count = _count(position)
         problems: list[str] = []
-        arrays = {field.name: blank(field, count) for field in FIELDS}
+        arrays = {f.name: np.zeros(count if f.width == 1 else (f.width, count)) for f in FIELDS}
         given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
         for name, values in given.items():
             if values is None and name not in ("position", "radius"):
@@ -188,17 +189,18 @@ class Grains:
         names = ", ".join(m.name for m in self.materials)
         return f"<{len(self)} grains of {names}>"
 
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
         """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""
         i, j = np.asarray(pairs).T
         separation = box.nearest(self.position[i] - self.position[j])
         return self.radius[i] + self.radius[j] - np.linalg.norm(separation, axis=1)
+
+    def touching(self, box: Box) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs (P, 2) of grains in contact, sorted, with their overlaps [m]; a gap up to `ROUNDING` counts."""
+        pairs = box.close_pairs(self.position, 2.0 * float(self.radius.max()) * (1.0 + ROUNDING))
+        overlap = self.overlaps(pairs, box)
+        found = overlap >= -ROUNDING * self.radius[pairs].sum(axis=1)
+        return pairs[found], overlap[found]
 
     def copy(self) -> Grains:
         """Return an independent copy."""

@@ -10,14 +10,15 @@ from .arguments import checked
 from .errors import BadInput, did_you_mean, shown
 from .units import si
 
-_UNITS = {
-    "density": "kg/m^3",
-    "surface_energy": "J/m^2",
-    "young_modulus": "Pa",
-    "poisson_ratio": "1",
-    "rolling_limit": "m",
-    "specific_moment": "A m^2/kg",
+_RANGES: dict[str, tuple[str, dict[str, float]]] = {
+    "density": ("kg/m^3", {"above": 0.0}),
+    "surface_energy": ("J/m^2", {"least": 0.0}),
+    "young_modulus": ("Pa", {"above": 0.0}),
+    "poisson_ratio": ("1", {"above": -1.0}),
+    "rolling_limit": ("m", {"above": 0.0}),
+    "specific_moment": ("A m^2/kg", {"least": 0.0}),
 }
+"""Unit and lower limit of each number."""
 
 
 @checked
@@ -59,15 +60,12 @@ class Material:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        for key, unit in _UNITS.items():
+        for key, (unit, limit) in _RANGES.items():
             value = getattr(self, key)
             if key == "surface_energy" and value is None:
                 continue
-            lowest = {"least": 0.0} if key in ("surface_energy", "specific_moment") else {"above": 0.0}
-            if key == "poisson_ratio":
-                lowest = {"above": -1.0}
             try:
-                number = si(value, unit, f"{self.name}: {key}", **lowest)
+                number = si(value, unit, f"{self.name}: {key}", **limit)
             except BadInput as error:
                 problems += error.problems
                 continue

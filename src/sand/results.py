@@ -12,12 +12,13 @@ from .analysis.clusters import cluster_labels
 from .analysis.ledger_columns import LedgerColumns
 from .arguments import checked
 from .config.case import read_case
-from .errors import BadInput, NoSuchKey, did_you_mean, import_optional, shown
+from .errors import BadInput, import_optional
 from .io import run_folder as files
 from .io.export import export_frames
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
 from .setup.from_frame import from_frame
+from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
 from .units import si
 from .viewer.external_field import read_field
@@ -25,14 +26,6 @@ from .viewer.simulation_view import view_folder
 
 if TYPE_CHECKING:
     from .plotting.render.still import Still
-
-
-class Columns(dict[str, np.ndarray]):
-    """Columns by name; an unknown name is refused with a suggestion."""
-
-    def __missing__(self, name: Any) -> np.ndarray:
-        """Raise BadInput, which is also a KeyError."""
-        raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self))}")
 
 
 @checked

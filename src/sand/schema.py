@@ -40,11 +40,6 @@ FIELDS = (
 BY_NAME = {field.name: field for field in FIELDS}
 
 
-def blank(field: Field, count: int) -> np.ndarray:
-    """Zeros in stored shape: (count,) or (width, count), contiguous, float64."""
-    return np.zeros(count if field.width == 1 else (field.width, count))
-
-
 def public(array: np.ndarray) -> np.ndarray:
     """Read-only view in public shape: (N,) or (N, width)."""
     view = array.T if array.ndim == 2 else array.view()

@@ -24,7 +24,7 @@ def known(tmp_path_factory):
     (run / "body.gsd").rename(run / TRAJECTORY)
     (run / LEDGER).write_text("step,total\n0,1.0\n")
     table = ContactTable.__new__(ContactTable)
-    table._columns = {"pair": np.zeros((0, 2), int), "overlap": np.zeros(0)}
+    table.update({"pair": np.zeros((0, 2), int), "overlap": np.zeros(0)})
     return {
         "sand": sand,
         "np": np,

@@ -12,16 +12,16 @@ import numpy as np
 from ..arguments import MOST_GRAINS
 from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
-from ..grains import ROUNDING, Grains
+from ..grains import Grains
 from ..material import PRESETS, Material
-from ..units import in_unit
+from ..units import si
 from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
 from .frame import MODES
 from .run_folder import read_text, replace_file
 from .trajectory import Frames, TrajectoryWriter
 
 NAMED = 10
-"""Grains or lines that are named one by one in a message."""
+"""Lines that are named one by one in a message."""
 SUFFIXES = (".xyz", ".extxyz", ".gsd")
 
 
@@ -60,38 +60,23 @@ def read_body(
     Raises
     ------
     BadInput
-        If the file is missing or foreign, has lines that are not numbers, grains with impossible numbers (the first
-        ten are named), no radii, or unknown materials.
+        If the file is missing or foreign, has lines that are not numbers (the first ten are named), grains with
+        impossible numbers, no radii, or unknown materials.
     """
     file = Path(path)
     found = _read_gsd(file) if file.suffix == ".gsd" else _read_lines(path)
-    unit = found.unit if length is None else _unit(length)
+    unit = found.unit if length is None else si(length, "m", "length", above=0.0)
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
     size = radius if found.radius is None else found.radius * unit
-    _refuse_numbers(path, found)
     own = _materials(path, found, material or (otherwise if found.names is None else None), materials)
-    body = Grains(found.position * unit, size, own, moment=found.moment)
+    try:
+        body = Grains(found.position * unit, size, own, moment=found.moment)
+    except BadInput as error:
+        raise error.at(str(path)) from None
     centre = np.average(body.position, axis=0, weights=body.mass)
     body.arrays.position[...] -= centre[:, None]
     return body
-
-
-def _refuse_numbers(path: str | Path, found: Columns) -> None:
-    """Raise BadInput with the first ten grains that have impossible numbers."""
-    parts = {"position": found.position, "radius": found.radius, "moment": found.moment}
-    problems = []
-    for name, values in parts.items():
-        if values is None:
-            continue
-        rows = values.reshape(len(values), -1)
-        wrong = ~np.isfinite(rows).all(axis=1) | ((rows <= 0.0).any(axis=1) if name == "radius" else False)
-        want = "a number above 0" if name == "radius" else "finite"
-        problems += [f"{path}: {name} of grain {k} is {values[k]}; it must be {want}" for k in np.flatnonzero(wrong)]
-    if len(problems) > NAMED:
-        problems[NAMED:] = [f"… and {len(problems) - NAMED} more"]
-    if problems:
-        raise BadInput(problems)
 
 
 def _materials(
@@ -106,17 +91,9 @@ def _materials(
     return [known[name] for name in found.names]
 
 
-def _unit(length: str) -> float:
-    factor = in_unit(length, "m")
-    if factor is None or np.ndim(factor) != 0 or not 0.0 < factor < np.inf:
-        raise BadInput(f"length = {length!r} must be a length such as '1 nm'")
-    return float(factor)
-
-
 def _read_gsd(path: Path) -> Columns:
     """Read the last frame of a trajectory of SAND or of another program.  Raises BadInput."""
-    frames = Frames(path)
-    try:
+    with contextlib.closing(Frames(path)) as frames:
         if not len(frames):
             raise BadInput(f"{path} holds no frame")
         if frames.written_by_sand:
@@ -126,17 +103,13 @@ def _read_gsd(path: Path) -> Columns:
         stored = frames.stored(-1)
         size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
         return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)
-    finally:
-        frames.close()
 
 
 def _read_lines(path: str | Path) -> Columns:
+    """Read extended XYZ, or columns x y z or x y z r.  Raises BadInput."""
     lines = read_text(path).splitlines()
-    return read_xyz(path, lines) if is_xyz(lines) else _read_columns(path, lines)
-
-
-def _read_columns(path: str | Path, lines: list[str]) -> Columns:
-    """Read columns x y z or x y z r.  Raises BadInput."""
+    if is_xyz(lines):
+        return read_xyz(path, lines)
     rows: list[list[float]] = []
     problems: list[str] = []
     for number, line in enumerate(lines, start=1):
@@ -205,11 +178,8 @@ def write_body(path: str | Path, grains: Grains, *, overwrite: bool = False) -> 
 
 def contacts_of(grains: Grains) -> dict[str, np.ndarray]:
     """Table of the unstrained contacts of grains in open space, by column, as `TrajectoryWriter.write` takes it."""
-    pair = Box.open().close_pairs(grains.position, 2.0 * float(grains.radius.max()) * (1.0 + ROUNDING))
-    overlap = grains.overlaps(pair, Box.open())
-    touching = overlap >= -ROUNDING * grains.radius[pair].sum(axis=1)
-    pair, overlap = pair[touching], np.maximum(overlap[touching], 0.0)
+    pair, overlap = grains.touching(Box.open())
     none, vectors = np.zeros(len(pair)), np.zeros((len(pair), 3))
     shares = {f"{mode}_share": none for mode in MODES}
     vectors_of = dict.fromkeys(("force", "slide_vector", "roll_vector"), vectors)
-    return {"pair": pair, "overlap": overlap, "formed": none, "twist": none, **vectors_of, **shares}
+    return {"pair": pair, "overlap": np.maximum(overlap, 0.0), "formed": none, "twist": none, **vectors_of, **shares}

@@ -15,6 +15,8 @@ from .trajectory import Frames
 
 INCOMPLETE_AT_MOST = 64
 """Incomplete frames at the end of a file above which the file counts as broken."""
+Head = tuple[float, int, int]
+"""Time [s], step and number of contacts of a frame."""
 
 
 class LiveTrajectory(FrameSequence):
@@ -43,16 +45,21 @@ class LiveTrajectory(FrameSequence):
     """
 
     def __init__(self, path: str | Path):
-        self.path, self.lock = Path(path), threading.RLock()
-        self.times, self.steps, self.contacts = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.incomplete = self.generation = 0
+        self.path, self.lock, self.generation = Path(path), threading.RLock(), 0
         self._seen = self._stamp()
-        self._frames = self._open()
-        self._read_new()
+        frames = self._open()
+        self._use(frames, _heads(frames, []))
         if not len(self):
             self.close()
             state = "no complete frame" if self.incomplete else "no frame yet"
             raise BadInput(f"{path} holds {state}: try again when the run has written one, or start it again")
+
+    def _use(self, frames: Frames, heads: list[Head]) -> None:
+        """Take over an open trajectory, of which the frames with these heads are complete."""
+        self._frames, self._heads, self.incomplete = frames, heads, len(frames) - len(heads)
+        self.times = np.array([time for time, _, _ in heads])
+        self.steps = np.array([step for _, step, _ in heads], np.int64)
+        self.contacts = np.array([contacts for _, _, contacts in heads], np.int64)
 
     def _open(self) -> Frames:
         frames = Frames(self.path)
@@ -88,23 +95,17 @@ class LiveTrajectory(FrameSequence):
                 frames = self._open()
             except BadInput:
                 return False
-            old, before = self._frames, (len(self), self.generation)
-            known = self.times, self.steps, self.contacts, self.incomplete
-            self._frames = frames
-            last = self._head(len(self) - 1)
-            if last is None or last[:2] != (self.times[-1], self.steps[-1]):
-                self.generation += 1
-                self.times, self.steps, self.contacts = self.times[:0], self.steps[:0], self.contacts[:0]
-            self._read_new()
-            if not len(self):  # replaced by a file without a frame: keep the old frames until it has one
-                self._frames, self.generation = old, before[1]
-                self.times, self.steps, self.contacts, self.incomplete = known
+            is_same = _starts_with(frames, self._heads)
+            heads = _heads(frames, self._heads if is_same else [])
+            if not heads:  # replaced by a file without a frame: keep the old frames until it has one
                 frames.close()
                 return False
+            is_new = not is_same or len(heads) > len(self)
+            self.close()
+            self._use(frames, heads)
+            self.generation += not is_same
             self._seen = stamp
-            with contextlib.suppress(OSError, RuntimeError):
-                old.close()
-            return before != (len(self), self.generation)
+            return is_new
 
     @property
     def age(self) -> float:
@@ -114,39 +115,8 @@ class LiveTrajectory(FrameSequence):
         except OSError:
             return 0.0
 
-    def _head(self, number: int) -> tuple[float, int, int] | None:
-        """Time, step and number of contacts of a frame; None if it is missing or incomplete."""
-        try:
-            return self._frames.head(number)
-        except BadInput:
-            return None
-
-    def _read_new(self) -> None:
-        """Read times and steps of new frames, up to the last complete one."""
-        count = len(self._frames)
-        complete = count
-        while complete > len(self) and count - complete < INCOMPLETE_AT_MOST and not self._is_complete(complete - 1):
-            complete -= 1
-        new = []
-        for number in range(len(self), complete):
-            if (head := self._head(number)) is None:
-                break
-            new.append(head)
-        if new:
-            times, steps, contacts = zip(*new, strict=True)
-            self.times = np.concatenate([self.times, times])
-            self.steps = np.concatenate([self.steps, steps]).astype(np.int64)
-            self.contacts = np.concatenate([self.contacts, contacts]).astype(np.int64)
-        self.incomplete = count - len(self)
-
-    def _is_complete(self, number: int) -> bool:
-        try:
-            return len(self._frames[number]) > 0
-        except BadInput:
-            return False
-
     def __len__(self) -> int:
-        return len(self.times)
+        return len(self._heads)
 
     def _frame(self, number: int) -> Frame:
         with self.lock:
@@ -159,5 +129,31 @@ class LiveTrajectory(FrameSequence):
 
     def close(self) -> None:
         """Close the file."""
-        with self.lock:
+        with self.lock, contextlib.suppress(OSError, RuntimeError):
             self._frames.close()
+
+
+def _starts_with(frames: Frames, heads: list[Head]) -> bool:
+    """Whether a trajectory holds the last of these frames at its place."""
+    try:
+        return frames.head(len(heads) - 1)[:2] == heads[-1][:2]
+    except BadInput:
+        return False
+
+
+def _heads(frames: Frames, known: list[Head]) -> list[Head]:
+    """Heads of the frames up to the last complete one; those of the first ones are `known`."""
+    complete, heads = len(frames), list(known)
+    while len(known) < complete > len(frames) - INCOMPLETE_AT_MOST and not _is_complete(frames, complete - 1):
+        complete -= 1
+    with contextlib.suppress(BadInput):
+        for number in range(len(known), complete):
+            heads.append(frames.head(number))
+    return heads
+
+
+def _is_complete(frames: Frames, number: int) -> bool:
+    try:
+        return len(frames[number]) > 0
+    except BadInput:
+        return False

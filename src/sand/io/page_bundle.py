@@ -1,13 +1,10 @@
-"""The bundle of the viewer page, which is missing if it could not be built, and pages written as files."""
+"""The bundle of the viewer page, which is missing if it could not be built, and temporary pages."""
 
 from __future__ import annotations
 
-import contextlib
 import os
 import tempfile
 from pathlib import Path
-from types import TracebackType
-from typing import Any
 
 from ..errors import BadInput, FilesFailed
 
@@ -66,56 +63,3 @@ def private_page(text: str) -> Path:
     except OSError as error:
         raise FilesFailed(f"cannot write a temporary page: {error.strerror}") from error
     return Path(name)
-
-
-class Written:
-    """A large text file written piece by piece to a temporary file, which is renamed when complete.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; an existing one is replaced only when the new one is complete.
-
-    Raises
-    ------
-    FilesFailed
-        If it cannot be written; also from `write` and at the end.
-    """
-
-    def __init__(self, path: str | Path):
-        self.path, self.size = Path(path), 0
-        self._temporary = self.path.with_name(f".{self.path.name}.new")
-        try:
-            self._file: Any = open(self._temporary, "wb")  # noqa: SIM115
-        except OSError as error:
-            raise self._failed(error) from error
-
-    def _failed(self, error: OSError) -> FilesFailed:
-        return FilesFailed(f"cannot write {self.path}: {error.strerror}; the old content is untouched")
-
-    def write(self, text: str | bytes) -> None:
-        """Append text.  Raises FilesFailed."""
-        part = text.encode() if isinstance(text, str) else text
-        try:
-            self._file.write(part)
-        except OSError as error:
-            raise self._failed(error) from error
-        self.size += len(part)
-
-    def __enter__(self) -> Written:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, _: object, __: TracebackType | None) -> None:
-        try:
-            if kind is None:
-                self._file.flush()
-                os.fsync(self._file.fileno())
-                self._file.close()
-                os.replace(self._temporary, self.path)
-        except OSError as error:
-            raise self._failed(error) from error
-        finally:
-            with contextlib.suppress(OSError):
-                self._file.close()
-            with contextlib.suppress(OSError):
-                self._temporary.unlink(missing_ok=True)

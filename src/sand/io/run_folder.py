@@ -10,37 +10,35 @@ import json
 import os
 import stat
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ..errors import BadInput, FilesFailed
 from .damage import DAMAGED, DIGEST, digest_of
 from .lock import LOCK, refuse_locked, writing
 
-CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, COLLISION, SCATTERING, RESULTS, FLIGHTS, VIEW, GROWTH = (
+OWN_FILES = (
+    CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS, FLIGHTS, GROWTH,
+    VIEW,
+) = (
     "case.toml",
     "trajectory.gsd",
     "ledger.csv",
     "summary.json",
     "figure.png",
+    "collision.toml",  # the case of a collision with one seed, whose folder has the case of the simulation in case.toml
+    "collisions.jsonl",  # outcomes of the finished collisions of a job that is not finished
     "collision.json",
     "scattering.json",
     "results.csv",
     "flights.csv",
-    "view.html",
     "growth.json",
-)
-_NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
-"""Errors by which systems report that they cannot sync a folder."""
-ONE_COLLISION = "collision.toml"
-"""The case of a collision with one seed, whose folder has the case of the simulation in case.toml."""
-OUTCOMES = "collisions.jsonl"
-"""Outcomes of the finished collisions of a job that is not finished."""
-OWN_FILES = (
-    CASE, TRAJECTORY, LEDGER, SUMMARY, FIGURE, ONE_COLLISION, OUTCOMES, COLLISION, SCATTERING, RESULTS, FLIGHTS, GROWTH,
-    VIEW,
+    "view.html",
 )  # fmt: skip
 """Names of all files that SAND writes to a folder, checkpoints excepted."""
+_NO_SYNC = (errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES, errno.EPERM)
+"""Errors by which systems report that they cannot sync a folder."""
 
 
 def checked_name(text: str, name: str) -> str:
@@ -118,7 +116,14 @@ def is_used(folder: Path) -> bool:
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Replace a file atomically: write a temporary file, sync, rename.
+    """Replace a file atomically.  Raises FilesFailed, as `replacing`."""
+    with replacing(path) as file:
+        file.write(content)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Replace a file atomically by what the block writes: write a temporary file, sync, rename.
 
     Raises
     ------
@@ -128,16 +133,17 @@ def replace_file(path: Path, content: bytes) -> None:
     temporary = path.with_name(f".{path.name}.new")
     try:
         with open(temporary, "wb") as file:
-            file.write(content)
+            yield file
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
         _sync_names(path.parent)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
         left = "the old content is untouched" if path.parent.is_dir() else "its folder has been removed"
         raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def append_text(path: Path, text: str) -> None:

@@ -6,28 +6,15 @@ shows that a file is unchanged, not that SAND wrote it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import BadInput
 from ..schema import FIELDS
-from ..state.state import (
-    BROKEN,
-    CLOCK,
-    CONTACTS,
-    COUNT,
-    GRAIN1,
-    GRAIN2,
-    LONG_RANGE_SUMS,
-    LOST,
-    MADE,
-    PAIRS,
-    STAGE,
-    STEPS,
-    TIME,
-)
+from ..state.arrays import SAVED_LONG_RANGE
+from ..state.state import CLOCK, CONTACTS, COUNT, GRAIN1, GRAIN2, LOST, PAIRS, STAGE, STEPS, TIME
 
 
 class ArraySpec(NamedTuple):
@@ -39,35 +26,24 @@ class ArraySpec(NamedTuple):
     required: bool = True
 
 
-def _grain_arrays() -> dict[str, ArraySpec]:
-    positive = ("radius", "mass", "inertia")
-    specs = {
-        f"grains/{f.name}": ArraySpec(
-            "f8", ("N",) if f.width == 1 else (f.width, "N"), "above 0" if f.name in positive else "finite"
-        )
-        for f in FIELDS
-    }
-    return specs | {"grains/material": ArraySpec("u4", ("N",), "any"), "grains/id": ArraySpec("u4", ("N",), "order")}
-
-
 STORED = {
     "clock": ArraySpec("f8", (len(CLOCK),), "no nan"),
     "count": ArraySpec("i8", (len(COUNT),), "any"),
     "lost": ArraySpec("f8", (len(LOST),)),
     "order": ArraySpec("u4", ("N",), "order", required=False),
     "ledger": ArraySpec("f8", (None, None)),
-    **_grain_arrays(),
+    **{f"grains/{field.name}": ArraySpec("f8", ("N",) if field.width == 1 else (field.width, "N")) for field in FIELDS},
+    **{f"grains/{name}": ArraySpec("f8", ("N",), "above 0") for name in ("radius", "mass", "inertia")},
+    "grains/material": ArraySpec("u4", ("N",), "any"),
+    "grains/id": ArraySpec("u4", ("N",), "order"),
     "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
-    "contacts/pointer1": ArraySpec("f8", (3, "C")),
-    "contacts/pointer2": ArraySpec("f8", (3, "C")),
-    "contacts/twist": ArraySpec("f8", ("C",)),
-    "contacts/formed": ArraySpec("f8", ("C",)),
+    **{
+        f"contacts/{name}": ArraySpec("f8", (3, "C")) for name in ("pointer1", "pointer2", "force", "torque1", "torque2")
+    },
+    **{f"contacts/{name}": ArraySpec("f8", ("C",)) for name in ("twist", "formed")},
     "contacts/constants": ArraySpec("f8", (None, (1, "C"))),
     "contacts/lost": ArraySpec("f8", ((4, 6), "C")),
     "contacts/damped": ArraySpec("f8", ((0, "C"),)),
-    "contacts/force": ArraySpec("f8", (3, "C")),
-    "contacts/torque1": ArraySpec("f8", (3, "C")),
-    "contacts/torque2": ArraySpec("f8", (3, "C")),
     "contacts/flag": ArraySpec("u1", ("C",), "any"),
     "contacts/every_step": ArraySpec("u1", ("C",), "boolean"),
     "contacts/side": ArraySpec("u4", ("2C",), "order"),
@@ -77,11 +53,8 @@ STORED = {
     "pair_list/step": ArraySpec("f8", ((1, "P"),), "no nan"),
     "pair_list/break_overlap": ArraySpec("f8", ((1, "P"),)),
     "pair_list/anchor": ArraySpec("f8", (3, "N"), "no nan"),
+    **{f"long_range/{name}": ArraySpec("f8", (3, (0, "N"))) for name in SAVED_LONG_RANGE},
     "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
-    **{
-        f"long_range/{name}": ArraySpec("f8", (3, (0, "N")))
-        for name in ("force", "torque", "constant_force", "constant_torque", "past_position", "past_moment", "path")
-    },
 }
 """All arrays of a checkpoint."""
 NUMBERS = {"steps": int, "time": float, "wall_seconds": float, "temperature": float}
@@ -166,18 +139,14 @@ def _check_array(name: str, array: np.ndarray, spec: ArraySpec, sizes: Mapping[s
         raise BadInput(f"{name!r} {message}")
 
 
-def _finite(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    return "" if np.isfinite(array).all() else "holds a number that is not finite"
+def _each(is_allowed: Callable[[np.ndarray], np.ndarray], allowed: str) -> Callable[[np.ndarray, Any], str]:
+    """Rule that each number of an array has to fulfil."""
 
+    def rule(array: np.ndarray, sizes: Mapping[str, int]) -> str:
+        good = is_allowed(array)
+        return "" if good.all() else f"holds {array[~good][0]}: it must be {allowed}"
 
-def _no_nan(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    """Infinities are allowed: steps without a limit, and reference positions before the first list."""
-    return "holds something that is not a number" if np.isnan(array).any() else ""
-
-
-def _above_zero(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    good = np.isfinite(array) & (array > 0.0)
-    return "" if good.all() else f"of grain {int(np.argmin(good))} is {array[np.argmin(good)]:g}: it must be above 0"
+    return rule
 
 
 def _pairs(array: np.ndarray, sizes: Mapping[str, int]) -> str:
@@ -198,19 +167,16 @@ def _starts(array: np.ndarray, sizes: Mapping[str, int]) -> str:
     return "" if good else f"does not grow from 0 to {sizes['2C']}"
 
 
-def _boolean(array: np.ndarray, sizes: Mapping[str, int]) -> str:
-    return "" if (array <= 1).all() else f"holds {int(array.max())}: it must be 0 or 1"
-
-
-RULES = {
+RULES: dict[str, Callable[[np.ndarray, Any], str]] = {
     "any": lambda array, sizes: "",
-    "finite": _finite,
-    "no nan": _no_nan,
-    "above 0": _above_zero,
+    "finite": _each(np.isfinite, "finite"),
+    # infinities are steps without a limit, and reference positions before the first list
+    "no nan": _each(lambda array: ~np.isnan(array), "a number"),
+    "above 0": _each(lambda array: np.isfinite(array) & (array > 0.0), "finite and above 0"),
+    "boolean": _each(lambda array: array <= 1, "0 or 1"),
     "grains": _pairs,
     "order": _order,
     "starts": _starts,
-    "boolean": _boolean,
 }
 """Functions that return what is wrong with the values of an array, or an empty string."""
 
@@ -228,9 +194,6 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
     for index, value in wanted.items():
         if count[index] != value:
             raise BadInput(f"'count' says {COUNT[index]} = {count[index]}, but it must be {value}")
-    for index in (MADE, BROKEN, LONG_RANGE_SUMS):
-        if count[index] < 0:
-            raise BadInput(f"'count' says {COUNT[index]} = {count[index]}: it must not be below 0")
     for index in (GRAIN1, GRAIN2):
         if not -1 <= count[index] < n:
             raise BadInput(f"'count' says {COUNT[index]} = {count[index]}, but the grains are 0 to {n - 1}")

@@ -45,12 +45,8 @@ class GrowingTable:
     def __init__(self, path: Path, columns: Sequence[str], *, resume: bool = False):
         self.path, self.columns = path, list(columns)
         head = ",".join(self.columns)
-        lines: list[str] = []
-        if resume and path.exists():
-            text = read_text(path).split("\n")[:-1]
-            if text and text[0] != head:
-                raise BadInput(f"{path} does not have the columns of this job; give another folder")
-            lines = [line for line in text[1:] if line.count(",") == head.count(",")]
+        found = _lines(path, head, "does not have the columns of this job; give another folder") if resume else []
+        lines = [line for line in found if line.count(",") == head.count(",")]
         try:
             self.rows = [[float(part) for part in line.split(",")] for line in lines]
         except ValueError:
@@ -91,21 +87,28 @@ class GrowingOutcomes:
     def __init__(self, path: Path, case: dict[str, Any], *, resume: bool = False):
         self.path = path
         head = json.dumps({"case": case}, sort_keys=True)
-        lines = read_text(path).split("\n")[:-1] if resume and path.exists() else []
-        if lines and lines[0] != head:
-            raise BadInput(f"{path} holds outcomes of another case; restore the case, or use another folder")
+        problem = "holds outcomes of another case; restore the case, or use another folder"
+        lines = _lines(path, head, problem) if resume else []
         self.found: dict[int, dict[str, Any]] = {}
-        for line in lines[1:]:
+        for line in lines:
             try:
                 entry = json.loads(line)
                 self.found[int(entry["seed"])] = dict(entry["outcome"])
             except (ValueError, TypeError, KeyError, RecursionError):
                 raise BadInput(f"{path} is not a list of outcomes; remove it, and they are computed again") from None
-        replace_file(path, "".join(line + "\n" for line in [head, *lines[1:]]).encode())
+        replace_file(path, "".join(line + "\n" for line in [head, *lines]).encode())
 
     def add(self, seed: int, outcome: dict[str, Any]) -> None:
         """Append one outcome; its numbers are stored to full precision.  Raises FilesFailed."""
         append_text(self.path, json.dumps({"seed": seed, "outcome": outcome}) + "\n")
+
+
+def _lines(path: Path, head: str, problem: str) -> list[str]:
+    """Complete lines of a file after its first one, `head`; none without a file.  Raises BadInput with `problem`."""
+    lines = read_text(path).split("\n")[:-1] if path.exists() else []
+    if lines and lines[0] != head:
+        raise BadInput(f"{path} {problem}")
+    return lines[1:]
 
 
 def _shortest(value: float) -> str:

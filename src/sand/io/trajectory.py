@@ -263,8 +263,5 @@ class Frames(FrameSequence):
 
 def read_frames(path: str | Path) -> list[Frame]:
     """Read all frames of a trajectory.  Raises BadInput for a missing or foreign file."""
-    frames = Frames(path)
-    try:
+    with contextlib.closing(Frames(path)) as frames:
         return list(frames)
-    finally:
-        frames.close()

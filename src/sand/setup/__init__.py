@@ -2,13 +2,12 @@
 
 from ..neighbours.spatial_sort import in_space_order
 from .aggregates import KINDS, build, chain, grain, hexagonal, lattice
-from .ballistic import bcca, bpca
 from .deposit import rbd
-from .diffusion import dla, dlca
 from .encounters import Encounter, encounter, turned, turned_at_random
 from .fractal import fractal
 from .from_frame import Start, StrainedContacts, from_frame
 from .gas import gas
+from .growing import bcca, bpca, dla, dlca
 from .moments import magnetic_energy, relaxed
 from .population import Lognormal, PowerLaw
 

@@ -13,10 +13,9 @@ from ..errors import BadInput, did_you_mean, shown
 from ..grains import Grains
 from ..material import PRESETS, Material, as_material
 from ..units import si
-from .ballistic import bcca, bpca
 from .deposit import rbd
-from .diffusion import dla, dlca
 from .fractal import fractal
+from .growing import bcca, bpca, dla, dlca
 from .moments import assign_moments, magnetic_fraction
 from .population import (
     RandomStreams,

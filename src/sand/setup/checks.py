@@ -6,7 +6,7 @@ import numpy as np
 
 from ..box import Box
 from ..errors import BadInput
-from ..grains import ROUNDING, Grains
+from ..grains import Grains
 from .population import grain_set_of, rest_distances
 
 MOST_OVERLAP = (2.0, 1e-3)
@@ -35,23 +35,15 @@ def check_body(body: Grains, origin: str) -> None:
     BadInput
         One line for each of the first ten such grains or pairs.
     """
-    problems = _overlaps(body) or _gaps(body)
+    pairs, overlap = body.touching(Box.open())
+    problems = _overlaps(body, pairs, overlap) or _gaps(body, pairs)
     if problems:
         more = len(problems) - MOST_MESSAGES
         listed = problems if more <= 0 else [*problems[:MOST_MESSAGES], f"… and {more} more"]
         raise BadInput(f"{origin}: {problem}" for problem in listed)
 
 
-def _pairs(body: Grains) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of grains in contact (P, 2), and their overlaps [m]."""
-    pairs = Box.open().close_pairs(body.position, 2.0 * float(body.radius.max()) * (1.0 + ROUNDING))
-    overlap = body.overlaps(pairs, Box.open())
-    touching = overlap >= -ROUNDING * body.radius[pairs].sum(axis=1)
-    return pairs[touching], overlap[touching]
-
-
-def _overlaps(body: Grains) -> list[str]:
-    pairs, overlap = _pairs(body)
+def _overlaps(body: Grains, pairs: np.ndarray, overlap: np.ndarray) -> list[str]:
     grain_set = grain_set_of(body.radius, [body.materials[k] for k in body.material])
     touch = body.radius[pairs].sum(axis=1)
     rest = touch - rest_distances(grain_set, pairs[:, 0], pairs[:, 1])
@@ -63,12 +55,12 @@ def _overlaps(body: Grains) -> list[str]:
     ]
 
 
-def _gaps(body: Grains) -> list[str]:
+def _gaps(body: Grains, pairs: np.ndarray) -> list[str]:
     """Messages about grains outside the largest cluster, with their nearest neighbour in it."""
     from scipy.spatial import cKDTree  # slow to import, and used for bodies from files only
 
     main = np.zeros(len(body), dtype=bool)
-    main[largest_cluster(_pairs(body)[0], len(body))] = True
+    main[largest_cluster(pairs, len(body))] = True
     outside = np.flatnonzero(~main)
     if not len(outside):
         return []

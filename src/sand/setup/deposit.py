@@ -16,7 +16,7 @@ from ..grains import Grains
 from ..material import Material
 from ._kernels.deposition import deposit
 from .checks import largest_cluster
-from .growing import CELL, TRIES, empty_hash_grid, require_all_placed
+from .growing import CELL, empty_hash_grid, require_all_placed
 from .moments import assign_moments
 from .population import (
     Lognormal,
@@ -72,7 +72,7 @@ def rbd(
         heap, side = _deposit_grains(count, distribution, material, rng.population, spare)
         columns = max(3, int(side / (CELL * heap.grain_set.largest)))
         position, grid = np.zeros((3, len(heap.radius))), empty_hash_grid(heap.grain_set, side / columns)
-        done = deposit(grid, position, heap.grain_set, side, columns, rng.positions, TRIES)
+        done = deposit(grid, position, heap.grain_set, side, columns, rng.positions)
         require_all_placed(done, len(heap.radius), f"grain {done} of the deposit")
         kept = cut_sphere(position.T, heap.radius, count)
         if len(kept):

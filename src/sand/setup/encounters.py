@@ -123,9 +123,8 @@ def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities:
 
 def _direction(along: Any) -> np.ndarray:
     named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    vector = np.asarray(named.get(along, along) if isinstance(along, str) else along, dtype=object)
     try:
-        vector = vector.astype(np.float64)
+        vector = np.asarray(named.get(along, along) if isinstance(along, str) else along, dtype=np.float64)
     except (TypeError, ValueError):
         vector = np.zeros(0)
     if vector.shape != (3,) or not np.linalg.norm(vector) > 0.0 or not np.isfinite(vector).all():

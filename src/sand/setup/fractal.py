@@ -12,13 +12,10 @@ from ..arguments import checked
 from ..errors import BadInput
 from ..grains import Grains
 from ..units import si
-from .ballistic import merge_clusters
-from .growing import halves
-from .moments import assign_moments
-from .population import Population, centred_grains, grain_count, population, random_streams
+from ._kernels.cluster_cluster import CHOICES
+from .growing import aggregate, halves, merge_clusters
+from .population import Population
 
-CHOICES = 100
-"""Number of collisions of each pair of clusters from which one is chosen."""
 DENSEST = 0.64
 """Filling factor of random close packing, an upper limit for aggregates."""
 LEAST, MOST = 1.3, 2.4
@@ -65,18 +62,19 @@ def fractal(
     ----------
     Filippov, Zurita & Rosner (2000), J. Colloid Interface Sci. 229, 261.
     """
-    count, rng = grain_count(grains, "grains of an aggregate"), random_streams(seed)
     power, factor = si(dimension, "1", "dimension"), si(prefactor, "1", "prefactor", above=0.0)
-    sample = population(count, radius, material, rng.population)
-    unit = float(sample.radius.mean())
-    check_feasible(sample, power, factor)
-    plan = _merge_order(count)
-    sizes = np.array([last - first for first, _, last in plan])
-    goals = unit * (np.maximum(sizes, 2) / factor) ** (1.0 / power)
-    position = merge_clusters(sample, plan, goals, rng.positions, CHOICES)
-    if count > MIN_CLUSTER:
-        _check_size(position, sample, goals[-1])
-    return assign_moments(centred_grains(position, sample), moment, moments, magnetic, rng.moments)
+
+    def place(sample: Population, seed: np.uint64) -> np.ndarray:
+        check_feasible(sample, power, factor)
+        plan = _merge_order(len(sample.radius))
+        sizes = np.array([last - first for first, _, last in plan])
+        goals = float(sample.radius.mean()) * (np.maximum(sizes, 2) / factor) ** (1.0 / power)
+        position = merge_clusters(sample, plan, goals, seed)
+        if len(position) > MIN_CLUSTER:
+            _check_size(position, sample, goals[-1])
+        return position
+
+    return aggregate(place, grains, radius, material, moment, moments, magnetic, seed)
 
 
 def _merge_order(count: int) -> list[tuple[int, int, int]]:

@@ -39,6 +39,11 @@ class Lognormal:
         Standard deviation of ln r, 0 < σ ≤ 2.
     least, most : float or str, optional
         Range of the radii [m], 3 σ from the median by default, which excludes 0.27 % of the distribution.
+
+    Raises
+    ------
+    BadInput
+        If a number is invalid.
     """
 
     median: Any
@@ -46,30 +51,29 @@ class Lognormal:
     least: Any = None
     most: Any = None
 
-    def bounds(self) -> tuple[float, float]:
-        """Smallest and largest radius [m]. Raises BadInput."""
-        middle, spread = si(self.median, "m", "median of the radii", above=0.0), self._spread()
-        least = middle * math.exp(-3.0 * spread) if self.least is None else self.least
-        most = middle * math.exp(3.0 * spread) if self.most is None else self.most
-        return _bounds(least, most)
-
-    def _spread(self) -> float:
-        spread = si(self.sigma, "1", "sigma of the radii", above=0.0)
-        if spread > 2.0:
+    def __post_init__(self) -> None:
+        median = si(self.median, "m", "median of the radii", above=0.0)
+        sigma = si(self.sigma, "1", "sigma of the radii", above=0.0)
+        if sigma > 2.0:
             raise BadInput(f"sigma of the radii = {self.sigma!r} must not exceed 2")
-        return spread
+        least = median * math.exp(-3.0 * sigma) if self.least is None else self.least
+        most = median * math.exp(3.0 * sigma) if self.most is None else self.most
+        _set(self, median=median, sigma=sigma, **_bounds(least, most))
+
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest radius [m]."""
+        return self.least, self.most
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Draw radii (count,) [m] by inversion. Raises BadInput."""
         from scipy.special import ndtr, ndtri
 
-        (least, most), spread = self.bounds(), self._spread()
-        middle = math.log(si(self.median, "m", "median of the radii", above=0.0))
-        low, high = (float(ndtr((math.log(v) - middle) / spread)) for v in (least, most))
+        middle = math.log(self.median)
+        low, high = (float(ndtr((math.log(v) - middle) / self.sigma)) for v in (self.least, self.most))
         if high - low < 1e-12:
             raise BadInput("radii: less than 1e-12 of this lognormal distribution lies between least and most")
-        drawn = np.exp(middle + spread * ndtri(low + (high - low) * rng.random(count)))
-        return np.clip(drawn, least, most)
+        drawn = np.exp(middle + self.sigma * ndtri(low + (high - low) * rng.random(count)))
+        return np.clip(drawn, self.least, self.most)
 
 
 @checked
@@ -83,33 +87,49 @@ class PowerLaw:
         For example −3.5 (Mathis, Rumpl & Nordsieck 1977).
     least, most : float or str
         Range [m], with a ratio of at most 200.
+
+    Raises
+    ------
+    BadInput
+        If a number is invalid.
     """
 
     exponent: Any
     least: Any
     most: Any
 
+    def __post_init__(self) -> None:
+        exponent = si(self.exponent, "1", "exponent of the radii")
+        if abs(exponent + 1.0) > 100.0:
+            raise BadInput(f"exponent of the radii = {self.exponent!r} must lie within ±100")
+        _set(self, exponent=exponent, **_bounds(self.least, self.most))
+
     def bounds(self) -> tuple[float, float]:
-        """Smallest and largest radius [m]. Raises BadInput."""
-        return _bounds(self.least, self.most)
+        """Smallest and largest radius [m]."""
+        return self.least, self.most
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Draw radii (count,) [m] by inversion. Raises BadInput."""
-        (least, most), power = self.bounds(), si(self.exponent, "1", "exponent of the radii") + 1.0
-        if abs(power) > 100.0:
-            raise BadInput(f"exponent of the radii = {self.exponent!r} must lie within ±100")
-        u, ratio = rng.random(count), math.log(most / least)
+        """Draw radii (count,) [m] by inversion."""
+        power, u, ratio = self.exponent + 1.0, rng.random(count), math.log(self.most / self.least)
         if abs(power * ratio) < 1e-9:
-            return least * np.exp(u * ratio)
-        return np.clip(least * np.exp(np.log1p(u * math.expm1(power * ratio)) / power), least, most)
+            return self.least * np.exp(u * ratio)
+        drawn = self.least * np.exp(np.log1p(u * math.expm1(power * ratio)) / power)
+        return np.clip(drawn, self.least, self.most)
 
 
-def _bounds(least: Any, most: Any) -> tuple[float, float]:
+def _set(law: Lognormal | PowerLaw, **numbers: float) -> None:
+    """Replace the given values of a frozen object by SI numbers."""
+    for name, number in numbers.items():
+        object.__setattr__(law, name, number)
+
+
+def _bounds(least: Any, most: Any) -> dict[str, float]:
+    """Smallest and largest radius [m]. Raises BadInput."""
     low, high = (si(v, "m", f"{n} of the radii", above=0.0) for v, n in ((least, "least"), (most, "most")))
     if not low < high:
         raise BadInput(f"radii: least = {format_quantity(low, 'm')} must be below most = {format_quantity(high, 'm')}")
     _refuse_wide(low, high)
-    return low, high
+    return {"least": low, "most": high}
 
 
 def _refuse_wide(low: float, high: float) -> None:
@@ -137,16 +157,13 @@ def radii_of(given: Any) -> Any:
         If it is none of these.
     """
     if isinstance(given, (Lognormal, PowerLaw)):
-        given.bounds()
         return given
     match = re.fullmatch(r"\s*(lognormal|power law)\s*\((.*)\)\s*", given) if isinstance(given, str) else None
     if match:
         words = [word.strip() for word in match.group(2).split(",")]
         if not (2 <= len(words) <= 4 if match.group(1) == "lognormal" else len(words) == 3):
             raise BadInput(f"radius = {given!r} has the wrong number of arguments; give {FORMS}")
-        law: Any = (Lognormal if match.group(1) == "lognormal" else PowerLaw)(*words)
-        law.bounds()
-        return law
+        return (Lognormal if match.group(1) == "lognormal" else PowerLaw)(*words)
     values = in_unit(given, "m")
     if values is None:
         raise BadInput(f"radius = {shown(given)} is not a radius or a distribution; give {FORMS}")

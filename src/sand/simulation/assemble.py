@@ -10,7 +10,6 @@ from ..box import Box
 from ..compiler.jit import is_builtin
 from ..contact.columns import constant_names
 from ..contact.model import Contact
-from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
@@ -38,7 +37,7 @@ from ..state.arrays import (
     stage_arrays,
 )
 from ..state.state import RECORDED, State
-from .checks import find_errors, find_warnings
+from .checks import check_system
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 
@@ -94,7 +93,7 @@ def build_engine(
     BadInput
         If something does not fit; all problems at once.
     """
-    warnings = _check_system(grains, forces, box, fresh=fresh)
+    warnings = check_system(grains, forces, box, fresh=fresh)
     by_type = _forces_by_type(forces, grains)
     pair_gap = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
@@ -232,26 +231,6 @@ def _gas_settings(gas: Sequence[Gas], grains: Grains, seed: int) -> GasSettings:
     if not gas:
         return GasSettings(math.inf, seed, VACUUM)
     return GasSettings(GAS_PERIOD_FRACTION * gas[0].shortest_time(grains), seed, gas[0].numbers())
-
-
-def _check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
-    """Check that grains, forces and box fit together; returns warnings, raises BadInput with all problems."""
-    problems = find_errors(grains, forces, box) if fresh else []
-    warnings: list[str] = []
-    for force in forces:
-        try:
-            warnings += force.check(grains, box)
-        except BadInput as error:
-            problems += error.problems
-    least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
-    if box.shortest < least:
-        problems.append(
-            f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
-            "so that a grain interacts with only one image of each neighbour"
-        )
-    if problems:
-        raise BadInput(problems)
-    return warnings + (find_warnings(grains, forces, box) if fresh else [])
 
 
 def _step_control(grains: Grains, stepping: Verlet, forces: ForcesByType, pair_gap: float) -> StepCriteria:

@@ -1,4 +1,4 @@
-"""Checks of grains, forces and box at a new start: impossible combinations are errors, unusual ones are warnings."""
+"""Checks of grains, forces and box: impossible combinations are errors, unusual ones are warnings."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 
 from ..box import Box
 from ..contact.model import Contact
+from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
-from ..units import format_quantity, is_word
+from ..units import format_quantity
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
@@ -22,13 +23,44 @@ OVERLAP_TOLERANCE = 1e-3
 """Overlap, in radii of the smaller grain, that counts as rounding where there is no contact law."""
 
 
-def find_errors(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Error messages: grains outside a periodic box, and cut-offs smaller than a grain."""
-    return [*_outside_box(grains, box), *_short_cutoffs(grains, forces, box)]
+def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bool) -> list[str]:
+    """Check that grains, forces and box fit together.
+
+    Parameters
+    ----------
+    fresh : bool
+        Whether this is a new start, of which more is checked.
+
+    Returns
+    -------
+    list[str]
+        Warnings.
+
+    Raises
+    ------
+    BadInput
+        With all problems.
+    """
+    problems = [*_outside_box(grains, box), *_short_cutoffs(grains, forces, box)] if fresh else []
+    warnings: list[str] = []
+    for force in forces:
+        try:
+            warnings += force.check(grains, box)
+        except BadInput as error:
+            problems += error.problems
+    least = 2.0 * (2.0 * float(grains.radius.max()) + float(grains.radius.min()))
+    if box.shortest < least:
+        problems.append(
+            f"box = {box.describe()} is too small: its shortest side must be at least {least:.3g} m, "
+            "so that a grain interacts with only one image of each neighbour"
+        )
+    if problems:
+        raise BadInput(problems)
+    return warnings + (_start_warnings(grains, forces, box) if fresh else [])
 
 
-def find_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Warnings: very large grains, and overlaps without a contact law."""
+def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
+    """Warnings about very large grains, and about overlaps without a contact law."""
     warnings = []
     contact = any(isinstance(force, Contact) for force in forces)
     largest = int(np.argmax(grains.radius))
@@ -63,12 +95,7 @@ def _short_cutoffs(grains: Grains, forces: Sequence[Force], box: Box) -> list[st
     problems = []
     for force in forces:
         cutoff = getattr(force, "cutoff", None)
-        if (
-            isinstance(force, LongRangeForce)
-            and cutoff is not None
-            and not is_word(cutoff, "auto")
-            and cutoff < diameter
-        ):
+        if isinstance(force, LongRangeForce) and isinstance(cutoff, float) and cutoff < diameter:
             problems.append(
                 f"{force.name}: cutoff = {format_quantity(cutoff, 'm')} ends within a grain, whose diameter is "
                 f"{format_quantity(diameter, 'm')}; give a longer one, or 'auto'"
@@ -91,14 +118,10 @@ def _overlaps(grains: Grains, box: Box) -> list[str]:
 
 def _nearest(grains: Grains, box: Box) -> np.ndarray:
     """Pairs (P, 2) of each grain with its nearest neighbours only: all overlapping pairs might be too many."""
-    from scipy.spatial import cKDTree  # slow to import
-
     count = len(grains)
     if count == 1:
         return np.zeros((0, 2), np.int64)
-    lengths = np.array([0.0 if v is None else v for v in box.lengths])
-    folded = np.where(lengths > 0.0, np.mod(grains.position, np.where(lengths > 0.0, lengths, 1.0)), grains.position)
-    folded = np.where((lengths > 0.0) & (folded >= lengths), 0.0, folded)
-    _, others = cKDTree(folded, boxsize=lengths).query(folded, min(count, NEAREST))
+    tree = box.tree(grains.position)
+    _, others = tree.query(tree.data, min(count, NEAREST))
     pairs = np.stack([np.repeat(np.arange(count), others.shape[1]), others.ravel()], axis=1)
     return np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,15 @@ COLUMNS = (
 """Name, unit and meaning of every column."""
 
 
-class ContactTable(Mapping[str, np.ndarray]):
+class Columns(dict[str, np.ndarray]):
+    """Columns by name; an unknown name is refused with a suggestion."""
+
+    def __missing__(self, name: Any) -> np.ndarray:
+        """Raise BadInput, which is also a KeyError."""
+        raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self))}")
+
+
+class ContactTable(Columns):
     """A snapshot of all contacts: one row per contact, columns by name (`COLUMNS`), such as `table["roll_share"]`.
 
     Columns have shape (C,), `pair` (C, 2) and vectors (C, 3), in the laboratory frame.
@@ -38,28 +45,13 @@ class ContactTable(Mapping[str, np.ndarray]):
         names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
         rows = np.zeros((scalars + 3 * len(names), used))
         contacts_kernel(law)(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
-        self._columns: dict[str, np.ndarray] = {
-            "pair": contacts.pair[:, :used].T.copy(),
-            "formed": contacts.formed[:used].copy(),
-        }
-        self._columns |= {name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)}
+        self["pair"], self["formed"] = contacts.pair[:, :used].T.copy(), contacts.formed[:used].copy()
+        self.update({name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)})
         vectors = rows[scalars:].reshape(len(names), 3, used)
-        self._columns |= {name: vectors[k].T.copy() for k, name in enumerate(names)}
+        self.update({name: vectors[k].T.copy() for k, name in enumerate(names)})
         for k, name in enumerate(RECORDED):
             is_recorded = k < len(contacts.lost)
-            self._columns[f"lost_{name}"] = contacts.lost[k, :used].copy() if is_recorded else np.zeros(used)
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self._columns:
-            raise NoSuchKey(f"there is no column {shown(name)}; {did_you_mean(str(name), list(self._columns))}")
-        return self._columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        """Number of columns; the number of contacts is `len(table["pair"])`."""
-        return len(self._columns)
+            self[f"lost_{name}"] = contacts.lost[k, :used].copy() if is_recorded else np.zeros(used)
 
     def __repr__(self) -> str:
         return f"<{len(self['pair'])} contacts: {', '.join(self)}>"

@@ -11,22 +11,5 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-_DISPLAYS: dict[str, Callable[..., Any]] = {}
-
-
-def register_display(name: str, function: Callable[..., Any]) -> None:
-    """Register a display, replacing an earlier one of the same name.
-
-    Parameters
-    ----------
-    name : str
-        One of "figure" (simulation) → figure, "save figure" (simulation, path) and "view" (simulation, path).
-    function : Callable[..., Any]
-        Called with the simulation as first argument.
-    """
-    _DISPLAYS[name] = function
-
-
-def display(name: str, *arguments: Any) -> Any:
-    """Call a registered display."""
-    return _DISPLAYS[name](*arguments)
+DISPLAYS: dict[str, Callable[..., Any]] = {}
+"""Displays by name: "figure" (simulation) → figure, "save figure" (simulation, path) and "view" (simulation, path)."""

@@ -30,8 +30,7 @@ NO_OVERLAPS = OverlappingPairs(np.zeros((0, 2), np.int64), np.zeros(0))
 
 def overlapping_pairs(grains: Grains, box: Box) -> OverlappingPairs:
     """All pairs of grains that overlap."""
-    pair = box.close_pairs(grains.position, 2.0 * float(grains.radius.max()))
-    overlap = grains.overlaps(pair, box)
+    pair, overlap = grains.touching(box)
     return OverlappingPairs(pair[overlap > 0.0], overlap[overlap > 0.0])
 
 

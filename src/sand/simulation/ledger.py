@@ -111,7 +111,7 @@ class Ledger(LedgerColumns):
 
     def from_array(self, table: np.ndarray, columns: Sequence[str]) -> None:
         """Restore the rows from the array of `to_array`; raises BadInput if it has other columns."""
-        if table.ndim != 2 or table.shape[1] != len(columns) or set(columns) != set(self.columns):
+        if set(columns) != set(self.columns):
             raise BadInput(
                 f"the ledger in the checkpoint has columns {', '.join(columns)}, not {', '.join(self.columns)}"
             )

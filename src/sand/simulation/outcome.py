@@ -26,13 +26,7 @@ class Outcome(Enum):
         return self not in (Outcome.FINISHED, Outcome.INTERRUPTED)
 
 
-OUTCOME_OF_STOP = {
-    Stop.NOT_FINITE: Outcome.NOT_FINITE,
-    Stop.NO_STEP: Outcome.NO_STEP,
-    Stop.TOO_FAST: Outcome.TOO_FAST,
-    Stop.SPINS_TOO_FAST: Outcome.SPINS_TOO_FAST,
-    Stop.OVERCOMPRESSED: Outcome.OVERCOMPRESSED,
-}
+OUTCOME_OF_STOP = {stop: Outcome[stop.name] for stop in Stop if stop.name in Outcome.__members__}
 
 
 @dataclass(frozen=True)

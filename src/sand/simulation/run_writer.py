@@ -21,7 +21,7 @@ from ..io.run_folder import make_folder, plain, read_json, write_json, write_tom
 from ..io.trajectory import TrajectoryWriter
 from ..state.state import CLOCK, COUNT, LOST, STAGE
 from ..version import __version__
-from .displays import display
+from .displays import DISPLAYS
 from .ledger import Ledger
 from .outcome import Outcome, Result
 from .serialise import case_of
@@ -62,7 +62,7 @@ class RunWriter:
         self._ends = (math.inf, math.inf)
         self._case: dict[str, Any] = {}
         self._lock: FolderLock | None = None
-        self._known = self._on_disk() if resumed else {}
+        self._own: tuple[str, int] | None = None  # the last checkpoint that this simulation wrote
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
         """Create the files or continue them; called by each `run` with its stop criteria.
@@ -74,13 +74,8 @@ class RunWriter:
         FilesFailed
             If a file cannot be written.
         """
-        lock = FolderLock(self.folder)
-        try:
-            self._refuse_others_files(simulation.steps)
-        except BadInput:
-            lock.release()
-            raise
-        self._lock = lock
+        self._lock = FolderLock(self.folder)
+        self._refuse_others_files(simulation.steps)
         if (until, last_step) != self._ends:
             self._ends = (until, last_step)
             self._case = case_of(simulation, until, last_step)
@@ -102,26 +97,20 @@ class RunWriter:
     def release(self) -> None:
         """Release the lock of the folder; `open` takes it again."""
         if self._lock is not None:
-            self._known = self._on_disk()
             self._lock.release()
             self._lock = None
 
-    def _on_disk(self) -> dict[str, tuple[int, int]]:
-        """Size and modification time of each checkpoint, to recognise those of other runs."""
-        found = {}
-        for path in self.folder.glob("checkpoint-*.npz"):
-            with contextlib.suppress(OSError):
-                found[path.name] = (path.stat().st_size, path.stat().st_mtime_ns)
-        return found
-
     def _refuse_others_files(self, steps: int) -> None:
         """Raise BadInput if the folder holds files that this simulation, at step `steps`, did not write."""
-        found, first = self._on_disk(), self._trajectory is None
-        begun = self._resumed or not first
-        strange = any(self._known.get(name) != seen for name, seen in found.items())
-        if first and self._resumed:  # another process may have continued the run since the checkpoint was read
-            strange |= bool(found) and max(found) != checkpoint_name(steps)
-        if strange or (not begun and (self.folder / files.TRAJECTORY).exists()):
+        begun = self._resumed or self._trajectory is not None
+        newest = max(self.folder.glob("checkpoint-*.npz"), default=None)
+        if newest is None:
+            strange = not begun and (self.folder / files.TRAJECTORY).exists()
+        elif self._own is None and self._resumed:  # another process may have continued the run since it was read
+            strange = newest.name != checkpoint_name(steps)
+        else:
+            strange = _stamp(newest) != self._own
+        if strange:
             advice = "continue its run with sand.resume" if begun else "give another folder"
             raise BadInput(f"another run has written to {self.folder} since this simulation was created; {advice}")
 
@@ -179,7 +168,7 @@ class RunWriter:
         }
         if simulation.is_sound:
             arrays = {**simulation.state.to_arrays(), "ledger": simulation.ledger.to_array()}
-            write_checkpoint(self.folder, arrays, meta)
+            self._own = _stamp(write_checkpoint(self.folder, arrays, meta))
         self._saved = wall.monotonic()
         self._took = self._saved - begun
 
@@ -207,7 +196,12 @@ class RunWriter:
     def draw(self, simulation: Simulation) -> None:
         """Draw the figure of the run so far."""
         if simulation.ledger.rows:
-            display("save figure", simulation, self.folder / files.FIGURE)
+            DISPLAYS["save figure"](simulation, self.folder / files.FIGURE)
+
+
+def _stamp(path: Path) -> tuple[str, int]:
+    """Name and modification time [ns] of a file, to recognise files of other runs."""
+    return path.name, path.stat().st_mtime_ns
 
 
 def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[str, Any]:
@@ -222,12 +216,8 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "steps": result.steps,
         "grains": len(simulation.grains),
         "contacts": last["contacts"],
-        "contacts_made": last["made"],
-        "contacts_moved": last["moved"],
-        "contacts_broken": last["broken"],
-        "clusters": last["clusters"],
-        "mean_cluster_size": last["mean_cluster_size"],
-        "largest_cluster": last["largest_cluster"],
+        **{f"contacts_{name}": last[name] for name in ("made", "moved", "broken")},
+        **{name: last[name] for name in ("clusters", "mean_cluster_size", "largest_cluster")},
         "dissipated": ledger.dissipated,
         "drift": result.drift,
         "drift_per_kT": ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),

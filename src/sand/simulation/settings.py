@@ -44,25 +44,13 @@ def read_observers(value: Any) -> list[Observer]:
     return observers
 
 
-class FixedList(tuple):
-    """A tuple that refuses the methods of a list with an explanation."""
-
-    def __getattr__(self, name: str) -> Any:
-        if hasattr(list, name):
-            self.__setitem__()
-        raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
-
-    def __setitem__(self, *_: Any) -> None:
-        raise NoSuchAttribute(f"the forces of a simulation cannot change; {_rebuild('forces')}")
-
-
-def read_forces(value: Any) -> FixedList:
+def read_forces(value: Any) -> tuple[Force, ...]:
     """Check forces given as a list, a single force or None.  Raises BadInput."""
     if isinstance(value, (type, Force)):
         value = [value]
     if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable | None):
         raise BadInput(f"forces = {shown(value)}; give a list such as [sand.Contact()]")
-    forces = FixedList(() if value is None else value)
+    forces = tuple(() if value is None else value)
     problems = []
     for force in forces:
         if isinstance(force, type):

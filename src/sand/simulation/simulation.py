@@ -25,7 +25,7 @@ from ..state.state import State
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
 from .contact_table import ContactTable
-from .displays import display
+from .displays import DISPLAYS
 from .ledger import Ledger, kinetic_energies, log_row
 from .observers import Observer, Schedule, call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome, Result
@@ -123,9 +123,8 @@ class Simulation(ReadOnlySettings):
             arrays, meta = restart
             self._engine.load_state(arrays)
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
-            self._choices_at_start = meta.get("choices", {})
-            if "ledger" in arrays:
-                self.ledger.from_array(arrays["ledger"], meta["ledger"])
+            self._choices_at_start = meta["choices"]
+            self.ledger.from_array(arrays["ledger"], meta["ledger"])
         for text in self._engine.warnings:
             warn(text)
         self._built = True
@@ -291,12 +290,12 @@ class Simulation(ReadOnlySettings):
             The widget, or the path of the page; where the installation lacks the page, the figure, with a warning.
         """
         self._begin()
-        return display("view", self, path)
+        return DISPLAYS["view"](self, path)
 
     def figure(self) -> Any:
         """Draw the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
         self._begin()
-        return display("figure", self)
+        return DISPLAYS["figure"](self)
 
     def _begin(self) -> None:
         if not self._has_begun:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..arguments import MOST_STEPS
 from ..errors import BadInput, shown
-from ..units import si
+from ..units import si, whole_number
 
 SHORTEST_DURATION = 1e-21
 """Shortest accepted time span [s]; light travels less than a picometre in it."""
@@ -60,7 +58,7 @@ def stop_criteria(until: Any, steps: int | None, time: float, step: int, planned
     end = math.inf if until is None else si(until, "s", "until")
     if 0.0 < end < SHORTEST_DURATION:
         duration(until, "until")
-    last = math.inf if steps is None else step + _positive_integer(steps)
+    last = math.inf if steps is None else step + whole_number(steps, "steps")
     if until is None and steps is None:
         end, last = planned
     if end == last == math.inf:
@@ -70,9 +68,3 @@ def stop_criteria(until: Any, steps: int | None, time: float, step: int, planned
     if until is not None and end < time:
         raise BadInput(f"until = {until!r} lies before the present time, {time:.6g} s")
     return StopCriteria(end, last)
-
-
-def _positive_integer(steps: Any) -> int:
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise BadInput(f"steps = {shown(steps)} must be a whole number of at least 1")
-    return int(steps)

@@ -15,8 +15,8 @@ from typing import Any
 
 from ..analysis.fractal import FEWEST
 from ..errors import BadInput
-from ..io.page_bundle import Written, read_bundle
-from ..io.run_folder import plain
+from ..io.page_bundle import read_bundle
+from ..io.run_folder import plain, replacing
 from .dataset import RunDataset
 from .dimensions import Dimensions
 
@@ -100,8 +100,8 @@ def write_page(
     dataset.compact = True
     count, dimensions, stride = len(dataset), [], _dimension_stride(dataset)
     largest_clusters = Dimensions()
-    with Written(path) as file:
-        file.write(_head(page_title(dataset), head, f"<p>{LOADING}</p>"))
+    with replacing(Path(path)) as file:
+        file.write(_head(page_title(dataset), head, f"<p>{LOADING}</p>").encode())
         file.write(_packet_element("sand-grains", dataset.grains()))
         for k in range(count):
             frame, names = dataset.read(k)
@@ -113,10 +113,10 @@ def write_page(
         if stride > 1 and any(dimensions):
             note = f"fractal dimensions of one frame of {stride}"
             manifest["note"] = "; ".join(filter(None, (manifest["note"], note)))
-        file.write(_json_element("sand-manifest", manifest))
-        file.write(_json_element("sand-series", dataset.series()))
-        file.write(f'<script type="module">{script}</script>\n{_FOOT}')
-    return file.size
+        file.write(_json_element("sand-manifest", manifest).encode())
+        file.write(_json_element("sand-series", dataset.series()).encode())
+        file.write(f'<script type="module">{script}</script>\n{_FOOT}'.encode())
+        return file.tell()
 
 
 def _dimension_stride(dataset: RunDataset) -> int:

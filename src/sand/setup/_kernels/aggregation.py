@@ -11,7 +11,7 @@ from ...numerics.random import normal_pair, random_words, uniform
 from ...numerics.vec import across, add, axpy, dot, load, norm, put, scale, sub
 from .hash_grid import (
     EMPTY,
-    clear,
+    TRIES,
     empty_distance,
     gap_to_nearest,
     head_of_neighbour_cell,
@@ -95,37 +95,31 @@ def try_place(grid, position, grain_set, b, x, neighbour):
 
 
 @kernel
-def grow_ballistic(grid, position, grain_set, first, last, extent, seed, tries):
-    """Add grains first … last − 1 one by one along random straight lines; each stays at its first contact.
+def grow_ballistic(grid, position, grain_set, seed):
+    """Grow an aggregate around grain 0 at the origin: grains arrive on random straight lines, stay at first contact.
 
     Parameters
     ----------
     grid : HashGrid
-        Contains the grains before `first`.
+        An empty grid.
     position : ndarray
-        (3, N) [m], modified.
+        (3, N) [m], zeros; modified.
     grain_set : GrainSet
         Properties of the grains.
-    first, last : int
-        Range of the grains to add.
-    extent : float
-        Outer radius of the aggregate about the origin [m].
     seed : int
         Seed of the random numbers.
-    tries : int
-        Largest number of attempts per grain.
 
     Returns
     -------
-    done : int
-        First grain that was not placed: `last`, or less if a grain found no single contact in `tries` attempts.
-    extent : float
-        New outer radius [m].
+    int
+        Number of grains placed; less than N if a grain found no single contact in `TRIES` attempts.
     """
-    for b in range(first, last):
+    insert_grain(grid, 0, (0.0, 0.0, 0.0))
+    extent = grain_set.radius[0]
+    for b in range(1, grain_set.radius.size):
         size = extent + grain_set.radius[b]
         placed = False
-        for number in range(tries):
+        for number in range(TRIES):
             u, _ = random_direction(seed, number, b, DIRECTION)
             offset = scale(size, random_point_on_disc(seed, number, b, u))
             back = math.sqrt(max(size * size - dot(offset, offset), 0.0))
@@ -137,8 +131,8 @@ def grow_ballistic(grid, position, grain_set, first, last, extent, seed, tries):
                 placed = True
                 break
         if not placed:
-            return b, extent
-    return last, extent
+            return b
+    return grain_set.radius.size
 
 
 @loop
@@ -199,8 +193,6 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
         Centre of the body [m].
     one, other : int
         Grains of the body and of the aggregate that are about to touch; `other` is EMPTY if the walk did not end.
-    gap : float
-        Gap between these two [m].
     """
     seed, number, grain = counter
     u, _ = random_direction(seed, number, grain, START)
@@ -219,7 +211,7 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
                     best, one, other = bound[b], b, j
         start = one
         if other != EMPTY and best < TOUCH * grain_set.largest:
-            return x, one, other, best
+            return x, one, other
         length = max(best, TOUCH * grain_set.largest)
         u, _ = random_direction(seed, draw, grain, STEPS)
         x = axpy(length, u, x)
@@ -228,7 +220,7 @@ def walk_on_spheres(grid, position, grain_set, first, last, bound, inner, size, 
             if not back:  # replaced by another walker from infinity, uniform on the sphere
                 x = scale(size, random_direction(seed, draw, grain, DIRECTION)[0])
             length = math.inf
-    return x, first, EMPTY, 0.0
+    return x, first, EMPTY
 
 
 @loop
@@ -240,16 +232,15 @@ def pull_to_rest(position, grain_set, x, offset, b, j):
 
 
 @kernel
-def grow_diffusing(grid, position, bound, grain_set, first, last, extent, seed, tries):
-    """Add grains first … last − 1 one by one by diffusion.
-
-    As `grow_ballistic`; positions of grains to be added must be 0, and `bound` is a work array (N,).
-    """
-    for b in range(first, last):
+def grow_diffusing(grid, position, bound, grain_set, seed):
+    """Grow an aggregate by diffusion, as `grow_ballistic`; `bound` is a work array (N,)."""
+    insert_grain(grid, 0, (0.0, 0.0, 0.0))
+    extent = grain_set.radius[0]
+    for b in range(1, grain_set.radius.size):
+        size = extent + grain_set.radius[b]
         placed = False
-        for number in range(tries):
-            size = extent + grain_set.radius[b]
-            x, _, neighbour, _ = walk_on_spheres(
+        for number in range(TRIES):
+            x, _, neighbour = walk_on_spheres(
                 grid, position, grain_set, b, b + 1, bound, extent, size, (seed, number, b)
             )
             if neighbour == EMPTY:
@@ -260,13 +251,5 @@ def grow_diffusing(grid, position, bound, grain_set, first, last, extent, seed, 
                 placed = True
                 break
         if not placed:
-            return b, extent
-    return last, extent
-
-
-@kernel
-def place_first_grain(grid, position):
-    """Clear the grid and place grain 0 at the origin."""
-    clear(grid)
-    put(position, 0, (0.0, 0.0, 0.0))
-    insert_grain(grid, 0, (0.0, 0.0, 0.0))
+            return b
+    return grain_set.radius.size

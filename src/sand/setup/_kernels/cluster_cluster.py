@@ -10,18 +10,21 @@ from .aggregation import OFFSET, TURN1, TURN2, pull_to_rest, walk_on_spheres
 from .hash_grid import (
     APART,
     EMPTY,
+    TRIES,
     HashGrid,
     cell_key,
     cell_on_axis,
     clear,
+    first_in_cell,
     insert_grain,
     insert_in_cell,
     pair_rest_distance,
-    slot_of,
     table_size,
     touches_other,
 )
 
+CHOICES = 100
+"""Number of successful collisions of two clusters from which the one nearest to the target is taken."""
 DISTANCE_TOLERANCE = 0.003
 """Relative error of the distance of centres at which a collision is accepted without further attempts."""
 
@@ -67,6 +70,27 @@ def place_rotated(position, work, grain_set, first, last, middle, q):
 
 
 @loop
+def place_both(position, work, grain_set, ends, middles, counter):
+    """Write both clusters to `work`, each centred at the origin in a random orientation; return their outer radii [m].
+
+    Parameters as for `try_merge`.
+    """
+    seed, number, grain = counter
+    q1, q2 = random_rotation(seed, number, grain, TURN1), random_rotation(seed, number, grain, TURN2)
+    reach1 = place_rotated(position, work, grain_set, ends[0], ends[1], middles[0], q1)
+    return reach1, place_rotated(position, work, grain_set, ends[1], ends[2], middles[1], q2)
+
+
+@loop
+def empty_grid(table, grains):
+    """Empty grid for this number of grains in the memory of `table`."""
+    size = table_size(grains, table.mask + 1)
+    grid = HashGrid(table.key, table.head, table.next_in_cell, size - 1, table.width)
+    clear(grid)
+    return grid
+
+
+@loop
 def column_key(x, y, step, width):
     """Key of the column of cells number `step` of the 3 × 3 columns around (x, y); number 4 contains it."""
     return cell_key(0, cell_on_axis(x, width) + step % 3 - 1, cell_on_axis(y, width) + step // 3 - 1, 0)
@@ -87,9 +111,7 @@ def contact_height(grid, work, grain_set, middle, last, dx, dy):
     for b in range(middle, last):
         x, y, z = work[0, b] + dx, work[1, b] + dy, work[2, b]
         for step in range(9):
-            key = column_key(x, y, step, grid.width)
-            slot = slot_of(grid, key)
-            j = grid.head[slot] if grid.key[slot] == key else EMPTY
+            j = first_in_cell(grid, column_key(x, y, step, grid.width))
             while j != EMPTY:
                 miss = (x - work[0, j]) ** 2 + (y - work[1, j]) ** 2
                 if (
@@ -109,9 +131,7 @@ def has_other_contact(grid, work, grain_set, middle, last, shift, one, other):
     for b in range(middle, last):
         x = add(load(work, b), shift)
         for step in range(9):
-            key = column_key(x[0], x[1], step, grid.width)
-            slot = slot_of(grid, key)
-            j = grid.head[slot] if grid.key[slot] == key else EMPTY
+            j = first_in_cell(grid, column_key(x[0], x[1], step, grid.width))
             while j != EMPTY:
                 touch = (grain_set.radius[b] + grain_set.radius[j]) * (1.0 + APART)
                 d = sub(x, load(work, j))
@@ -151,20 +171,12 @@ def try_merge(table, position, work, grain_set, ends, middles, counter, target):
     """
     seed, number, grain = counter
     first, middle, last = ends
-    reach = place_rotated(
-        position, work, grain_set, first, middle, middles[0], random_rotation(seed, number, grain, TURN1)
-    )
-    reach += place_rotated(
-        position, work, grain_set, middle, last, middles[1], random_rotation(seed, number, grain, TURN2)
-    )
-    grid = HashGrid(
-        table.key, table.head, table.next_in_cell, table_size(middle - first, table.mask + 1) - 1, table.width
-    )
-    clear(grid)
+    reach1, reach2 = place_both(position, work, grain_set, ends, middles, counter)
+    grid = empty_grid(table, middle - first)
     for i in range(first, middle):
         insert_in_cell(grid, column_key(work[0, i], work[1, i], 4, grid.width), i)
     words = random_words(seed, number, grain, OFFSET)
-    offset = min(reach, target) * math.sqrt(uniform(words[0]))
+    offset = min(reach1 + reach2, target) * math.sqrt(uniform(words[0]))
     angle = 2.0 * math.pi * uniform(words[1])
     dx, dy = offset * math.cos(angle), offset * math.sin(angle)
     height, one, other = contact_height(grid, work, grain_set, middle, last, dx, dy)
@@ -198,7 +210,7 @@ def target_distance(goal, squares, masses):
 
 
 @kernel
-def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, choices):
+def join_ballistic(table, position, work, grain_set, joins, goals, seed):
     """Merge pairs of clusters by ballistic collisions.
 
     Parameters
@@ -215,15 +227,11 @@ def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, 
         (K,) target radius of gyration of each merged cluster [m]; infinite: none.
     seed : int
         Seed of the random numbers.
-    tries : int
-        Largest number of attempts per pair.
-    choices : int
-        Number of successful collisions from which the one nearest to the target is taken.
 
     Returns
     -------
     int
-        Number of merged pairs; less than K if a pair found no single contact in `tries` attempts.
+        Number of merged pairs; less than K if a pair found no single contact in `TRIES` attempts.
     """
     for k in range(goals.size):
         ends = (joins[0, k], joins[1, k], joins[2, k])
@@ -235,7 +243,7 @@ def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, 
             square2 = squared_gyration_radius(position, grain_set, ends[1], ends[2], middle2, mass2)
             target = target_distance(goals[k], (square1, square2), (mass1, mass2))
         best, chosen, found = math.inf, -1, 0
-        for number in range(tries):
+        for number in range(TRIES):
             counter = (seed, number, joins[1, k])
             merged, shift = try_merge(table, position, work, grain_set, ends, (middle1, middle2), counter, target)
             if merged:
@@ -243,7 +251,7 @@ def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, 
                 error = abs(norm(shift) - target) if target < math.inf else 0.0
                 if error < best:
                     best, chosen = error, number
-                if found == choices or error <= DISTANCE_TOLERANCE * target or target == math.inf:
+                if found == CHOICES or error <= DISTANCE_TOLERANCE * target or target == math.inf:
                     break
         if chosen < 0:
             return k
@@ -254,7 +262,7 @@ def join_ballistic(table, position, work, grain_set, joins, goals, seed, tries, 
 
 
 @kernel
-def join_diffusing(table, position, work, bound, grain_set, joins, seed, tries):
+def join_diffusing(table, position, work, bound, grain_set, joins, seed):
     """Merge pairs of clusters by diffusion without rotation.
 
     As `join_ballistic`; `bound` is a work array (N,).
@@ -263,21 +271,16 @@ def join_diffusing(table, position, work, bound, grain_set, joins, seed, tries):
         ends = (joins[0, k], joins[1, k], joins[2, k])
         middle1, _ = centre_of_mass(position, grain_set, ends[0], ends[1])
         middle2, _ = centre_of_mass(position, grain_set, ends[1], ends[2])
-        slots = table_size(ends[1] - ends[0], table.mask + 1)
-        grid = HashGrid(table.key, table.head, table.next_in_cell, slots - 1, table.width)
         done = False
-        for number in range(tries):
-            inner = place_rotated(
-                position, work, grain_set, ends[0], ends[1], middle1, random_rotation(seed, number, ends[1], TURN1)
-            )
-            size = inner + place_rotated(
-                position, work, grain_set, ends[1], ends[2], middle2, random_rotation(seed, number, ends[1], TURN2)
-            )
-            clear(grid)
+        for number in range(TRIES):
+            counter = (seed, number, ends[1])
+            inner, outer = place_both(position, work, grain_set, ends, (middle1, middle2), counter)
+            grid = empty_grid(table, ends[1] - ends[0])
             for i in range(ends[0], ends[1]):
                 insert_grain(grid, i, load(work, i))
-            counter = (seed, number, ends[1])
-            x, one, other, _ = walk_on_spheres(grid, work, grain_set, ends[1], ends[2], bound, inner, size, counter)
+            x, one, other = walk_on_spheres(
+                grid, work, grain_set, ends[1], ends[2], bound, inner, inner + outer, counter
+            )
             if other == EMPTY:
                 continue
             x = pull_to_rest(work, grain_set, x, load(work, one), one, other)

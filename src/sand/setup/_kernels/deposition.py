@@ -6,7 +6,7 @@ from ...compiler.jit import kernel, loop
 from ...numerics.random import random_words, uniform
 from ...numerics.vec import across, axpy, dot, norm, put, scale
 from .aggregation import START
-from .hash_grid import APART, EMPTY, cell_key, cell_on_axis, clear, insert_in_cell, pair_rest_distance, slot_of
+from .hash_grid import APART, EMPTY, TRIES, cell_key, cell_on_axis, first_in_cell, insert_in_cell, pair_rest_distance
 
 
 @loop
@@ -28,8 +28,7 @@ def landing_height(grid, position, grain_set, b, x, y, side, count):
     """Height at which grain b, falling at (x, y), lands, and the grain below it; EMPTY: the floor at z = 0."""
     height, neighbour = grain_set.radius[b], EMPTY
     for step in range(9):
-        slot = slot_of(grid, periodic_column_key(x, y, step, grid.width, count))
-        j = grid.head[slot] if grid.key[slot] != EMPTY else EMPTY
+        j = first_in_cell(grid, periodic_column_key(x, y, step, grid.width, count))
         while j != EMPTY:
             dx, dy = minimum_image(x - position[0, j], side), minimum_image(y - position[1, j], side)
             miss = dx * dx + dy * dy
@@ -55,8 +54,7 @@ def nearest_image(position, j, x, side):
 def touches_other_periodic(grid, position, grain_set, b, x, side, count, one, other):
     """Whether grain b at x touches any grain other than `one` and `other`, periodic images included."""
     for step in range(9):
-        slot = slot_of(grid, periodic_column_key(x[0], x[1], step, grid.width, count))
-        j = grid.head[slot] if grid.key[slot] != EMPTY else EMPTY
+        j = first_in_cell(grid, periodic_column_key(x[0], x[1], step, grid.width, count))
         while j != EMPTY:
             image = nearest_image(position, j, x, side)
             d = (x[0] - image[0], x[1] - image[1], x[2] - image[2])
@@ -83,8 +81,7 @@ def roll_to_second_contact(grid, position, grain_set, b, x, neighbour, side, cou
     own = scale(1.0 / arm, (x[0] - origin[0], x[1] - origin[1], x[2] - origin[2]))
     best, place, second = -1.0, x, EMPTY
     for step in range(9):
-        slot = slot_of(grid, periodic_column_key(x[0], x[1], step, grid.width, count))
-        k = grid.head[slot] if grid.key[slot] != EMPTY else EMPTY
+        k = first_in_cell(grid, periodic_column_key(x[0], x[1], step, grid.width, count))
         while k != EMPTY:
             image = nearest_image(position, k, x, side)
             to = (image[0] - origin[0], image[1] - origin[1], image[2] - origin[2])
@@ -108,7 +105,7 @@ def roll_to_second_contact(grid, position, grain_set, b, x, neighbour, side, cou
 
 
 @kernel
-def deposit(grid, position, grain_set, side, count, seed, tries):
+def deposit(grid, position, grain_set, side, count, seed):
     """Drop all grains one by one on a periodic square.
 
     A grain that lands on another rolls over it to the nearest position where it touches a second one.
@@ -116,7 +113,7 @@ def deposit(grid, position, grain_set, side, count, seed, tries):
     Parameters
     ----------
     grid : HashGrid
-        Work space.
+        An empty grid.
     position : ndarray
         (3, N) [m], set here.
     grain_set : GrainSet
@@ -127,18 +124,15 @@ def deposit(grid, position, grain_set, side, count, seed, tries):
         Number of columns of the grid along each side.
     seed : int
         Seed of the random numbers.
-    tries : int
-        Largest number of attempts per grain.
 
     Returns
     -------
     int
-        Number of grains placed; less than N if each of `tries` attempts of a grain had too many contacts.
+        Number of grains placed; less than N if each of `TRIES` attempts of a grain had too many contacts.
     """
-    clear(grid)
     for b in range(grain_set.radius.size):
         placed = False
-        for number in range(tries):
+        for number in range(TRIES):
             words = random_words(seed, number, b, START)
             x, y = side * uniform(words[0]), side * uniform(words[1])
             z, neighbour = landing_height(grid, position, grain_set, b, x, y, side, count)

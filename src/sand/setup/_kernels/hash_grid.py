@@ -20,6 +20,8 @@ LEVELS = 8
 SLOTS_PER_GRAIN, MIN_SLOTS = 4, 512
 """Smallest size of the table: a connected grain occupies at most three cells, summed over the levels, apart from up to
 eight cells per level at its corners; the table must never be full."""
+TRIES = 100_000
+"""Largest number of attempts to place a grain, or merge two clusters, with a single contact."""
 APART = 1e-9
 """Smallest gap of surfaces that do not touch, relative to the sum of their radii."""
 _HALF = 1 << 19
@@ -100,6 +102,13 @@ def clear(grid):
 
 
 @loop
+def first_in_cell(grid, key):
+    """First grain in the list of a cell, or EMPTY."""
+    slot = slot_of(grid, key)
+    return grid.head[slot] if grid.key[slot] == key else EMPTY
+
+
+@loop
 def insert_in_cell(grid, key, i):
     """Insert grain i in the list of a cell."""
     slot = slot_of(grid, key)
@@ -150,9 +159,7 @@ def empty_distance(grid, x):
 def head_of_neighbour_cell(grid, x, step):
     """First grain in the list of cell number `step` of the 27 lowest-level cells around x, or EMPTY."""
     cx, cy, cz = (cell_on_axis(x[0], grid.width), cell_on_axis(x[1], grid.width), cell_on_axis(x[2], grid.width))
-    key = cell_key(0, cx + step % 3 - 1, cy + step // 3 % 3 - 1, cz + step // 9 - 1)
-    slot = slot_of(grid, key)
-    return grid.head[slot] if grid.key[slot] == key else EMPTY
+    return first_in_cell(grid, cell_key(0, cx + step % 3 - 1, cy + step // 3 % 3 - 1, cz + step // 9 - 1))
 
 
 @loop
