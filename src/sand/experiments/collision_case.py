@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from functools import partial
@@ -195,13 +195,10 @@ def read_collision(path: str | Path) -> CollisionCase:
     return validate(with_integrator(CollisionCase, content), content, str(path), problems)
 
 
-def run_seed(text: str, seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
-    """Simulate one collision of a case in JSON and return the outcome as a dictionary; runs in worker processes."""
-    import warnings
-
+def run_seed(content: dict[str, Any], seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
+    """Simulate one collision of a case and return the outcome as a dictionary; runs in worker processes."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        content = json.loads(text)
         case = with_integrator(CollisionCase, content).model_validate(content)
         return case.run(seed, observers=list(observers))[0].to_dict()
 
@@ -231,8 +228,8 @@ def run_seeds(
     observers : sequence, optional
         Observers of the simulations, without an executor.
     """
-    own: dict[str, Any] = {} if executor is not None else {"observers": observers}
-    work, found = partial(run_seed, json.dumps(case), **own), dict(known or {})
+    work = partial(run_seed, case, observers=() if executor is not None else observers)
+    found = dict(known or {})
     left = [seed for seed in dict.fromkeys(seeds) if seed not in found]
     for seed, outcome in _outcomes(work, left, executor):
         found[seed] = outcome

@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from ..config.commands import command_for
 from ..errors import BadInput
 from ..io.lock import writing
 from ..io.run_folder import (
@@ -25,14 +24,6 @@ from ..io.run_folder import (
 from ..io.table import GrowingOutcomes
 from .collision import run_to_end
 from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
-
-
-def description_in(folder: Path) -> Path | None:
-    """Path of the case file that `sand collide` wrote to a folder; None if there is none."""
-    one, many = folder / ONE_COLLISION, folder / CASE
-    if one.exists():
-        return one
-    return many if many.exists() and command_for(read_toml(many)) == "collide" else None
 
 
 class CollisionJob:
@@ -94,12 +85,7 @@ class CollisionJob:
         seeds = self.case.impact.seeds
         results = [self._one(seeds[0], observers)] if len(seeds) == 1 else self._many(seeds, executor, observers)
         counts = Counter(result["outcome"] for result in results)
-        content = {
-            "case": str(self.path),
-            "folder": str(self.folder),
-            "collisions": results,
-            "counts": dict(counts),
-        }
+        content = {"case": str(self.path), "folder": str(self.folder), "collisions": results, "counts": dict(counts)}
         write_json(self.folder / COLLISION, content)
         (self.folder / OUTCOMES).unlink(missing_ok=True)  # its content is in collision.json
         return content
