@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import time as wall
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -102,9 +103,8 @@ class CrossSection:
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes and derived values, for JSON."""
-        own = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        more = {name: getattr(self, name) for name in ("enhancement", "enhancement_error", "c", "c_error")}
-        return own | more
+        derived = ("enhancement", "enhancement_error", "c", "c_error")
+        return vars(self) | {name: getattr(self, name) for name in derived}
 
 
 @checked
@@ -277,18 +277,12 @@ def _pieces(
         yield rows
         if executor is not None:
             break
-    if executor is None:
-        return
-    waiting = []
-    while tasks:
-        bundle, tasks = cut(tasks, size)
-        waiting.append(executor.submit(fly, setup, bundle, width, seed))
-    try:
-        for future in as_completed(waiting):
-            yield future.result()
-    finally:
-        for future in waiting:
-            future.cancel()
+    if executor is not None:
+        bundles = []
+        while tasks:
+            bundle, tasks = cut(tasks, size)
+            bundles.append(bundle)
+        yield from executor.map(partial(fly, setup, width=width, seed=seed), bundles)
 
 
 def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:

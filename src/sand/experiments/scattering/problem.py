@@ -19,17 +19,14 @@ from ...units import format_quantity, in_unit, is_word, si
 from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 
-SPEED_UNITS = ("m/s", "thermal")
 SPINS = {"none": 0.0, "kT/2": 0.5, "equipartition": 1.5}
 """Mean rotational energy of a grain in k_B T."""
 ORIENTATIONS = {"random": RANDOM, "aligned": ALIGNED, "given": GIVEN}
-SHAPES = ("plane", "sphere")
-OUTCOMES = ("hit", "stick")
 ALLOWED: dict[str, Any] = {
-    "speed_unit": SPEED_UNITS,
+    "speed_unit": ("m/s", "thermal"),
     "orientation": ORIENTATIONS,
-    "start_shape": SHAPES,
-    "outcome": OUTCOMES,
+    "start_shape": ("plane", "sphere"),
+    "outcome": ("hit", "stick"),
 }
 """Allowed words of the text arguments."""
 AUTO_START = 10.0
@@ -268,9 +265,7 @@ def impact_parameter(value: Any, setup: Flight, name: str = "impact_parameter") 
         if setup.scales.capture == 0.0:
             raise BadInput(f"{name} = {value!r}: without moments b_max is 0; give a length")
     else:
-        b = si(value, "m", name)
-    if b < 0.0:
-        raise BadInput(f"{name} = {value!r} must be at least 0 m")
+        b = si(value, "m", name, least=0.0)
     if setup.sphere and b >= setup.distance:
         raise BadInput(
             f"{name} = {value!r} must be below the radius of the start, {format_quantity(setup.distance, 'm')}"
