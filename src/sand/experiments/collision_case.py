@@ -27,7 +27,7 @@ from ..setup.encounters import offset_of
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
-from .collision import Approach, Collision, approach, prepare, resume_collision, run_to_end
+from .collision import Approach, Collision, approach, prepare, run_to_end
 
 BodyKind = Literal[
     "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
@@ -146,13 +146,9 @@ class CollisionCase(Section):
             seed=seed if self.impact.turn else None,
         )
 
-    def prepare(self, start: Approach, **options: Any) -> Simulation:
-        """Set up the simulation of one collision; options are those of `Simulation`. Raises BadInput."""
-        return prepare(start, self.forces.build() or None, self.stepping, **options)
-
-    def resume_collision(self, start: Approach, folder: Path, **options: Any) -> Simulation:
-        """Resume an interrupted collision, see `collision.resume_collision`. Raises BadInput."""
-        return resume_collision(start, folder, self.forces.build() or None, self.stepping, **options)
+    def physics(self) -> tuple[list[Any] | None, Verlet]:
+        """Forces and integrator, as `collision.prepare` and `collision.resume_collision` take them."""
+        return self.forces.build() or None, self.stepping
 
     def check(self) -> Simulation:
         """Set up the first collision in memory, to find errors in the combination of bodies, forces and materials.
@@ -162,12 +158,12 @@ class CollisionCase(Section):
         BadInput
             If there are errors.
         """
-        return self.prepare(self.approach(self.impact.seeds[0]))
+        return prepare(self.approach(self.impact.seeds[0]), *self.physics())
 
     def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
         """Simulate one collision; options are those of `Simulation`. Raises BadInput."""
         start = self.approach(seed)
-        simulation = self.prepare(start, **options)
+        simulation = prepare(start, *self.physics(), **options)
         return run_to_end(start, simulation), simulation
 
 

@@ -22,7 +22,7 @@ from ..io.run_folder import (
     write_toml,
 )
 from ..io.table import GrowingOutcomes
-from .collision import run_to_end
+from .collision import prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
 
 
@@ -92,12 +92,14 @@ class CollisionJob:
 
     def _one(self, seed: int, observers: Sequence[Any]) -> dict[str, Any]:
         """Simulate a single collision with all files of a run."""
-        start, case = self._with_case_name(lambda: self.case.approach(seed)), self.case
+        start, case, own = self._with_case_name(lambda: self.case.approach(seed)), self.case, list(observers)
         if self.resume and any(self.folder.glob("checkpoint-*.npz")):
-            simulation = case.resume_collision(start, self.folder, observers=list(observers))
+            simulation = resume_collision(start, self.folder, *case.physics(), observers=own)
         else:  # without a checkpoint there is nothing to resume
-            options = {"out": self.folder, "overwrite": self.overwrite or self.resume, "observers": list(observers)}
-            simulation = self._with_case_name(lambda: case.prepare(start, **options))
+            replace = self.overwrite or self.resume
+            simulation = self._with_case_name(
+                lambda: prepare(start, *case.physics(), out=self.folder, overwrite=replace, observers=own)
+            )
             self._describe(ONE_COLLISION)
         return run_to_end(start, simulation).to_dict()
 

@@ -167,7 +167,7 @@ def _rows(rows: Iterable[Sequence[Any]]) -> np.ndarray:
     try:
         table = np.array([[float(value) for value in row] for row in rows])
     except (TypeError, ValueError):
-        raise BadInput("rows must be four numbers each: m1 [kg], m2 [kg], sigma [m^2], v [m/s]") from None
+        table = np.zeros(0)
     if table.ndim != 2 or table.shape[1] != 4 or not (np.isfinite(table) & (table > 0.0)).all():
         raise BadInput("rows must be four finite numbers above 0 each: m1 [kg], m2 [kg], sigma [m^2], v [m/s]")
     return table
