@@ -6,7 +6,7 @@ import difflib
 import importlib
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 LONGEST = 80
@@ -75,6 +75,26 @@ class Interrupted(KeyboardInterrupt):
 
 FORBID_EXTRA = {"extra": "forbid"}
 """Pydantic configuration of the settings classes that case files build: unknown keys are errors."""
+
+
+class ErrorCollector:
+    """Collects the errors of several checks, so that they can be reported together."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+
+    def take(self, make: Callable[..., Any], *args: Any, instead: Any = None, **named: Any) -> Any:
+        """Return `make(*args, **named)`, or `instead` if it raises BadInput, whose messages are collected."""
+        try:
+            return make(*args, **named)
+        except BadInput as error:
+            self.problems += error.problems
+            return instead
+
+    def done(self) -> None:
+        """Raise BadInput if there were errors."""
+        if self.problems:
+            raise BadInput(self.problems)
 
 
 def did_you_mean(word: str, allowed: Sequence[str]) -> str:

@@ -271,7 +271,7 @@ def grow(**changed):
         (lambda: grow(sizes=[2.0, 1.0]), "rise"),
         (lambda: grow(sizes=[0.5, 1.0]), "start at 1"),
         (lambda: grow(numbers=[1.0, 2.0]), "one for each size"),
-        (lambda: grow(numbers="many"), "must be numbers"),
+        (lambda: grow(numbers="many"), "must be an array of numbers"),
         (lambda: grow(times=[2.0, 1.0]), "times"),
         (lambda: grow(times=[float("nan")]), "finite"),
         (lambda: grow(mass="1 m"), "mass"),

@@ -332,7 +332,7 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(process.ProcessPoolExecutor, "submit", lambda *a, **k: Done())
-        patch.setattr(scattering, "as_completed", dead)
+        patch.setattr(process.ProcessPoolExecutor, "map", dead)
         assert main(["scatter", str(case), "--out", str(out), "--workers", "2"]) == 2
     told = capsys.readouterr().err
     assert "a worker process died" in told

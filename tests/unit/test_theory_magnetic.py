@@ -101,7 +101,7 @@ def test_sizes_and_moments():
         (lambda: theory.capture_cross_section(MOMENT, MASS, 1.0, c="x"), "c = 'x'"),
         (lambda: theory.growth_exponents("x"), "exponent"),
         (lambda: theory.dynamic_exponent("a", 0), "eta"),
-        (lambda: theory.mean_size("abc"), "must be a list or an array of numbers"),
+        (lambda: theory.mean_size("abc"), "must be an array of numbers"),
         (lambda: theory.barrier(1e-7, 1.0, MASS, 0.0), "alpha"),
         (lambda: theory.dynamic_exponent(0.9, 0.2), "below 1"),
         (lambda: theory.growth_exponents(reading="papr"), "did you mean 'paper'"),

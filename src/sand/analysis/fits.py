@@ -125,7 +125,7 @@ class RateLaw(NamedTuple):
 
     def at(self, time: np.ndarray | float) -> np.ndarray | float:
         """S at a time [s]."""
-        return _grown(np.asarray(time), self.degree, self.time)
+        return np.exp(_log_grown(np.asarray(time), self.degree, self.time))
 
 
 @checked
@@ -162,22 +162,15 @@ def rate_law(time: np.ndarray, sizes: np.ndarray) -> RateLaw:
     boxes = len(s)
     without = [_rate(t, np.delete(s, k, axis=0).mean(axis=0))[0] for k in range(boxes)] if boxes > 1 else []
     degree_error, *ends = jackknife(degree, np.array(without))
-    z, low, high = (float(v) for v in _exponent_of(np.array([degree, *ends])))
+    z, low, high = (np.inf if value >= 1.0 else 1.0 / (1.0 - value) for value in (degree, *ends))
     return RateLaw(z, degree_error * z * z, low, high, degree, degree_error, tau, t.size, boxes)
 
 
-def _exponent_of(degree: np.ndarray) -> np.ndarray:
-    """Exponent z = 1/(1 − degree), infinite for degree ≥ 1."""
-    return np.where(degree >= 1.0, np.inf, 1.0 / np.where(degree >= 1.0, 1.0, 1.0 - degree))
-
-
-def _grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
-    """Solution of dS/dt = S^degree/τ, S(0) = 1: (1 + (1 − degree) t/τ)^(1/(1 − degree)); exponential at degree 1."""
-    return np.exp(_log_grown(time, degree, tau))
-
-
 def _log_grown(time: np.ndarray, degree: float, tau: float) -> np.ndarray:
-    """Logarithm of that solution, accurate near degree 1; strongly negative after a divergence of S."""
+    """ln S of the solution of dS/dt = S^degree/τ, S(0) = 1: (1 + (1 − degree) t/τ)^(1/(1 − degree)).
+
+    It is exponential at degree 1; the logarithm is accurate near it, and strongly negative after a divergence of S.
+    """
     rest = 1.0 - degree
     if abs(rest) < 1e-15:
         return time / tau

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from ..arguments import checked
 from ..errors import BadInput
 from ..units import seed_given
-from .fits import PowerLawFit, power_law
+from .fits import power_law
 from .shape import gyration_radius
 
 FEWEST = 32
@@ -178,11 +178,10 @@ def _spaced(low: float, high: float) -> np.ndarray:
 
 def _of_slopes(x: np.ndarray, y: np.ndarray, unit: float, window: tuple[float, float]) -> Dimension:
     """Dimension from the slope over the whole window; error from the slopes of its thirds."""
-    used = y > 0
-    if used.sum() < 3:
-        raise BadInput("the aggregate has no grains in most of the window; choose larger distances")
-    whole: PowerLawFit = power_law(x[used], y[used])
-    thirds = [part for part in np.array_split(np.flatnonzero(used), 3) if len(part) > 1]
+    if len(x) < 3:
+        raise BadInput("the window has fewer than three different distances; choose a wider one")
+    whole = power_law(x, y)
+    thirds = [part for part in np.array_split(np.arange(len(x)), 3) if len(part) > 1]
     thirds = thirds if len(thirds) > 1 else [np.arange(2), np.arange(len(x) - 2, len(x))]
     slopes = [power_law(x[part], y[part]).exponent for part in thirds]
     error = float(np.std(slopes, ddof=1) / np.sqrt(len(slopes)))

@@ -58,23 +58,16 @@ def aggregate_statistics(frame: Any, least: int = 2) -> dict[str, np.ndarray]:
         grains = members[k]
         pairs = np.searchsorted(grains, frame.pair[label_of_pair == k])
         position, mass, radius = whole[grains], np.asarray(frame.mass, float)[grains], frame.radius[grains]
-        net = network(len(grains), pairs)
-        rows.append(
-            (
-                len(grains),
-                mass.sum(),
-                gyration_radius(position, mass),
-                elongation(position, mass, radius),
-                filling_factor(position, radius),
-                np.linalg.norm(moments[k]),
-                aligned[k],
-                net.coordination,
-                net.ends,
-                net.junctions,
-                net.rings,
-                net.longest,
-            )
-        )
+        values = network(len(grains), pairs)._asdict() | {
+            "grains": len(grains),
+            "mass": mass.sum(),
+            "gyration_radius": gyration_radius(position, mass),
+            "elongation": elongation(position, mass, radius),
+            "filling_factor": filling_factor(position, radius),
+            "moment": np.linalg.norm(moments[k]),
+            "alignment": aligned[k],
+        }
+        rows.append([values[name] for name in COLUMNS])
     table = np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
     return {name: table[:, c] for c, name in enumerate(COLUMNS)}
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
 from .clusters import cluster_labels
 from .shape import coordination
@@ -44,25 +44,19 @@ def network(count: int, pairs: np.ndarray) -> Network:
     return Network(
         int((contacts == 1).sum()),
         int((contacts >= 3).sum()),
-        int(len(ends) - count + connected_components(_graph(count, ends), directed=False)[0]),
+        len(ends) - count + 1,
         _longest(count, ends),
         np.sort(lengths[lengths > 0])[::-1],
         float(contacts.mean()),
     )
 
 
-def _graph(count: int, ends: np.ndarray) -> coo_array:
-    return coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count)).tocsr()
-
-
 def _longest(count: int, ends: np.ndarray) -> int:
     """Number of grains on the path to the farthest grain from the farthest grain from grain 0."""
-    graph, start = _graph(count, ends), 0
-    steps = np.zeros(count, dtype=int)
-    for _ in range(2):
-        order, predecessor = breadth_first_order(graph, start, directed=False)
-        steps[start] = 0
-        for grain in order[1:]:
-            steps[grain] = steps[predecessor[grain]] + 1
-        start = int(order[-1])
-    return int(steps[start]) + 1
+    graph = coo_array((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(count, count)).tocsr()
+    order, _ = breadth_first_order(graph, 0, directed=False)
+    order, predecessor = breadth_first_order(graph, order[-1], directed=False)
+    grain, longest = order[-1], 1
+    while grain != order[0]:
+        grain, longest = predecessor[grain], longest + 1
+    return longest

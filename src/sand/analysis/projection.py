@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from ..compiler.jit import kernel, loop
 
 
@@ -56,8 +54,11 @@ def _sort(start, end, count):
 
 
 @kernel
-def _union(x, y, r, reach, start, end):
-    """Area by Green's theorem: sum over the uncovered arcs of all circles."""
+def area_of_union(x, y, r, reach, start, end):
+    """Area [m²] of the union of discs by Green's theorem: sum over the uncovered arcs of all circles.
+
+    `x` is sorted, `reach` the largest radius [m]; `start` and `end` are work arrays of length 2N + 2.
+    """
     area = 0.0
     for i in range(x.size):
         count = _covered(x, y, r, i, reach, start, end)
@@ -72,17 +73,3 @@ def _union(x, y, r, reach, start, end):
         if at < math.pi:
             area += _arc(x[i], y[i], r[i], at, math.pi)
     return area
-
-
-def area_of_union(x: np.ndarray, y: np.ndarray, r: np.ndarray, reach: float) -> float:
-    """Area [m²] of the union of discs.
-
-    Parameters
-    ----------
-    x, y, r : ndarray
-        Centres, sorted by x, and radii (N,) [m].
-    reach : float
-        Largest radius [m].
-    """
-    size = 2 * len(x) + 2
-    return float(_union(x, y, np.ascontiguousarray(r), reach, np.empty(size), np.empty(size)))

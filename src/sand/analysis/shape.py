@@ -155,12 +155,12 @@ def projected_area(
     centred, _ = _centred(position, None)
     size = np.broadcast_to(np.asarray(radius, float), len(centred)).copy()
     views = directions_of_view(directions) if isinstance(directions, int) else np.asarray(directions, float)
-    areas = []
+    areas, work = [], np.empty((2, 2 * len(size) + 2))
     for axis in views:
         flat = centred @ _across(axis)
         order = np.argsort(flat[:, 0], kind="stable")  # sorted by x, so that only neighbours are compared
         x, y = np.ascontiguousarray(flat[order].T)
-        areas.append(area_of_union(x, y, size[order], float(size.max())))
+        areas.append(area_of_union(x, y, size[order], size.max(), *work))
     return float(np.mean(areas)), float(np.std(areas) / math.sqrt(max(len(areas) - 1, 1)))
 
 

@@ -106,9 +106,10 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
         del how["threads"]  # a flight uses one thread
         read = read_scattering(folder / CASE)
         return scatter(folder / CASE, read, folder, resume=True, scheduler=scheduler, **how)
-    from ..experiments.collision_job import CollisionJob, description_in
+    from ..experiments.collision_job import CollisionJob
 
-    job = CollisionJob(description_in(folder) or folder / CASE, folder, resume=True)
+    one = folder / ONE_COLLISION
+    job = CollisionJob(one if one.exists() else folder / CASE, folder, resume=True)
     return collide(job, f"resume {folder}", **how)
 
 

@@ -143,8 +143,7 @@ def shape(position: np.ndarray, pairs: np.ndarray, grains: int) -> Shape:
     nodes = [k for k in range(grains + 1) if len(neighbours[k]) == 3]
     if not nodes:
         return Shape("straight" if _largest_bend(position[:grains]) < STRAIGHT else "bent", np.nan, rolled)
-    leans = [_crossbar(position, neighbours, node) for node in nodes]
-    best = max(leans)
+    best = max(_crossbar(position, pairs, neighbours[node], node) for node in nodes)
     is_t = best > 90.0 - PERPENDICULAR and rolled > PERPENDICULAR
     return Shape("T" if is_t else "branched", best, rolled)
 
@@ -200,20 +199,11 @@ def _rolled(position: np.ndarray, neighbours: list[list[int]], grains: int) -> f
     return _angle(position[end] - position[last], position[last] - position[last - 1])
 
 
-def _crossbar(position: np.ndarray, neighbours: list[list[int]], node: int) -> float:
+def _crossbar(position: np.ndarray, pairs: np.ndarray, neighbours: list[int], node: int) -> float:
     """Angle [°], up to 90, between the stem (the longest branch) and the line through the other two neighbours."""
-    stem = max(neighbours[node], key=lambda k: _branch(neighbours, node, k))
-    one, other = (k for k in neighbours[node] if k != stem)
+    branches = cluster_labels(len(position), pairs[(pairs != node).all(axis=1)])
+    sizes = np.bincount(branches)
+    stem = max(neighbours, key=lambda k: sizes[branches[k]])
+    one, other = (k for k in neighbours if k != stem)
     lean = _angle(position[stem] - position[node], position[one] - position[other])
     return min(lean, 180.0 - lean)
-
-
-def _branch(neighbours: list[list[int]], node: int, start: int) -> int:
-    """Number of grains of the branch that begins with `start` at `node`."""
-    seen, queue = {node, start}, [start]
-    while queue:
-        for k in neighbours[queue.pop()]:
-            if k not in seen:
-                seen.add(k)
-                queue.append(k)
-    return len(seen) - 1

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +124,11 @@ def resume_collision(
     simulation = resume(folder, **options)
     requested, stored = (case_of(one, math.inf, math.inf) for one in (prepare(start, forces, stepping), simulation))
     changed = [name for name in requested if name != "run" and requested[name] != stored[name]]
-    first = _first_frame(Path(folder) / TRAJECTORY)
+    try:
+        with closing(Frames(Path(folder) / TRAJECTORY)) as frames:
+            first = frames[0]
+    except BadInput:  # missing or damaged; the resumed run repairs it
+        first = None
     for name in ("position", "velocity") if first is not None else ():
         ours, theirs = getattr(start.grains, name), getattr(first, name)
         # trajectories are stored in single precision
@@ -134,20 +140,6 @@ def resume_collision(
             "another folder"
         )
     return simulation
-
-
-def _first_frame(path: Path) -> Any:
-    """First frame of a trajectory; None if it is missing or damaged, which the resumed run repairs."""
-    try:
-        frames = Frames(path)
-    except BadInput:
-        return None
-    try:
-        return frames[0]
-    except BadInput:
-        return None
-    finally:
-        frames.close()
 
 
 def run_to_end(start: Approach, simulation: Simulation) -> Collision:
@@ -216,12 +208,8 @@ def collide_many(
     **options
         Options of `collide`.
     """
-    if executor is None:
-        return [_one(build, seed, options) for seed in seeds]
-    waiting = [executor.submit(_one, build, seed, options) for seed in seeds]
-    return [future.result() for future in waiting]
+    return list((map if executor is None else executor.map)(partial(_one, build, options), seeds))
 
 
-def _one(build: Callable[[int], tuple[Grains, Grains]], seed: int, options: dict[str, Any]) -> Collision:
-    target, projectile = build(seed)
-    return collide(target, projectile, seed=seed, **options)[0]
+def _one(build: Callable[[int], tuple[Grains, Grains]], options: dict[str, Any], seed: int) -> Collision:
+    return collide(*build(seed), seed=seed, **options)[0]

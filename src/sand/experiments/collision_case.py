@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from functools import partial
@@ -27,7 +27,7 @@ from ..setup.encounters import offset_of
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
-from .collision import Approach, Collision, approach, prepare, resume_collision, run_to_end
+from .collision import Approach, Collision, approach, prepare, run_to_end
 
 BodyKind = Literal[
     "grain", "chain", "lattice", "hexagonal", "bpca", "pca", "bcca", "dla", "dlca", "fractal", "rbd", "file"
@@ -146,13 +146,9 @@ class CollisionCase(Section):
             seed=seed if self.impact.turn else None,
         )
 
-    def prepare(self, start: Approach, **options: Any) -> Simulation:
-        """Set up the simulation of one collision; options are those of `Simulation`. Raises BadInput."""
-        return prepare(start, self.forces.build() or None, self.stepping, **options)
-
-    def resume_collision(self, start: Approach, folder: Path, **options: Any) -> Simulation:
-        """Resume an interrupted collision, see `collision.resume_collision`. Raises BadInput."""
-        return resume_collision(start, folder, self.forces.build() or None, self.stepping, **options)
+    def physics(self) -> tuple[list[Any] | None, Verlet]:
+        """Forces and integrator, as `collision.prepare` and `collision.resume_collision` take them."""
+        return self.forces.build() or None, self.stepping
 
     def check(self) -> Simulation:
         """Set up the first collision in memory, to find errors in the combination of bodies, forces and materials.
@@ -162,12 +158,12 @@ class CollisionCase(Section):
         BadInput
             If there are errors.
         """
-        return self.prepare(self.approach(self.impact.seeds[0]))
+        return prepare(self.approach(self.impact.seeds[0]), *self.physics())
 
     def run(self, seed: int, **options: Any) -> tuple[Collision, Simulation]:
         """Simulate one collision; options are those of `Simulation`. Raises BadInput."""
         start = self.approach(seed)
-        simulation = self.prepare(start, **options)
+        simulation = prepare(start, *self.physics(), **options)
         return run_to_end(start, simulation), simulation
 
 
@@ -195,13 +191,10 @@ def read_collision(path: str | Path) -> CollisionCase:
     return validate(with_integrator(CollisionCase, content), content, str(path), problems)
 
 
-def run_seed(text: str, seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
-    """Simulate one collision of a case in JSON and return the outcome as a dictionary; runs in worker processes."""
-    import warnings
-
+def run_seed(content: dict[str, Any], seed: int, observers: Sequence[Any] = ()) -> dict[str, Any]:
+    """Simulate one collision of a case and return the outcome as a dictionary; runs in worker processes."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        content = json.loads(text)
         case = with_integrator(CollisionCase, content).model_validate(content)
         return case.run(seed, observers=list(observers))[0].to_dict()
 
@@ -231,8 +224,8 @@ def run_seeds(
     observers : sequence, optional
         Observers of the simulations, without an executor.
     """
-    own: dict[str, Any] = {} if executor is not None else {"observers": observers}
-    work, found = partial(run_seed, json.dumps(case), **own), dict(known or {})
+    work = partial(run_seed, case, observers=() if executor is not None else observers)
+    found = dict(known or {})
     left = [seed for seed in dict.fromkeys(seeds) if seed not in found]
     for seed, outcome in _outcomes(work, left, executor):
         found[seed] = outcome

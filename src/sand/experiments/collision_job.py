@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from ..config.commands import command_for
 from ..errors import BadInput
 from ..io.lock import writing
 from ..io.run_folder import (
@@ -23,16 +22,8 @@ from ..io.run_folder import (
     write_toml,
 )
 from ..io.table import GrowingOutcomes
-from .collision import run_to_end
+from .collision import prepare, resume_collision, run_to_end
 from .collision_case import CollisionCase, read_collision, run_seeds, with_absolute_paths
-
-
-def description_in(folder: Path) -> Path | None:
-    """Path of the case file that `sand collide` wrote to a folder; None if there is none."""
-    one, many = folder / ONE_COLLISION, folder / CASE
-    if one.exists():
-        return one
-    return many if many.exists() and command_for(read_toml(many)) == "collide" else None
 
 
 class CollisionJob:
@@ -94,24 +85,21 @@ class CollisionJob:
         seeds = self.case.impact.seeds
         results = [self._one(seeds[0], observers)] if len(seeds) == 1 else self._many(seeds, executor, observers)
         counts = Counter(result["outcome"] for result in results)
-        content = {
-            "case": str(self.path),
-            "folder": str(self.folder),
-            "collisions": results,
-            "counts": dict(counts),
-        }
+        content = {"case": str(self.path), "folder": str(self.folder), "collisions": results, "counts": dict(counts)}
         write_json(self.folder / COLLISION, content)
         (self.folder / OUTCOMES).unlink(missing_ok=True)  # its content is in collision.json
         return content
 
     def _one(self, seed: int, observers: Sequence[Any]) -> dict[str, Any]:
         """Simulate a single collision with all files of a run."""
-        start, case = self._with_case_name(lambda: self.case.approach(seed)), self.case
+        start, case, own = self._with_case_name(lambda: self.case.approach(seed)), self.case, list(observers)
         if self.resume and any(self.folder.glob("checkpoint-*.npz")):
-            simulation = case.resume_collision(start, self.folder, observers=list(observers))
+            simulation = resume_collision(start, self.folder, *case.physics(), observers=own)
         else:  # without a checkpoint there is nothing to resume
-            options = {"out": self.folder, "overwrite": self.overwrite or self.resume, "observers": list(observers)}
-            simulation = self._with_case_name(lambda: case.prepare(start, **options))
+            replace = self.overwrite or self.resume
+            simulation = self._with_case_name(
+                lambda: prepare(start, *case.physics(), out=self.folder, overwrite=replace, observers=own)
+            )
             self._describe(ONE_COLLISION)
         return run_to_end(start, simulation).to_dict()
 

@@ -159,11 +159,9 @@ def classify_collision(simulation: Simulation, start: Approach, before: int, qui
 
 
 def _outcome(labels: np.ndarray, first: int, made: int) -> str:
-    bodies = int(labels.max()) + 1
-    if bodies == 1:
+    if not labels.any():
         return "stick"
-    same = bodies == 2 and len(set(labels[:first].tolist())) == 1 and len(set(labels[first:].tolist())) == 1
-    if not same:
+    if (labels != (np.arange(len(labels)) >= first)).any():  # target 0 and projectile 1, as they were
         return "fragment"
     return "bounce" if made else "miss"
 

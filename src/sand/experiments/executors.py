@@ -12,7 +12,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 
-from ..errors import BadInput
+from ..errors import BadInput, import_optional
 from ..threads import set_threads
 
 ANSWER = 10.0
@@ -94,17 +94,11 @@ def _start(pool: Executor, workers: int) -> None:
 def _dask(address: str) -> Iterator[Executor]:
     if not _ADDRESS.fullmatch(address):
         raise BadInput(f"scheduler {address!r} must be an address such as tcp://127.0.0.1:8786")
+    distributed = import_optional("distributed", "a scheduler")
     try:
-        from distributed import Client
-    except ImportError:
-        raise BadInput("a scheduler needs dask: pip install 'sand[dask]'") from None
-    try:
-        client = Client(address, timeout=ANSWER, set_as_default=False)
+        client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise BadInput(f"the scheduler at {address} does not answer within {ANSWER:g} s ({reason})") from None
-    try:
-        with client.get_executor(pure=False, retries=3) as executor:
-            yield executor
-    finally:
-        client.close()
+    with client, client.get_executor(pure=False, retries=3) as executor:
+        yield executor

@@ -36,7 +36,7 @@ class BoxResult(NamedTuple):
     size: np.ndarray  # (K,) S(t)
     grains: int
     radius: float  # mean of the grains [m]
-    moment: float  # mean magnitude of the moments of the grains [A m²]
+    moment: float  # mean magnitude of the non-zero moments of the grains [A m²]; 0 if there are none
     aggregates: dict[str, np.ndarray]  # columns of `aggregate_statistics` of all frames read, and `time` [s]
     case: dict[str, Any]  # settings that boxes of an ensemble share
 
@@ -70,21 +70,17 @@ def read_box(folder: str | Path, looks: int = LOOKS, least: int = 2) -> BoxResul
         found.append(rows | {"time": np.full(len(rows["grains"]), frame.time)})
     first = frames[0]
     frames.close()
+    moments = np.linalg.norm(first.moment, axis=1)
     return BoxResult(
         Path(folder),
         ledger["time"],
         ledger["mean_cluster_size"],
         len(first),
         float(first.radius.mean()),
-        _mean_magnitude(np.linalg.norm(first.moment, axis=1)),
+        float(moments[moments > 0.0].mean()) if moments.any() else 0.0,
         {name: np.concatenate([rows[name] for rows in found]) for name in (*COLUMNS, "time")},
         shared_settings(run.case),
     )
-
-
-def _mean_magnitude(moments: np.ndarray) -> float:
-    """Mean magnitude of the non-zero moments; 0 if there are none."""
-    return float(moments[moments > 0.0].mean()) if (moments > 0.0).any() else 0.0
 
 
 def boxes_in(folder: str | Path) -> list[Path]:
@@ -170,7 +166,8 @@ def growth_of(boxes: Sequence[BoxResult], window: tuple[float, float] | None = N
             missing[name] = str(error)
             return None
 
-    of_box, rows = _all_aggregates(boxes)
+    rows = all_aggregates(boxes)
+    of_box = np.repeat(np.arange(len(boxes)), [len(box.aggregates["grains"]) for box in boxes])
 
     def moment_law(which: np.ndarray) -> PowerLawFit:
         if boxes[0].moment == 0.0:
@@ -207,7 +204,6 @@ def _slope(time: np.ndarray, sizes: np.ndarray) -> PowerLawFit:
     return power_law(np.tile(time, len(sizes)), sizes.ravel(), np.repeat(np.arange(len(sizes)), len(time)))
 
 
-def _all_aggregates(boxes: Sequence[BoxResult]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Box index of each row, and the rows of all boxes."""
-    of_box = np.concatenate([np.full(len(box.aggregates["grains"]), k) for k, box in enumerate(boxes)])
-    return of_box, {name: np.concatenate([box.aggregates[name] for box in boxes]) for name in boxes[0].aggregates}
+def all_aggregates(boxes: Sequence[BoxResult]) -> dict[str, np.ndarray]:
+    """Columns of `BoxResult.aggregates` with the rows of all boxes."""
+    return {name: np.concatenate([box.aggregates[name] for box in boxes]) for name in boxes[0].aggregates}

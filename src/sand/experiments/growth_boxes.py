@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,8 @@ def _refuse_other_boxes(place: Path, places: Sequence[Path], content: dict[str, 
     path = place / files.CASE
     before = files.read_toml(path) if path.exists() else content
     changed = any(before.get(name) != content.get(name) for name in {*before, *content} - {"run", "grow"})
-    boxes = [box for box in boxes_of(place) if changed or box not in places]
+    started = [case.parent for case in place.glob(f"seed-*/{files.CASE}")]
+    boxes = [box for box in started if changed or box not in places]
     if not boxes:
         return
     requested = shared_settings(case_of(simulation_of(check_case(content, "case"), None), math.inf, math.inf))
@@ -97,12 +99,8 @@ def _run_all(
     observers: Sequence[Any],
 ) -> None:
     """Run the boxes of `grow`. Raises BadInput for boxes that stopped for physical reasons."""
-    jobs = [(content, seed, str(one)) for seed, one in zip(seeds, places, strict=True)]
-    if executor is None:
-        outcomes: Any = (run_box(*job, observers) for job in jobs)
-    else:
-        waiting = [executor.submit(run_box, *job) for job in jobs]
-        outcomes = (future.result() for future in waiting)
+    run, own = (map, observers) if executor is None else (executor.map, ())
+    outcomes = run(partial(run_box, content, observers=own), seeds, map(str, places))
     problems = []
     for seed, one, outcome in zip(seeds, places, outcomes, strict=True):
         if on_result is not None:
@@ -133,11 +131,6 @@ def _describe(place: Path, content: dict[str, Any], seeds: Sequence[int]) -> lis
     return all_seeds
 
 
-def boxes_of(folder: Path) -> list[Path]:
-    """Folders of the boxes that `grow` has started in a folder."""
-    return [box.parent for box in folder.glob(f"seed-*/{files.CASE}")]
-
-
 def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence[Any] = ()) -> str:
     """Run one box to its end, from its newest checkpoint if there is one; returns the name of the outcome.
 
@@ -146,19 +139,20 @@ def run_box(content: dict[str, Any], seed: int, folder: str, observers: Sequence
     BadInput
         If the folder contains a run of another case.
     """
-    place, case = Path(folder), check_case(content, "case")
+    place, case, own = Path(folder), check_case(content, "case"), list(observers)
     case.run.seed = seed
+    until = case.run.until
     if any(place.glob("checkpoint-*.npz")):
-        simulation = resume(place, observers=list(observers))
+        simulation = resume(place, observers=own)
         requested, stored = (case_of(one, math.inf, math.inf) for one in (simulation_of(case, None), simulation))
         if changed := [name for name in requested if name != "run" and requested[name] != stored[name]]:
             raise BadInput(
                 f"{place} contains a run with different [{changed[0]}]; give another folder, or the same case"
             )
-        until = case.run.until if case.run.until is None else max(case.run.until, simulation.time)
+        until = None if until is None else max(until, simulation.time)
     else:
         # a run killed at its very start leaves a folder without a checkpoint
-        simulation, until = simulation_of(case, place, overwrite=True, observers=list(observers)), case.run.until
+        simulation = simulation_of(case, place, overwrite=True, observers=own)
     steps = None if case.run.steps is None else case.run.steps - simulation.steps
     arrived = (until is not None and simulation.time >= until) or (steps is not None and steps <= 0)
     if arrived and _finished_summary(place).get("steps") == simulation.steps:

@@ -11,7 +11,7 @@ from ..config.case import check_case
 from ..config.commands import refuse_other_command
 from ..config.errors import validate
 from ..config.sections import Section, Seed
-from ..errors import BadInput
+from ..errors import ErrorCollector
 from ..io.run_folder import read_toml
 
 
@@ -39,19 +39,11 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     """
     content = read_toml(path)
     refuse_other_command(content, path, "grow")
-    given = content.pop("grow", None)
-    problems: list[str] = []
-    seeds = None
-    try:
-        seeds = None if given is None else validate(GrowSection, given, str(path), table="grow").seeds
-    except BadInput as error:
-        problems = error.problems
-    try:
-        case = check_case(content, str(path))
-    except BadInput as error:
-        raise BadInput(problems + error.problems) from None
-    if problems:
-        raise BadInput(problems)
+    given, errors, section = content.pop("grow", None), ErrorCollector(), None
+    if given is not None:
+        section = errors.take(validate, GrowSection, given, str(path), table="grow")
+    case = errors.take(check_case, content, str(path))
+    errors.done()
     if case.grains.file is not None:  # relative to the case file
         content["grains"]["file"] = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
-    return content, seeds
+    return content, section and section.seeds

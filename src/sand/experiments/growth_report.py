@@ -12,7 +12,7 @@ from ..analysis.fits import separation
 from ..errors import BadInput
 from ..io.run_folder import make_folder, write_json
 from ..io.table import write_table
-from .growth import BoxResult, GrowthResult, boxes_in, growth_of, read_box
+from .growth import BoxResult, GrowthResult, all_aggregates, boxes_in, growth_of, read_box
 
 NAMES = ("analysis.json", "growth.csv", "aggregates.csv", "growth.png")
 """Files of an analysis."""
@@ -50,11 +50,8 @@ def read_ensemble(folder: str | Path, window: tuple[float, float] | None = None)
 
 def ensemble_summary(one: Ensemble) -> dict[str, Any]:
     """Entry of one ensemble in analysis.json; laws with value, error and interval, None where unknown."""
-
-    def law(found: Any) -> dict[str, Any] | None:
-        return None if found is None else found._asdict()
-
     growth = one.growth
+    laws = {name: getattr(growth, name) for name in ("z", "slope", "moment", "moment_without_rings", "dimension")}
     return {
         "name": one.name,
         "boxes": len(one.boxes),
@@ -63,11 +60,7 @@ def ensemble_summary(one: Ensemble) -> dict[str, Any]:
         "mean_size": float(growth.mean[-1]),
         "mean_size_error": float(growth.error[-1]),
         "window": list(growth.window),
-        "z": law(growth.z),
-        "slope": law(growth.slope),
-        "moment": law(growth.moment),
-        "moment_without_rings": law(growth.moment_without_rings),
-        "dimension": law(growth.dimension),
+        **{name: None if law is None else law._asdict() for name, law in laws.items()},
         "missing": growth.missing,
     }
 
@@ -107,9 +100,8 @@ def write_analysis(folder: Path, ensembles: Sequence[Ensemble], content: dict[st
     write_table(folder / NAMES[2], [row for one in ensembles for row in _aggregate_rows(one)])
     drawn = []
     for one in ensembles:
-        joined = {k: np.concatenate([box.aggregates[k] for box in one.boxes]) for k in one.boxes[0].aggregates}
         units = {"unit_moment": one.boxes[0].moment, "unit_radius": one.boxes[0].radius}
-        drawn.append((one.name, one.growth, joined | units))
+        drawn.append((one.name, one.growth, all_aggregates(one.boxes) | units))
     save(growth_figure(drawn), folder / NAMES[3])
 
 
@@ -126,9 +118,8 @@ def _growth_rows(one: Ensemble, most: int) -> list[dict[str, Any]]:
 
 
 def _aggregate_rows(one: Ensemble) -> list[dict[str, Any]]:
-    rows = []
-    for box in one.boxes:
-        names = list(box.aggregates)
-        for values in zip(*(box.aggregates[name].tolist() for name in names), strict=True):
-            rows.append({"ensemble": one.name, "box": box.folder.name, **dict(zip(names, values, strict=True))})
-    return rows
+    return [
+        {"ensemble": one.name, "box": box.folder.name, **dict(zip(box.aggregates, values, strict=True))}
+        for box in one.boxes
+        for values in zip(*(column.tolist() for column in box.aggregates.values()), strict=True)
+    ]

@@ -83,14 +83,16 @@ def measured(rows: Iterable[Sequence[Any]], *, extrapolate: bool = False) -> Col
 
 
 @checked
-def on_grid(kernel: KernelFunction, masses: Any) -> np.ndarray:
+def on_grid(kernel: KernelFunction, masses: np.ndarray) -> np.ndarray:
     """Tabulate K(m_i, m_j) (K, K) [m³/s] on increasing masses (K,) [kg] > 0. Raises BadInput."""
-    m = _masses(masses)
+    m = np.asarray(masses, float)
+    if m.ndim != 1 or not len(m) or not (np.isfinite(m) & (m > 0.0)).all() or not (np.diff(m) > 0.0).all():
+        raise BadInput("masses must be finite, above 0 kg, and increasing")
     return np.asarray(kernel(*np.broadcast_arrays(m[:, None], m[None, :])), float)
 
 
 @checked
-def write_csv(path: str | Path, kernel: KernelFunction, masses: Any) -> None:
+def write_csv(path: str | Path, kernel: KernelFunction, masses: np.ndarray) -> None:
     """Write a table with one line for each pair m1 ≤ m2: `mass1` [kg], `mass2` [kg], `kernel` [m³/s].
 
     Parameters
@@ -109,22 +111,22 @@ def write_csv(path: str | Path, kernel: KernelFunction, masses: Any) -> None:
     FilesFailed
         If the file cannot be written.
     """
-    m, table = _masses(masses), on_grid(kernel, masses)
-    pairs = [(i, j) for i in range(len(m)) for j in range(i, len(m))]
-    write_table(
-        Path(path), [{"mass1": float(m[i]), "mass2": float(m[j]), "kernel": float(table[i, j])} for i, j in pairs]
-    )
+    table, m = on_grid(kernel, masses), np.asarray(masses, float)
+    i, j = np.triu_indices(len(m))
+    columns = {"mass1": m[i], "mass2": m[j], "kernel": table[i, j]}
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    write_table(Path(path), [dict(zip(columns, row, strict=True)) for row in rows])
 
 
 @checked
-def write_cgs(path: str | Path, kernel: KernelFunction, masses: Any) -> None:
+def write_cgs(path: str | Path, kernel: KernelFunction, masses: np.ndarray) -> None:
     """Write text for `numpy.loadtxt`: masses (K,) [g] in the first row, then K (K, K) [cm³/s].
 
     Parameters and errors as for `write_csv`.
     """
-    m, table = _masses(masses), on_grid(kernel, masses)
+    table = np.vstack([np.multiply(masses, GRAM), on_grid(kernel, masses) * CUBIC_CM]).tolist()
     lines = ["# collision kernel; first row: masses m_j [g]; row 1 + i: K(m_i, m_j) [cm^3/s]"]
-    lines += [" ".join(repr(float(v)) for v in row) for row in [m * GRAM, *(table * CUBIC_CM)]]
+    lines += [" ".join(map(repr, row)) for row in table]
     replace_file(Path(path), ("\n".join(lines) + "\n").encode())
 
 
@@ -165,20 +167,10 @@ def _rows(rows: Iterable[Sequence[Any]]) -> np.ndarray:
     try:
         table = np.array([[float(value) for value in row] for row in rows])
     except (TypeError, ValueError):
-        raise BadInput("rows must be four numbers each: m1 [kg], m2 [kg], sigma [m^2], v [m/s]") from None
+        table = np.zeros(0)
     if table.ndim != 2 or table.shape[1] != 4 or not (np.isfinite(table) & (table > 0.0)).all():
         raise BadInput("rows must be four finite numbers above 0 each: m1 [kg], m2 [kg], sigma [m^2], v [m/s]")
     return table
-
-
-def _masses(masses: Any) -> np.ndarray:
-    try:
-        m = np.asarray(masses, float)
-    except (TypeError, ValueError):
-        raise BadInput("masses must be numbers, in kg") from None
-    if m.ndim != 1 or not len(m) or not (np.isfinite(m) & (m > 0.0)).all() or not (np.diff(m) > 0.0).all():
-        raise BadInput("masses must be finite, above 0 kg, and increasing")
-    return m
 
 
 def _slopes(points: np.ndarray, values: np.ndarray) -> np.ndarray:

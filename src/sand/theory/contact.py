@@ -8,8 +8,7 @@ from typing import Any
 
 from ..arguments import checked
 from ..contact import jkr
-from ..contact.dmt import tabor_parameter
-from ..contact.law import ContactConstants, Pairing, contact_constants
+from ..contact.law import bond_between
 from ..contact.mixing import MIXING, pairing_between
 from ..errors import BadInput, did_you_mean
 from ..material import Material, as_material
@@ -152,6 +151,7 @@ def contact(
     limit = None if rolling_limit is None else si(rolling_limit, "m", "rolling_limit", above=0.0)
     pairing = pairing_between(a, b, mixing=mixing, rolling_limit=limit)
     m1, m2 = (m.density * 4.0 / 3.0 * math.pi * r**3 for m, r in ((a, r1), (b, r2)))
+<<<<<<< HEAD
     return _numbers(contact_constants(jkr.LAW)(pairing, r1, r2, m1, m2), pairing, (r1, r2), (m1, m2))
 
 
@@ -194,11 +194,36 @@ def _numbers(
         slide_force=constants.slide_stiffness * constants.slide_limit,
         roll_moment=constants.roll_stiffness * constants.reduced_radius * constants.roll_limit,
         twist_moment=constants.twist_stiffness * constants.twist_limit,
+=======
+    bond = bond_between(pairing, r1, r2, m1, m2)
+    unit = bond.pull_off_force * bond.pull_off_overlap
+    at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
+    cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
+    inverse_mass = 1.0 / m1 + 1.0 / m2
+    inverse_inertia = 2.5 / (m1 * r1 * r1) + 2.5 / (m2 * r2 * r2)
+    inverse_slide = inverse_mass + (2.5 / m1 + 2.5 / m2)
+    k_n = jkr.normal_stiffness(bond.rest_radius, pairing.modulus)
+    rolled = bond.roll_stiffness * bond.roll_limit * math.pi * bond.reduced_radius
+    squared_frequencies = {
+        "normal_period": k_n * inverse_mass,
+        "slide_period": bond.slide_stiffness * inverse_slide,
+        "roll_period": bond.roll_stiffness * bond.reduced_radius**2 * inverse_inertia,
+        "twist_period": bond.twist_stiffness * inverse_inertia,
+    }
+    constants = {name: value for name, value in bond._asdict().items() if name in ContactNumbers.__dataclass_fields__}
+    return ContactNumbers(
+        **constants,
+        jkr_ratio=bond.rest_radius / bond.reduced_radius,
+        rest_overlap=jkr.rest_overlap(bond.rest_radius, bond.reduced_radius),
+        break_energy=unit * (at[jkr.ROOT_AT_BREAK] - at[1.0]),
+        cycle_energy=cycle,
+        normal_stiffness=k_n,
+        slide_force=bond.slide_stiffness * bond.slide_limit,
+        roll_moment=bond.roll_stiffness * bond.reduced_radius * bond.roll_limit,
+        twist_moment=bond.twist_stiffness * bond.twist_limit,
+>>>>>>> less-exp
         roll_energy_clamped=rolled,
         roll_energy_released=0.5 * rolled,
-        normal_period=normal,
-        slide_period=slide,
-        roll_period=roll,
-        twist_period=twist,
+        **{name: 2.0 * math.pi / math.sqrt(w) for name, w in squared_frequencies.items()},
         sticking_speed=math.sqrt(2.0 * cycle * inverse_mass),
     )

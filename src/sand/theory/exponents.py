@@ -82,16 +82,12 @@ def exponent_fit(found: Outputs, others: tuple[Outputs, ...], sizes: int) -> Exp
     first, last = (
         _slope(*_logarithms(Outputs(found.size[part], found.rate[part]))) for part in (slice(half), slice(-half, None))
     )
-    changes = [abs(degree - _slope(*_logarithms(other))) if _positive(other) else np.inf for other in others]
+    # outputs that are not positive have no logarithms and determine no λ
+    changes = [abs(degree - _slope(*_logarithms(other))) if np.min(other) > 0.0 else np.inf for other in others]
     error = max(scatter, abs(last - first), *changes, (1.0 + abs(degree)) * rounding / spread)
     half_width = float(stdtrit(points - 2, 0.975)) * error
     z, low, high = (1.0 / (1.0 - x) if x < 1.0 else np.inf for x in (degree, degree - half_width, degree + half_width))
     return ExponentFit(z, low, high, degree, error, half_width, points)
-
-
-def _positive(outputs: Outputs) -> bool:
-    """Whether S and dS/dt have logarithms; other outputs determine no λ."""
-    return all(bool((values > 0.0).all()) for values in outputs)
 
 
 def _logarithms(outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,14 +60,14 @@ def aggregate_moment(moment: Any, grains: Any, exponent: float = REMANENCE) -> f
 
 
 @checked
-def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np.ndarray | None = None) -> float:
+def mean_size(sizes: np.ndarray, numbers: np.ndarray | None = None) -> float:
     """Mean cluster size S = Σ s² n_s/Σ s n_s (Eq. 17): the mean, over all grains, of the size of their cluster.
 
     Parameters
     ----------
-    sizes : Sequence[float] or ndarray
+    sizes : ndarray
         s (K,) ≥ 1, grains per cluster.
-    numbers : Sequence[float] or ndarray or None, optional
+    numbers : ndarray or None, optional
         n_s (K,) ≥ 0, number of clusters of each size; 1 by default.
 
     Raises
@@ -76,11 +75,8 @@ def mean_size(sizes: Sequence[float] | np.ndarray, numbers: Sequence[float] | np
     BadInput
         If there are no clusters, or a size is below 1.
     """
-    try:
-        s = np.asarray(sizes, float)
-        n = np.ones_like(s) if numbers is None else np.asarray(numbers, float)
-    except (TypeError, ValueError):
-        raise BadInput("sizes and numbers must be numbers") from None
+    s = np.asarray(sizes, float)
+    n = np.ones_like(s) if numbers is None else np.asarray(numbers, float)
     if s.ndim != 1 or s.shape != n.shape or not (s >= 1.0).all() or not (n >= 0.0).all() or not n.sum() > 0.0:
         raise BadInput("sizes must be at least 1; numbers must be at least 0, not all 0, and one for each size")
     if not (s * s * n).sum() < math.inf:

@@ -12,6 +12,7 @@ from ..arguments import checked
 from ..constants import BOLTZMANN, MAGNETIC
 from ..errors import BadInput
 from ..forces.pair import dipole_formulas as dipole
+from ..forces.vectors import three
 from ..units import si
 
 
@@ -123,8 +124,8 @@ def dipole_energy(moment1: Any, moment2: Any, apart: Any) -> float:
     BadInput
         If a vector does not have three finite components, or the separation is 0.
     """
-    a, b = _three(moment1, "A m^2", "moment1"), _three(moment2, "A m^2", "moment2")
-    r = _three(apart, "m", "apart")
+    a, b = three(moment1, "A m^2", "moment1"), three(moment2, "A m^2", "moment2")
+    r = three(apart, "m", "apart")
     if not any(r):
         raise BadInput("apart = 0: the energy of two dipoles at the same position is not finite")
     return dipole.pair_load(r, a, b, MAGNETIC)[3]
@@ -253,11 +254,3 @@ def _thermal(moment: Any, distance: Any, temperature: Any) -> tuple[float, float
 def _moments(moment1: Any, moment2: Any) -> tuple[float, float]:
     first = si(moment1, "A m^2", "moment1", least=0.0)
     return first, first if moment2 is None else si(moment2, "A m^2", "moment2", least=0.0)
-
-
-def _three(value: Any, unit: str, name: str) -> tuple[float, float, float]:
-    try:
-        x, y, z = value
-    except (TypeError, ValueError):
-        raise BadInput(f"{name} = {value!r} must be three components in {unit}") from None
-    return si(x, unit, f"{name} x"), si(y, unit, f"{name} y"), si(z, unit, f"{name} z")

@@ -10,7 +10,6 @@ Olund 1969, as applied by Brauer et al. 2008).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -46,9 +45,7 @@ def all_sizes(largest: int) -> np.ndarray:
     BadInput
         If `largest` is out of range.
     """
-    count = int(si(largest, "1", "largest", least=2.0))
-    _check_count(count)
-    return np.arange(1.0, count + 1.0)
+    return np.arange(1.0, _checked_count(int(si(largest, "1", "largest", least=2.0))) + 1.0)
 
 
 @checked
@@ -78,16 +75,16 @@ def log_sizes(largest: Any, per_decade: Any = 20) -> np.ndarray:
     ratio = 10.0 ** (1.0 / each)
     first = np.arange(1.0, min(np.ceil(1.0 / (ratio - 1.0)), np.ceil(top)) + 1.0)
     more = max(int(np.ceil(each * np.log10(top / first[-1]) - 1e-9)), 0)
-    _check_count(len(first) + more)
-    return np.concatenate([first, first[-1] * ratio ** np.arange(1.0, more + 1.0)])
+    count = _checked_count(len(first) + more)
+    return np.concatenate([first, first[-1] * ratio ** np.arange(1.0, count - len(first) + 1.0)])
 
 
 @checked
 def coagulate(
     kernel: KernelFunction,
-    sizes: Sequence[float] | np.ndarray,
-    numbers: Any,
-    times: Any,
+    sizes: np.ndarray,
+    numbers: np.ndarray,
+    times: np.ndarray,
     *,
     mass: Any,
     until_size: Any = None,
@@ -101,11 +98,11 @@ def coagulate(
     ----------
     kernel : KernelFunction
         K(m1, m2) [m³/s] of two arrays of masses [kg], see `kinetics`.
-    sizes : Sequence[float] or ndarray
+    sizes : ndarray
         x (K,) ≥ 1, increasing, grains per cluster, see `all_sizes` and `log_sizes`.
     numbers : float or ndarray
         Initial densities n (K,) [1/m³] ≥ 0; one number: density of clusters of the first size.
-    times : Sequence[float] or ndarray
+    times : ndarray
         Times of the outputs (T,) [s] ≥ 0, increasing.
     mass : float or str
         Mass of a grain [kg] > 0.
@@ -135,7 +132,16 @@ def coagulate(
     if method not in METHODS:
         raise BadInput(f"method = {method!r}; {did_you_mean(str(method), METHODS)}")
     grain = si(mass, "kg", "mass", above=0.0)
-    x, n, t = _sizes(sizes), _densities(numbers, np.size(sizes)), _times(times)
+    x, t = np.asarray(sizes, float), np.atleast_1d(np.asarray(times, float))
+    if not _rises(x) or _checked_count(len(x)) < 2 or not x[0] >= 1.0:
+        raise BadInput("sizes must be at least two finite numbers that rise and start at 1 or above")
+    n = np.asarray(numbers, float)
+    if n.ndim == 0:
+        n = np.append(n, np.zeros(len(x) - 1))
+    if n.shape != x.shape or not ((n >= 0.0) & np.isfinite(n)).all() or not n.sum() > 0.0:
+        raise BadInput("numbers must be one finite density in 1/m^3, or one for each size, at least 0 and not all 0")
+    if not _rises(t) or not t[0] >= 0.0:
+        raise BadInput("times must be finite, at least 0 s, and rise")
     largest_mean = math.inf if until_size is None else si(until_size, "1", "until_size", above=0.0)
     loss = si(may_lose, "1", "may_lose", above=0.0, below=1.0)
     tolerance = si(accuracy, "1", "accuracy", least=1e-12)
@@ -190,38 +196,23 @@ def _solve(problem: _Problem, t: np.ndarray) -> SizeDistribution:
     reached = np.reshape(done.y, (len(start), -1))  # SciPy returns an empty list if no output was reached
     # the tighter solution has the same outputs, without limits of S and the loss
     solve_tighter = partial(_solve, problem._replace(mean_size=math.inf, loss=math.inf, tolerance=0.1 * tolerance))
-    units = (grains, time_unit, problem.grain)
-    return _size_distribution(system, reached, t[: reached.shape[1]], units, outcome, solve_tighter)
-
-
-def _size_distribution(
-    system: _System,
-    y: np.ndarray,
-    times: np.ndarray,
-    units: tuple[float, float, float],
-    outcome: str,
-    solve_tighter: Any,
-) -> SizeDistribution:
-    """The result from the mass fractions `y` (K + 1, T); units: density of grains, time, mass of a grain."""
-    grains, time_unit, grain = units
-    x, fractions = system.sizes, y[:-1].T
-    all_changes = np.reshape([system.change(0.0, column) for column in y.T], (len(fractions), len(x) + 1))
+    fractions = reached[:-1].T
+    all_changes = np.reshape([system.change(0.0, column) for column in reached.T], (len(fractions), len(x) + 1))
     changes, loss = all_changes[:, :-1], all_changes[:, -1]
     on_grid = fractions.sum(axis=1)
     mean = fractions @ x / on_grid
-    rate = (changes @ x - mean * changes.sum(axis=1)) / on_grid / time_unit
-    density = grain * grains
+    density = problem.grain * grains
     return SizeDistribution(
-        times,
-        x,
-        grains * fractions / x,
-        mean,
-        rate,
-        density * on_grid,
-        density * y[-1],
-        density * loss / time_unit,
-        outcome,
-        solve_tighter,
+        times=t[: len(fractions)],
+        sizes=x,
+        numbers=grains * fractions / x,
+        mean_size=mean,
+        rate=(changes @ x - mean * changes.sum(axis=1)) / on_grid / time_unit,
+        mass=density * on_grid,
+        lost=density * reached[-1],
+        loss_rate=density * loss / time_unit,
+        outcome=outcome,
+        solve_tighter=solve_tighter,
     )
 
 
@@ -286,42 +277,14 @@ def _rates(kernel: KernelFunction, masses: np.ndarray) -> tuple[np.ndarray, floa
     return found / found[0, 0], float(found[0, 0])
 
 
-def _check_count(count: int) -> None:
+def _checked_count(count: int) -> int:
     if count > MAX_SIZES:
         raise BadInput(
             f"{count} sizes exceed the limit of {MAX_SIZES}, since all pairs are kept in memory; use log_sizes"
         )
+    return count
 
 
-def _sizes(sizes: Any) -> np.ndarray:
-    x = _numbers(sizes, "sizes")
-    if x.ndim != 1 or len(x) < 2 or not (np.diff(x) > 0.0).all() or not x[0] >= 1.0:
-        raise BadInput("sizes must be at least two numbers that rise and start at 1 or above")
-    _check_count(len(x))
-    return x
-
-
-def _densities(numbers: Any, count: int) -> np.ndarray:
-    n = _numbers(numbers, "numbers")
-    if n.ndim == 0:
-        n = np.append(n, np.zeros(count - 1))
-    if n.shape != (count,) or not (n >= 0.0).all() or not n.sum() > 0.0:
-        raise BadInput("numbers must be one density in 1/m^3, or one for each size, at least 0 and not all 0")
-    return n
-
-
-def _times(times: Any) -> np.ndarray:
-    t = np.atleast_1d(_numbers(times, "times"))
-    if t.ndim != 1 or not len(t) or not t[0] >= 0.0 or not (np.diff(t) > 0.0).all():
-        raise BadInput("times must be at least 0 s and rise")
-    return t
-
-
-def _numbers(values: Any, name: str) -> np.ndarray:
-    try:
-        found = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise BadInput(f"{name} must be numbers") from None
-    if not np.isfinite(found).all():
-        raise BadInput(f"{name} must be finite numbers")
-    return found
+def _rises(values: np.ndarray) -> bool:
+    """Whether an array is one-dimensional, not empty, finite and increasing."""
+    return values.ndim == 1 and values.size > 0 and bool(np.isfinite(values).all() and (np.diff(values) > 0.0).all())

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import time as wall
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -102,9 +103,8 @@ class CrossSection:
 
     def to_dict(self) -> dict[str, Any]:
         """All attributes and derived values, for JSON."""
-        own = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        more = {name: getattr(self, name) for name in ("enhancement", "enhancement_error", "c", "c_error")}
-        return own | more
+        derived = ("enhancement", "enhancement_error", "c", "c_error")
+        return vars(self) | {name: getattr(self, name) for name in derived}
 
 
 @checked
@@ -175,25 +175,23 @@ def measure(
     if not 1e-4 <= goal <= 0.5:
         raise BadInput(f"relative_error = {relative_error!r} must lie in 1e-4 … 0.5")
     start = wall.monotonic()
-    farthest = setup.distance if setup.sphere else np.inf
-    strata = Strata.up_to(setup.scales.widest, farthest)
+    strata = Strata(setup.scales.widest, setup.distance if setup.sphere else np.inf)
     before = rows_by_flight(known)
     # with a random target velocity σ is a rate over v∞; with a fixed one it is measured in the frame of the target
     unit = setup.speed if setup.drift_spread > 0.0 else setup.relative_speed
     rows: list[np.ndarray] = []
-    while tasks := strata.round(goal, farthest):
+    while tasks := strata.round(goal):
         for new in run_flights(setup, tasks, strata.width, seed, executor, before, keep):
             rows.append(new)
-            for row in new:
-                strata.add(int(row[0]), int(row[1]), float(row[END] == HIT), float(row[SPEED]) / unit)
+            strata.add(new[:, 0], new[:, 1], new[:, END] == HIT, new[:, SPEED] / unit)
         if progress is not None:
             progress(sum(len(r) for r in rows), strata.estimate().value, strata.error())
     whole = np.concatenate(rows)
-    _warn(strata, whole, farthest)
+    _warn(strata, whole)
     return _result(setup, strata, whole, seed, wall.monotonic() - start)
 
 
-def _warn(strata: Strata, rows: np.ndarray, farthest: float) -> None:
+def _warn(strata: Strata, rows: np.ndarray) -> None:
     """Warn if σ is unreliable. Raises BadInput if more than 1 % of the flights failed."""
     failed = int((rows[:, END] == FAILED).sum())
     if failed > 0.01 * len(rows):
@@ -203,7 +201,7 @@ def _warn(strata: Strata, rows: np.ndarray, farthest: float) -> None:
     hits, _ = strata.counts()
     if not hits.any():
         warn(f"none of {len(rows)} flights hit: sigma is 0 within the error")
-    if hits[-1] and (len(strata) + 1) * strata.width > farthest * (1 + 1e-9):
+    if hits[-1] and (len(strata) + 1) * strata.width > strata.farthest * (1 + 1e-9):
         warn("flights hit at all impact parameters up to the radius of the start: sigma is truncated there")
 
 
@@ -279,25 +277,18 @@ def _pieces(
         yield rows
         if executor is not None:
             break
-    if executor is None:
-        return
-    waiting = []
-    while tasks:
-        bundle, tasks = cut(tasks, size)
-        waiting.append(executor.submit(fly, setup, bundle, width, seed))
-    try:
-        for future in as_completed(waiting):
-            yield future.result()
-    finally:
-        for future in waiting:
-            future.cancel()
+    if executor is not None:
+        bundles = []
+        while tasks:
+            bundle, tasks = cut(tasks, size)
+            bundles.append(bundle)
+        yield from executor.map(partial(fly, setup, width=width, seed=seed), bundles)
 
 
 def _result(setup: Flight, strata: Strata, rows: np.ndarray, seed: int, seconds: float) -> CrossSection:
     found, sure = strata.estimate(), strata.estimate(CERTAIN)
     hits, tries = strata.counts()
-    k = np.arange(len(strata))
-    low, high = strata.edges(k)
+    low, high = strata.edges(np.arange(len(strata)))
     ends = rows[:, END]
     return CrossSection(
         sigma=found.value,

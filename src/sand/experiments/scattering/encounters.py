@@ -115,21 +115,8 @@ class Flight:
 
     def start(self, azimuth: float = -1.0) -> InitialConditions:
         """Initial conditions for the kernel; the azimuth [rad] of the impact parameter is random if negative."""
-        axes = [_axis(g) for g in (self.projectile, self.target)]
-        return InitialConditions(
-            self.speed,
-            self.along,
-            self.drift,
-            self.drift_spread,
-            self.distance,
-            self.sphere,
-            azimuth,
-            self.axes,
-            axes[0],
-            axes[1],
-            *self.spin,
-            *self.spin_energy,
-        )
+        own = {name: getattr(self, name) for name in InitialConditions._fields if hasattr(self, name)}
+        return InitialConditions(**own, axis=(_axis(self.projectile), _axis(self.target)), azimuth=azimuth)
 
     def pair(self) -> tuple[Model, Spheres | Aggregates]:
         """Equations of motion of the pair and their parameters, for the kernel."""

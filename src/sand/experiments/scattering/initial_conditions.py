@@ -24,14 +24,11 @@ class InitialConditions(NamedTuple):
     drift_spread: float  # standard deviation of each component of that velocity [m/s]
     distance: float  # distance of the plane, or radius of the sphere, on which flights start [m]
     sphere: bool
-    azimuth: float  # azimuth of the impact parameter about the line of flight [rad]; random if negative
     axes: int  # RANDOM, ALIGNED or GIVEN
-    axis1: tuple  # directions of the moments if GIVEN
-    axis2: tuple
-    spin1: tuple  # mean spins [rad/s]; thermal spins are added
-    spin2: tuple
-    spin_energy1: float  # mean energy of the thermal spin [J], a third about each axis
-    spin_energy2: float
+    spin: tuple  # mean spins of both bodies [rad/s]; thermal spins are added
+    spin_energy: tuple  # mean energies of the thermal spins [J], a third about each axis
+    axis: tuple  # directions of the moments if GIVEN
+    azimuth: float  # azimuth of the impact parameter about the line of flight [rad]; random if negative
 
 
 @formula

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -92,22 +93,23 @@ class Job:
     def _cross_sections(self, executor: Executor | None, progress: Progress) -> dict[str, Any]:
         from ...plotting.scattering import sigma_figure
 
-        found = []
-        for k, one in enumerate(self.flights):
-            part = k / len(self.flights)
-            found.append(
-                measure(
-                    one,
-                    relative_error=self.case.measure.relative_error,
-                    seed=seed_of(self.case.measure.seed, k),
-                    executor=executor,
-                    known=self.before.get(k, ()),
-                    keep=lambda rows, k=k: self._keep(k, rows),  # type: ignore[misc]
-                    progress=lambda n, s, e, part=part, one=one: progress(  # type: ignore[misc]
-                        f"{one.speed:.4g} m/s: {n} flights, sigma = {s:.4g} +- {e:.1g} m^2", part
-                    ),
-                )
+        def show(setup: int, flights: int, sigma: float, error: float) -> None:
+            speed = self.flights[setup].speed
+            text = f"{speed:.4g} m/s: {flights} flights, sigma = {sigma:.4g} +- {error:.1g} m^2"
+            progress(text, setup / len(self.flights))
+
+        found = [
+            measure(
+                one,
+                relative_error=self.case.measure.relative_error,
+                seed=seed_of(self.case.measure.seed, k),
+                executor=executor,
+                known=self.before.get(k, ()),
+                keep=partial(self._keep, k),
+                progress=partial(show, k),
             )
+            for k, one in enumerate(self.flights)
+        ]
         rows = [one.to_dict() for one in found]
         flat = [{k: v for k, v in row.items() if k not in ("profile", "interval", "seconds")} for row in rows]
         write_table(self.folder / RESULTS, flat)
@@ -156,14 +158,12 @@ class Job:
 
 def _path_rows(setup: int, group: list[Trajectory]) -> list[dict[str, Any]]:
     """Time and positions of both bodies, `POINTS` rows for each flight."""
-    rows = []
+    names = ["time", *(f"{body}_{axis}" for body in ("projectile", "target") for axis in "xyz")]
+    rows: list[dict[str, Any]] = []
     for n, one in enumerate(group):
         times = np.linspace(0.0, one.time[-1], POINTS)
-        projectile, target = one.at(times)
-        for t, p, q in zip(times, projectile, target, strict=True):
-            row: dict[str, Any] = {"setup": setup, "flight": n, "time": float(t)}
-            row |= {f"projectile_{a}": float(p[k]) for k, a in enumerate("xyz")}
-            rows.append(row | {f"target_{a}": float(q[k]) for k, a in enumerate("xyz")})
+        table = np.column_stack([times, *one.at(times)]).tolist()
+        rows += [{"setup": setup, "flight": n, **dict(zip(names, values, strict=True))} for values in table]
     return rows
 
 

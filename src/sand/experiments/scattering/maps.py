@@ -112,10 +112,7 @@ def probability_map(
     """
     if not flights or cells < 1 or per_cell < 1:
         raise BadInput(f"a map needs speeds, and cells = {cells} and per_cell = {per_cell} of at least 1")
-    most = [
-        min(HEADROOM * one.scales.widest, one.distance) if one.sphere else HEADROOM * one.scales.widest
-        for one in flights
-    ]
+    most = [min(HEADROOM * one.scales.widest, one.distance if one.sphere else np.inf) for one in flights]
     hits, done = np.zeros((len(flights), cells)), np.zeros((len(flights), cells))
     tasks = [Task(k, 0, per_cell) for k in range(cells)]
     for v, one in enumerate(flights):

@@ -4,62 +4,39 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...arguments import checked
 from ...constants import BOLTZMANN
-from ...errors import BadInput, did_you_mean, shown
+from ...errors import BadInput, ErrorCollector, did_you_mean
 from ...forces.vectors import three
 from ...grains import Grains
 from ...material import Material, as_material
 from ...theory.magnetic import thermal_speed
 from ...units import format_quantity, in_unit, is_word, si
-from .encounters import Flight, scales_of
+from .encounters import Flight, Scales, scales_of
 from .initial_conditions import ALIGNED, GIVEN, RANDOM
 
-SPEED_UNITS = ("m/s", "thermal")
 SPINS = {"none": 0.0, "kT/2": 0.5, "equipartition": 1.5}
 """Mean rotational energy of a grain in k_B T."""
 ORIENTATIONS = {"random": RANDOM, "aligned": ALIGNED, "given": GIVEN}
-SHAPES = ("plane", "sphere")
-OUTCOMES = ("hit", "stick")
 ALLOWED: dict[str, Any] = {
-    "speed_unit": SPEED_UNITS,
+    "speed_unit": ("m/s", "thermal"),
     "orientation": ORIENTATIONS,
-    "start_shape": SHAPES,
-    "outcome": OUTCOMES,
+    "start_shape": ("plane", "sphere"),
+    "outcome": ("hit", "stick"),
 }
 """Allowed words of the text arguments."""
 AUTO_START = 10.0
 """Default distance of the start in units of b_max."""
 LEAST_START = 5.0
 """Smallest default distance of the start in units of r1 + r2."""
+REST = (0.0, 0.0, 0.0)
 _OF_CAPTURE = re.compile(r"\s*(\S+)\s+(b_max|R_m)\s*")
 FARTHEST = 1e9
 """Largest distance of the start in units of r1 + r2."""
-
-
-class ErrorCollector:
-    """Collects errors, so that they can be reported together."""
-
-    def __init__(self) -> None:
-        self.problems: list[str] = []
-
-    def take(self, make: Callable[[], Any], instead: Any = None) -> Any:
-        """Return `make()`, or `instead` if it raises BadInput, whose messages are collected."""
-        try:
-            return make()
-        except BadInput as error:
-            self.problems += error.problems
-            return instead
-
-    def done(self) -> None:
-        """Raise BadInput if there were errors."""
-        if self.problems:
-            raise BadInput(self.problems)
 
 
 @checked
@@ -140,21 +117,20 @@ def _checked(given: dict[str, Any]) -> Flight:
     """Check all arguments of `flight` and report their errors together."""
     errors = ErrorCollector()
     first, second = _bodies(errors, given)
-    heat = errors.take(lambda: si(given["temperature"], "K", "temperature", least=0.0), 0.0)
+    heat = errors.take(si, given["temperature"], "K", "temperature", least=0.0, instead=0.0)
     for name, allowed in ALLOWED.items():
-        if not isinstance(given[name], str) or given[name] not in allowed:
-            errors.problems.append(f"{name} = {given[name]!r}; {did_you_mean(str(given[name]), list(allowed))}")
-    rest = (0.0, 0.0, 0.0)
-    drift, spread = errors.take(lambda: _drift(given["target_velocity"], heat, second), (rest, 0.0))
-    spins, energy = errors.take(lambda: _spin(given["spin"], heat), ((rest, rest), 0.0))
-    external = errors.take(lambda: rest if given["field"] is None else three(given["field"], "T", "field"))
-    tolerance = errors.take(lambda: si(given["tolerance"], "1", "tolerance", above=0.0), 1e-8)
+        if given[name] not in allowed:
+            errors.problems.append(f"{name} = {given[name]!r}; {did_you_mean(given[name], list(allowed))}")
+    drift, spread = errors.take(_drift, given["target_velocity"], heat, second, instead=(REST, 0.0))
+    spins, energy = errors.take(_spin, given["spin"], heat, instead=((REST, REST), 0.0))
+    external = REST if given["field"] is None else errors.take(three, given["field"], "T", "field")
+    tolerance = errors.take(si, given["tolerance"], "1", "tolerance", above=0.0, instead=1e-8)
     if not 1e-13 <= tolerance <= 1e-3:
         errors.problems.append(f"tolerance = {given['tolerance']!r} must lie in 1e-13 … 1e-3")
-    escape = errors.take(
-        lambda: 0.0 if is_word(given["escape"], "auto") else si(given["escape"], "m", "escape", above=0.0)
-    )
-    speed_si = errors.take(lambda: _speed(given["speed"], given["speed_unit"], heat, first))
+    escape = 0.0
+    if not is_word(given["escape"], "auto"):
+        escape = errors.take(si, given["escape"], "m", "escape", above=0.0)
+    speed_si = errors.take(_speed, given["speed"], given["speed_unit"], heat, first)
     distance: Any = None
     if first is not None and second is not None and speed_si is not None:
         if given["orientation"] == "aligned" and not len(first) == len(second) == 1:
@@ -163,8 +139,8 @@ def _checked(given: dict[str, Any]) -> Flight:
         if speed < 1e-9 * speed_si:
             errors.problems.append("speed and target_velocity are equal: the bodies never collide")
         else:
-            distance = errors.take(lambda: _distance(given["start"], first, second, speed, heat))
-            touch = scales_of(first, second, speed).touch
+            scales = scales_of(first, second, speed)
+            distance, touch = errors.take(_distance, given["start"], scales, heat), scales.touch
             if escape and not escape > touch:
                 errors.problems.append(
                     f"escape = {given['escape']!r} must exceed r1 + r2 = {format_quantity(touch, 'm')}"
@@ -191,13 +167,9 @@ def _checked(given: dict[str, Any]) -> Flight:
 
 def _bodies(errors: ErrorCollector, given: dict[str, Any]) -> tuple[Any, Any]:
     """Projectile and target; None if invalid."""
-    for name in ("projectile", "target"):
-        if given[name] is not None and not isinstance(given[name], Grains):
-            errors.problems.append(f"{name} = {shown(given[name])} must be grains, such as sand.setup.grain(...)")
-            return None, None
     first = given["projectile"]
     if first is None:
-        first = errors.take(lambda: _single_grain(given["radius"], given["material"], given["moment"]))
+        first = errors.take(_single_grain, given["radius"], given["material"], given["moment"])
     elif given["radius"] is not None or given["material"] is not None:
         errors.problems.append("radius and material follow from the projectile; leave them out")
     return first, first if given["target"] is None else given["target"]
@@ -227,23 +199,21 @@ def _speed(speed: Any, unit: str, heat: float, body: Grains | None) -> float | N
 
 def _drift(value: Any, heat: float, body: Grains | None) -> tuple[Any, float]:
     """Mean velocity of the target, and the standard deviation of each component [m/s]."""
-    rest = (0.0, 0.0, 0.0)
     if value is None or body is None:
-        return rest, 0.0
-    if isinstance(value, str) and value == "thermal":
-        return rest, thermal_speed(float(body.mass.sum()), heat)
+        return REST, 0.0
+    if is_word(value, "thermal"):
+        return REST, thermal_speed(float(body.mass.sum()), heat)
     return three(value, "m/s", "target_velocity"), 0.0
 
 
 def _spin(value: Any, heat: float) -> tuple[Any, float]:
     """Mean spins of both bodies [rad/s], and the mean energy of thermal spins [J]."""
-    rest = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     if isinstance(value, str):
         if value not in SPINS:
             raise BadInput(f"spin = {value!r}; {did_you_mean(value, list(SPINS))}, or three components in rad/s")
         if SPINS[value] > 0.0 and not heat > 0.0:
             raise BadInput(f"spin = {value!r} needs a temperature above 0 K")
-        return rest, SPINS[value] * BOLTZMANN * heat
+        return (REST, REST), SPINS[value] * BOLTZMANN * heat
     parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) else [value]
     if len(parts) == 2:
         return (three(parts[0], "rad/s", "spin of the projectile"), three(parts[1], "rad/s", "spin of the target")), 0.0
@@ -251,10 +221,9 @@ def _spin(value: Any, heat: float) -> tuple[Any, float]:
     return (both, both), 0.0
 
 
-def _distance(start: Any, first: Grains, second: Grains, speed: float, heat: float) -> float:
+def _distance(start: Any, scales: Scales, heat: float) -> float:
     """Distance of the start [m]. Raises BadInput if the bodies touch there."""
-    scales = scales_of(first, second, speed)
-    if isinstance(start, str) and start == "auto":
+    if is_word(start, "auto"):
         return max(AUTO_START * scales.capture, LEAST_START * scales.touch)
     multiple = _multiple(start, "start")
     if multiple is not None:
@@ -296,9 +265,7 @@ def impact_parameter(value: Any, setup: Flight, name: str = "impact_parameter") 
         if setup.scales.capture == 0.0:
             raise BadInput(f"{name} = {value!r}: without moments b_max is 0; give a length")
     else:
-        b = si(value, "m", name)
-    if b < 0.0:
-        raise BadInput(f"{name} = {value!r} must be at least 0 m")
+        b = si(value, "m", name, least=0.0)
     if setup.sphere and b >= setup.distance:
         raise BadInput(
             f"{name} = {value!r} must be below the radius of the start, {format_quantity(setup.distance, 'm')}"

@@ -76,23 +76,24 @@ class Strata:
 
     Parameters
     ----------
+    widest : float
+        Largest impact parameter captured by a central potential [m].
+    farthest : float, optional
+        Limit of the impact parameter [m], the radius of a starting sphere.
+
+    Attributes
+    ----------
     width : float
         Width of an annulus [m].
-    count : int
-        Number of annuli.
     """
 
-    def __init__(self, width: float, count: int):
-        self.width = width
-        self.results: list[dict[int, tuple[float, float]]] = [{} for _ in range(count)]
-
-    @classmethod
-    def up_to(cls, widest: float, farthest: float = math.inf) -> Strata:
-        """Initial annuli; b is limited to `farthest` [m], the radius of a starting sphere."""
-        return cls(min(HEADROOM * widest, farthest) / STRATA, STRATA)
+    def __init__(self, widest: float, farthest: float = math.inf):
+        self.width, self.farthest = min(HEADROOM * widest, farthest) / STRATA, farthest
+        self._count = STRATA
+        self._flights = np.zeros((0, 4))  # stratum, number, hit and weight, in the order of strata and numbers
 
     def __len__(self) -> int:
-        return len(self.results)
+        return self._count
 
     def edges(self, stratum: int | np.ndarray) -> tuple[float | np.ndarray, float | np.ndarray]:
         """Smallest and largest b of a stratum [m]."""
@@ -103,24 +104,25 @@ class Strata:
         k = np.arange(len(self))
         return math.pi * self.width**2 * (2 * k + 1.0)
 
-    def add(self, stratum: int, number: int, hit: float, weight: float) -> None:
-        """Add the result of a flight: hit (1 or 0), and its weight."""
-        while stratum >= len(self):
-            self.results.append({})
-        self.results[stratum][number] = (hit, weight)
+    def add(self, stratum: np.ndarray, number: np.ndarray, hit: np.ndarray, weight: np.ndarray) -> None:
+        """Add results of flights (K,): hit (1 or 0), and weight."""
+        both = np.vstack([self._flights, np.column_stack([stratum, number, hit, weight])])
+        # sorted, so that sums have equal bits in any order of completion
+        self._flights = both[np.lexsort((both[:, 1], both[:, 0]))]
+        self._count = max(self._count, int(self._flights[-1, 0]) + 1)
 
     def counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of hits and of flights (K,) of the annuli."""
-        hits = np.array([sum(hit for hit, _ in values_in_order(one)) for one in self.results])
-        return hits, np.array([len(one) for one in self.results])
+        stratum = self._flights[:, 0].astype(int)
+        return np.bincount(stratum, self._flights[:, 2], len(self)), np.bincount(stratum, minlength=len(self))
 
     def weights(self) -> tuple[np.ndarray, np.ndarray]:
         """Mean and variance (K,) of the weights of hits; 1 and 0 without hits."""
         mean, spread = np.ones(len(self)), np.zeros(len(self))
-        for k, one in enumerate(self.results):
-            found = np.array([weight for hit, weight in values_in_order(one) if hit > 0.0])
-            if found.size:
-                mean[k], spread[k] = found.mean(), found.var()
+        hits = self._flights[self._flights[:, 2] > 0.0]
+        for k in np.unique(hits[:, 0]).astype(int):
+            found = hits[hits[:, 0] == k, 3]
+            mean[k], spread[k] = found.mean(), found.var()
         return mean, spread
 
     def estimate(self, z: float = ONE_SIGMA) -> Estimate:
@@ -141,7 +143,7 @@ class Strata:
         found = self.estimate()
         return 0.5 * (found.high - found.low)
 
-    def round(self, relative_error: float, farthest: float = math.inf) -> list[Task]:
+    def round(self, relative_error: float) -> list[Task]:
         """Flights of the next round; an empty list if σ is accurate enough.
 
         First, `PILOT` flights in each annulus, with further annuli as long as the outermost ones have hits. Then
@@ -151,7 +153,7 @@ class Strata:
         pilot = [Task(k, int(n), PILOT) for k, n in enumerate(tries) if n < PILOT]
         if pilot:
             return pilot
-        possible = farthest / self.width - len(self) + 1e-9
+        possible = self.farthest / self.width - len(self) + 1e-9
         if hits[-EMPTY:].any() and possible >= 1.0:
             further = int(min(max(len(self) // 4, 1), possible))
             return [Task(len(self) + k, 0, PILOT) for k in range(further)]
@@ -180,11 +182,6 @@ def neighbour_sums(counts: np.ndarray) -> np.ndarray:
     """
     padded = np.pad(np.asarray(counts, float), 2)
     return sum(padded[2 + k : 2 + k + len(counts)] for k in (-2, -1, 1, 2))  # type: ignore[return-value]
-
-
-def values_in_order(flights: dict[int, tuple[float, float]]) -> Iterator[tuple[float, float]]:
-    """Results in the order of their numbers, so that sums have equal bits in any order of completion."""
-    return (flights[number] for number in sorted(flights))
 
 
 def cut(tasks: list[Task], most: int) -> tuple[list[Task], list[Task]]:

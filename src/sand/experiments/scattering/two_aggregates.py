@@ -15,7 +15,7 @@ from ...numerics.quaternion import normalised, turned, turned_back, turning_rate
 from ...numerics.random import normal_pair, random_words
 from ...numerics.vec import add, axpy, cross, dot, load, norm, put, scale, sub
 from .initial_conditions import AXIS1, AXIS2, RANDOM, SPIN_STREAM1, SPIN_STREAM2, R, U, draw_spin, set_vector, vector_at
-from .two_spheres import CLOSE, Model, relative_square
+from .two_spheres import Model, longest_safe_step, relative_motion_error, relative_square
 
 TURN1, TURN2, ANGULAR1, ANGULAR2 = 6, 10, 14, 17
 """Offsets of orientations and angular momenta in the state."""
@@ -122,15 +122,12 @@ def rigid_error(y, error, parameters):
 
     Their lower bounds use Σ|μ| of both bodies.
     """
-    r, u = vector_at(y, R), vector_at(y, U)
+    r = vector_at(y, R)
     square = dot(r, r)
     first, second = parameters.first, parameters.second
     outer = math.sqrt(dot(parameters.field, parameters.field))
     strength = 2.0 * parameters.k * first.strength * second.strength / (square * math.sqrt(square))
-    worst = max(
-        relative_square(vector_at(error, R), square),
-        relative_square(vector_at(error, U), max(dot(u, u), strength / parameters.reduced)),
-    )
+    worst = relative_motion_error(y, error, parameters.reduced, strength)
     worst = max(worst, rotation_error(y, error, TURN1, ANGULAR1, first, strength + first.strength * outer))
     worst = max(worst, rotation_error(y, error, TURN2, ANGULAR2, second, strength + second.strength * outer))
     return math.sqrt(worst)
@@ -155,8 +152,7 @@ def rigid_gap(y, parameters):
                 gap = min(gap, apart - first.radius[i] - second.radius[j])
     speed = norm(u) + norm(spin_of(q1, vector_at(y, ANGULAR1), first.inertia)) * first.extent
     speed += norm(spin_of(q2, vector_at(y, ANGULAR2), second.inertia)) * second.extent
-    way = max(0.5 * gap, CLOSE * parameters.smallest)
-    return gap, way / speed if speed > 0.0 else math.inf
+    return gap, longest_safe_step(gap, speed, parameters.smallest)
 
 
 @loop
@@ -219,12 +215,11 @@ def draw_rigid_pose(y, flight_id, start, parameters):
     q2 = draw_orientation(flight_id, AXIS2, start.axes, second.pose)
     set_quaternion(y, TURN1, q1)
     set_quaternion(y, TURN2, q2)
-    set_vector(
-        y, ANGULAR1, draw_angular_momentum(flight_id, SPIN_STREAM1, start.spin1, start.spin_energy1, q1, first.inertia)
-    )
-    set_vector(
-        y, ANGULAR2, draw_angular_momentum(flight_id, SPIN_STREAM2, start.spin2, start.spin_energy2, q2, second.inertia)
-    )
+    energy1, energy2 = start.spin_energy
+    angular1 = draw_angular_momentum(flight_id, SPIN_STREAM1, start.spin[0], energy1, q1, first.inertia)
+    angular2 = draw_angular_momentum(flight_id, SPIN_STREAM2, start.spin[1], energy2, q2, second.inertia)
+    set_vector(y, ANGULAR1, angular1)
+    set_vector(y, ANGULAR2, angular2)
 
 
 TWO_AGGREGATES = Model(AGGREGATES, rigid_rates, rigid_error, rigid_gap, rigid_energy, normalise_rigid, draw_rigid_pose)

@@ -85,6 +85,23 @@ def relative_square(error, square):
 
 
 @loop
+def relative_motion_error(y, error, reduced, strength):
+    """Largest squared error of r and u over its scale; `strength` is the magnetic energy at this separation [J]."""
+    r, u = vector_at(y, R), vector_at(y, U)
+    return max(
+        relative_square(vector_at(error, R), dot(r, r)),
+        relative_square(vector_at(error, U), max(dot(u, u), strength / reduced)),
+    )
+
+
+@loop
+def longest_safe_step(gap, speed, smallest):
+    """Longest step [s] that cannot miss a contact: half the gap, or `CLOSE` of the smallest radius near contact."""
+    way = max(0.5 * gap, CLOSE * smallest)
+    return way / speed if speed > 0.0 else math.inf
+
+
+@loop
 def sphere_error(y, error, parameters):
     """Largest error over its scale; the scales are |r|, |u|, 1 and |ω|.
 
@@ -95,11 +112,8 @@ def sphere_error(y, error, parameters):
     square = dot(r, r)
     strength = 2.0 * parameters.k * parameters.moment1 * parameters.moment2 / (square * math.sqrt(square))
     outer = math.sqrt(dot(parameters.field, parameters.field))
-    u, w1, w2 = vector_at(y, U), vector_at(y, SPIN1), vector_at(y, SPIN2)
-    worst = max(
-        relative_square(vector_at(error, R), square),
-        relative_square(vector_at(error, U), max(dot(u, u), strength / parameters.reduced)),
-    )
+    w1, w2 = vector_at(y, SPIN1), vector_at(y, SPIN2)
+    worst = relative_motion_error(y, error, parameters.reduced, strength)
     worst = max(
         worst, relative_square(vector_at(error, DIRECTION1), 1.0), relative_square(vector_at(error, DIRECTION2), 1.0)
     )
@@ -114,9 +128,7 @@ def sphere_gap(y, parameters):
     """Gap [m], and the longest step [s] that cannot miss a contact."""
     r, u = vector_at(y, R), vector_at(y, U)
     gap = math.sqrt(dot(r, r)) - parameters.touch
-    speed = math.sqrt(dot(u, u))
-    way = max(0.5 * gap, CLOSE * parameters.smallest)
-    return gap, way / speed if speed > 0.0 else math.inf
+    return gap, longest_safe_step(gap, math.sqrt(dot(u, u)), parameters.smallest)
 
 
 @loop
@@ -143,12 +155,12 @@ def normalise_spheres(y):
 def draw_sphere_pose(y, flight_id, start, parameters):
     """Draw moments and spins as `InitialConditions` prescribes."""
     line = unit(vector_at(y, R))
-    set_vector(y, DIRECTION1, draw_axis(flight_id, AXIS1, start.axes, start.axis1, line))
-    set_vector(y, DIRECTION2, draw_axis(flight_id, AXIS2, start.axes, start.axis2, line))
-    spread1 = math.sqrt(2.0 / 3.0 * start.spin_energy1 / parameters.inertia1)
-    spread2 = math.sqrt(2.0 / 3.0 * start.spin_energy2 / parameters.inertia2)
-    set_vector(y, SPIN1, draw_spin(flight_id, SPIN_STREAM1, start.spin1, spread1))
-    set_vector(y, SPIN2, draw_spin(flight_id, SPIN_STREAM2, start.spin2, spread2))
+    set_vector(y, DIRECTION1, draw_axis(flight_id, AXIS1, start.axes, start.axis[0], line))
+    set_vector(y, DIRECTION2, draw_axis(flight_id, AXIS2, start.axes, start.axis[1], line))
+    spread1 = math.sqrt(2.0 / 3.0 * start.spin_energy[0] / parameters.inertia1)
+    spread2 = math.sqrt(2.0 / 3.0 * start.spin_energy[1] / parameters.inertia2)
+    set_vector(y, SPIN1, draw_spin(flight_id, SPIN_STREAM1, start.spin[0], spread1))
+    set_vector(y, SPIN2, draw_spin(flight_id, SPIN_STREAM2, start.spin[1], spread2))
 
 
 TWO_SPHERES = Model(SPHERES, sphere_rates, sphere_error, sphere_gap, sphere_energy, normalise_spheres, draw_sphere_pose)
