@@ -11,7 +11,6 @@ import click
 from ..arguments import MOST_GRAINS
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE
 
 KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")
 
@@ -44,7 +43,7 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
 @options.as_json
 @options.debug
-def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> int:
+def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> None:
     """Build an aggregate with all contacts at rest and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
 
     \b
@@ -62,14 +61,10 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -
     from ..setup.aggregates import build
 
     with report.compiling(as_json):
-        body = report.with_notes(lambda: build(kind, **_arguments(given)))
+        body = build(kind, **_arguments(given))
     write_body(target, body, overwrite=overwrite)
     content = {"kind": kind, "file": str(target), "seed": given["seed"], **_properties(body)}
-    if as_json:
-        report.emit(content)
-    else:
-        report.show(f"build {kind}", _rows(content))
-    return DONE
+    report.answer(content, f"build {kind}", _rows(content), as_json=as_json)
 
 
 def _arguments(given: dict[str, Any]) -> dict[str, Any]:

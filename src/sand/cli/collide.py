@@ -11,7 +11,6 @@ import click
 from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .exits import DONE
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""
@@ -28,7 +27,7 @@ SHOWN = 12
 @options.debug
 def command(
     case: str, out: str | None, seeds: str | None, workers: int, threads: int | None, overwrite: bool, as_json: bool
-) -> int:
+) -> None:
     """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 
     Writes collision.json and a figure to the folder; for a single seed also the trajectory, the ledger and all other
@@ -41,16 +40,11 @@ def command(
 
     job = CollisionJob(case, None if out is None else Path(out), chosen, overwrite=overwrite)
     refuse_folder(job.folder, Path(case), overwrite=overwrite)
-    return collide(job, f"collide {case}", workers, threads, as_json)
+    collide(job, f"collide {case}", workers, threads, as_json)
 
 
-def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> int:
+def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> None:
     """Run a `CollisionJob` and print the results.
-
-    Returns
-    -------
-    int
-        The exit code.
 
     Raises
     ------
@@ -61,18 +55,9 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: 
 
     processes = workers if len(job.case.impact.seeds) > 1 else 1
     with running_job(job.folder, processes, threads=threads, quiet=as_json or quiet) as (executor, interrupts):
-        content = report.with_notes(lambda: job.run(executor, [interrupts]))
-    if as_json:
-        report.emit(content)
-    elif not quiet:
-        _show(heading, job.folder, content["collisions"])
-    return DONE
-
-
-def outcome_counts(results: list[dict[str, Any]]) -> str:
-    """How often each outcome occurred, as text."""
-    counts = Counter(result["outcome"] for result in results)
-    return ", ".join(f"{n} × {name}" for name, n in counts.most_common())
+        content = job.run(executor, [interrupts])
+    rows = [*collision_rows(content["collisions"]), ("files", f"{job.folder}/")]
+    report.answer(content, heading, rows, as_json=as_json, quiet=quiet)
 
 
 def read_seeds(text: str) -> list[int]:
@@ -91,15 +76,16 @@ def read_seeds(text: str) -> list[int]:
     return list(dict.fromkeys(seeds))
 
 
-def _show(heading: str, folder: Path, results: list[dict[str, Any]]) -> None:
-    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", collision_line(r)) for r in results[:SHOWN]]
+def collision_rows(results: list[dict[str, Any]]) -> report.Rows:
+    """The first SHOWN collisions, and how often each outcome occurred."""
+    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", _collision(r)) for r in results[:SHOWN]]
     if len(results) > SHOWN:
         rows.append(("…", f"and {len(results) - SHOWN} more"))
-    report.show(heading, [*rows, ("outcomes", outcome_counts(results)), ("files", f"{folder}/")])
+    counts = Counter(r["outcome"] for r in results)
+    return [*rows, ("outcomes", ", ".join(f"{n} × {name}" for name, n in counts.most_common()))]
 
 
-def collision_line(r: dict[str, Any]) -> str:
-    """Describe one collision on one line."""
+def _collision(r: dict[str, Any]) -> str:
     pieces = f"{len(r['fragments'])} bodies, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"

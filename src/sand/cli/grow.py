@@ -12,7 +12,6 @@ from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
 from .collide import read_seeds
-from .exits import DONE
 
 DEFAULT_SEEDS = list(range(1, 9))
 
@@ -29,16 +28,7 @@ DEFAULT_SEEDS = list(range(1, 9))
 @options.as_json
 @options.quiet
 @options.debug
-def command(
-    case: str,
-    seeds: str | None,
-    out: str | None,
-    workers: int,
-    scheduler: str | None,
-    threads: int | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+def command(case: str, seeds: str | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 
     Each box is a run as by `sand run`; growth.json lists how they ended. Called again, the command continues unfinished
@@ -53,14 +43,7 @@ def command(
     folder = Path(out or Path(case).stem)
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder} is a file; give another folder with --out")
-    how: dict[str, Any] = {
-        "workers": workers,
-        "scheduler": scheduler,
-        "threads": threads,
-        "quiet": quiet,
-        "as_json": as_json,
-    }
-    return boxes(content, chosen or own or DEFAULT_SEEDS, folder, **how)
+    boxes(content, chosen or own or DEFAULT_SEEDS, folder, threads=threads, **how)
 
 
 def boxes(
@@ -73,13 +56,8 @@ def boxes(
     threads: int | None,
     quiet: bool,
     as_json: bool,
-) -> int:
+) -> None:
     """Run or continue the boxes of a case.
-
-    Returns
-    -------
-    int
-        The exit code.
 
     Raises
     ------
@@ -97,9 +75,8 @@ def boxes(
             report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
 
     with running_job(folder, workers, scheduler, threads, quiet=quiet) as (executor, interrupts):
-        report.with_notes(lambda: grow(content, seeds, folder, executor, finished, [interrupts]))
+        grow(content, seeds, folder, executor, finished, [interrupts])
     if as_json:
         report.emit({"folder": str(folder), "seeds": seeds, "outcomes": outcomes})
     elif not quiet:
         report.write_line(f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}")
-    return DONE

@@ -13,10 +13,11 @@ from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
+from ..simulation.outcome import Outcome, Result
 from ..units import format_quantity
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
-from .interrupt import InterruptObserver
+from .job import InterruptObserver
 from .progress import Progress
 
 
@@ -47,7 +48,7 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
     verbose = not (quiet or as_json)
     bar = None
     with report.compiling(quiet), InterruptObserver() as interrupts:
-        simulation = report.with_notes(make)
+        simulation = make()
         simulation.observers.append(interrupts)
         goal = _absolute_end(simulation, end)
         if verbose:
@@ -57,8 +58,7 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
                 simulation.observers.append(bar)
         try:
             until, steps = end or End()
-            with report.notes():
-                result = simulation.run(until, steps=steps)
+            result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
         except FilesFailed as error:
@@ -78,8 +78,6 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
 
 def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
     """The result of a run that had finished except for its figure when it was interrupted; None for any other."""
-    from ..simulation.outcome import Outcome, Result
-
     if simulation.time < goal[0] and simulation.steps < goal[1]:
         return None
     try:
@@ -103,14 +101,12 @@ def _absolute_end(simulation: Any, end: End | None) -> tuple[float, float]:
 
 def _conclude(result: Any, folder: Path, *, verbose: bool, as_json: bool) -> int:
     """Report how a run ended; returns the exit code."""
-    from ..simulation.outcome import Outcome
-
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
     if as_json:
         report.emit({**summary, "folder": str(folder)})
     if verbose:
-        rows = [*report.results(summary), ("files", _listed(folder))]
+        rows = [*report.results(summary), ("files", report.listed(folder))]
         report.show("done" if outcome is Outcome.FINISHED else "so far", rows)
     if outcome is Outcome.INTERRUPTED:
         report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
@@ -142,11 +138,6 @@ def _how_to_recover(folder: Path) -> str:
     if report.checkpoints(folder):
         return f"once this is solved, continue from the last checkpoint with: {report.resume_line(folder)}"
     return "there is no checkpoint yet; once this is solved, start again with --overwrite"
-
-
-def _listed(folder: Path) -> str:
-    """The folder and the names of its files, as one line."""
-    return f"{folder}/  " + "  ".join(report.files_of(folder))
 
 
 def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:

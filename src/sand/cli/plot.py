@@ -9,7 +9,6 @@ import click
 
 from ..errors import BadInput, did_you_mean
 from . import options, report
-from .exits import DONE
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
@@ -53,7 +52,7 @@ class Source(NamedTuple):
 @options.debug
 def command(
     source: str, what: str | None, out: str | None, form: str, frame: int, overwrite: bool, as_json: bool, **how: Any
-) -> int:
+) -> None:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
@@ -64,16 +63,14 @@ def command(
     from ..io.run_folder import make_folder, replace_file
 
     folder, names = _check_options(Path(source), what, out, form, overwrite, how)
-    pictures = report.with_notes(lambda: _draw(_open_source(Path(source)), names, frame, form, how))
+    pictures = _draw(_open_source(Path(source)), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)
-    for path, content in zip((folder / f"{name}.{form}" for name in names), pictures, strict=True):
+    paths = [folder / f"{name}.{form}" for name in names]
+    for path, content in zip(paths, pictures, strict=True):
         replace_file(path, content)
-    if as_json:
-        report.emit({"files": [str(folder / f"{name}.{form}") for name in names]})
-    else:
-        report.show(f"plot {source}", [("folder", str(folder)), ("files", ", ".join(f"{n}.{form}" for n in names))])
-    return DONE
+    rows = [("folder", str(folder)), ("files", ", ".join(path.name for path in paths))]
+    report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json)
 
 
 def _check_options(

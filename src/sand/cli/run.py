@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -40,8 +41,7 @@ def command(
     seed: int | None,
     overwrite: bool,
     threads: int | None,
-    as_json: bool,
-    quiet: bool,
+    **output: bool,
 ) -> int:
     """Run the simulation that CASE.toml describes.
 
@@ -80,16 +80,18 @@ def command(
         described.run.until, described.run.steps = end, None
     if seed is not None:
         described.run.seed = seed
-    folder = Path(out or _usual_folder(described.run.out, Path(name), grains, frame))
+    usual = described.run.out or Path(name).stem
+    if grains is not None:  # never the folder of the earlier run
+        usual = f"{grains.parent.name}-from-{'last' if frame is None or frame < 0 else frame}"
+    folder = Path(out or usual)
     refuse_folder(folder, Path(name), overwrite=overwrite)
-    return launch(
-        lambda: report.with_file_name(Path(name), lambda: simulation_of(described, folder, overwrite=overwrite)),
-        folder,
-        f"run {name}" + (f" from {source}" if source else ""),
-        End(described.run.until, described.run.steps),
-        quiet=quiet,
-        as_json=as_json,
-    )
+
+    def build() -> Any:
+        with report.naming(name):
+            return simulation_of(described, folder, overwrite=overwrite)
+
+    heading = f"run {name}" + (f" from {source}" if source else "")
+    return launch(build, folder, heading, End(described.run.until, described.run.steps), **output)
 
 
 def _source(source: str) -> Path:
@@ -113,10 +115,3 @@ def _case_name(case: str | None, source: Path | None) -> str:
     if not (source.parent / CASE).exists():
         raise BadInput(f"--from: there is no {CASE} beside {source}; give a case file before --from")
     return str(source.parent / CASE)
-
-
-def _usual_folder(given: str | None, case: Path, source: Path | None, frame: int | None) -> Path:
-    """Folder for the files without --out: from the case, or its name; never that of the earlier run."""
-    if source is None:
-        return Path(given or case.stem)
-    return Path(f"{source.parent.name}-from-{'last' if frame is None or frame < 0 else frame}")
