@@ -21,7 +21,7 @@ from .setup.from_frame import from_frame
 from .simulation.simulation import Simulation
 from .units import si
 from .viewer.external_field import read_field
-from .viewer.simulation_view import view_folder
+from .viewer.show import view_folder
 
 if TYPE_CHECKING:
     from .plotting.render.still import Still

@@ -6,7 +6,6 @@ import base64
 import gzip
 import hashlib
 import html
-import json
 import math
 import re
 from collections.abc import Callable
@@ -16,9 +15,9 @@ from typing import Any
 from ..analysis.fractal import FEWEST
 from ..errors import BadInput
 from ..io.page_bundle import Written, read_bundle
-from ..io.run_folder import plain
 from .dataset import RunDataset
 from .dimensions import Dimensions
+from .packets import compact_json
 
 BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data: blob:; media-src blob:; "
 """Content security policy of both pages: nothing is loaded from or sent to other sites."""
@@ -61,7 +60,7 @@ def write_page(
     dataset: RunDataset,
     path: str | Path,
     *,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[], None] | None = None,
     bundle: tuple[str, str] | None = None,
 ) -> int:
     """Write a single-file page with all selected frames of a dataset, in half precision.
@@ -75,7 +74,7 @@ def write_page(
     path : str or Path
         Path of the HTML file; an existing file is replaced.
     progress : callable, optional
-        Called with the number of frames written so far and in total.
+        Called after each frame.
     bundle : tuple of (str, str), optional
         Script and style sheet; those of the package by default.
 
@@ -108,7 +107,7 @@ def write_page(
             file.write(_packet_element(f"sand-frame-{k}", dataset.packet(k, frame, names)))
             dimensions.append(largest_clusters.of(frame, names) if k % stride == 0 else {})
             if progress:
-                progress(k + 1, count)
+                progress()
         manifest = dataset.manifest() | {"running": False, "dimensions": dimensions}
         if stride > 1 and any(dimensions):
             note = f"fractal dimensions of one frame of {stride}"
@@ -134,7 +133,7 @@ def _packet_element(key: str, packet: bytes) -> bytes:
 
 def _json_element(key: str, content: dict[str, Any]) -> str:
     """Script element with JSON, in which `<` is escaped so that no text can end the element."""
-    text = json.dumps(plain(content), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    text = compact_json(content).replace("<", "\\u003c")
     return f'<script type="application/json" id="{key}">{text}</script>\n'
 
 
@@ -155,10 +154,8 @@ def frame_slice(frames: slice, every: int) -> slice:
     Raises
     ------
     BadInput
-        If `every` or the step of the slice is less than 1.
+        If the step of the slice is less than 1.
     """
-    if every < 1:
-        raise BadInput(f"every = {every} must be an integer of at least 1")
     if frames.step is not None and frames.step < 1:
         raise BadInput(f"frames with step {frames.step}: the viewer plays frames forwards; give a step of at least 1")
     return slice(frames.start, frames.stop, (frames.step or 1) * every)
