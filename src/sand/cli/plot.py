@@ -140,8 +140,9 @@ def _open_source(path: Path) -> Source:
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
-    from ..plotting.plots import HISTORY, figure_bytes, grains_figure, history_figure
+    from ..plotting.plots import HISTORY, grains_figure, history_figure
     from ..plotting.render.still import still_picture
+    from ..plotting.run_figure import figure_bytes
 
     history = _history(source) if any(name in HISTORY for name in names) else None
     one, field = None, None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_prefix
 
@@ -41,7 +41,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
             axes.set(xscale="log", yscale="log")
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-                axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                axis.set_major_formatter(lambda value, _: f"{value:g}")
                 axis.set_minor_formatter(NullFormatter())
         left.set(xlabel=f"time [{unit}]", ylabel="mean size $S$ [grains]")
         low, high = left.get_ylim()

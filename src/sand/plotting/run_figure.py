@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,15 +26,12 @@ WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
 MIN_GRAIN_RADIUS = 11.0
 """Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
-COMPRESSION = 6
-"""zlib level of PNG files; level 9 saves another 5 % and takes ten times as long (1 s)."""
-_PNG: dict[str, Any] = {
-    "format": "png",
-    "dpi": DPI,
-    "facecolor": "auto",  # that of the figure, also with a dark background
-    "metadata": {"Software": "SAND"},
-    "pil_kwargs": {"compress_level": COMPRESSION},
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": "SAND"},
+    "pdf": {"CreationDate": None, "Creator": "SAND", "Producer": "SAND"},
+    "svg": {"Date": None, "Creator": "SAND"},
 }
+"""Metadata of files by format, without time stamps."""
 
 # Positions of the panels in units of the figure size.
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
@@ -45,7 +43,7 @@ class RunFigure(Figure):
     """A figure that notebooks display as PNG with any backend."""
 
     def _repr_png_(self) -> bytes:
-        return png(self)
+        return figure_bytes(self)
 
 
 def run_figure(simulation: Simulation) -> Figure:
@@ -108,9 +106,7 @@ def _materials(grains: Any) -> str:
 
 def _radius_range(radius: np.ndarray) -> str:
     small, large = float(radius.min()), float(radius.max())
-    if large < 1.001 * small:
-        return format_si(large, "m")
-    return f"{format_si(small, 'm')} to {format_si(large, 'm')}"
+    return format_si(large, "m") if large < 1.001 * small else f"{format_si(small, 'm')} to {format_si(large, 'm')}"
 
 
 def _describe_box(box: Box) -> str:
@@ -148,14 +144,7 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
     draw_scene(axes, scene, _pixels(height))
     panel_letter(axes, "e", 0.0)
     axes.text(
-        0.04,
-        1.004,
-        _caption(scene, lost),
-        transform=axes.transAxes,
-        size=7.5,
-        color=MUTED,
-        va="bottom",
-        ha="left",
+        0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=7.5, color=MUTED, va="bottom", ha="left"
     )
     if enlarge:
         axes = _panel(figure, _RIGHT, full[0], strip)
@@ -193,10 +182,21 @@ def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
     return panels
 
 
-def png(figure: Figure) -> bytes:
-    """Encode a figure as PNG."""
-    with plot_style():
-        figure.savefig(content := io.BytesIO(), **_PNG)
+def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -> bytes:
+    """Encode a figure as a file, without time stamps: equal figures give equal bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure of matplotlib.
+    form : str, optional
+        "png", "pdf" or "svg".
+    transparent : bool, optional
+        Transparent background.
+    """
+    colour = "none" if transparent else "auto"  # "auto" is the colour of the figure, also with a dark background
+    with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
+        figure.savefig(content := io.BytesIO(), format=form, dpi=DPI, facecolor=colour, metadata=_METADATA[form])
     return content.getvalue()
 
 
@@ -208,7 +208,7 @@ def save(figure: Figure, path: str | Path) -> None:
     FilesFailed
         If the file cannot be written.
     """
-    replace_file(Path(path), png(figure))
+    replace_file(Path(path), figure_bytes(figure))
 
 
 def show(figure: Figure) -> Figure:

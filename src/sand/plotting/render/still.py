@@ -14,7 +14,7 @@ from ...analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, quantit
 from ...arguments import checked
 from ...box import Box
 from ...errors import BadInput, did_you_mean, refuse_other
-from ..run_figure import DPI, RunFigure, headline, png
+from ..run_figure import DPI, RunFigure, figure_bytes, headline
 from ..style import DARK_BACKGROUND, LIGHT_BACKGROUND, MUTED, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, plot_style, rgb
 from .colouring import ColourKey, coloured
 from .legend import draw_colour_keys, draw_directions
@@ -63,7 +63,7 @@ class Still(RunFigure):
 
     def image(self) -> Image.Image:
         """The complete image with annotations, as a Pillow image."""
-        return Image.open(io.BytesIO(png(self)))
+        return Image.open(io.BytesIO(figure_bytes(self)))
 
 
 @checked
