@@ -11,21 +11,49 @@ from ..arguments import checked
 from ..box import Box, as_box
 from ..errors import BadInput
 from ..grains import Grains
+from ..io.bodies import read_body
 from ..io.checkpoint import newest_checkpoint
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..io.trajectory import Frames
 from ..material import Material
+from ..setup.checks import check_body
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
 from ..simulation.simulation import Simulation
-from .bodies import body_from_file
 from .case import Case, check_case
 
 ENDS = (("run", "until"), ("run", "steps"))
 """Keys that may be changed in the case.toml of a resumed run."""
 TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
 """Suffixes of text files with a body; all other files are read as trajectories."""
+
+
+def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Simulation:
+    """Create a simulation of grains in a box with the forces, steps and seed of a case."""
+    return Simulation(
+        grains,
+        case.forces.build(),
+        box=box,
+        stepping=case.stepping,
+        neighbours=case.neighbours,
+        seed=case.run.seed,
+        **options,
+    )
+
+
+def body_from_file(path: str | Path, material: Material | None = None, *others: Any, **named: Any) -> Grains:
+    """Read a body that is in one piece; parameters as for `io.bodies.read_body`.
+
+    Raises
+    ------
+    BadInput
+        As `read_body`; also for grains that overlap by more than a simulation allows at its start, and for grains
+        without a contact to the rest. The first ten are named.
+    """
+    body = read_body(path, material, *others, **named)
+    check_body(body, str(path))
+    return body
 
 
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
@@ -48,18 +76,8 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     if case.grains.file is not None and out is not None:
         _refuse_own_source(Path(case.grains.file), Path(out))
     start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
-    simulation = Simulation(
-        start.grains,
-        case.forces.build(),
-        box=start.box,
-        stepping=case.stepping,
-        neighbours=case.neighbours,
-        seed=case.run.seed,
-        out=out,
-        frame_every=case.run.frame_every,
-        contacts=start.contacts,
-        **options,
-    )
+    options |= {"out": out, "frame_every": case.run.frame_every, "contacts": start.contacts}
+    simulation = simulate(case, start.grains, start.box, **options)
     simulation.recipe, simulation.origin = case.grains.recipe(), start.note
     return simulation
 
@@ -229,18 +247,8 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
     if (grains.arrays.material != part["material"]).any():
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
-    simulation = Simulation(
-        grains,
-        case.forces.build(),
-        box=case.box.periodic,
-        stepping=case.stepping,
-        neighbours=case.neighbours,
-        seed=case.run.seed,
-        out=place,
-        frame_every=case.run.frame_every,
-        restart=(arrays, meta),
-        **options,
-    )
+    options |= {"out": place, "frame_every": case.run.frame_every, "restart": (arrays, meta)}
+    simulation = simulate(case, grains, case.box.periodic, **options)
     if case.grains.kind != "given":
         simulation.recipe = case.grains.recipe()
     end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ..arguments import MOST_GRAINS
-from ..config.bodies import body_from_file
+from ..config.build import body_from_file
 from ..config.case import ForcesSection, MaterialSection, material_errors
 from ..config.commands import BODIES, refuse_other_command
 from ..config.errors import validate

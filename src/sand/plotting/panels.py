@@ -242,5 +242,5 @@ def _log_ticks(axes: Axes, plain: bool = False) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _tick_label(value: float, _: int) -> str:
+def _tick_label(value: float, _: float) -> str:
     return f"{value:.4g}".replace("-", "−") if value == 0.0 or 1e-3 <= abs(value) < 1e5 else f"{value:.1e}"

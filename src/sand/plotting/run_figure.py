@@ -16,7 +16,7 @@ from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
 from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
-from .render.scene import Scene, draw_largest, draw_scene, make_scene, view_window
+from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
 from .style import MUTED, format_number, format_si, panel_letter, plot_style
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _METADATA: dict[str, dict[str, Any]] = {
 
 # Positions of the panels in units of the figure size.
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
-_TOP, _BOTTOM = 0.862, 0.075
+_TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
 _MARGIN = 0.012
 
 
@@ -121,7 +121,9 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    panels = [_panel(figure, _LEFT, bottom, height) for bottom, height in _stack((1.0, 1.35, 1.1, 0.5), 0.036)]
+    gap = 4 * _GAP / (_TOP - _BOTTOM - 3 * _GAP)  # relative to the mean height of the four panels
+    place = {"left": _LEFT[0], "right": _LEFT[1], "bottom": _BOTTOM, "top": _TOP, "hspace": gap}
+    panels = list(figure.subplots(4, 1, height_ratios=(1.0, 1.35, 1.1, 0.5), gridspec_kw=place))
     draw_clusters(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
@@ -137,7 +139,7 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
     full = (0.03, 0.85)
     window = view_window(scene, _pixels(full[1])[0] / _pixels(full[1])[1])
     grain_radius = float(np.median(scene.radius)) * _pixels(full[1])[0] / (window[1] - window[0])
-    enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(scene.largest_clusters())
+    enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(largest_clusters(scene.label))
     strip = 0.235
     bottom, height = (full[0] + strip + 0.02, full[1] - strip - 0.02) if enlarge else full
     axes = _panel(figure, _RIGHT, bottom, height)
@@ -154,7 +156,7 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
 
 def _caption(scene: Scene, lost: int) -> str:
     parts = []
-    if scene.largest_clusters():
+    if largest_clusters(scene.label):
         parts.append("one colour per cluster, single grains grey")
     if scene.arrow.any():
         parts.append("arrows: moments")
@@ -170,16 +172,6 @@ def _panel(figure: Figure, columns: tuple[float, float], bottom: float, height: 
 def _pixels(height: float) -> tuple[int, int]:
     """Width and height in pixels of a panel on the right with this height relative to the figure."""
     return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
-
-
-def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
-    """Bottom and height of panels on the left from top to bottom, with heights in the given proportions."""
-    scale = (_TOP - _BOTTOM - gap * (len(heights) - 1)) / sum(heights)
-    panels, top = [], _TOP
-    for share in heights:
-        panels.append((top - share * scale, share * scale))
-        top -= share * scale + gap
-    return panels
 
 
 def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -> bytes:

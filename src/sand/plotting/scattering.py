@@ -26,6 +26,8 @@ from .style import (
     si_prefix,
 )
 
+WINDOW = 2.5
+"""Half the width of a panel of trajectories, in the unit of length."""
 DOTS = 60
 """Dots along each trajectory, at equal time intervals."""
 LINE_POINTS = 600
@@ -38,9 +40,7 @@ PROBABILITY_MAP = "cividis"
 """Colour map of probabilities: perceptually uniform, also for colour-blind readers."""
 
 
-def trajectories_figure(
-    groups: Sequence[Sequence[Any]], names: Sequence[str], scales: Any, title: str, window: float = 2.5
-) -> Figure:
+def trajectories_figure(groups: Sequence[Sequence[Any]], names: Sequence[str], scales: Any, title: str) -> Figure:
     """Figure with one panel per initial spin: trajectories of both bodies in the x-y plane.
 
     Parameters
@@ -53,8 +53,6 @@ def trajectories_figure(
         Its `capture`, the impact parameter b_max of Eq. 14 [m], is the unit of length; r₁ + r₂ if it is 0.
     title : str
         Description of the two bodies.
-    window : float, optional
-        Half the width of a panel, in the unit of length.
     """
     unit = scales.capture or scales.touch
     unit_name = "b_\\mathrm{max}" if scales.capture else "(r_1+r_2)"
@@ -62,8 +60,8 @@ def trajectories_figure(
         figure = RunFigure(figsize=(4.6 * len(groups) + 0.4, 4.9), dpi=DPI, layout=LAYOUT)
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, len(groups)))):
             for one, colour in zip(groups[k], cycle(LARGEST_COLOURS), strict=False):
-                _draw_trajectory(axes, one, colour, unit, window)
-            axes.set(xlim=(-window, window), ylim=(-window, window), aspect="equal")
+                _draw_trajectory(axes, one, colour, unit)
+            axes.set(xlim=(-WINDOW, WINDOW), ylim=(-WINDOW, WINDOW), aspect="equal")
             axes.set(xlabel=f"$x/{unit_name}$", ylabel=f"$y/{unit_name}$")
             axes.set_title(f"spin: {names[k]}", loc="left", fontsize=8.0)
             axes.legend(loc="upper left", title=f"$b/{unit_name}$", title_fontsize=7.0, fontsize=6.5, alignment="left")
@@ -73,10 +71,10 @@ def trajectories_figure(
     return figure
 
 
-def _draw_trajectory(axes: Axes, one: Any, colour: str, unit: float, window: float) -> None:
+def _draw_trajectory(axes: Axes, one: Any, colour: str, unit: float) -> None:
     """One trajectory projected along z; dots are spaced over the time that it spends in and near the window."""
-    near = np.abs(one.projectile[:, :2]).max(axis=1) < 1.4 * window * unit
-    near |= np.abs(one.target[:, :2]).max(axis=1) < 1.4 * window * unit
+    reach = np.minimum(*(np.abs(body[:, :2]).max(axis=1) for body in (one.projectile, one.target)))
+    near = reach < 1.4 * WINDOW * unit
     inside = np.flatnonzero(near)
     first, last = (one.time[inside[0]], one.time[inside[-1]]) if inside.size else (one.time[0], one.time[-1])
     label = f"{one.impact_parameter / unit:.4g}: {one.end}"

@@ -61,7 +61,6 @@ def write_page(
     path: str | Path,
     *,
     progress: Callable[[], None] | None = None,
-    bundle: tuple[str, str] | None = None,
 ) -> int:
     """Write a single-file page with all selected frames of a dataset, in half precision.
 
@@ -75,8 +74,6 @@ def write_page(
         Path of the HTML file; an existing file is replaced.
     progress : callable, optional
         Called after each frame.
-    bundle : tuple of (str, str), optional
-        Script and style sheet; those of the package by default.
 
     Returns
     -------
@@ -90,7 +87,7 @@ def write_page(
     FilesFailed
         If the file cannot be written.
     """
-    script, styles = bundle or read_bundle()
+    script, styles = read_bundle()
     script = _escape_script(f"\n{script}\n")
     script_hash = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"{BASE_POLICY}script-src 'sha256-{script_hash}'; style-src 'unsafe-inline'"
