@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
 
@@ -19,14 +18,20 @@ SHOWN = 12
 @click.command("collide", short_help="Collide two bodies that a case file describes.")
 @click.argument("case", metavar="CASE.toml", type=options.PATH)
 @click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
-@click.option("--seeds", metavar="LIST", help="Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
+@options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
 @options.threads
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.as_json
 @options.debug
 def command(
-    case: str, out: str | None, seeds: str | None, workers: int, threads: int | None, overwrite: bool, as_json: bool
+    case: str,
+    out: str | None,
+    seeds: list[int] | None,
+    workers: int,
+    threads: int | None,
+    overwrite: bool,
+    as_json: bool,
 ) -> None:
     """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 
@@ -34,11 +39,10 @@ def command(
     files of `sand run`. Ctrl-C interrupts it; continue with `sand resume`.
     """
     set_threads(threads)
-    chosen = None if seeds is None else read_seeds(seeds)
     from ..experiments.collision_job import CollisionJob
     from .launch import refuse_folder
 
-    job = CollisionJob(case, None if out is None else Path(out), chosen, overwrite=overwrite)
+    job = CollisionJob(case, None if out is None else Path(out), seeds, overwrite=overwrite)
     refuse_folder(job.folder, Path(case), overwrite=overwrite)
     collide(job, f"collide {case}", workers, threads, as_json)
 
@@ -58,22 +62,6 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: 
         content = job.run(executor, [interrupts])
     rows = [*collision_rows(content["collisions"]), ("files", f"{job.folder}/")]
     report.answer(content, heading, rows, as_json=as_json, quiet=quiet)
-
-
-def read_seeds(text: str) -> list[int]:
-    """Read '3', '1,2,5' or '1-20' as integers.  Raises BadInput."""
-    seeds: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        ends = [first, last or first]
-        valid = all(end.isdecimal() and len(end) < 20 for end in ends) and (last or not dash)
-        if not valid or int(ends[1]) - int(ends[0]) > 100_000 or int(ends[1]) > options.MOST_SEED:
-            shown = text if len(text) <= 40 else f"{text[:40]}…"
-            raise BadInput(f"--seeds {shown!r} must be whole numbers below 2^63 such as '3', '1,2,5' or '1-20'")
-        seeds += range(int(ends[0]), int(ends[1]) + 1)
-    if not seeds:
-        raise BadInput(f"--seeds {text!r} names no seed: the first number must not be above the last")
-    return list(dict.fromkeys(seeds))
 
 
 def collision_rows(results: list[dict[str, Any]]) -> report.Rows:

@@ -11,14 +11,13 @@ import click
 from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .collide import read_seeds
 
 DEFAULT_SEEDS = list(range(1, 9))
 
 
 @click.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
 @click.argument("case", metavar="CASE.toml", type=options.PATH)
-@click.option("--seeds", metavar="LIST", help="Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
+@options.seeds("Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
 @click.option(
     "--out", metavar="DIR", type=options.PATH, help="Folder for the folders of the boxes (default: the case's name)."
 )
@@ -28,7 +27,7 @@ DEFAULT_SEEDS = list(range(1, 9))
 @options.as_json
 @options.quiet
 @options.debug
-def command(case: str, seeds: str | None, out: str | None, threads: int | None, **how: Any) -> None:
+def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 
     Each box is a run as by `sand run`; growth.json lists how they ended. Called again, the command continues unfinished
@@ -36,14 +35,13 @@ def command(case: str, seeds: str | None, out: str | None, threads: int | None, 
     growth.
     """
     set_threads(threads)
-    chosen = None if seeds is None else read_seeds(seeds)
     from ..experiments.growth_case import read_growth
 
     content, own = read_growth(case)
     folder = Path(out or Path(case).stem)
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder} is a file; give another folder with --out")
-    boxes(content, chosen or own or DEFAULT_SEEDS, folder, threads=threads, **how)
+    boxes(content, seeds or own or DEFAULT_SEEDS, folder, threads=threads, **how)
 
 
 def boxes(

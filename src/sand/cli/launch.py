@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
@@ -21,14 +21,16 @@ from .job import InterruptObserver
 from .progress import Progress
 
 
-class End(NamedTuple):
-    """End of a run: a time [s], a number of further steps, or whichever comes first."""
-
-    until: float | None = None
-    steps: int | None = None
-
-
-def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None, *, quiet: bool, as_json: bool) -> int:
+def launch(
+    make: Callable[[], Any],
+    folder: Path,
+    heading: str,
+    until: float | None,
+    steps: int | None = None,
+    *,
+    quiet: bool,
+    as_json: bool,
+) -> int:
     """Create a simulation, run it, and report how it ended.
 
     Parameters
@@ -37,27 +39,28 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         Returns the simulation, which writes its files to `folder`.
     heading : str
         Heading of the description before the start.
-    end : End or None
-        End of the run; None for the planned end of the simulation.
+    until, steps : float or None, int or None
+        End of the run: a time [s], a number of further steps, or whichever comes first; without both, the planned end
+        of the simulation.
 
     Returns
     -------
     int
         The exit code.
     """
-    verbose = not (quiet or as_json)
     bar = None
     with report.compiling(quiet), InterruptObserver() as interrupts:
         simulation = make()
         simulation.observers.append(interrupts)
-        goal = _absolute_end(simulation, end)
-        if verbose:
+        goal = simulation.planned
+        if until is not None or steps is not None:
+            goal = (until or math.inf, math.inf if steps is None else simulation.steps + steps)
+        if not (quiet or as_json):
             report.show(heading, report.opening(simulation, *goal, folder))
             if sys.stderr.isatty():
                 bar = Progress(*goal)
                 simulation.observers.append(bar)
         try:
-            until, steps = end or End()
             result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
@@ -73,7 +76,7 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         finally:
             if bar is not None:
                 bar.finish()
-    return _conclude(result, folder, verbose=verbose, as_json=as_json)
+    return _conclude(result, folder, quiet=quiet, as_json=as_json)
 
 
 def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
@@ -89,25 +92,13 @@ def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -
     return Result(Outcome.FINISHED, simulation.steps, simulation.time, simulation.ledger.drift)
 
 
-def _absolute_end(simulation: Any, end: End | None) -> tuple[float, float]:
-    """Planned end of the run: time [s] and step, infinite where not set."""
-    if end is None:
-        return simulation.planned
-    return (
-        math.inf if end.until is None else end.until,
-        math.inf if end.steps is None else simulation.steps + end.steps,
-    )
-
-
-def _conclude(result: Any, folder: Path, *, verbose: bool, as_json: bool) -> int:
+def _conclude(result: Any, folder: Path, **output: bool) -> int:
     """Report how a run ended; returns the exit code."""
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
-    if as_json:
-        report.emit({**summary, "folder": str(folder)})
-    if verbose:
-        rows = [*report.results(summary), ("files", report.listed(folder))]
-        report.show("done" if outcome is Outcome.FINISHED else "so far", rows)
+    rows = [*report.results(summary), ("files", report.listed(folder))]
+    heading = "done" if outcome is Outcome.FINISHED else "so far"
+    report.answer({**summary, "folder": str(folder)}, heading, rows, **output)
     if outcome is Outcome.INTERRUPTED:
         report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
         return INTERRUPTED

@@ -31,14 +31,13 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 @options.quiet
 @options.debug
 def command(
-    folder: str, until: str | None, workers: int, scheduler: str | None, threads: int | None, **output: bool
+    folder: str, until: float | None, workers: int, scheduler: str | None, threads: int | None, **output: bool
 ) -> int | None:
     """Continue the run in DIR from its newest checkpoint to its planned end, or to --until.
 
     Jobs of `sand collide`, `sand scatter` and `sand grow` are continued as well: finished parts are kept, and the
     results are those of an uninterrupted job.
     """
-    asked = options.seconds(until)
     set_threads(threads)
     place = Path(folder)
     kind = _kind(place)
@@ -51,7 +50,7 @@ def command(
         return None
     if workers > 1 or scheduler is not None:
         raise BadInput("--workers and --scheduler apply to jobs of many parts; for a run use --threads")
-    return _run(place, until, asked, **output)
+    return _run(place, until, **output)
 
 
 def _kind(folder: Path) -> str:
@@ -91,24 +90,24 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
         collide(job, f"resume {folder}", **how)
 
 
-def _run(place: Path, until: str | None, asked: float | None, *, quiet: bool, as_json: bool) -> int | None:
+def _run(place: Path, until: float | None, *, quiet: bool, as_json: bool) -> int | None:
     """Continue a run; returns the exit code, None if its planned end is reached."""
     from ..config.build import resume
     from ..units import format_quantity
-    from .launch import End, launch
+    from .launch import launch
 
     simulation = resume(place)
     (end, last_step), now = simulation.planned, format_quantity(simulation.time, "s")
-    if asked is None and (simulation.time >= end or simulation.steps >= last_step):
+    if until is None and (simulation.time >= end or simulation.steps >= last_step):
         summary = read_json(place / SUMMARY) if as_json and (place / SUMMARY).exists() else {}
         further = f"to continue it further: {report.resume_line(place)} --until TIME"
         text = f"{place} has reached its planned end at t = {now}; {further}"
         report.answer({**summary, "folder": str(place)}, text, [], as_json=as_json, quiet=quiet)
         return None
-    if asked is not None and asked <= simulation.time:
-        raise BadInput(f"--until = {until!r} is not later than {now}, the present time of {place}")
-    if asked is not None and asked < end < math.inf:
-        new, planned = format_quantity(asked, "s"), format_quantity(end, "s")
+    if until is not None and until <= simulation.time:
+        new = format_quantity(until, "s")
+        raise BadInput(f"--until = {new} is not later than {now}, the present time of {place}")
+    if until is not None and until < end < math.inf:
+        new, planned = format_quantity(until, "s"), format_quantity(end, "s")
         report.note(f"{place} now ends at {new} instead of {planned}, as --until is earlier than the planned end")
-    goal = None if asked is None else End(asked)
-    return launch(lambda: simulation, place, f"resume {place}", goal, quiet=quiet, as_json=as_json)
+    return launch(lambda: simulation, place, f"resume {place}", until, quiet=quiet, as_json=as_json)

@@ -37,7 +37,7 @@ def command(
     source: str | None,
     frame: int | None,
     out: str | None,
-    until: str | None,
+    until: float | None,
     seed: int | None,
     overwrite: bool,
     threads: int | None,
@@ -51,7 +51,6 @@ def command(
     With --from, grains, contacts and box come from a frame of an earlier run, and time begins at 0; CASE.toml
     describes everything else, by default the case.toml of the earlier run.
     """
-    end = options.seconds(until)
     set_threads(threads)
     if case is not None and Path(case).is_dir():
         folder = Path(case)
@@ -64,7 +63,7 @@ def command(
         raise BadInput(f"{case} is a folder; give a case file: sand run CASE.toml")
     from ..config.build import simulation_of
     from ..config.case import GrainsSection, read_case
-    from .launch import End, launch, refuse_folder
+    from .launch import launch, refuse_folder
 
     if source is None and frame is not None:
         raise BadInput("--frame selects the frame of --from FILE to start with; give --from, too")
@@ -76,8 +75,8 @@ def command(
         described.grains = GrainsSection(kind="file", file=str(grains.absolute()), frame=number)
         if case is None:  # another seed, so that a gas does not repeat the kicks of the earlier run
             described.run.seed += 1 + number % 1_000_000
-    if end is not None:
-        described.run.until, described.run.steps = end, None
+    if until is not None:
+        described.run.until, described.run.steps = until, None
     if seed is not None:
         described.run.seed = seed
     usual = described.run.out or Path(name).stem
@@ -91,7 +90,7 @@ def command(
             return simulation_of(described, folder, overwrite=overwrite)
 
     heading = f"run {name}" + (f" from {source}" if source else "")
-    return launch(build, folder, heading, End(described.run.until, described.run.steps), **output)
+    return launch(build, folder, heading, described.run.until, described.run.steps, **output)
 
 
 def _source(source: str) -> Path:
