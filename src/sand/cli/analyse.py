@@ -23,8 +23,7 @@ from . import options, report
 )
 @click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S in which z is fitted.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
-@options.as_json
-@options.debug
+@options.output
 def command(
     folders: tuple[str, ...],
     out: str | None,

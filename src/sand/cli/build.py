@@ -39,8 +39,7 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
     "--out", required=True, metavar="FILE", type=options.PATH, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
-@options.as_json
-@options.debug
+@options.output
 def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> None:
     """Build an aggregate with all contacts at rest and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
 

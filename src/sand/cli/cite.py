@@ -28,8 +28,7 @@ REFERENCES = (
 
 
 @click.command("cite", short_help="What to cite.")
-@options.as_json
-@options.debug
+@options.output
 def command(as_json: bool) -> None:
     """What to cite when SAND was of use."""
     software = f"SAND, Soft Aggregate Numerical Dynamics, version {__version__}"

@@ -22,8 +22,7 @@ SHOWN = 12
 @options.workers
 @options.threads
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
-@options.as_json
-@options.debug
+@options.output
 def command(
     case: str,
     out: str | None,

@@ -19,8 +19,7 @@ SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vt
 @click.option("--out", metavar="PATH", type=options.PATH, help="Path without suffix (default: 'trajectory' in DIR).")
 @click.option("--frames", metavar="SLICE", default=":", help="Frames, as in Python: '-1', '10:', '::5'.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@options.as_json
-@options.debug
+@options.output
 def command(folder: str, form: str, out: str | None, frames: str, overwrite: bool, as_json: bool) -> None:
     """Export the frames of the run in DIR to other programs.
 

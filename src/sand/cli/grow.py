@@ -24,9 +24,7 @@ DEFAULT_SEEDS = list(range(1, 9))
 @options.workers
 @options.scheduler
 @options.threads
-@options.as_json
-@options.quiet
-@options.debug
+@options.quiet_output
 def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 

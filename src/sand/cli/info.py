@@ -30,8 +30,7 @@ JOBS = {
 
 @click.command("info", short_help="Describe a run or one of its files.")
 @click.argument("path", metavar="DIR|FILE", type=options.PATH)
-@options.as_json
-@options.debug
+@options.output
 def command(path: str, as_json: bool) -> None:
     """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
 

@@ -52,7 +52,7 @@ def launch(
     with report.compiling(quiet), InterruptObserver() as interrupts:
         simulation = make()
         simulation.observers.append(interrupts)
-        goal = simulation.planned
+        goal: tuple[float, float] = simulation.planned
         if until is not None or steps is not None:
             goal = (until or math.inf, math.inf if steps is None else simulation.steps + steps)
         if not (quiet or as_json):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -37,12 +38,22 @@ workers = click.option(
 
 scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://host:port.")
 
-as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 
-quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
+_quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
 
 # read from the command line by `program`, because errors may occur before options are parsed
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
+
+
+def output(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --json and --debug."""
+    return _as_json(debug(command))
+
+
+def quiet_output(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --json, --quiet and --debug."""
+    return _as_json(_quiet(debug(command)))
 
 
 threads = click.option(

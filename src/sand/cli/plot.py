@@ -48,8 +48,7 @@ class Source(NamedTuple):
 @click.option("--transparent", is_flag=True, help="Transparent background.")
 @click.option("--dark", is_flag=True, help="Dark background.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@options.as_json
-@options.debug
+@options.output
 def command(
     source: str, what: str | None, out: str | None, form: str, frame: int, overwrite: bool, as_json: bool, **how: Any
 ) -> None:

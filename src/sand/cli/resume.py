@@ -27,9 +27,7 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 @options.workers
 @options.scheduler
 @options.threads
-@options.as_json
-@options.quiet
-@options.debug
+@options.quiet_output
 def command(
     folder: str, until: float | None, workers: int, scheduler: str | None, threads: int | None, **output: bool
 ) -> int | None:

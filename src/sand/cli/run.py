@@ -29,9 +29,7 @@ from . import options, report
 @click.option("--seed", type=options.SEED, metavar="N", help="Seed in place of that in the case.")
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.threads
-@options.as_json
-@options.quiet
-@options.debug
+@options.quiet_output
 def command(
     case: str | None,
     source: str | None,

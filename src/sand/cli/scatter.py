@@ -19,9 +19,7 @@ from . import options, report
 @options.scheduler
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
 @click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
-@options.quiet
-@options.as_json
-@options.debug
+@options.quiet_output
 def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: Any) -> None:
     """Compute the encounters of two bodies that CASE.toml describes.
 

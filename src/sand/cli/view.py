@@ -40,9 +40,7 @@ YOUNG = 5.0
 @click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port (default: any free one).")
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 @click.option("--overwrite", is_flag=True, help="Replace FILE if it exists.")
-@options.as_json
-@options.quiet
-@options.debug
+@options.quiet_output
 def command(
     folder: str, html: str | None, every: int, frames: str, port: int, no_browser: bool, overwrite: bool, **output: bool
 ) -> None:

@@ -51,11 +51,11 @@ class RunDataset:
         Returns the run summary; None while the run goes on, `{}` if it is unavailable.
     field : FieldDescription, optional
         External magnetic field.
-    compact : bool, optional
-        Frames in half precision.
 
     Attributes
     ----------
+    compact : bool
+        Whether frames are sent in half precision; False at first.
     notes : list of str
         Notes for the reader of the page.
     unit : float
@@ -71,9 +71,8 @@ class RunDataset:
         ledger: Callable[[], LedgerColumns | None],
         summary: Callable[[], Mapping[str, Any] | None],
         field: FieldDescription | None = None,
-        compact: bool = False,
     ):
-        self.frames, self.name, self.source, self.compact = frames, name, source, compact
+        self.frames, self.name, self.source, self.compact = frames, name, source, False
         self.notes, self._lock = list[str](), threading.RLock()
         self._read_ledger, self._read_summary, self._field = ledger, summary, field
         self._requested = slice(None)

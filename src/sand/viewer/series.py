@@ -108,16 +108,13 @@ def _events(ledger: LedgerColumns) -> dict[str, Any]:
     if not {"made", "broken"} <= set(ledger.columns):
         return {"time": [], "made": [], "broken": []}
 
-    def increments(rows: LedgerColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    for rows in (ledger, ledger.select(evenly_spaced(len(ledger)))):
         made, broken = (np.maximum(np.diff(rows[name]), 0.0) for name in ("made", "broken"))
-        return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
-
-    events, made, broken = increments(ledger)
-    if len(events) > MAX_POINTS:
-        ledger = ledger.select(evenly_spaced(len(ledger)))
-        events, made, broken = increments(ledger)
+        events = np.flatnonzero((made > 0.0) | (broken > 0.0))
+        if len(events) <= MAX_POINTS:
+            break
     return {
-        "time": _json_numbers(ledger["time"][1:][events], 10),
+        "time": _json_numbers(rows["time"][1:][events], 10),
         "made": made[events].astype(int).tolist(),
         "broken": broken[events].astype(int).tolist(),
     }
