@@ -165,12 +165,13 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         if report.is_resumable(folder):
             advice += f"; or continue that run: {report.resume_line(folder)}"
         raise BadInput(f"folder {folder} exists and is not empty; {advice}")
-    if any((folder / name).exists() and (folder / name).samefile(case) for name in OWN_FILES):
+    replaced = [folder / name for name in OWN_FILES if (folder / name).exists()]
+    if any(path.samefile(case) for path in replaced):
         raise BadInput(
             f"--overwrite would replace the case file {case} itself; copy it to another folder, or give another --out"
         )
     content = read_toml(case)
     for body in sorted(BODIES & content.keys()):
-        path = Path(content[body].get("path", case))
-        if any((folder / name).exists() and path.exists() and (folder / name).samefile(path) for name in OWN_FILES):
-            raise BadInput(f"--overwrite would replace {path}, the {body} of {case}; give another --out")
+        source = Path(content[body].get("path", case))
+        if source.exists() and any(path.samefile(source) for path in replaced):
+            raise BadInput(f"--overwrite would replace {source}, the {body} of {case}; give another --out")

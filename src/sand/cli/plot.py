@@ -83,9 +83,7 @@ def _check_options(
     problems: list[str] = []
     is_trajectory = source.is_file()
     default = (STILL,) if is_trajectory else (*HISTORY, STILL)
-    names = (
-        list(dict.fromkeys(part.strip() for part in selection.split(","))) if selection is not None else list(default)
-    )
+    names = list(default if selection is None else dict.fromkeys(part.strip() for part in selection.split(",")))
     allowed = (*HISTORY, STILL, *GRAIN_NAMES)
     problems += [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
     if is_trajectory:
@@ -95,10 +93,12 @@ def _check_options(
         problems.append(
             f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
         )
-    size = _size(how["size"])
-    if size is None:
+    try:
+        width, height = map(int, how["size"].lower().replace("×", "x").split("x"))
+    except ValueError:
         problems.append(f"--size {how['size']!r} must be width x height in pixels, such as 1600x1000")
-    how["size"], how["whole"] = size or (1600, 1000), not how.pop("cut")
+        width, height = 1600, 1000
+    how["size"], how["whole"] = (width, height), not how.pop("cut")
     how["bonds"] = None if how["bonds"] == "none" else how["bonds"]
     try:
         check_picture_options(how["colour"], how["bonds"], how["view"], how["size"])
@@ -114,13 +114,6 @@ def _check_options(
     if problems:
         raise BadInput(problems)
     return folder, names
-
-
-def _size(text: str) -> tuple[int, int] | None:
-    parts = text.lower().replace("×", "x").split("x")
-    if len(parts) != 2 or not all(part.strip().isdecimal() and len(part) < 9 for part in parts):
-        return None
-    return int(parts[0]), int(parts[1])
 
 
 def _open_source(path: Path) -> Source:
@@ -139,19 +132,24 @@ def _open_source(path: Path) -> Source:
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
+    from ..analysis.ledger_columns import LedgerColumns
+    from ..forces.pair.dipoles import kinetic_temperature
+    from ..io.ledger_table import read_ledger
+    from ..io.run_folder import LEDGER
     from ..plotting.plots import HISTORY, grains_figure, history_figure
     from ..plotting.render.still import still_picture
     from ..plotting.run_figure import figure_bytes
 
-    history = _history(source) if any(name in HISTORY for name in names) else None
-    one, field = None, None
+    if any(name in HISTORY for name in names):
+        ledger, first = LedgerColumns.from_rows(read_ledger(source.path / LEDGER)), _frame(source, 0)
+        start = (len(first), kinetic_temperature(first))
     if any(name not in HISTORY for name in names):
         one = _frame(source, frame)
         field = None if source.run is None else source.run.flux_density(one.time)
 
     def draw(name: str) -> Any:
-        if history is not None and name in HISTORY:
-            return history_figure(history[0], name, *history[1:], dark=how["dark"])
+        if name in HISTORY:
+            return history_figure(ledger, name, *start, dark=how["dark"])
         if name == STILL:
             return still_picture(one, field=field, **how)
         return grains_figure(one, name, field, dark=how["dark"])
@@ -159,24 +157,8 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
     return [figure_bytes(draw(name), form, how["transparent"]) for name in names]
 
 
-def _history(source: Source) -> tuple[Any, int, float]:
-    """The ledger, the number of grains, and their initial temperature [K].  Raises BadInput."""
-    from ..analysis.ledger_columns import LedgerColumns
-    from ..forces.pair.dipoles import kinetic_temperature
-    from ..io.ledger_table import read_ledger
-    from ..io.run_folder import LEDGER
-
-    ledger = LedgerColumns.from_rows(read_ledger(source.path / LEDGER))
-    first = _frame(source, 0)
-    return ledger, len(first), kinetic_temperature(first)
-
-
 def _frame(source: Source, number: int) -> Any:
     """Read a frame.  Raises BadInput if it does not exist."""
     if not len(source.frames):
         raise BadInput(f"{source.path} has no frame yet")
-    try:
-        return source.frames[number]
-    except IndexError:
-        last = len(source.frames) - 1
-        raise BadInput(f"--frame {number}: {source.path} has frames 0 to {last}, or -1 to {-last - 1}") from None
+    return source.frames[number]

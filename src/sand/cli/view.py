@@ -20,8 +20,6 @@ LARGE = 100e6
 """Size [B] above which a page takes long to open."""
 WAIT = 60.0
 """Longest wall time [s] to wait for the first frame of a run, which may have to compile first."""
-NOTE_EVERY = 15.0
-"""Wall time [s] between notes while waiting."""
 YOUNG = 5.0
 """Age [s] of a trajectory up to which its first frame may still be missing."""
 
@@ -79,8 +77,7 @@ def _open_dataset(path: Path, verbose: bool) -> Any:
     from ..viewer.external_field import read_field
     from ..viewer.run_files import find_run_folder
 
-    begun = time.monotonic()
-    noted = -NOTE_EVERY
+    begun, noted = time.monotonic(), not verbose
     while True:
         waited = time.monotonic() - begun
         try:
@@ -93,10 +90,9 @@ def _open_dataset(path: Path, verbose: bool) -> Any:
                 raise BadInput(
                     f"{path} has no frame after {WAIT:.0f} s; check whether its run is still running or has failed"
                 ) from error
-        if verbose and waited - noted >= NOTE_EVERY:
-            elapsed = f" ({waited:.0f} s so far)" if noted >= 0.0 else ""
-            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one{elapsed}")
-            noted = waited
+        if not noted:
+            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one")
+            noted = True
         time.sleep(0.2)
 
 

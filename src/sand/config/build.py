@@ -23,8 +23,6 @@ from ..setup.gas import gas
 from ..simulation.simulation import Simulation
 from .case import Case, check_case
 
-ENDS = (("run", "until"), ("run", "steps"))
-"""Keys that may be changed in the case.toml of a resumed run."""
 TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
 """Suffixes of text files with a body; all other files are read as trajectories."""
 
@@ -158,8 +156,6 @@ def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]
     frames = Frames(place)
     try:
         start = from_frame(frames[frame], materials)
-    except IndexError as error:
-        raise BadInput(f"{error}; -1 is the last") from None
     finally:
         frames.close()
     return start._replace(note=f"{place}, {start.note}")
@@ -176,16 +172,10 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     path = folder / CASE
     begun: dict[str, Any] = meta["case"]
     there = read_toml(path) if path.exists() else begun
-    case = check_case(there, str(path))
-
-    def fixed(content: dict[str, Any], name: str) -> Any:
-        """A table without the end of the run, which may be changed."""
-        return {key: value for key, value in content.get(name, {}).items() if (name, key) not in ENDS}
-
-    was = check_case(begun, str(path))
+    was, case = (check_case(content, str(path)) for content in (begun, there))
+    was.run.until, was.run.steps = case.run.until, case.run.steps  # the end may be changed
     for name in {**begun, **there}:
-        meant = name not in {table for table, _ in ENDS} and getattr(was, name) == getattr(case, name)
-        if fixed(begun, name) != fixed(there, name) and not meant:
+        if begun.get(name) != there.get(name) and getattr(was, name) != getattr(case, name):
             raise BadInput(
                 f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; restore it, "
                 f"or start a new run from the last frame: sand run CASE.toml --from {shlex.quote(str(folder))}"

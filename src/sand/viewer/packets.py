@@ -124,15 +124,10 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
     }
     arrays = {
         "position": frame.position / unit,
-        "velocity": frame.velocity,
-        "spin": frame.spin,
-        "moment": frame.moment,
+        **{name: getattr(frame, name) for name in ("velocity", "spin", "moment")},
         "cluster": names.astype(np.uint32),
         "pair": frame.pair.astype(np.uint32),
-        "force": frame.force,
-        "share": frame.share,
-        "overlap": frame.overlap,
-        "formed": frame.formed,
+        **{name: getattr(frame, name) for name in ("force", "share", "overlap", "formed")},
     }
     return encode(header, arrays, compact)
 
