@@ -106,18 +106,23 @@ def _material(text: str) -> str | dict[str, float]:
 
 def _properties(body: Any) -> dict[str, Any]:
     """Properties of an aggregate: grains, radii, mass, size, dimension, contacts, moments."""
+    from ..analysis.fractal import correlation_dimension
+    from ..analysis.shape import gyration_radius
     from ..io.bodies import contacts_of
 
-    size, dimension, error = _shape(body)
     contacts = len(contacts_of(body)["pair"])
+    try:
+        dimension = correlation_dimension(body.position)
+    except BadInput:  # too few grains
+        dimension = None
     content = {
         "grains": len(body),
         "materials": [m.name for m in body.materials],
         "radius": [float(body.radius.min()), float(body.radius.max())],
         "mass": float(body.mass.sum()),
-        "radius_of_gyration": size,
-        "fractal_dimension": dimension,
-        "fractal_dimension_error": error,
+        "radius_of_gyration": gyration_radius(body.position, body.mass),
+        "fractal_dimension": dimension.value if dimension else None,
+        "fractal_dimension_error": dimension.error if dimension else None,
         "contacts": contacts,
         "mean_coordination": 2.0 * contacts / len(body),
     }
@@ -125,19 +130,6 @@ def _properties(body: Any) -> dict[str, Any]:
     if magnetic:
         content |= {"magnetic_grains": magnetic, "net_moment": [float(v) for v in body.moment.sum(axis=0)]}
     return content
-
-
-def _shape(body: Any) -> tuple[float, float | None, float | None]:
-    """Radius of gyration [m], correlation dimension and its error (None if there are too few grains)."""
-    from ..analysis.fractal import correlation_dimension
-    from ..analysis.shape import gyration_radius
-
-    size = gyration_radius(body.position, body.mass)
-    try:
-        found = correlation_dimension(body.position)
-    except BadInput:
-        return size, None, None
-    return size, found.value, found.error
 
 
 def _rows(content: dict[str, Any]) -> report.Rows:

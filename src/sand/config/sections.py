@@ -29,11 +29,7 @@ class Section(BaseModel):
 
 def quantity(unit: str, **bounds: float) -> Any:
     """Type of a number with a unit, given as text or in SI; `bounds` as for `units.si`."""
-
-    def read(value: Any, info: ValidationInfo) -> float:
-        return si(value, unit, str(info.field_name), **bounds)
-
-    return Annotated[Any, BeforeValidator(read)]
+    return Annotated[Any, BeforeValidator(_named(lambda value, name: si(value, unit, name, **bounds)))]
 
 
 def word(allowed: Collection[str]) -> Any:

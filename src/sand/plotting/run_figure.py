@@ -72,10 +72,10 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
     if not simulation.ledger.rows:
         return
     last = simulation.ledger.rows[-1]
-    count = int(last["clusters"])
+    count, mean = int(last["clusters"]), last["mean_cluster_size"]
     facts = [
         f"{count} cluster{'s' if count != 1 else ''}",
-        f"mean size S = {_format_mean(last['mean_cluster_size'])}",
+        f"mean size S = {mean:.0f}" if mean >= 100.0 else f"mean size S = {mean:.3g}",
         f"largest {int(last['largest_cluster'])}",
         f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)",
     ]
@@ -84,29 +84,19 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
     figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
 
 
-def _format_mean(size: float) -> str:
-    return f"{size:.0f}" if size >= 100.0 else f"{size:.3g}"
-
-
 def headline(grains: Any, box: Box, time: float) -> str:
     """Title of a run: '100 grains of iron, r = 10 nm, periodic cube of 1.2 µm, t = 5 µs'."""
+    names = material_names(grains)
+    materials = ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
+    small, large = float(grains.radius.min()), float(grains.radius.max())
+    least = "" if large < 1.001 * small else f"{format_si(small, 'm')} to "
     parts = [
-        f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {_materials(grains)}",
-        f"r = {_radius_range(grains.radius)}",
+        f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {materials}",
+        f"r = {least}{format_si(large, 'm')}",
         _describe_box(box),
         f"t = {format_si(time, 's')}",
     ]
     return ",  ".join(parts)
-
-
-def _materials(grains: Any) -> str:
-    names = material_names(grains)
-    return ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
-
-
-def _radius_range(radius: np.ndarray) -> str:
-    small, large = float(radius.min()), float(radius.max())
-    return format_si(large, "m") if large < 1.001 * small else f"{format_si(small, 'm')} to {format_si(large, 'm')}"
 
 
 def _describe_box(box: Box) -> str:

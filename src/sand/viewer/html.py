@@ -32,23 +32,18 @@ LOADING = "Reading the frames … If this message stays, the file is incomplete;
 """Shown until the script at the end of the file runs."""
 
 
-def page_title(dataset: RunDataset) -> str:
-    """Title of the page of a run."""
-    return f"{dataset.name} – SAND"
-
-
-def served_page(title: str) -> str:
-    """HTML of the page as served by `server.Server`."""
+def served_page(name: str) -> str:
+    """HTML of the page of a run with this name, as served by `server.Server`."""
     styles = '<link rel="stylesheet" href="grainview.css">\n'
-    return _head(title, styles) + '<script type="module" src="grainview.js"></script>\n' + _FOOT
+    return _head(name, styles) + '<script type="module" src="grainview.js"></script>\n' + _FOOT
 
 
-def _head(title: str, styles: str, content: str = "") -> str:
+def _head(name: str, styles: str, content: str = "") -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="referrer" content="no-referrer">\n'
-        f'<link rel="icon" href="data:,">\n<title>{html.escape(title)}</title>\n{styles}</head>\n<body>\n'
+        f'<link rel="icon" href="data:,">\n<title>{html.escape(name)} – SAND</title>\n{styles}</head>\n<body>\n'
         f'<div id="grainview">{content}</div>\n<noscript>{NO_SCRIPT}</noscript>\n'
     )
 
@@ -97,7 +92,7 @@ def write_page(
     count, dimensions, stride = len(dataset), [], _dimension_stride(dataset)
     largest_clusters = Dimensions()
     with Written(path) as file:
-        file.write(_head(page_title(dataset), head, f"<p>{LOADING}</p>"))
+        file.write(_head(dataset.name, head, f"<p>{LOADING}</p>"))
         file.write(_packet_element("sand-grains", dataset.grains()))
         for k in range(count):
             frame, names = dataset.read(k)

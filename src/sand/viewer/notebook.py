@@ -24,12 +24,9 @@ def widget(dataset: RunDataset) -> Any:
     BadInput
         If the viewer page is not installed.
     """
-    return _widget_class(*read_bundle())(dataset)
+    import anywidget  # an optional dependency
 
-
-def _widget_class(script: str, styles: str) -> Any:
-    """Define the widget class; in a function, because anywidget is an optional dependency."""
-    import anywidget
+    script, styles = read_bundle()
 
     class GrainWidget(anywidget.AnyWidget):
         """Animated view of the grains of a run.
@@ -52,7 +49,7 @@ def _widget_class(script: str, styles: str) -> Any:
         def _on_message(self, _: Any, content: Any, buffers: Any) -> None:
             self.send(*answer_message(self._dataset, content))
 
-    return GrainWidget
+    return GrainWidget(dataset)
 
 
 def answer_message(dataset: RunDataset, content: Any) -> tuple[dict[str, Any], list[bytes]]:

@@ -19,7 +19,7 @@ from typing import Any
 from ..errors import BadInput, NoSuchKey
 from ..io.page_bundle import read_bundle
 from .dataset import RunDataset
-from .html import SERVED_POLICY, page_title, served_page
+from .html import SERVED_POLICY, served_page
 from .packets import compact_json
 
 LOOPBACK = "127.0.0.1"
@@ -80,7 +80,7 @@ class Server(ThreadingHTTPServer):
         self.dataset, self.token = dataset, secrets.token_urlsafe(24)
         self._free_connections = threading.BoundedSemaphore(MAX_CONNECTIONS)
         self._files = {
-            "": ("text/html; charset=utf-8", served_page(page_title(dataset))),
+            "": ("text/html; charset=utf-8", served_page(dataset.name)),
             "grainview.js": ("text/javascript; charset=utf-8", script),
             "grainview.css": ("text/css; charset=utf-8", styles),
         }
