@@ -43,17 +43,9 @@ def command(case: str, seeds: list[int] | None, out: str | None, threads: int | 
 
 
 def boxes(
-    content: dict[str, Any],
-    seeds: list[int],
-    folder: Path,
-    *,
-    workers: int,
-    scheduler: str | None,
-    threads: int | None,
-    quiet: bool,
-    as_json: bool,
+    content: dict[str, Any], seeds: list[int], folder: Path, *, quiet: bool, as_json: bool, **execution: Any
 ) -> None:
-    """Run or continue the boxes of a case.
+    """Run or continue the boxes of a case; `execution` as for `job.running_job`.
 
     Raises
     ------
@@ -70,9 +62,8 @@ def boxes(
         if not (quiet or as_json):
             report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
 
-    with running_job(folder, workers, scheduler, threads, quiet=quiet) as (executor, interrupts):
+    with running_job(folder, quiet=quiet, **execution) as (executor, interrupts):
         grow(content, seeds, folder, executor, finished, [interrupts])
-    if as_json:
-        report.emit({"folder": str(folder), "seeds": seeds, "outcomes": outcomes})
-    elif not quiet:
-        report.write_line(f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}")
+    text = f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}"
+    found = {"folder": str(folder), "seeds": seeds, "outcomes": outcomes}
+    report.answer(found, text, [], as_json=as_json, quiet=quiet)

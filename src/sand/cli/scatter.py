@@ -48,12 +48,11 @@ def scatter(
     *,
     resume: bool,
     overwrite: bool = False,
-    workers: int,
-    scheduler: str | None,
     quiet: bool,
     as_json: bool,
+    **execution: Any,
 ) -> None:
-    """Compute a scattering job and print the results.
+    """Compute a scattering job and print the results; `execution` as for `job.running_job`.
 
     Parameters
     ----------
@@ -75,7 +74,7 @@ def scatter(
     hidden = quiet or as_json
     with (
         report.progress_bar(1.0, hidden, bar_format="{percentage:3.0f}% {desc}") as bar,
-        running_job(folder, workers, scheduler, quiet=quiet) as (executor, _),
+        running_job(folder, quiet=quiet, **execution) as (executor, _),
     ):
 
         def progress(text: str, part: float) -> None:

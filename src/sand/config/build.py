@@ -91,18 +91,10 @@ def _of_gas(case: Case) -> Start:
     section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
         raise BadInput("grains.material of a gas must be one name")
-    grains = gas(
-        section.number,  # type: ignore[arg-type]
-        case.box.periodic,
-        radius=section.radius,
-        material=library[section.material],
-        moment=section.moment,
-        charge=section.charge,
-        temperature=section.temperature,
-        spins=section.spins,
-        seed=case.run.seed,
-    )
-    return Start(grains, None, as_box(case.box.periodic), "")
+    given = {name: getattr(section, name) for name in ("radius", "moment", "charge", "temperature", "spins")}
+    material, box = library[section.material], case.box.periodic
+    grains = gas(section.number, box, material=material, seed=case.run.seed, **given)  # type: ignore[arg-type]
+    return Start(grains, None, as_box(box), "")
 
 
 def _of_file(case: Case) -> Start:
