@@ -31,10 +31,10 @@ from .sections import (
     PathName,
     Section,
     Seed,
+    Stepping,
     Steps,
     quantity,
     with_integrator,
-    without_method,
     word,
 )
 
@@ -186,13 +186,8 @@ class Case(Section):
     grains: GrainsSection
     materials: dict[str, MaterialSection] = Field(default_factory=dict)
     forces: ForcesSection = ForcesSection()
-    stepping: Verlet = Verlet()
+    stepping: Stepping = Verlet()
     neighbours: Neighbours = Neighbours()
-
-    @field_validator("stepping", mode="before")
-    @classmethod
-    def _method(cls, value: Any) -> Any:
-        return without_method(value)
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the materials of the case, by name."""
