@@ -25,11 +25,7 @@ from . import options, report
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
 @options.output
 def command(
-    folders: tuple[str, ...],
-    out: str | None,
-    window: tuple[float, float] | None,
-    overwrite: bool,
-    as_json: bool,
+    folders: tuple[str, ...], out: str | None, window: tuple[float, float] | None, overwrite: bool, as_json: bool
 ) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 

@@ -52,13 +52,14 @@ def command(
     set_threads(threads)
     if case is not None and Path(case).is_dir():
         folder = Path(case)
+        advice = "give a case file: sand run CASE.toml"
         if report.is_resumable(folder):
-            raise BadInput(f"{case} is a folder; to continue its run: {report.resume_line(folder)}")
-        if (folder / TRAJECTORY).exists():
-            raise BadInput(f"{case} is a folder; to start from its last frame: sand run --from {shlex.quote(case)}")
-        if (folder / CASE).exists():
-            raise BadInput(f"{case} is a folder; to run its case: sand run {shlex.quote(str(folder / CASE))}")
-        raise BadInput(f"{case} is a folder; give a case file: sand run CASE.toml")
+            advice = f"to continue its run: {report.resume_line(folder)}"
+        elif (folder / TRAJECTORY).exists():
+            advice = f"to start from its last frame: sand run --from {shlex.quote(case)}"
+        elif (folder / CASE).exists():
+            advice = f"to run its case: sand run {shlex.quote(str(folder / CASE))}"
+        raise BadInput(f"{case} is a folder; {advice}")
     from ..config.build import simulation_of
     from ..config.case import GrainsSection, read_case
     from .launch import launch, refuse_folder

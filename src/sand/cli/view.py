@@ -27,11 +27,7 @@ YOUNG = 5.0
 @click.command("view", short_help="Show the grains of a run in the browser.")
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @click.option(
-    "--html",
-    "html",
-    metavar="FILE",
-    type=options.PATH,
-    help="Write one self-contained page instead, to keep or send.",
+    "--html", "html", metavar="FILE", type=options.PATH, help="Write one self-contained page instead, to keep or send."
 )
 @click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Only every K-th frame.")
 @click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")

@@ -24,19 +24,7 @@ from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
 from .commands import refuse_other_command
 from .errors import validate
-from .sections import (
-    Count,
-    Duration,
-    Moment,
-    PathName,
-    Section,
-    Seed,
-    Stepping,
-    Steps,
-    quantity,
-    with_integrator,
-    word,
-)
+from .sections import Count, Duration, Moment, PathName, Section, Seed, Stepping, Steps, quantity, with_integrator, word
 
 
 class RunSection(Section):

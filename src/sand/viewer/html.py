@@ -51,12 +51,7 @@ def _head(name: str, styles: str, content: str = "") -> str:
 _FOOT = "</body>\n</html>\n"
 
 
-def write_page(
-    dataset: RunDataset,
-    path: str | Path,
-    *,
-    progress: Callable[[], None] | None = None,
-) -> int:
+def write_page(dataset: RunDataset, path: str | Path, *, progress: Callable[[], None] | None = None) -> int:
     """Write a single-file page with all selected frames of a dataset, in half precision.
 
     Frames are read, packed and written one by one.
