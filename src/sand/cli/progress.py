@@ -47,7 +47,7 @@ class Progress(Observer):
         total = self._end if self._by_time else self._last_step
         if self._bar is None:
             self._read_row(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
-            self._bar = progress_bar(total, False, initial=position, bar_format=FORMAT, delay=0.2)
+            self._bar = progress_bar(total, False, initial=position, bar_format=FORMAT)
         bar = self._bar
         bar.set_description_str(format_quantity(simulation.time, "s"), refresh=False)
         rate = bar.format_dict["rate"] or 0.0

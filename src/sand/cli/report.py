@@ -148,7 +148,8 @@ def progress_bar(total: float, hidden: bool, **layout: Any) -> Any:
     from tqdm import tqdm
 
     tqdm.monitor_interval = 0  # no monitor thread: updates are frequent enough
-    return tqdm(total=total, disable=hidden or None, dynamic_ncols=True, miniters=0, leave=False, **layout)
+    settings = {"dynamic_ncols": True, "miniters": 0, "delay": 0.2, "leave": False}
+    return tqdm(total=total, disable=hidden or None, **settings, **layout)
 
 
 def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:
