@@ -101,7 +101,7 @@ def test_extreme_entries_of_a_case(place, capsys, old, new, part):
         (["view", "small", "--frames", "9" * 5000], "--frames"),
         (["plot", ""], "DIR = ''"),
         (["plot", "small", "--out", ""], "--out = ''"),
-        (["plot", "small", "--size", "999999999x999999999"], "--size"),
+        (["plot", "small", "--size", "999999999x999999999"], "width and height"),
         (["plot", "small", "--size", "9" * 5000 + "x1"], "--size"),
         (["plot", "small", "--frame", str(10**30)], "--frame"),
         (["plot", "small", "--view", "nan,0,1"], "view 'nan,0,1'"),
