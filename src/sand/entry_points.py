@@ -23,7 +23,7 @@ def _save_figure(simulation: Any, path: Path) -> None:
 
 
 def _view(simulation: Any, path: Any) -> Any:
-    from .viewer.simulation_view import view_simulation
+    from .viewer.show import view_simulation
 
     return view_simulation(simulation, path)
 

@@ -11,6 +11,7 @@ import numpy as np
 from .analysis.clusters import cluster_labels
 from .analysis.ledger_columns import LedgerColumns
 from .arguments import checked
+from .config.build import simulate
 from .config.case import read_case
 from .errors import BadInput, import_optional
 from .io import run_folder as files
@@ -22,7 +23,7 @@ from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
 from .units import si
 from .viewer.external_field import read_field
-from .viewer.simulation_view import view_folder
+from .viewer.show import view_folder
 
 if TYPE_CHECKING:
     from .plotting.render.still import Still
@@ -106,15 +107,7 @@ class Run:
         """
         case = read_case(self.folder / files.CASE)
         start = from_frame(self.frames[frame], case.materials_by_name())
-        return Simulation(
-            start.grains,
-            case.forces.build(),
-            box=start.box,
-            contacts=start.contacts,
-            stepping=case.stepping,
-            neighbours=case.neighbours,
-            seed=case.run.seed,
-        )
+        return simulate(case, start.grains, start.box, contacts=start.contacts)
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:

@@ -76,10 +76,10 @@ FAULTS = (
     Fault("no images along z", "forgotten image", "formula", "box.py",
           "v[2] - span.z * np.rint(v[2] * span.inverse_z)", "v[2]",
           "unit/test_box.py::test_nearest_image_is_the_shortest"),
-    Fault("sliding forgets where it ends", "factor 2", "formula", "contact/law.py",
+    Fault("sliding forgets where it ends", "factor 2", "formula", "contact/mechanics.py",
           "slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))",
           "slide = dot(start.slide, sub(end.slide, left.slide))",
-          "physics/test_contact_law.py::test_what_yielding_dissipates"),
+          "generic/test_contact_laws.py::test_what_yielding_dissipates"),
     # loops
     Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "neighbours/cell_list.py",
           "(0, high - nx + 1)", "(0, high - nx)",

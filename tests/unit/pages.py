@@ -6,10 +6,24 @@ import json
 import re
 from pathlib import Path
 
-from sand.viewer.packets import decode
+import numpy as np
+
+from sand.viewer.packets import MAGIC, TYPES
 
 SCRIPT = "const a = '</script><!-- ${x}'; console.log(a)"
 """What a script may hold that would end its element."""
+
+
+def decode(packet):
+    """Header of a packet, and its arrays by name; floats as float64."""
+    assert packet[:8] == MAGIC
+    start = 12 + int.from_bytes(packet[8:12], "little")
+    header, arrays = json.loads(packet[12:start]), {}
+    for entry in header["arrays"]:
+        kind, shape = TYPES[entry["type"]], entry["shape"]
+        stored = np.frombuffer(packet, kind, int(np.prod(shape)), start + entry["offset"]).reshape(shape)
+        arrays[entry["name"]] = stored.astype(np.float64) * entry.get("scale", 1.0) if kind.kind == "f" else stored
+    return header, arrays
 
 
 def elements(path):

@@ -486,12 +486,12 @@ class Terminal(io.StringIO):
 
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("by", ["until", "steps"])
-def test_progress_shows_time_and_numbers(place, by):
+def test_progress_shows_time_and_numbers(place, monkeypatch, by):
     """Physical time, rate, clusters, S and drift, whether the run goes to a time or to a number of steps."""
-    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     simulation = simulation_of(read_case("small.toml"), None)
     ends = {"until": [2e-8, 4e-8], "steps": [400, 400]}[by]
-    bar = Progress(*((4e-8, float("inf")) if by == "until" else (float("inf"), 800)), terminal)
+    bar = Progress(*((4e-8, float("inf")) if by == "until" else (float("inf"), 800)))
     simulation.observers.append(bar)
     for end in ends:
         simulation.run(**{by: end})
@@ -505,13 +505,13 @@ def test_progress_shows_time_and_numbers(place, by):
 
 
 @pytest.mark.compiled("dipoles")
-def test_progress_of_a_resumed_run_has_numbers_from_the_start(done):
+def test_progress_of_a_resumed_run_has_numbers_from_the_start(done, monkeypatch):
     """Between two frames the last row of the ledger serves."""
     from sand.config.build import resume
 
-    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     simulation = resume(done)
-    bar = Progress(1e-7, float("inf"), terminal)
+    bar = Progress(1e-7, float("inf"))
     bar.tick(simulation)
     bar._bar.refresh()
     bar.finish()

@@ -57,7 +57,7 @@ def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
         (["--size", "wide"], "--size 'wide' must be width x height"),
         (["--view", "botom"], "there is no view 'botom'"),
         (["--view", "0,0,0"], "must be three finite numbers, not all 0"),
-        (["--frame", "99"], "has frames 0 to 3, or -1 to -4"),
+        (["--frame", "99"], "has 4 frames, from 0 to 3; there is no 99"),
         (["--cluster", "9"], "cluster 9: there are 4"),
         (["--format", "gif"], "is not one of"),
         (["--out", "/nowhere/at/all"], "cannot be a folder"),

@@ -101,7 +101,7 @@ def test_extreme_entries_of_a_case(place, capsys, old, new, part):
         (["view", "small", "--frames", "9" * 5000], "--frames"),
         (["plot", ""], "DIR = ''"),
         (["plot", "small", "--out", ""], "--out = ''"),
-        (["plot", "small", "--size", "999999999x999999999"], "--size"),
+        (["plot", "small", "--size", "999999999x999999999"], "width and height"),
         (["plot", "small", "--size", "9" * 5000 + "x1"], "--size"),
         (["plot", "small", "--frame", str(10**30)], "--frame"),
         (["plot", "small", "--view", "nan,0,1"], "view 'nan,0,1'"),
@@ -112,7 +112,7 @@ def test_extreme_entries_of_a_case(place, capsys, old, new, part):
         (["analyse", "small", "--window", "nan", "nan"], "--window"),
         (["build", "pca", "--grains", str(10**30), "--out", "a.xyz"], "--grains"),
         (["build", "lattice", "--shape", "9" * 5000 + ",1,1", "--out", "a.xyz"], "--shape"),
-        (["build", "lattice", "--shape", "99999999,99999999,99999999", "--out", "a.xyz"], "--shape"),
+        (["build", "lattice", "--shape", "99999999,99999999,99999999", "--out", "a.xyz"], "lattice"),
         (["build", "pca", "--grains", "8", "--out", ""], "--out = ''"),
         (["build", "pca", "--grains", "8", "--out", "a.xyz", "--seed", str(2**64)], "--seed"),
         pytest.param(

@@ -16,7 +16,7 @@ from sand.constants import BOLTZMANN
 from sand.plotting.panels import energy_unit, time_unit
 from sand.plotting.render.scene import camera_rotation, make_scene, side_by_side, view_window
 from sand.plotting.render.spheres import SUPERSAMPLING, Spheres, render_spheres
-from sand.plotting.run_figure import png, run_figure, save, show
+from sand.plotting.run_figure import figure_bytes, run_figure, save, show
 from sand.plotting.style import format_si, round_length, si_prefix
 from sand.simulation.ledger import Ledger
 
@@ -319,7 +319,7 @@ def odd_runs():
 )
 def test_odd_runs_have_a_figure(name):
     """A PNG of 1600 × 1000 pixels comes of every run, and no warning."""
-    picture = Image.open(io.BytesIO(png(run_figure(odd_runs()[name]))))
+    picture = Image.open(io.BytesIO(figure_bytes(run_figure(odd_runs()[name]))))
     assert picture.size == (1600, 1000)
 
 
@@ -366,7 +366,7 @@ def test_nothing_global_changes(grown):
     before, opened = dict(matplotlib.rcParams), pyplot.get_fignums()
     with matplotlib.rc_context({"font.size": 31.0, "axes.grid": True}):
         figure = run_figure(grown)
-        png(figure)
+        figure_bytes(figure)
         assert matplotlib.rcParams["font.size"] == 31.0
     assert figure.texts[0].get_size() < 31.0
     assert dict(matplotlib.rcParams) == before
@@ -377,7 +377,7 @@ def test_nothing_global_changes(grown):
 @pytest.mark.slow
 def test_same_run_same_picture(grown):
     """Two figures of one run agree byte for byte."""
-    assert png(run_figure(grown)) == png(run_figure(grown))
+    assert figure_bytes(run_figure(grown)) == figure_bytes(run_figure(grown))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import sand
-from sand.cli.interrupt import InterruptObserver
+from sand.cli.job import InterruptObserver
 from sand.cli.main import main
 from sand.experiments import collision_case
 from sand.io.checkpoint import newest_checkpoint

@@ -13,9 +13,8 @@ import sand
 from sand.viewer import html as page
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import frame_slice, frame_stride, write_page
-from sand.viewer.packets import decode
 
-from .pages import blocks, elements
+from .pages import blocks, decode, elements
 from .reels import reel
 
 pytestmark = pytest.mark.usefixtures("bundle")
@@ -26,8 +25,8 @@ def test_a_file_holds_the_run(looked_at, tmp_path):
     """Frames decode back: positions to the last bit of single precision, others within 2⁻¹¹; manifest and series."""
     story = run_dataset(looked_at[0])
     told = []
-    size = write_page(story, tmp_path / "a.html", progress=lambda done, count: told.append((done, count)))
-    assert size == (tmp_path / "a.html").stat().st_size and told == [(k, 6) for k in range(1, 7)]
+    size = write_page(story, tmp_path / "a.html", progress=lambda: told.append(1))
+    assert size == (tmp_path / "a.html").stat().st_size and len(told) == 6
     manifest, series, packets = blocks(tmp_path / "a.html")
     assert series == json.loads(json.dumps(story.series())) and len(packets) == 6
     assert manifest["dimensions"] == [{}] * 6 and not manifest["running"]
@@ -104,8 +103,6 @@ def test_thinned_files(tmp_path):
     for wrong in (slice(50, 60), slice(3, 3)):
         with pytest.raises(sand.BadInput, match="contains none of them"):
             story.select(wrong)
-    with pytest.raises(sand.BadInput, match="every"):
-        frame_slice(slice(None), 0)
 
 
 def test_dimensions_in_a_file(tmp_path, monkeypatch):

@@ -148,7 +148,7 @@ def test_grounds(dark):
 @pytest.mark.slow
 def test_the_same_frame_the_same_bits():
     """Two pictures of a frame agree byte for byte, as PNG, PDF and SVG."""
-    from sand.plotting.plots import figure_bytes
+    from sand.plotting.run_figure import figure_bytes
 
     frame = frame_of(np.arange(4)[:, None] * [2 * R, 0, 0], [(0, 1)], moment=np.eye(4, 3) * 1e-18)
     for form in ("png", "pdf", "svg"):

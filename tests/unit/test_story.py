@@ -16,9 +16,9 @@ from sand.io.gsd_index import ENTRY, read_index
 from sand.io.trajectory import TrajectoryWriter
 from sand.viewer.dataset import run_dataset
 from sand.viewer.external_field import read_field
-from sand.viewer.packets import decode
-from sand.viewer.ranges import EXTREMES, PERCENTILES
+from sand.viewer.series import EXTREMES, PERCENTILES
 
+from .pages import decode
 from .reels import append, contacts_of, reel
 
 KEYS = [

@@ -8,9 +8,8 @@ import sand
 from sand.viewer import show
 from sand.viewer.dataset import run_dataset
 from sand.viewer.notebook import answer_message, widget
-from sand.viewer.packets import decode
 
-from .pages import SCRIPT
+from .pages import SCRIPT, decode
 
 pytestmark = pytest.mark.usefixtures("bundle")
 
@@ -70,10 +69,3 @@ def test_the_widget(looked_at, monkeypatch):
     assert sent[0][0] == {"kind": "frame", "k": 1} and decode(sent[0][1][0])[0]["frame"] == 1
     monkeypatch.setattr(show, "in_notebook", lambda: True)
     assert type(sand.open(looked_at[0]).view()).__name__ == "GrainWidget"
-
-
-def test_without_anywidget(looked_at, monkeypatch):
-    """It says what to install."""
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(sand.BadInput, match="pip install anywidget"):
-        widget(run_dataset(looked_at[0]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,15 +23,10 @@ from . import options, report
 )
 @click.option("--window", nargs=2, type=float, metavar="S1 S2", help="Range of S in which z is fitted.")
 @click.option("--overwrite", is_flag=True, help="Replace an earlier analysis in FOLDER.")
-@options.as_json
-@options.debug
+@options.output
 def command(
-    folders: tuple[str, ...],
-    out: str | None,
-    window: tuple[float, float] | None,
-    overwrite: bool,
-    as_json: bool,
-) -> int:
+    folders: tuple[str, ...], out: str | None, window: tuple[float, float] | None, overwrite: bool, as_json: bool
+) -> None:
     """Measure how aggregates grew in each DIR: a run, or a folder of runs that differ in their seeds (`sand grow`).
 
     Results are S(t) with its exponent z, moments against size, and the fractal dimension, each with an error from the
@@ -51,7 +47,6 @@ def command(
         report.emit(content)
     else:
         _show(content, target)
-    return 0
 
 
 def _output_folder(folder: Path, names: Sequence[str], overwrite: bool) -> Path:
@@ -67,52 +62,39 @@ def _show(content: dict[str, Any], folder: Path | None) -> None:
     from ..units import format_quantity
 
     for one in content["ensembles"]:
+        fitted = f", fitted from S = {one['window'][0]:g} until a box has {one['window'][1]:.4g}"
         rows = [
             ("boxes", f"{one['boxes']} of {one['grains']} grains"),
             ("S", f"{one['mean_size']:.3g}{_error(one['mean_size_error'])} at {format_quantity(one['time'], 's')}"),
-            (
-                "z",
-                _line(
-                    one,
-                    "z",
-                    "S = (1 + t/zτ)^",
-                    f", fitted from S = {one['window'][0]:g} until a box has {one['window'][1]:.4g}",
-                ),
-            ),
-            ("", _line(one, "slope", "slope of ln S over ln t: ", "") if one["slope"] else ""),
-            ("moments", _line(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
-            ("", _line(one, "moment_without_rings", "without rings N^", "") if one["moment"] else ""),
-            ("D_f", _line(one, "dimension", "", " from N(r_g)")),
+            ("z", _law(one, "z", "S = (1 + t/zτ)^", fitted)),
+            ("", _law(one, "slope", "slope of ln S over ln t: ") if one["slope"] else ""),
+            ("moments", _law(one, "moment", "μ ∝ N^", "; the paper: 0.63")),
+            ("", _law(one, "moment_without_rings", "without rings N^") if one["moment"] else ""),
+            ("D_f", _law(one, "dimension", "", " from N(r_g)")),
         ]
         report.show(one["name"], [row for row in rows if row[1]])
     comparison = content["comparison"]
     if comparison is not None:
-        report.show(
-            f"{comparison['first']} and {comparison['second']}",
-            [
-                (
-                    "ln S",
-                    f"differ by {comparison['sigma']:.3g} standard errors "
-                    f"at {format_quantity(comparison['time'], 's')}",
-                ),
-                ("S", f"differ by {comparison['sigma_of_size']:.3g}"),
-            ],
-        )
+        when = format_quantity(comparison["time"], "s")
+        rows = [
+            ("ln S", f"differ by {comparison['sigma']:.3g} standard errors at {when}"),
+            ("S", f"differ by {comparison['sigma_of_size']:.3g}"),
+        ]
+        report.show(f"{comparison['first']} and {comparison['second']}", rows)
     if folder is not None:
         report.show("files", [("folder", str(folder))])
 
 
-def _error(error: float | None) -> str:
-    return "" if error is None or error != error else f" ± {error:.2g}"
+def _error(error: float) -> str:
+    return "" if math.isnan(error) else f" ± {error:.2g}"
 
 
-def _line(one: dict[str, Any], key: str, before: str, after: str) -> str:
+def _law(one: dict[str, Any], key: str, before: str, after: str = "") -> str:
     """One fitted law as text, or why it could not be fitted."""
     law = one[key]
     if law is None:
-        return f"unknown: {one['missing'].get(key, '')}" if key in one["missing"] else ""
+        return f"unknown: {one['missing'][key]}"
     value = law.get("exponent", law.get("value"))
-    low, high = law.get("low"), law.get("high")
-    has_interval = low is not None and low == low
-    interval = f" (95 % from {low:.3g} to {high:.3g})" if has_interval else ""
+    low = law.get("low", math.nan)
+    interval = "" if math.isnan(low) else f" (95 % from {low:.3g} to {law['high']:.3g})"
     return f"{before}{value:.3g}{_error(law['error'])}{interval}{after}"

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..arguments import MOST_GRAINS
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE
 
 KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca", "fractal", "rbd")
 
@@ -42,9 +39,8 @@ KINDS = ("grain", "chain", "lattice", "hexagonal", "bpca", "bcca", "dla", "dlca"
     "--out", required=True, metavar="FILE", type=options.PATH, help="Extended XYZ (.xyz, .extxyz) or GSD (.gsd)."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the file if it exists.")
-@options.as_json
-@options.debug
-def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> int:
+@options.output
+def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -> None:
     """Build an aggregate with all contacts at rest and write it to FILE for `sand collide`, `sand run`, OVITO and ASE.
 
     \b
@@ -62,14 +58,10 @@ def command(kind: str, out: str, overwrite: bool, as_json: bool, **given: Any) -
     from ..setup.aggregates import build
 
     with report.compiling(as_json):
-        body = report.with_notes(lambda: build(kind, **_arguments(given)))
+        body = build(kind, **_arguments(given))
     write_body(target, body, overwrite=overwrite)
     content = {"kind": kind, "file": str(target), "seed": given["seed"], **_properties(body)}
-    if as_json:
-        report.emit(content)
-    else:
-        report.show(f"build {kind}", _rows(content))
-    return DONE
+    report.answer(content, f"build {kind}", _rows(content), as_json=as_json)
 
 
 def _arguments(given: dict[str, Any]) -> dict[str, Any]:
@@ -77,12 +69,10 @@ def _arguments(given: dict[str, Any]) -> dict[str, Any]:
     found = dict(given)
     shape = found.pop("shape")
     if shape is not None:
-        words = [word.strip() for word in shape.split(",")]
-        if len(words) != 3 or not all(word.isdecimal() and len(word) < 10 and int(word) > 0 for word in words):
-            raise BadInput(f"--shape {shape!r} must be three whole numbers above 0, such as 5,5,5")
-        found["shape"] = [int(word) for word in words]
-        if math.prod(found["shape"]) > MOST_GRAINS:
-            raise BadInput(f"--shape {shape} has more than {MOST_GRAINS:.0e} grains")
+        try:
+            found["shape"] = [int(word) for word in shape.split(",")]
+        except ValueError:
+            raise BadInput(f"--shape {shape[:40]!r} must be three whole numbers above 0, such as 5,5,5") from None
         if found["grains"] is not None:
             raise BadInput("--shape sets the number of grains; leave --grains out")
     for name in ("dimension", "prefactor", "magnetic"):
@@ -116,18 +106,23 @@ def _material(text: str) -> str | dict[str, float]:
 
 def _properties(body: Any) -> dict[str, Any]:
     """Properties of an aggregate: grains, radii, mass, size, dimension, contacts, moments."""
+    from ..analysis.fractal import correlation_dimension
+    from ..analysis.shape import gyration_radius
     from ..io.bodies import contacts_of
 
-    size, dimension, error = _shape(body)
     contacts = len(contacts_of(body)["pair"])
+    try:
+        dimension = correlation_dimension(body.position)
+    except BadInput:  # too few grains
+        dimension = None
     content = {
         "grains": len(body),
         "materials": [m.name for m in body.materials],
         "radius": [float(body.radius.min()), float(body.radius.max())],
         "mass": float(body.mass.sum()),
-        "radius_of_gyration": size,
-        "fractal_dimension": dimension,
-        "fractal_dimension_error": error,
+        "radius_of_gyration": gyration_radius(body.position, body.mass),
+        "fractal_dimension": dimension.value if dimension else None,
+        "fractal_dimension_error": dimension.error if dimension else None,
         "contacts": contacts,
         "mean_coordination": 2.0 * contacts / len(body),
     }
@@ -135,19 +130,6 @@ def _properties(body: Any) -> dict[str, Any]:
     if magnetic:
         content |= {"magnetic_grains": magnetic, "net_moment": [float(v) for v in body.moment.sum(axis=0)]}
     return content
-
-
-def _shape(body: Any) -> tuple[float, float | None, float | None]:
-    """Radius of gyration [m], correlation dimension and its error (None if there are too few grains)."""
-    from ..analysis.fractal import correlation_dimension
-    from ..analysis.shape import gyration_radius
-
-    size = gyration_radius(body.position, body.mass)
-    try:
-        found = correlation_dimension(body.position)
-    except BadInput:
-        return size, None, None
-    return size, found.value, found.error
 
 
 def _rows(content: dict[str, Any]) -> report.Rows:

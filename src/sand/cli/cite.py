@@ -28,16 +28,14 @@ REFERENCES = (
 
 
 @click.command("cite", short_help="What to cite.")
-@options.as_json
-@options.debug
-def command(as_json: bool) -> int:
+@options.output
+def command(as_json: bool) -> None:
     """What to cite when SAND was of use."""
     software = f"SAND, Soft Aggregate Numerical Dynamics, version {__version__}"
     if as_json:
         references = [{"for": reason, "reference": text} for reason, text in REFERENCES]
         report.emit({"software": software, "version": __version__, "references": references})
-        return 0
+        return
     click.echo(f"Please cite the version you used:\n  {software}\nand what it is built on:")
     for reason, text in REFERENCES:
         click.echo(f"  {text}\n      ({reason})")
-    return 0

@@ -8,10 +8,8 @@ from typing import Any
 
 import click
 
-from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .exits import DONE
 
 SHOWN = 12
 """Collisions listed one by one on the screen; collision.json has all of them."""
@@ -20,37 +18,36 @@ SHOWN = 12
 @click.command("collide", short_help="Collide two bodies that a case file describes.")
 @click.argument("case", metavar="CASE.toml", type=options.PATH)
 @click.option("--out", metavar="DIR", type=options.PATH, help="Folder for the files (default: the case's name).")
-@click.option("--seeds", metavar="LIST", help="Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
+@options.seeds("Seeds in place of those in the case: '3', '1,2,5' or '1-20'.")
 @options.workers
 @options.threads
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
-@options.as_json
-@options.debug
+@options.output
 def command(
-    case: str, out: str | None, seeds: str | None, workers: int, threads: int | None, overwrite: bool, as_json: bool
-) -> int:
+    case: str,
+    out: str | None,
+    seeds: list[int] | None,
+    workers: int,
+    threads: int | None,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
     """Collide the bodies that CASE.toml describes and follow them until their contacts have come to rest.
 
     Writes collision.json and a figure to the folder; for a single seed also the trajectory, the ledger and all other
     files of `sand run`. Ctrl-C interrupts it; continue with `sand resume`.
     """
     set_threads(threads)
-    chosen = None if seeds is None else read_seeds(seeds)
     from ..experiments.collision_job import CollisionJob
     from .launch import refuse_folder
 
-    job = CollisionJob(case, None if out is None else Path(out), chosen, overwrite=overwrite)
+    job = CollisionJob(case, None if out is None else Path(out), seeds, overwrite=overwrite)
     refuse_folder(job.folder, Path(case), overwrite=overwrite)
-    return collide(job, f"collide {case}", workers, threads, as_json)
+    collide(job, f"collide {case}", workers, threads, as_json)
 
 
-def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> int:
+def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: bool, quiet: bool = False) -> None:
     """Run a `CollisionJob` and print the results.
-
-    Returns
-    -------
-    int
-        The exit code.
 
     Raises
     ------
@@ -61,45 +58,21 @@ def collide(job: Any, heading: str, workers: int, threads: int | None, as_json: 
 
     processes = workers if len(job.case.impact.seeds) > 1 else 1
     with running_job(job.folder, processes, threads=threads, quiet=as_json or quiet) as (executor, interrupts):
-        content = report.with_notes(lambda: job.run(executor, [interrupts]))
-    if as_json:
-        report.emit(content)
-    elif not quiet:
-        _show(heading, job.folder, content["collisions"])
-    return DONE
+        content = job.run(executor, [interrupts])
+    rows = [*collision_rows(content["collisions"]), ("files", f"{job.folder}/")]
+    report.answer(content, heading, rows, as_json=as_json, quiet=quiet)
 
 
-def outcome_counts(results: list[dict[str, Any]]) -> str:
-    """How often each outcome occurred, as text."""
-    counts = Counter(result["outcome"] for result in results)
-    return ", ".join(f"{n} × {name}" for name, n in counts.most_common())
-
-
-def read_seeds(text: str) -> list[int]:
-    """Read '3', '1,2,5' or '1-20' as integers.  Raises BadInput."""
-    seeds: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        ends = [first, last or first]
-        valid = all(end.isdecimal() and len(end) < 20 for end in ends) and (last or not dash)
-        if not valid or int(ends[1]) - int(ends[0]) > 100_000 or int(ends[1]) > options.MOST_SEED:
-            shown = text if len(text) <= 40 else f"{text[:40]}…"
-            raise BadInput(f"--seeds {shown!r} must be whole numbers below 2^63 such as '3', '1,2,5' or '1-20'")
-        seeds += range(int(ends[0]), int(ends[1]) + 1)
-    if not seeds:
-        raise BadInput(f"--seeds {text!r} names no seed: the first number must not be above the last")
-    return list(dict.fromkeys(seeds))
-
-
-def _show(heading: str, folder: Path, results: list[dict[str, Any]]) -> None:
-    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", collision_line(r)) for r in results[:SHOWN]]
+def collision_rows(results: list[dict[str, Any]]) -> report.Rows:
+    """The first SHOWN collisions, and how often each outcome occurred."""
+    rows = [(f"seed {r['seed'] if r['seed'] is not None else '-'}", _collision(r)) for r in results[:SHOWN]]
     if len(results) > SHOWN:
         rows.append(("…", f"and {len(results) - SHOWN} more"))
-    report.show(heading, [*rows, ("outcomes", outcome_counts(results)), ("files", f"{folder}/")])
+    counts = Counter(r["outcome"] for r in results)
+    return [*rows, ("outcomes", ", ".join(f"{n} × {name}" for name, n in counts.most_common()))]
 
 
-def collision_line(r: dict[str, Any]) -> str:
-    """Describe one collision on one line."""
+def _collision(r: dict[str, Any]) -> str:
     pieces = f"{len(r['fragments'])} bodies, largest {r['largest_remnant']:.0%} of the mass"
     lost = sum(r["lost"].values()) / r["impact_energy"]
     events = f"contacts {r['made']} made, {r['moved']} moved, {r['broken']} broken"

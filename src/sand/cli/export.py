@@ -8,20 +8,19 @@ import click
 
 from ..errors import BadInput
 from . import options, report
-from .exits import DONE
 
-FORMATS = ("xyz", "lammps-dump", "lammps-data", "vtk")
+SUFFIXES = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
+"""Pattern of the end of the file names, by format."""
 
 
 @click.command("export", short_help="Export the frames of a run to other programs.")
 @click.argument("folder", metavar="DIR", type=options.PATH)
-@click.option("--to", "form", required=True, type=click.Choice(FORMATS), help="Format of the files.")
+@click.option("--to", "form", required=True, type=click.Choice(list(SUFFIXES)), help="Format of the files.")
 @click.option("--out", metavar="PATH", type=options.PATH, help="Path without suffix (default: 'trajectory' in DIR).")
 @click.option("--frames", metavar="SLICE", default=":", help="Frames, as in Python: '-1', '10:', '::5'.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@options.as_json
-@options.debug
-def command(folder: str, form: str, out: str | None, frames: str, overwrite: bool, as_json: bool) -> int:
+@options.output
+def command(folder: str, form: str, out: str | None, frames: str, overwrite: bool, as_json: bool) -> None:
     """Export the frames of the run in DIR to other programs.
 
     vtk: a .vtp for each frame and a .pvd with their times, for ParaView; xyz: extended XYZ in ångström, for OVITO and
@@ -32,17 +31,13 @@ def command(folder: str, form: str, out: str | None, frames: str, overwrite: boo
 
     run = Run(folder)
     stem = Path(out) if out else Path(folder) / Path(TRAJECTORY).stem
-    suffixes = {"xyz": ".xyz", "lammps-dump": ".dump", "lammps-data": "-*.data", "vtk": ".pvd"}
-    existing = sorted(stem.parent.glob(stem.name + suffixes[form]))
+    existing = sorted(stem.parent.glob(stem.name + SUFFIXES[form]))
     if existing and not overwrite:
         raise BadInput(f"{existing[0]} exists; give another --out, or --overwrite")
     written = run.export(form, stem, chosen(frames))
-    if as_json:
-        report.emit({"files": [str(path) for path in written]})
-    else:
-        more = f" and {len(written) - 1} more" if len(written) > 1 else ""
-        report.show(f"export {folder}", [("files", f"{written[0]}{more}")])
-    return DONE
+    more = f" and {len(written) - 1} more" if len(written) > 1 else ""
+    content = {"files": [str(path) for path in written]}
+    report.answer(content, f"export {folder}", [("files", f"{written[0]}{more}")], as_json=as_json)
 
 
 def chosen(text: str) -> slice:

@@ -11,34 +11,21 @@ import click
 from ..errors import BadInput
 from ..threads import set_threads
 from . import options, report
-from .collide import read_seeds
-from .exits import DONE
 
 DEFAULT_SEEDS = list(range(1, 9))
 
 
 @click.command("grow", short_help="Run the same box for many seeds, for a joint analysis.")
 @click.argument("case", metavar="CASE.toml", type=options.PATH)
-@click.option("--seeds", metavar="LIST", help="Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
+@options.seeds("Seeds, one box each: '3', '1,2,5' or '1-8' (the default).")
 @click.option(
     "--out", metavar="DIR", type=options.PATH, help="Folder for the folders of the boxes (default: the case's name)."
 )
 @options.workers
 @options.scheduler
 @options.threads
-@options.as_json
-@options.quiet
-@options.debug
-def command(
-    case: str,
-    seeds: str | None,
-    out: str | None,
-    workers: int,
-    scheduler: str | None,
-    threads: int | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@options.quiet_output
+def command(case: str, seeds: list[int] | None, out: str | None, threads: int | None, **how: Any) -> None:
     """Run the box that CASE.toml describes once for each seed, into DIR/seed-1 and so on.
 
     Each box is a run as by `sand run`; growth.json lists how they ended. Called again, the command continues unfinished
@@ -46,40 +33,19 @@ def command(
     growth.
     """
     set_threads(threads)
-    chosen = None if seeds is None else read_seeds(seeds)
     from ..experiments.growth_case import read_growth
 
     content, own = read_growth(case)
     folder = Path(out or Path(case).stem)
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"{folder} is a file; give another folder with --out")
-    how: dict[str, Any] = {
-        "workers": workers,
-        "scheduler": scheduler,
-        "threads": threads,
-        "quiet": quiet,
-        "as_json": as_json,
-    }
-    return boxes(content, chosen or own or DEFAULT_SEEDS, folder, **how)
+    boxes(content, seeds or own or DEFAULT_SEEDS, folder, threads=threads, **how)
 
 
 def boxes(
-    content: dict[str, Any],
-    seeds: list[int],
-    folder: Path,
-    *,
-    workers: int,
-    scheduler: str | None,
-    threads: int | None,
-    quiet: bool,
-    as_json: bool,
-) -> int:
-    """Run or continue the boxes of a case.
-
-    Returns
-    -------
-    int
-        The exit code.
+    content: dict[str, Any], seeds: list[int], folder: Path, *, quiet: bool, as_json: bool, **execution: Any
+) -> None:
+    """Run or continue the boxes of a case; `execution` as for `job.running_job`.
 
     Raises
     ------
@@ -96,10 +62,8 @@ def boxes(
         if not (quiet or as_json):
             report.write_line(f"  seed {seed}: {outcome}  ({len(outcomes)} of {len(seeds)})")
 
-    with running_job(folder, workers, scheduler, threads, quiet=quiet) as (executor, interrupts):
-        report.with_notes(lambda: grow(content, seeds, folder, executor, finished, [interrupts]))
-    if as_json:
-        report.emit({"folder": str(folder), "seeds": seeds, "outcomes": outcomes})
-    elif not quiet:
-        report.write_line(f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}")
-    return DONE
+    with running_job(folder, quiet=quiet, **execution) as (executor, interrupts):
+        grow(content, seeds, folder, executor, finished, [interrupts])
+    text = f"all boxes are in {folder}; measure them with: sand analyse {shlex.quote(str(folder))}"
+    found = {"folder": str(folder), "seeds": seeds, "outcomes": outcomes}
+    report.answer(found, text, [], as_json=as_json, quiet=quiet)

@@ -1,45 +1,51 @@
-"""`sand info DIR|FILE`: describes a run or one of its files on one screen."""
+"""`sand info DIR|FILE`: describes a run, a job or one of their files on one screen."""
 
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ..config.commands import command_for
 from ..errors import BadInput
 from ..io import run_folder as files
 from ..io.ledger_table import read_ledger
 from . import options, report
-from .info_jobs import describe_job_file, describe_job_folder, describe_other_case
-from .report import Description
+from .collide import collision_rows
+from .scatter import result_rows
+
+Description = tuple[str, report.Rows, dict[str, Any]]
+"""Heading and rows for people, and the same content for machines."""
+JOBS = {
+    "scatter": ("a scattering job", "scattering"),
+    "collide": ("collisions", "collision"),
+    "grow": ("boxes", "growth"),
+}
+"""Names of jobs by command: for people, and the `kind` for machines."""
 
 
 @click.command("info", short_help="Describe a run or one of its files.")
 @click.argument("path", metavar="DIR|FILE", type=options.PATH)
-@options.as_json
-@options.debug
-def command(path: str, as_json: bool) -> int:
+@options.output
+def command(path: str, as_json: bool) -> None:
     """Describe the folder of a run, a case file, trajectory.gsd, ledger.csv, summary.json or a checkpoint.
 
     Also describes cases, folders and results of `sand scatter`, `sand collide` and `sand grow`.
 
     A case file is checked as by `sand run`, but not run.
     """
-    heading, rows, content = report.with_notes(lambda: _describe(Path(path)))
-    if as_json:
-        report.emit(content)
-    else:
-        report.show(heading, rows)
-    return 0
+    heading, rows, content = _describe(Path(path))
+    report.answer(content, f"{path}: {heading}", rows, as_json=as_json)
 
 
 def _describe(path: Path) -> Description:
     """Describe a folder or a file according to its type.  Raises BadInput."""
     if path.is_dir():
-        return describe_run(path)
+        return describe_folder(path)
     if not path.exists():
         raise BadInput(f"there is no file or folder {path}")
     if path.suffix not in FILE_TYPES:
@@ -70,14 +76,24 @@ def _ledger(path: Path) -> list[dict[str, float]]:
     return rows
 
 
-def describe_run(path: Path) -> Description:
-    """Describe the folder of a run: its outcome, or its present state."""
-    from ..units import format_quantity
-
+def describe_folder(path: Path) -> Description:
+    """Describe the folder of a run or a job: its outcome, or its present state."""
     if not any((path / name).exists() for name in (files.CASE, files.ONE_COLLISION)):
         raise BadInput(f"{path} is not the folder of a run: there is no {files.CASE} in it")
-    if (job := describe_job_folder(path)) is not None:
-        return job
+    listed = ("files", "  ".join(report.files_of(path)))
+    for name in (files.SCATTERING, files.COLLISION):
+        if (path / name).exists() and (job := _describe_results(path / name, files.read_json(path / name))):
+            heading, rows, content = job
+            return heading, [*rows, listed], {**content, "folder": str(path)}
+    job_command, case, begun = report.job_in(path)
+    if job_command in JOBS:
+        return _describe_job(path, job_command, case, begun, [listed])
+    return _describe_run(path, listed)
+
+
+def _describe_run(path: Path, listed: tuple[str, str]) -> Description:
+    from ..units import format_quantity
+
     planned = files.read_toml(path / files.CASE).get("run", {})
     summary = _summary(path / files.SUMMARY) if (path / files.SUMMARY).exists() else None
     ledger = _ledger(path / files.LEDGER) if (path / files.LEDGER).exists() else []
@@ -90,22 +106,36 @@ def describe_run(path: Path) -> Description:
         rows += [("outcome", summary["outcome_text"] + named), ("grains", str(summary["grains"]))]
         rows += [*summary["choices"].items(), *report.results(summary)]
     if beyond is not None:
-        label = "state" if summary is None else "since then"
         rows += [
-            (label, "running, or killed"),
+            ("state" if summary is None else "since then", "running, or killed"),
             ("last frame", f"{format_quantity(beyond['time'], 's')} after {beyond['step']} steps"),
             ("clusters", report.clusters(beyond)),
         ]
     if "until" in planned:
         rows.append(("planned end", format_quantity(planned["until"], "s")))
-    rows.append(("files", "  ".join(report.files_of(path))))
+    rows.append(listed)
     until = planned.get("until", 0.0)
     ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
     if report.checkpoints(path) and not ended:
         rows.append(("continue with", report.resume_line(path)))
-    content: dict[str, Any] = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
-    content |= {"planned_end": planned.get("until"), "files": report.files_of(path)}
-    return f"{path}: a run", rows, content
+    content = {"kind": "run", "folder": str(path), "summary": summary, "last_row": last}
+    return "a run", rows, content | {"planned_end": planned.get("until"), "files": report.files_of(path)}
+
+
+def _describe_job(path: Path, job_command: str, case: Path, begun: bool, rows: report.Rows) -> Description:
+    """Describe an unfinished job, or the boxes of `sand grow`."""
+    name, kind = JOBS[job_command]
+    content: dict[str, Any] = {"kind": kind, "folder": str(path), "finished": False}
+    if not begun:
+        start = ("run it with", f"sand {job_command} {shlex.quote(str(case))}")
+        return name, [("state", "not started"), *rows, start], content
+    if job_command == "grow":
+        ends = [files.read_json(summary).get("outcome") for summary in path.glob(f"seed-*/{files.SUMMARY}")]
+        rows.append(("boxes", f"{ends.count('finished')} finished"))
+        if (path / files.GROWTH).exists():
+            rows = [("state", "finished"), *rows, ("measure with", f"sand analyse {shlex.quote(str(path))}")]
+            return name, rows, content | {"finished": True} | files.read_json(path / files.GROWTH)
+    return name, [("state", "running, or interrupted"), *rows, ("continue with", report.resume_line(path))], content
 
 
 def describe_case(path: Path) -> Description:
@@ -114,19 +144,54 @@ def describe_case(path: Path) -> Description:
     from ..config.case import read_case
     from ..simulation.serialise import case_of
 
-    if (other := describe_other_case(path)) is not None:
-        return other
+    meant_for = command_for(files.read_toml(path))
+    if meant_for in JOBS:
+        return JOB_CASES[meant_for](path, ("run it with", f"sand {meant_for} {shlex.quote(str(path))}"))
     case = read_case(path)
     if case.grains.kind == "given":
         rows = [("grains", f"{case.grains.number}, from a script"), ("box", case.box.periodic.describe())]
-        return f"{path}: the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
-    simulation = report.with_notes(lambda: report.with_file_name(path, lambda: simulation_of(case, None)))
-    folder = Path(case.run.out or path.stem)
+        return "the case of a run", rows, {"kind": "case", "case": files.read_toml(path)}
+    with report.naming(path):
+        simulation = simulation_of(case, None)
     end = math.inf if case.run.until is None else case.run.until
     steps = math.inf if case.run.steps is None else case.run.steps
-    rows = report.opening(simulation, end, steps, folder)
     content = {"kind": "case", "case": case_of(simulation, end, steps), "choices": simulation.choices}
-    return f"{path}: a valid case", rows, content
+    return "a valid case", report.opening(simulation, end, steps, Path(case.run.out or path.stem)), content
+
+
+def _collision_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.collision_case import read_collision
+
+    case = read_collision(path)
+    with report.naming(path):
+        simulation = case.check()
+    bodies = f"{case.projectile.kind} on {case.target.kind}, {len(simulation.grains)} grains"
+    rows = [("bodies", bodies), ("seeds", str(len(case.impact.seeds))), start]
+    return "a valid collision case", rows, {"kind": "collision case", "case": files.read_toml(path)}
+
+
+def _growth_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..config.build import simulation_of
+    from ..config.case import check_case
+    from ..experiments.growth_case import read_growth
+
+    content, seeds = read_growth(path)
+    with report.naming(path):
+        simulation = simulation_of(check_case(content, ""), None)
+    rows = [("boxes", f"{len(seeds or [])} of {len(simulation.grains)} grains"), start]
+    return "a valid growth case", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}}
+
+
+def _scattering_case(path: Path, start: tuple[str, str]) -> Description:
+    from ..experiments.scattering.case import read_scattering
+    from ..units import format_quantity
+
+    case, flights = read_scattering(path)
+    rows: report.Rows = [("job", case.measure.job)]
+    for flight in flights:
+        capture = f", b_max = {format_quantity(flight.scales.capture, 'm')}" if flight.scales.capture else ""
+        rows.append((f"{flight.speed:.4g} m/s", f"from {format_quantity(flight.distance, 'm')}{capture}"))
+    return "a valid scattering case", [*rows, start], {"kind": "scattering case", "case": files.read_toml(path)}
 
 
 def describe_trajectory(path: Path) -> Description:
@@ -154,7 +219,7 @@ def describe_trajectory(path: Path) -> Description:
         "contacts": len(last.pair),
         "box": list(last.box.lengths),
     }
-    return f"{path}: a trajectory", rows, content
+    return "a trajectory", rows, content
 
 
 def describe_checkpoint(path: Path) -> Description:
@@ -171,17 +236,30 @@ def describe_checkpoint(path: Path) -> Description:
         ("planned end", "none" if end is None else format_quantity(end, "s")),
         ("continue with", report.resume_line(path.parent)),
     ]
-    content = {"kind": "checkpoint", "grains": grains, "contacts": contacts, **meta}
-    return f"{path}: an intact checkpoint", rows, content
+    return "an intact checkpoint", rows, {"kind": "checkpoint", "grains": grains, "contacts": contacts, **meta}
 
 
 def describe_json(path: Path) -> Description:
     """Describe the summary of a run, or the results of another command."""
-    if (job := describe_job_file(path)) is not None:
+    if (job := _describe_results(path, files.read_json(path))) is not None:
         return job
     summary = _summary(path)
     rows = [("outcome", summary["outcome_text"] + report.named(summary["grains_concerned"]))]
-    return f"{path}: the summary of a run", rows + report.results(summary), {"kind": "summary", **summary}
+    return "the summary of a run", rows + report.results(summary), {"kind": "summary", **summary}
+
+
+def _describe_results(path: Path, content: dict[str, Any]) -> Description | None:
+    """Describe scattering.json or collision.json; None for any other file.  Raises BadInput if it is incomplete."""
+    try:
+        if "job" in content:
+            (name, kind), rows = JOBS["scatter"], [("job", content["job"]), *result_rows(content)]
+        elif "collisions" in content:
+            (name, kind), rows = JOBS["collide"], collision_rows(content["collisions"])
+        else:
+            return None
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError):
+        raise BadInput(f"{path} is not a result of SAND") from None
+    return name, rows, {"kind": kind, **content}
 
 
 def describe_ledger(path: Path) -> Description:
@@ -197,10 +275,15 @@ def describe_ledger(path: Path) -> Description:
         ("dissipated", ", ".join(f"{k[5:]} {v:.3g} J" for k, v in lost.items())),
         ("clusters", report.clusters(last)),
     ]
-    content = {"kind": "ledger", "rows": len(ledger), "first": first, "last": last}
-    return f"{path}: the ledger of a run", rows, content
+    return "the ledger of a run", rows, {"kind": "ledger", "rows": len(ledger), "first": first, "last": last}
 
 
+JOB_CASES: dict[str, Callable[[Path, tuple[str, str]], Description]] = {
+    "scatter": _scattering_case,
+    "collide": _collision_case,
+    "grow": _growth_case,
+}
+"""Description of the case files of jobs; the second argument is the row with the command that runs the case."""
 FILE_TYPES: dict[str, Callable[[Path], Description]] = {
     ".toml": describe_case,
     ".gsd": describe_trajectory,

@@ -7,27 +7,30 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..config.commands import BODIES
 from ..errors import BadInput, FilesFailed, Interrupted
 from ..io.lock import LOCK, refuse_locked
 from ..io.run_folder import OWN_FILES, SUMMARY, is_used, read_json, read_toml
+from ..simulation.outcome import Outcome, Result
 from ..units import format_quantity
 from . import report
 from .exits import DONE, INTERRUPTED, PHYSICS
-from .interrupt import InterruptObserver
+from .job import InterruptObserver
 from .progress import Progress
 
 
-class End(NamedTuple):
-    """End of a run: a time [s], a number of further steps, or whichever comes first."""
-
-    until: float | None = None
-    steps: int | None = None
-
-
-def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None, *, quiet: bool, as_json: bool) -> int:
+def launch(
+    make: Callable[[], Any],
+    folder: Path,
+    heading: str,
+    until: float | None,
+    steps: int | None = None,
+    *,
+    quiet: bool,
+    as_json: bool,
+) -> int:
     """Create a simulation, run it, and report how it ended.
 
     Parameters
@@ -36,29 +39,29 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         Returns the simulation, which writes its files to `folder`.
     heading : str
         Heading of the description before the start.
-    end : End or None
-        End of the run; None for the planned end of the simulation.
+    until, steps : float or None, int or None
+        End of the run: a time [s], a number of further steps, or whichever comes first; without both, the planned end
+        of the simulation.
 
     Returns
     -------
     int
         The exit code.
     """
-    verbose = not (quiet or as_json)
     bar = None
     with report.compiling(quiet), InterruptObserver() as interrupts:
-        simulation = report.with_notes(make)
+        simulation = make()
         simulation.observers.append(interrupts)
-        goal = _absolute_end(simulation, end)
-        if verbose:
+        goal: tuple[float, float] = simulation.planned
+        if until is not None or steps is not None:
+            goal = (until or math.inf, math.inf if steps is None else simulation.steps + steps)
+        if not (quiet or as_json):
             report.show(heading, report.opening(simulation, *goal, folder))
             if sys.stderr.isatty():
                 bar = Progress(*goal)
                 simulation.observers.append(bar)
         try:
-            until, steps = end or End()
-            with report.notes():
-                result = simulation.run(until, steps=steps)
+            result = simulation.run(until, steps=steps)
         except Interrupted as stop:
             result = stop.result
         except FilesFailed as error:
@@ -73,13 +76,11 @@ def launch(make: Callable[[], Any], folder: Path, heading: str, end: End | None,
         finally:
             if bar is not None:
                 bar.finish()
-    return _conclude(result, folder, verbose=verbose, as_json=as_json)
+    return _conclude(result, folder, quiet=quiet, as_json=as_json)
 
 
 def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
     """The result of a run that had finished except for its figure when it was interrupted; None for any other."""
-    from ..simulation.outcome import Outcome, Result
-
     if simulation.time < goal[0] and simulation.steps < goal[1]:
         return None
     try:
@@ -91,27 +92,13 @@ def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -
     return Result(Outcome.FINISHED, simulation.steps, simulation.time, simulation.ledger.drift)
 
 
-def _absolute_end(simulation: Any, end: End | None) -> tuple[float, float]:
-    """Planned end of the run: time [s] and step, infinite where not set."""
-    if end is None:
-        return simulation.planned
-    return (
-        math.inf if end.until is None else end.until,
-        math.inf if end.steps is None else simulation.steps + end.steps,
-    )
-
-
-def _conclude(result: Any, folder: Path, *, verbose: bool, as_json: bool) -> int:
+def _conclude(result: Any, folder: Path, **output: bool) -> int:
     """Report how a run ended; returns the exit code."""
-    from ..simulation.outcome import Outcome
-
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
-    if as_json:
-        report.emit({**summary, "folder": str(folder)})
-    if verbose:
-        rows = [*report.results(summary), ("files", _listed(folder))]
-        report.show("done" if outcome is Outcome.FINISHED else "so far", rows)
+    rows = [*report.results(summary), ("files", report.listed(folder))]
+    heading = "done" if outcome is Outcome.FINISHED else "so far"
+    report.answer({**summary, "folder": str(folder)}, heading, rows, **output)
     if outcome is Outcome.INTERRUPTED:
         report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
         return INTERRUPTED
@@ -142,11 +129,6 @@ def _how_to_recover(folder: Path) -> str:
     if report.checkpoints(folder):
         return f"once this is solved, continue from the last checkpoint with: {report.resume_line(folder)}"
     return "there is no checkpoint yet; once this is solved, start again with --overwrite"
-
-
-def _listed(folder: Path) -> str:
-    """The folder and the names of its files, as one line."""
-    return f"{folder}/  " + "  ".join(report.files_of(folder))
 
 
 def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
@@ -183,12 +165,13 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         if report.is_resumable(folder):
             advice += f"; or continue that run: {report.resume_line(folder)}"
         raise BadInput(f"folder {folder} exists and is not empty; {advice}")
-    if any((folder / name).exists() and (folder / name).samefile(case) for name in OWN_FILES):
+    replaced = [folder / name for name in OWN_FILES if (folder / name).exists()]
+    if any(path.samefile(case) for path in replaced):
         raise BadInput(
             f"--overwrite would replace the case file {case} itself; copy it to another folder, or give another --out"
         )
     content = read_toml(case)
     for body in sorted(BODIES & content.keys()):
-        path = Path(content[body].get("path", case))
-        if any((folder / name).exists() and path.exists() and (folder / name).samefile(path) for name in OWN_FILES):
-            raise BadInput(f"--overwrite would replace {path}, the {body} of {case}; give another --out")
+        source = Path(content[body].get("path", case))
+        if source.exists() and any(path.samefile(source) for path in replaced):
+            raise BadInput(f"--overwrite would replace {source}, the {body} of {case}; give another --out")

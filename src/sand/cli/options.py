@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import click
 
 from ..arguments import MOST_GRAINS, MOST_PROCESSES, MOST_SEED
+from ..errors import BadInput
 from ..io.run_folder import checked_name
 
 
@@ -36,12 +38,22 @@ workers = click.option(
 
 scheduler = click.option("--scheduler", metavar="ADDRESS", help="Use a running dask scheduler, tcp://host:port.")
 
-as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
+_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else.")
 
-quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
+_quiet = click.option("--quiet", is_flag=True, help="Print notes and errors only.")
 
 # read from the command line by `program`, because errors may occur before options are parsed
 debug = click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
+
+
+def output(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --json and --debug."""
+    return _as_json(debug(command))
+
+
+def quiet_output(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options --json, --quiet and --debug."""
+    return _as_json(_quiet(debug(command)))
 
 
 threads = click.option(
@@ -53,24 +65,41 @@ threads = click.option(
 
 
 def end_of_run(text: str) -> Any:
-    """The option --until with the help text `text`."""
-    return click.option("--until", metavar="TIME", help=text)
+    """The option --until with the help text `text`; its value is in seconds."""
+    return click.option("--until", metavar="TIME", callback=_seconds, help=text)
 
 
-def seconds(text: str | None, name: str = "--until") -> float | None:
-    """Convert a time from the command line to seconds, checked as in a case file; a bare number is SI.
-
-    Raises
-    ------
-    BadInput
-        If it has a wrong unit, is not a number, not above 0, or too short.
-    """
-    from ..simulation.stop import duration
-
+def _seconds(_context: click.Context, _option: click.Parameter, text: str | None) -> float | None:
+    """Convert a time to seconds, checked as in a case file; a bare number is SI.  Raises BadInput."""
     if text is None:
         return None
+    from ..simulation.stop import duration
+
     try:
         value: float | str = float(text)
     except ValueError:
         value = text
-    return duration(value, name)
+    return duration(value, "--until")
+
+
+def seeds(text: str) -> Any:
+    """The option --seeds with the help text `text`; its value is a list of integers."""
+    return click.option("--seeds", metavar="LIST", callback=_seeds, help=text)
+
+
+def _seeds(_context: click.Context, _option: click.Parameter, text: str | None) -> list[int] | None:
+    """Read '3', '1,2,5' or '1-20' as integers.  Raises BadInput."""
+    if text is None:
+        return None
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        ends = [first, last or first]
+        valid = all(end.isdecimal() and len(end) < 20 for end in ends) and (last or not dash)
+        if not valid or int(ends[1]) - int(ends[0]) > 100_000 or int(ends[1]) > MOST_SEED:
+            shown = text if len(text) <= 40 else f"{text[:40]}…"
+            raise BadInput(f"--seeds {shown!r} must be whole numbers below 2^63 such as '3', '1,2,5' or '1-20'")
+        found += range(int(ends[0]), int(ends[1]) + 1)
+    if not found:
+        raise BadInput(f"--seeds {text!r} names no seed: the first number must not be above the last")
+    return list(dict.fromkeys(found))

@@ -9,7 +9,6 @@ import click
 
 from ..errors import BadInput, did_you_mean
 from . import options, report
-from .exits import DONE
 
 STILL = "still"
 FORMATS = ("png", "pdf", "svg")
@@ -49,11 +48,10 @@ class Source(NamedTuple):
 @click.option("--transparent", is_flag=True, help="Transparent background.")
 @click.option("--dark", is_flag=True, help="Dark background.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
-@options.as_json
-@options.debug
+@options.output
 def command(
     source: str, what: str | None, out: str | None, form: str, frame: int, overwrite: bool, as_json: bool, **how: Any
-) -> int:
+) -> None:
     """Draw the run in DIR, or a .gsd of SAND: figures over time, a still picture of a frame, histograms over grains.
 
     WHAT is size (of clusters, over time), energies, losses, contacts, balance, still; or a QUANTITY of grains, of which
@@ -64,16 +62,14 @@ def command(
     from ..io.run_folder import make_folder, replace_file
 
     folder, names = _check_options(Path(source), what, out, form, overwrite, how)
-    pictures = report.with_notes(lambda: _draw(_open_source(Path(source)), names, frame, form, how))
+    pictures = _draw(_open_source(Path(source)), names, frame, form, how)
     if not folder.exists():
         make_folder(folder)
-    for path, content in zip((folder / f"{name}.{form}" for name in names), pictures, strict=True):
+    paths = [folder / f"{name}.{form}" for name in names]
+    for path, content in zip(paths, pictures, strict=True):
         replace_file(path, content)
-    if as_json:
-        report.emit({"files": [str(folder / f"{name}.{form}") for name in names]})
-    else:
-        report.show(f"plot {source}", [("folder", str(folder)), ("files", ", ".join(f"{n}.{form}" for n in names))])
-    return DONE
+    rows = [("folder", str(folder)), ("files", ", ".join(path.name for path in paths))]
+    report.answer({"files": [str(path) for path in paths]}, f"plot {source}", rows, as_json=as_json)
 
 
 def _check_options(
@@ -87,9 +83,7 @@ def _check_options(
     problems: list[str] = []
     is_trajectory = source.is_file()
     default = (STILL,) if is_trajectory else (*HISTORY, STILL)
-    names = (
-        list(dict.fromkeys(part.strip() for part in selection.split(","))) if selection is not None else list(default)
-    )
+    names = list(default if selection is None else dict.fromkeys(part.strip() for part in selection.split(",")))
     allowed = (*HISTORY, STILL, *GRAIN_NAMES)
     problems += [f"--what {name!r} is unknown; {did_you_mean(name, allowed)}" for name in names if name not in allowed]
     if is_trajectory:
@@ -99,10 +93,12 @@ def _check_options(
         problems.append(
             f"--cluster is for the still picture; {', '.join(others)} would show all grains: leave them out"
         )
-    size = _size(how["size"])
-    if size is None:
+    try:
+        width, height = map(int, how["size"].lower().replace("×", "x").split("x"))
+    except ValueError:
         problems.append(f"--size {how['size']!r} must be width x height in pixels, such as 1600x1000")
-    how["size"], how["whole"] = size or (1600, 1000), not how.pop("cut")
+        width, height = 1600, 1000
+    how["size"], how["whole"] = (width, height), not how.pop("cut")
     how["bonds"] = None if how["bonds"] == "none" else how["bonds"]
     try:
         check_picture_options(how["colour"], how["bonds"], how["view"], how["size"])
@@ -118,13 +114,6 @@ def _check_options(
     if problems:
         raise BadInput(problems)
     return folder, names
-
-
-def _size(text: str) -> tuple[int, int] | None:
-    parts = text.lower().replace("×", "x").split("x")
-    if len(parts) != 2 or not all(part.strip().isdecimal() and len(part) < 9 for part in parts):
-        return None
-    return int(parts[0]), int(parts[1])
 
 
 def _open_source(path: Path) -> Source:
@@ -143,18 +132,24 @@ def _open_source(path: Path) -> Source:
 
 def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str, Any]) -> list[bytes]:
     """Draw all files in memory, so that none is written unless all can be drawn.  Raises BadInput."""
-    from ..plotting.plots import HISTORY, figure_bytes, grains_figure, history_figure
+    from ..analysis.ledger_columns import LedgerColumns
+    from ..forces.pair.dipoles import kinetic_temperature
+    from ..io.ledger_table import read_ledger
+    from ..io.run_folder import LEDGER
+    from ..plotting.plots import HISTORY, grains_figure, history_figure
     from ..plotting.render.still import still_picture
+    from ..plotting.run_figure import figure_bytes
 
-    history = _history(source) if any(name in HISTORY for name in names) else None
-    one, field = None, None
+    if any(name in HISTORY for name in names):
+        ledger, first = LedgerColumns.from_rows(read_ledger(source.path / LEDGER)), _frame(source, 0)
+        start = (len(first), kinetic_temperature(first))
     if any(name not in HISTORY for name in names):
         one = _frame(source, frame)
         field = None if source.run is None else source.run.flux_density(one.time)
 
     def draw(name: str) -> Any:
-        if history is not None and name in HISTORY:
-            return history_figure(history[0], name, *history[1:], dark=how["dark"])
+        if name in HISTORY:
+            return history_figure(ledger, name, *start, dark=how["dark"])
         if name == STILL:
             return still_picture(one, field=field, **how)
         return grains_figure(one, name, field, dark=how["dark"])
@@ -162,24 +157,8 @@ def _draw(source: Source, names: list[str], frame: int, form: str, how: dict[str
     return [figure_bytes(draw(name), form, how["transparent"]) for name in names]
 
 
-def _history(source: Source) -> tuple[Any, int, float]:
-    """The ledger, the number of grains, and their initial temperature [K].  Raises BadInput."""
-    from ..analysis.ledger_columns import LedgerColumns
-    from ..forces.pair.dipoles import kinetic_temperature
-    from ..io.ledger_table import read_ledger
-    from ..io.run_folder import LEDGER
-
-    ledger = LedgerColumns.from_rows(read_ledger(source.path / LEDGER))
-    first = _frame(source, 0)
-    return ledger, len(first), kinetic_temperature(first)
-
-
 def _frame(source: Source, number: int) -> Any:
     """Read a frame.  Raises BadInput if it does not exist."""
     if not len(source.frames):
         raise BadInput(f"{source.path} has no frame yet")
-    try:
-        return source.frames[number]
-    except IndexError:
-        last = len(source.frames) - 1
-        raise BadInput(f"--frame {number}: {source.path} has frames 0 to {last}, or -1 to {-last - 1}") from None
+    return source.frames[number]

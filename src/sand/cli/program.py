@@ -35,7 +35,7 @@ for _module in COMMANDS:
 
 
 def run_command(words: list[str], interrupted: Callable[[], bool]) -> int:
-    """Run one command.
+    """Run one command; errors become lines and an exit code, unless --debug is given.
 
     Parameters
     ----------
@@ -50,21 +50,13 @@ def run_command(words: list[str], interrupted: Callable[[], bool]) -> int:
         The exit code.
     """
     try:
-        return _call(words, interrupted)
-    except BrokenPipeError:  # the reader has ended, as in `sand info DIR | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or flushing at exit would fail
-        return DONE
-
-
-def _call(words: list[str], interrupted: Callable[[], bool]) -> int:
-    """Run the command; errors become lines and an exit code, unless --debug is given."""
-    try:
         with sand.make_context("sand", list(words)) as context, report.notes():
             return sand.invoke(context) or DONE
     except click.exceptions.Exit as stop:  # --help, --version
         return stop.exit_code
-    except BrokenPipeError:
-        raise
+    except BrokenPipeError:  # the reader has ended, as in `sand info DIR | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or flushing at exit would fail
+        return DONE
     except (KeyboardInterrupt, click.Abort) as stop:
         return _fail([str(stop) or "interrupted"], INTERRUPTED, words)
     except Exception as error:
@@ -82,8 +74,6 @@ def _explain(error: Exception) -> tuple[list[str], int]:
     if isinstance(error, click.UsageError):
         where = error.ctx.command_path if error.ctx else "sand"
         return [f"{_one_line(error.format_message()).rstrip('.')}; see {where} --help"], BAD_INPUT
-    if isinstance(error, click.ClickException):
-        return [_one_line(error.format_message())], BAD_INPUT
     if isinstance(error, MemoryError):
         return ["not enough memory; use fewer grains"], BAD_INPUT
     text = _one_line(f"{type(error).__name__}: {error}")

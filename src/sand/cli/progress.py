@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from typing import IO, Any
+from typing import Any
 
 from ..simulation.observers import Observer
 from ..units import format_quantity
+from .report import progress_bar
 
 FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}<{remaining}{postfix}]"
 """Layout of the bar, at most 80 columns."""
@@ -22,16 +22,13 @@ class Progress(Observer):
         End of the run [s]; if infinite, the bar counts steps.
     last_step : float
         Last step of the run.
-    file : IO[str] or None, optional
-        A terminal.
     """
 
     tick_reads_grains = False
 
-    def __init__(self, end: float, last_step: float, file: IO[str] | None = None):
+    def __init__(self, end: float, last_step: float):
         self._end, self._last_step = end, last_step
         self._by_time = math.isfinite(end)
-        self._file = file or sys.stderr
         self._bar: Any = None
         self._numbers = ""
 
@@ -50,28 +47,13 @@ class Progress(Observer):
         total = self._end if self._by_time else self._last_step
         if self._bar is None:
             self._read_row(simulation, simulation.ledger.rows[-1])  # a resumed run begins between two frames
-            self._bar = self._open(position, total)
+            self._bar = progress_bar(total, False, initial=position, bar_format=FORMAT)
         bar = self._bar
         bar.set_description_str(format_quantity(simulation.time, "s"), refresh=False)
         rate = bar.format_dict["rate"] or 0.0
         speed = f"{format_quantity(float(f'{rate:.2g}'), 's')}/s" if self._by_time else f"{rate:.2g} steps/s"
         bar.set_postfix_str(f"{speed}, {self._numbers}" if rate else self._numbers, refresh=False)
         bar.update(min(position, total) - bar.n)
-
-    def _open(self, position: float, total: float) -> Any:
-        from tqdm import tqdm
-
-        tqdm.monitor_interval = 0  # no monitor thread: ticks are frequent enough
-        return tqdm(
-            total=total,
-            initial=position,
-            bar_format=FORMAT,
-            dynamic_ncols=True,
-            miniters=0,
-            delay=0.2,
-            leave=False,
-            file=self._file,
-        )
 
     def finish(self) -> None:
         """Remove the bar."""

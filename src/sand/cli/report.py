@@ -9,9 +9,8 @@ import shlex
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 
@@ -19,12 +18,8 @@ from ..config.commands import command_for
 from ..errors import BadInput
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, is_job, plain, read_toml
 
-T = TypeVar("T")
 Rows = list[tuple[str, str]]
 """Labels and texts of a table of two columns."""
-Description = tuple[str, Rows, dict[str, Any]]
-"""Heading and rows for people, and the same content for machines."""
-
 LONGEST_NOTE = 600
 """Largest number of characters of a note."""
 _UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
@@ -51,7 +46,8 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
     """Print a note, once, if anything is compiled inside the block."""
     if quiet:
         return nullcontext()
-    jit = with_notes(lambda: import_module("sand.compiler.jit"))  # may warn of the compiler or its cache
+    from ..compiler import jit
+
     return jit.compiling(lambda: note("compiling the loops for this combination of forces, for this and later runs …"))
 
 
@@ -68,10 +64,12 @@ def show(heading: str, rows: Rows) -> None:
         write_line(line)
 
 
-def with_notes(make: Callable[[], T]) -> T:
-    """Call `make`; its warnings are printed as notes, each once."""
-    with notes():
-        return make()
+def answer(content: dict[str, Any], heading: str, rows: Rows, *, as_json: bool, quiet: bool = False) -> None:
+    """Print a result, as `emit` for --json or as `show`; nothing if `quiet`."""
+    if as_json:
+        emit(content)
+    elif not quiet:
+        show(heading, rows)
 
 
 @contextmanager
@@ -90,10 +88,11 @@ def notes() -> Iterator[None]:
         yield
 
 
-def with_file_name(case: Path, make: Callable[[], T]) -> T:
-    """Call `make`; the name of the case file is put in front of its error messages."""
+@contextmanager
+def naming(case: str | Path) -> Iterator[None]:
+    """Put the name of the case file in front of the error messages of the block."""
     try:
-        return make()
+        yield
     except BadInput as error:
         raise error.at(str(case)) from None
 
@@ -114,12 +113,19 @@ def is_resumable(folder: Path) -> bool:
     """Whether `sand resume` can continue the content of a folder."""
     if checkpoints(folder):
         return True
-    one = folder / ONE_COLLISION
-    case = one if one.exists() else folder / CASE
     try:
-        return case.exists() and is_job(folder, case) and command_for(read_toml(case)) not in (None, "run")
+        command, _, begun = job_in(folder)
     except BadInput:
         return False
+    return begun and command not in (None, "run")
+
+
+def job_in(folder: Path) -> tuple[str | None, Path, bool]:
+    """Command and case file of the run or job in a folder, and whether it has begun.  Raises BadInput."""
+    one = folder / ONE_COLLISION  # then case.toml is the case of the simulation
+    case = one if one.exists() else folder / CASE
+    command = command_for(read_toml(case)) if case.exists() else None
+    return command, case, command is not None and is_job(folder, case)
 
 
 def checkpoints(folder: Path) -> list[Path]:
@@ -130,6 +136,20 @@ def checkpoints(folder: Path) -> list[Path]:
 def files_of(folder: Path) -> list[str]:
     """Names of the files of SAND in a folder."""
     return [name for name in OWN_FILES if (folder / name).exists()] + [p.name for p in checkpoints(folder)]
+
+
+def listed(folder: Path) -> str:
+    """The folder and the names of its files, as one line."""
+    return f"{folder}/  " + "  ".join(files_of(folder))
+
+
+def progress_bar(total: float, hidden: bool, **layout: Any) -> Any:
+    """Progress bar of tqdm, shown on a terminal only."""
+    from tqdm import tqdm
+
+    tqdm.monitor_interval = 0  # no monitor thread: updates are frequent enough
+    settings = {"dynamic_ncols": True, "miniters": 0, "delay": 0.2, "leave": False}
+    return tqdm(total=total, disable=hidden or None, **settings, **layout)
 
 
 def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:

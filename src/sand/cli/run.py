@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -28,20 +29,17 @@ from . import options, report
 @click.option("--seed", type=options.SEED, metavar="N", help="Seed in place of that in the case.")
 @click.option("--overwrite", is_flag=True, help="Replace the run in the folder.")
 @options.threads
-@options.as_json
-@options.quiet
-@options.debug
+@options.quiet_output
 def command(
     case: str | None,
     source: str | None,
     frame: int | None,
     out: str | None,
-    until: str | None,
+    until: float | None,
     seed: int | None,
     overwrite: bool,
     threads: int | None,
-    as_json: bool,
-    quiet: bool,
+    **output: bool,
 ) -> int:
     """Run the simulation that CASE.toml describes.
 
@@ -51,20 +49,20 @@ def command(
     With --from, grains, contacts and box come from a frame of an earlier run, and time begins at 0; CASE.toml
     describes everything else, by default the case.toml of the earlier run.
     """
-    end = options.seconds(until)
     set_threads(threads)
     if case is not None and Path(case).is_dir():
         folder = Path(case)
+        advice = "give a case file: sand run CASE.toml"
         if report.is_resumable(folder):
-            raise BadInput(f"{case} is a folder; to continue its run: {report.resume_line(folder)}")
-        if (folder / TRAJECTORY).exists():
-            raise BadInput(f"{case} is a folder; to start from its last frame: sand run --from {shlex.quote(case)}")
-        if (folder / CASE).exists():
-            raise BadInput(f"{case} is a folder; to run its case: sand run {shlex.quote(str(folder / CASE))}")
-        raise BadInput(f"{case} is a folder; give a case file: sand run CASE.toml")
+            advice = f"to continue its run: {report.resume_line(folder)}"
+        elif (folder / TRAJECTORY).exists():
+            advice = f"to start from its last frame: sand run --from {shlex.quote(case)}"
+        elif (folder / CASE).exists():
+            advice = f"to run its case: sand run {shlex.quote(str(folder / CASE))}"
+        raise BadInput(f"{case} is a folder; {advice}")
     from ..config.build import simulation_of
     from ..config.case import GrainsSection, read_case
-    from .launch import End, launch, refuse_folder
+    from .launch import launch, refuse_folder
 
     if source is None and frame is not None:
         raise BadInput("--frame selects the frame of --from FILE to start with; give --from, too")
@@ -76,20 +74,22 @@ def command(
         described.grains = GrainsSection(kind="file", file=str(grains.absolute()), frame=number)
         if case is None:  # another seed, so that a gas does not repeat the kicks of the earlier run
             described.run.seed += 1 + number % 1_000_000
-    if end is not None:
-        described.run.until, described.run.steps = end, None
+    if until is not None:
+        described.run.until, described.run.steps = until, None
     if seed is not None:
         described.run.seed = seed
-    folder = Path(out or _usual_folder(described.run.out, Path(name), grains, frame))
+    usual = described.run.out or Path(name).stem
+    if grains is not None:  # never the folder of the earlier run
+        usual = f"{grains.parent.name}-from-{'last' if frame is None or frame < 0 else frame}"
+    folder = Path(out or usual)
     refuse_folder(folder, Path(name), overwrite=overwrite)
-    return launch(
-        lambda: report.with_file_name(Path(name), lambda: simulation_of(described, folder, overwrite=overwrite)),
-        folder,
-        f"run {name}" + (f" from {source}" if source else ""),
-        End(described.run.until, described.run.steps),
-        quiet=quiet,
-        as_json=as_json,
-    )
+
+    def build() -> Any:
+        with report.naming(name):
+            return simulation_of(described, folder, overwrite=overwrite)
+
+    heading = f"run {name}" + (f" from {source}" if source else "")
+    return launch(build, folder, heading, described.run.until, described.run.steps, **output)
 
 
 def _source(source: str) -> Path:
@@ -113,10 +113,3 @@ def _case_name(case: str | None, source: Path | None) -> str:
     if not (source.parent / CASE).exists():
         raise BadInput(f"--from: there is no {CASE} beside {source}; give a case file before --from")
     return str(source.parent / CASE)
-
-
-def _usual_folder(given: str | None, case: Path, source: Path | None, frame: int | None) -> Path:
-    """Folder for the files without --out: from the case, or its name; never that of the earlier run."""
-    if source is None:
-        return Path(given or case.stem)
-    return Path(f"{source.parent.name}-from-{'last' if frame is None or frame < 0 else frame}")

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..errors import BadInput
+from ..io.run_folder import FLIGHTS
 from . import options, report
-from .exits import DONE
 
 
 @click.command("scatter", short_help="Compute cross-sections and trajectories of two bodies from a case file.")
@@ -20,19 +19,8 @@ from .exits import DONE
 @options.scheduler
 @click.option("--resume", is_flag=True, help="Continue the flights in the folder, as `sand resume` does.")
 @click.option("--overwrite", is_flag=True, help="Replace the job in the folder.")
-@options.quiet
-@options.as_json
-@options.debug
-def command(
-    case: str,
-    out: str | None,
-    workers: int,
-    scheduler: str | None,
-    resume: bool,
-    overwrite: bool,
-    quiet: bool,
-    as_json: bool,
-) -> int:
+@options.quiet_output
+def command(case: str, out: str | None, resume: bool, overwrite: bool, **how: Any) -> None:
     """Compute the encounters of two bodies that CASE.toml describes.
 
     Writes scattering.json, results.csv and a figure to the folder, and for cross-sections and maps flights.csv with
@@ -40,14 +28,17 @@ def command(
     with `sand resume`.
     """
     from ..experiments.scattering.case import read_scattering
+    from .launch import refuse_folder
 
     if resume and overwrite:
         raise BadInput("--resume and --overwrite exclude each other")
     read = read_scattering(case)
     folder = Path(out or read[0].measure.out or Path(case).stem)
-    _check_folder(folder, Path(case), resume=resume, overwrite=overwrite)
-    how: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "quiet": quiet, "as_json": as_json}
-    return scatter(Path(case), read, folder, resume=resume, overwrite=overwrite, **how)
+    if not resume:
+        refuse_folder(folder, Path(case), overwrite=overwrite)
+    elif not (folder / FLIGHTS).exists():
+        raise BadInput(f"there is nothing to resume in {folder}: no {FLIGHTS}")
+    scatter(Path(case), read, folder, resume=resume, overwrite=overwrite, **how)
 
 
 def scatter(
@@ -57,12 +48,11 @@ def scatter(
     *,
     resume: bool,
     overwrite: bool = False,
-    workers: int,
-    scheduler: str | None,
     quiet: bool,
     as_json: bool,
-) -> int:
-    """Compute a scattering job and print the results.
+    **execution: Any,
+) -> None:
+    """Compute a scattering job and print the results; `execution` as for `job.running_job`.
 
     Parameters
     ----------
@@ -70,11 +60,6 @@ def scatter(
         The result of `read_scattering` for the case.
     resume : bool
         Whether to continue the flights in the folder.
-
-    Returns
-    -------
-    int
-        The exit code.
 
     Raises
     ------
@@ -86,49 +71,22 @@ def scatter(
     from ..io.run_folder import make_folder, read_toml
     from .job import running_job
 
-    bar = _Bar(not (quiet or as_json))
-    try:
-        with running_job(folder, workers, scheduler, quiet=quiet) as (executor, _):
-            if not resume:
-                make_folder(folder, overwrite=overwrite)
-            with writing(folder):
-                job = Job(*read, read_toml(case), folder, resume)
-                content = report.with_notes(lambda: job.run(executor, bar.update))
-    finally:
-        bar.close()
-    if as_json:
-        report.emit({**content, "folder": str(folder)})
-    elif not quiet:
-        files = ("files", f"{folder}/  {'  '.join(report.files_of(folder))}")
-        report.show(f"scatter {case}", [*result_rows(content), files])
-    return DONE
+    hidden = quiet or as_json
+    with (
+        report.progress_bar(1.0, hidden, bar_format="{percentage:3.0f}% {desc}") as bar,
+        running_job(folder, quiet=quiet, **execution) as (executor, _),
+    ):
 
+        def progress(text: str, part: float) -> None:
+            bar.set_description_str(text, refresh=False)
+            bar.update(part - bar.n)
 
-def _check_folder(folder: Path, case: Path, *, resume: bool, overwrite: bool) -> None:
-    """Refuse a folder that cannot be used, before anything is computed.  Raises BadInput."""
-    from ..io.run_folder import FLIGHTS
-    from .launch import refuse_folder
-
-    if not resume:
-        refuse_folder(folder, case, overwrite=overwrite)
-    elif not (folder / FLIGHTS).exists():
-        raise BadInput(f"there is nothing to resume in {folder}: no {FLIGHTS}")
-
-
-class _Bar:
-    """Progress on one line that is overwritten; shown on a terminal only."""
-
-    def __init__(self, wanted: bool):
-        self.shown = wanted and sys.stderr.isatty()
-
-    def update(self, text: str, part: float) -> None:
-        if self.shown:
-            sys.stderr.write(f"\r{100 * part:3.0f}% {text:<70}"[:80])
-            sys.stderr.flush()
-
-    def close(self) -> None:
-        if self.shown:
-            sys.stderr.write("\r" + 80 * " " + "\r")
+        if not resume:
+            make_folder(folder, overwrite=overwrite)
+        with writing(folder):
+            content = Job(*read, read_toml(case), folder, resume).run(executor, progress)
+    rows = [*result_rows(content), ("files", report.listed(folder))]
+    report.answer({**content, "folder": str(folder)}, f"scatter {case}", rows, as_json=as_json, quiet=quiet)
 
 
 def result_rows(content: dict[str, Any]) -> report.Rows:

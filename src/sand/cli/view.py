@@ -14,15 +14,12 @@ import click
 from ..errors import BadInput
 from ..io.run_folder import CASE, SUMMARY, TRAJECTORY
 from . import options, report
-from .exits import DONE
 from .export import chosen
 
 LARGE = 100e6
 """Size [B] above which a page takes long to open."""
 WAIT = 60.0
 """Longest wall time [s] to wait for the first frame of a run, which may have to compile first."""
-NOTE_EVERY = 15.0
-"""Wall time [s] between notes while waiting."""
 YOUNG = 5.0
 """Age [s] of a trajectory up to which its first frame may still be missing."""
 
@@ -30,31 +27,17 @@ YOUNG = 5.0
 @click.command("view", short_help="Show the grains of a run in the browser.")
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @click.option(
-    "--html",
-    "html",
-    metavar="FILE",
-    type=options.PATH,
-    help="Write one self-contained page instead, to keep or send.",
+    "--html", "html", metavar="FILE", type=options.PATH, help="Write one self-contained page instead, to keep or send."
 )
 @click.option("--every", metavar="K", type=click.IntRange(min=1), default=1, help="Only every K-th frame.")
 @click.option("--frames", metavar="SLICE", default=":", help="Which frames, as in Python: '-1', '10:', '::5'.")
 @click.option("--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Port (default: any free one).")
 @click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
 @click.option("--overwrite", is_flag=True, help="Replace FILE if it exists.")
-@options.as_json
-@options.quiet
-@options.debug
+@options.quiet_output
 def command(
-    folder: str,
-    html: str | None,
-    every: int,
-    frames: str,
-    port: int,
-    no_browser: bool,
-    overwrite: bool,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+    folder: str, html: str | None, every: int, frames: str, port: int, no_browser: bool, overwrite: bool, **output: bool
+) -> None:
     """Show the grains of the run in DIR, or of a trajectory of SAND, in the browser.
 
     New frames of a running simulation appear as they are written; if there is none yet, the first one is waited for.
@@ -66,22 +49,22 @@ def command(
     if target is not None:
         _refuse_target(target, overwrite)
     selection = frame_slice(chosen(frames), every)
-    dataset = _open_dataset(Path(folder), verbose=not (quiet or as_json))
+    silent = output["quiet"] or output["as_json"]
+    dataset = _open_dataset(Path(folder), verbose=not silent)
     if selection != slice(None, None, 1):
         parts = [f"frames {frames} of the run"] * (frames != ":") + [f"one frame of {every}"] * (every > 1)
         dataset.select(selection, ", ".join(parts))
     if target is None:
-        return _serve(dataset, folder, port, not no_browser, as_json, quiet)
-    size = write_page(dataset, target, progress=None if quiet or as_json else _Bar(target))
-    if as_json:
-        report.emit({"file": str(target), "bytes": size})
-    elif not quiet:
-        rows = [("file", str(target)), ("frames", str(len(dataset))), ("size", _megabytes(size))]
-        report.show(f"view {folder}", rows)
+        _serve(dataset, folder, port, not no_browser, as_json=output["as_json"], silent=silent)
+        return
+    with report.progress_bar(len(dataset), silent, desc=report.clean(target.name), unit="frame") as bar:
+        size = write_page(dataset, target, progress=bar.update)
+    megabytes = f"{size / 1e6:.3g} MB"
+    rows = [("file", str(target)), ("frames", str(len(dataset))), ("size", megabytes)]
+    report.answer({"file": str(target), "bytes": size}, f"view {folder}", rows, **output)
     if size > LARGE:
         fewer = max(int(every * size / LARGE) + 1, 2)
-        report.note(f"note: a page of {_megabytes(size)} opens slowly; --every {fewer} would reduce it to about 100 MB")
-    return DONE
+        report.note(f"note: a page of {megabytes} opens slowly; --every {fewer} would reduce it to about 100 MB")
 
 
 def _open_dataset(path: Path, verbose: bool) -> Any:
@@ -90,8 +73,7 @@ def _open_dataset(path: Path, verbose: bool) -> Any:
     from ..viewer.external_field import read_field
     from ..viewer.run_files import find_run_folder
 
-    begun = time.monotonic()
-    noted = -NOTE_EVERY
+    begun, noted = time.monotonic(), not verbose
     while True:
         waited = time.monotonic() - begun
         try:
@@ -104,10 +86,9 @@ def _open_dataset(path: Path, verbose: bool) -> Any:
                 raise BadInput(
                     f"{path} has no frame after {WAIT:.0f} s; check whether its run is still running or has failed"
                 ) from error
-        if verbose and waited - noted >= NOTE_EVERY:
-            elapsed = f" ({waited:.0f} s so far)" if noted >= 0.0 else ""
-            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one{elapsed}")
-            noted = waited
+        if not noted:
+            report.note(f"no frame yet; waiting up to {WAIT:.0f} s for the run to write one")
+            noted = True
         time.sleep(0.2)
 
 
@@ -140,28 +121,7 @@ def _refuse_target(target: Path, overwrite: bool) -> None:
         raise BadInput(f"there is no folder {target.parent}; make it first")
 
 
-def _megabytes(size: int) -> str:
-    return f"{size / 1e6:.3g} MB"
-
-
-class _Bar:
-    """Progress of writing the page, shown on a terminal only."""
-
-    def __init__(self, target: Path):
-        self.target = target
-        self._bar: Any = None
-
-    def __call__(self, done: int, count: int) -> None:
-        from tqdm import tqdm
-
-        if self._bar is None:
-            self._bar = tqdm(total=count, desc=report.clean(self.target.name), unit="frame", disable=None, leave=False)
-        self._bar.update(done - self._bar.n)
-        if done == count:
-            self._bar.close()
-
-
-def _serve(dataset: Any, folder: str, port: int, browser: bool, as_json: bool, quiet: bool) -> int:
+def _serve(dataset: Any, folder: str, port: int, browser: bool, *, as_json: bool, silent: bool) -> None:
     """Serve the page until Ctrl-C."""
     from ..viewer.browser import open_page, remove_redirects
     from ..viewer.server import Server
@@ -170,11 +130,9 @@ def _serve(dataset: Any, folder: str, port: int, browser: bool, as_json: bool, q
     server.start()
     try:
         opened = browser and open_page(server.url)
-        if as_json:
-            report.emit({"url": server.url})
-        else:
-            report.show(f"view {shlex.quote(folder)}", [("address", server.url), ("frames", str(len(dataset)))])
-        if not quiet and not as_json:
+        rows = [("address", server.url), ("frames", str(len(dataset)))]
+        report.answer({"url": server.url}, f"view {shlex.quote(folder)}", rows, as_json=as_json)
+        if not silent:
             if os.environ.get("SSH_CONNECTION"):
                 tunnel = f"ssh -L {server.port}:127.0.0.1:{server.port} …"
                 report.note(f"note: to open it on another machine, first run there: {tunnel}")
@@ -185,9 +143,8 @@ def _serve(dataset: Any, folder: str, port: int, browser: bool, as_json: bool, q
     finally:
         server.stop()
         remove_redirects()
-    if not quiet and not as_json:
+    if not silent:
         report.note("ended")
-    return DONE
 
 
 def _wait() -> None:

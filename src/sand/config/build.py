@@ -11,21 +11,47 @@ from ..arguments import checked
 from ..box import Box, as_box
 from ..errors import BadInput
 from ..grains import Grains
+from ..io.bodies import read_body
 from ..io.checkpoint import newest_checkpoint
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..io.trajectory import Frames
 from ..material import Material
+from ..setup.checks import check_body
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
 from ..simulation.simulation import Simulation
-from .bodies import body_from_file
 from .case import Case, check_case
 
-ENDS = (("run", "until"), ("run", "steps"))
-"""Keys that may be changed in the case.toml of a resumed run."""
 TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
 """Suffixes of text files with a body; all other files are read as trajectories."""
+
+
+def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Simulation:
+    """Create a simulation of grains in a box with the forces, steps and seed of a case."""
+    return Simulation(
+        grains,
+        case.forces.build(),
+        box=box,
+        stepping=case.stepping,
+        neighbours=case.neighbours,
+        seed=case.run.seed,
+        **options,
+    )
+
+
+def body_from_file(path: str | Path, material: Material | None = None, *others: Any, **named: Any) -> Grains:
+    """Read a body that is in one piece; parameters as for `io.bodies.read_body`.
+
+    Raises
+    ------
+    BadInput
+        As `read_body`; also for grains that overlap by more than a simulation allows at its start, and for grains
+        without a contact to the rest. The first ten are named.
+    """
+    body = read_body(path, material, *others, **named)
+    check_body(body, str(path))
+    return body
 
 
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
@@ -48,18 +74,8 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     if case.grains.file is not None and out is not None:
         _refuse_own_source(Path(case.grains.file), Path(out))
     start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
-    simulation = Simulation(
-        start.grains,
-        case.forces.build(),
-        box=start.box,
-        stepping=case.stepping,
-        neighbours=case.neighbours,
-        seed=case.run.seed,
-        out=out,
-        frame_every=case.run.frame_every,
-        contacts=start.contacts,
-        **options,
-    )
+    options |= {"out": out, "frame_every": case.run.frame_every, "contacts": start.contacts}
+    simulation = simulate(case, start.grains, start.box, **options)
     simulation.recipe, simulation.origin = case.grains.recipe(), start.note
     return simulation
 
@@ -75,18 +91,10 @@ def _of_gas(case: Case) -> Start:
     section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
         raise BadInput("grains.material of a gas must be one name")
-    grains = gas(
-        section.number,  # type: ignore[arg-type]
-        case.box.periodic,
-        radius=section.radius,
-        material=library[section.material],
-        moment=section.moment,
-        charge=section.charge,
-        temperature=section.temperature,
-        spins=section.spins,
-        seed=case.run.seed,
-    )
-    return Start(grains, None, as_box(case.box.periodic), "")
+    given = {name: getattr(section, name) for name in ("radius", "moment", "charge", "temperature", "spins")}
+    material, box = library[section.material], case.box.periodic
+    grains = gas(section.number, box, material=material, seed=case.run.seed, **given)  # type: ignore[arg-type]
+    return Start(grains, None, as_box(box), "")
 
 
 def _of_file(case: Case) -> Start:
@@ -140,8 +148,6 @@ def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]
     frames = Frames(place)
     try:
         start = from_frame(frames[frame], materials)
-    except IndexError as error:
-        raise BadInput(f"{error}; -1 is the last") from None
     finally:
         frames.close()
     return start._replace(note=f"{place}, {start.note}")
@@ -158,16 +164,10 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     path = folder / CASE
     begun: dict[str, Any] = meta["case"]
     there = read_toml(path) if path.exists() else begun
-    case = check_case(there, str(path))
-
-    def fixed(content: dict[str, Any], name: str) -> Any:
-        """A table without the end of the run, which may be changed."""
-        return {key: value for key, value in content.get(name, {}).items() if (name, key) not in ENDS}
-
-    was = check_case(begun, str(path))
+    was, case = (check_case(content, str(path)) for content in (begun, there))
+    was.run.until, was.run.steps = case.run.until, case.run.steps  # the end may be changed
     for name in {**begun, **there}:
-        meant = name not in {table for table, _ in ENDS} and getattr(was, name) == getattr(case, name)
-        if fixed(begun, name) != fixed(there, name) and not meant:
+        if begun.get(name) != there.get(name) and getattr(was, name) != getattr(case, name):
             raise BadInput(
                 f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; restore it, "
                 f"or start a new run from the last frame: sand run CASE.toml --from {shlex.quote(str(folder))}"
@@ -229,18 +229,8 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
     if (grains.arrays.material != part["material"]).any():
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
-    simulation = Simulation(
-        grains,
-        case.forces.build(),
-        box=case.box.periodic,
-        stepping=case.stepping,
-        neighbours=case.neighbours,
-        seed=case.run.seed,
-        out=place,
-        frame_every=case.run.frame_every,
-        restart=(arrays, meta),
-        **options,
-    )
+    options |= {"out": place, "frame_every": case.run.frame_every, "restart": (arrays, meta)}
+    simulation = simulate(case, grains, case.box.periodic, **options)
     if case.grains.kind != "given":
         simulation.recipe = case.grains.recipe()
     end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))

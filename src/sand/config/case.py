@@ -24,19 +24,7 @@ from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
 from .commands import refuse_other_command
 from .errors import validate
-from .sections import (
-    Count,
-    Duration,
-    Moment,
-    PathName,
-    Section,
-    Seed,
-    Steps,
-    quantity,
-    with_integrator,
-    without_method,
-    word,
-)
+from .sections import Count, Duration, Moment, PathName, Section, Seed, Stepping, Steps, quantity, with_integrator, word
 
 
 class RunSection(Section):
@@ -186,13 +174,8 @@ class Case(Section):
     grains: GrainsSection
     materials: dict[str, MaterialSection] = Field(default_factory=dict)
     forces: ForcesSection = ForcesSection()
-    stepping: Verlet = Verlet()
+    stepping: Stepping = Verlet()
     neighbours: Neighbours = Neighbours()
-
-    @field_validator("stepping", mode="before")
-    @classmethod
-    def _method(cls, value: Any) -> Any:
-        return without_method(value)
 
     def materials_by_name(self) -> dict[str, Material]:
         """Presets and the materials of the case, by name."""

@@ -29,11 +29,7 @@ class Section(BaseModel):
 
 def quantity(unit: str, **bounds: float) -> Any:
     """Type of a number with a unit, given as text or in SI; `bounds` as for `units.si`."""
-
-    def read(value: Any, info: ValidationInfo) -> float:
-        return si(value, unit, str(info.field_name), **bounds)
-
-    return Annotated[Any, BeforeValidator(read)]
+    return Annotated[Any, BeforeValidator(_named(lambda value, name: si(value, unit, name, **bounds)))]
 
 
 def word(allowed: Collection[str]) -> Any:
@@ -71,7 +67,7 @@ Seed = Annotated[int, Field(ge=0, le=MOST_SEED, strict=True)]
 """Seed of random numbers."""
 
 
-def without_method(value: Any) -> Any:
+def _without_method(value: Any) -> Any:
     """The [stepping] table without `method`, evaluated by `with_integrator`.  Raises ValueError if unknown."""
     if isinstance(value, dict) and "method" in value:
         value = dict(value)
@@ -81,10 +77,15 @@ def without_method(value: Any) -> Any:
     return value
 
 
+Stepping = Annotated[Verlet, BeforeValidator(_without_method)]
+"""The [stepping] table; `with_integrator` replaces the class by that of its `method`."""
+
+
 def with_integrator(model: type[Any], content: dict[str, Any]) -> type[Any]:
     """The model of a case file whose [stepping] table has the keys of the integrator that `content` selects."""
     given = content.get("stepping")
     integrator = INTEGRATORS.get(str(given.get("method", "verlet"))) if isinstance(given, dict) else None
     if integrator is None or integrator is model.model_fields["stepping"].annotation:
         return model
-    return create_model(model.__name__, __base__=model, stepping=(integrator, integrator()))
+    section: Any = Annotated[integrator, BeforeValidator(_without_method)]
+    return create_model(model.__name__, __base__=model, stepping=(section, integrator()))

@@ -13,11 +13,11 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ..arguments import MOST_GRAINS
-from ..config.bodies import body_from_file
+from ..config.build import body_from_file
 from ..config.case import ForcesSection, MaterialSection, material_errors
 from ..config.commands import BODIES, refuse_other_command
 from ..config.errors import validate
-from ..config.sections import Count, Moment, PathName, Section, Seed, quantity, with_integrator, without_method, word
+from ..config.sections import Count, Moment, PathName, Section, Seed, Stepping, quantity, with_integrator, word
 from ..grains import Grains
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
@@ -127,12 +127,7 @@ class CollisionCase(Section):
     impact: ImpactSection
     materials: dict[str, MaterialSection] = Field(default_factory=dict)
     forces: ForcesSection = ForcesSection()
-    stepping: Verlet = Verlet()
-
-    @field_validator("stepping", mode="before")
-    @classmethod
-    def _method(cls, value: Any) -> Any:
-        return without_method(value)
+    stepping: Stepping = Verlet()
 
     def approach(self, seed: int) -> Approach:
         """Bodies of one collision; with `turn`, the seed determines random rotations. Raises BadInput."""

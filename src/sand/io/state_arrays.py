@@ -26,6 +26,7 @@ class ArraySpec(NamedTuple):
     required: bool = True
 
 
+CONTACT_VECTORS = ("pointer1", "pointer2", "force", "torque1", "torque2")
 STORED = {
     "clock": ArraySpec("f8", (len(CLOCK),), "no nan"),
     "count": ArraySpec("i8", (len(COUNT),), "any"),
@@ -38,7 +39,8 @@ STORED = {
     "grains/id": ArraySpec("u4", ("N",), "order"),
     "contacts/pair": ArraySpec("u4", (2, "C"), "grains"),
     **{
-        f"contacts/{name}": ArraySpec("f8", (3, "C")) for name in ("pointer1", "pointer2", "force", "torque1", "torque2")
+        f"contacts/{name}": ArraySpec("f8", (3, "C"))
+        for name in ("pointer1", "pointer2", "force", "torque1", "torque2")
     },
     **{f"contacts/{name}": ArraySpec("f8", ("C",)) for name in ("twist", "formed")},
     "contacts/constants": ArraySpec("f8", (None, (1, "C"))),

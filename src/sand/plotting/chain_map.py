@@ -63,9 +63,8 @@ def _draw_grains(axes: Axes, picture: Picture) -> None:
     for k in np.argsort(x[:, 2]):
         colour = "#D55E00" if k == len(x) - 1 else "#0072B2" if k == len(x) - 2 else "#9FB7C9"
         axes.add_patch(Circle((x[k, 0], x[k, 1]), 1.0, facecolor=colour, edgecolor="white", linewidth=0.6))
-    axes.set_xlim(x[:, 0].min() - 2, x[:, 0].max() + 2)
-    axes.set_ylim(x[:, 1].min() - 2, x[:, 1].max() + 2)
-    axes.set_aspect("equal")
+    low, high = x.min(axis=0) - 2, x.max(axis=0) + 2
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_axis_off()
     axes.set_title(picture.title, size=8)
 
@@ -83,6 +82,5 @@ def _draw_map(axes: Axes, shape_map: Map) -> None:
         shading="nearest",
     )
     axes.set_yticks(np.arange(len(shape_map.speeds)), [f"{v:g}" for v in shape_map.speeds])
-    axes.set_xlabel("impact position (radii from the end grain)")
-    axes.set_ylabel("speed (m/s)")
+    axes.set(xlabel="impact position (radii from the end grain)", ylabel="speed (m/s)")
     axes.set_title(shape_map.title, size=8)

@@ -33,11 +33,9 @@ def collision_figure(results: list[dict[str, Any]]) -> Figure:
             if selected.any():
                 rank = np.flatnonzero(selected) + 1
                 left.plot(rank, masses[order][selected], "o", color=colour, markersize=4, label=name)
-        left.set_xlim(0.5, len(results) + 0.5)
+        left.set(xlim=(0.5, len(results) + 0.5), ylim=(0.0, 1.05))
+        left.set(xlabel="collisions, sorted by largest remnant", ylabel="mass of the largest remnant / total mass")
         left.xaxis.set_major_locator(MaxNLocator(integer=True))
-        left.set_ylim(0.0, 1.05)
-        left.set_xlabel("collisions, sorted by largest remnant")
-        left.set_ylabel("mass of the largest remnant / total mass")
         left.legend(loc="lower left")
         channels = [c for c in results[0]["lost"] if any(r["lost"][c] for r in results)]
         share = np.array([[r["lost"][c] / r["impact_energy"] for c in channels] for r in results])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from .style import BLUE, GREEN, MUTED, PURPLE, RED, TEXT_COLOUR, plot_style, si_prefix
 
@@ -41,7 +41,7 @@ def growth_figure(ensembles: Sequence[tuple[str, Any, dict[str, Any]]]) -> Figur
             axes.set(xscale="log", yscale="log")
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-                axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                axis.set_major_formatter(lambda value, _: f"{value:g}")
                 axis.set_minor_formatter(NullFormatter())
         left.set(xlabel=f"time [{unit}]", ylabel="mean size $S$ [grains]")
         low, high = left.get_ylim()
@@ -74,11 +74,11 @@ def _draw_growth(axes: Axes, name: str, growth: Any, size: float, colour: str) -
     axes.plot(time[fitted], growth.z.at(growth.time[fitted]), color=TEXT_COLOUR, lw=0.8, ls="--")
     axes.axhline(growth.window[1], color=MUTED, lw=0.6, ls=":", zorder=0)
     centre = np.exp(np.log(growth.time[fitted]).mean())
-    for text, z in (("2", PAPER_EXPONENTS["z, Brownian"]), ("3.2", PAPER_EXPONENTS["z, magnetic"])):
+    for z in (PAPER_EXPONENTS["z, Brownian"], PAPER_EXPONENTS["z, magnetic"]):
         ends = centre * np.array([0.7, 1.4])
         height = float(growth.z.at(centre)) * (ends / centre) ** z
         axes.plot(ends / size, height, color=MUTED, lw=0.8)
-        axes.annotate(f"$t^{{{text}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=7)
+        axes.annotate(f"$t^{{{z:g}}}$", (ends[1] / size, height[1]), color=MUTED, fontsize=7)
 
 
 def _draw_moments(axes: Axes, growth: Any, rows: dict[str, Any], colour: str) -> None:

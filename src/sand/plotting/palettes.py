@@ -6,17 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 
-from .style import (
-    BLUE,
-    GREEN,
-    LARGEST_COLOURS,
-    ORANGE,
-    OTHER_COLOURS,
-    PURPLE,
-    RED,
-    SINGLE_COLOUR,
-    SKY,
-)
+from .style import BLUE, GREEN, LARGEST_COLOURS, ORANGE, OTHER_COLOURS, PURPLE, RED, SINGLE_COLOUR, SKY
 
 STEPS = 64
 """Number of colours of each map sent to the viewer page."""

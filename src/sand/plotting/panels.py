@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, SymmetricalLogLocator
 
 from ..analysis.ledger_columns import LOSSES
 from ..constants import BOLTZMANN
@@ -114,10 +114,8 @@ def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
     axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest (grains)", **style)
     axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$ (grains)", **style)
     top = max(float(ledger[name].max()) for name in ("clusters", "largest_cluster", "mean_cluster_size"))
-    axes.set_yscale("log")
-    axes.set_ylim(0.85, max(1.25 * top, 4.0))
+    axes.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)), ylabel="number")
     _log_ticks(axes, plain=True)
-    axes.set_ylabel("number")
     legend_above(axes)
 
 
@@ -151,8 +149,7 @@ def draw_losses(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None
     for name, (size, colour) in drawn.items():
         axes.plot(t, size, color=colour, label=CHANNEL_LABELS.get(name, name), **_markers(t))
     smallest = min(float(np.nanmin(size)) for size, _ in drawn.values())
-    axes.set_yscale("log")
-    axes.set_ylim(max(smallest / 2.0, top * 10.0**-DECADES), top * 2.5)
+    axes.set(yscale="log", ylim=(max(smallest / 2.0, top * 10.0**-DECADES), top * 2.5))
     _log_ticks(axes)
     legend_above(axes)
     zero = [name for name, (size, _) in channels.items() if not peak(size) and name not in OPTIONAL_CHANNELS]
@@ -171,9 +168,8 @@ def draw_contacts(axes: Axes, ledger: Any, time: AxisUnit) -> None:
     style = _markers(t)
     for name, (label, colour) in COUNTS.items():
         axes.plot(t, ledger[name], color=colour, label=label, linewidth=1.9 if name == "contacts" else 1.2, **style)
-    axes.set_ylim(0.0, max(1.08 * max(float(ledger[name].max()) for name in COUNTS), 4.0))
+    axes.set(ylim=(0.0, max(1.08 * max(float(ledger[name].max()) for name in COUNTS), 4.0)), ylabel="number")
     axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axes.set_ylabel("number")
     legend_above(axes)
 
 
@@ -186,10 +182,9 @@ def draw_balance(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> Non
     axes.axhline(0.0, color=MUTED, linewidth=0.5, zorder=0)
     axes.plot(t, change, color=TEXT_COLOUR, linewidth=1.0, **_markers(t))
     half = max(1.3 * peak(change), MIN_BALANCE_RANGE * scale) or 1.0
-    axes.set_ylim(-half, half)
+    axes.set(ylim=(-half, half), ylabel=f"Δ ({unit.name})")
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
-    axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
-    axes.set_ylabel(f"Δ ({unit.name})")
+    axes.yaxis.set_major_formatter(_tick_label)
     drift = f"relative drift {format_number(ledger.drift)}" if np.isfinite(ledger.drift) else "not finite at the end"
     text = f"change of the total energy: {drift}"
     axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
@@ -223,7 +218,7 @@ def _scale(axes: Axes, curves: list[np.ndarray]) -> None:
     if min(peaks) > top / 30.0:
         axes.margins(y=0.08)
         axes.yaxis.set_major_locator(MaxNLocator(5))
-        axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
+        axes.yaxis.set_major_formatter(_tick_label)
         return
     # The axis is linear below the smallest peak, but at least below 10^-DECADES of the largest.
     linear = 10.0 ** np.floor(np.log10(max(min(peaks), top * 10.0**-DECADES)))
@@ -243,9 +238,9 @@ def _log_ticks(axes: Axes, plain: bool = False) -> None:
     short = high < 250.0 * low
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if short else LogLocator(numticks=5))
     if plain or short:
-        axes.yaxis.set_major_formatter(FuncFormatter(_tick_label))
+        axes.yaxis.set_major_formatter(_tick_label)
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _tick_label(value: float, _: int) -> str:
+def _tick_label(value: float, _: float) -> str:
     return f"{value:.4g}".replace("-", "−") if value == 0.0 or 1e-3 <= abs(value) < 1e5 else f"{value:.1e}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from typing import Any
 
@@ -168,33 +167,3 @@ def _apply_dark(figure: Figure, dark: bool) -> None:
         for line in axes.get_lines():
             if line.get_color() == TEXT_COLOUR:
                 line.set_color(TEXT_ON_DARK)
-
-
-def figure_bytes(figure: Figure, form: str, transparent: bool = False) -> bytes:
-    """Encode a figure as a file, without time stamps: equal figures give equal bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-        Figure of matplotlib.
-    form : str
-        "png", "pdf" or "svg".
-    transparent : bool, optional
-        Transparent background.
-    """
-    import matplotlib
-
-    metadata: dict[str, dict[str, Any]] = {
-        "png": {"Software": "SAND"},
-        "pdf": {"CreationDate": None, "Creator": "SAND", "Producer": "SAND"},
-        "svg": {"Date": None, "Creator": "SAND"},
-    }
-    with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
-        figure.savefig(
-            content := io.BytesIO(),
-            format=form,
-            dpi=DPI,
-            facecolor="none" if transparent else "auto",
-            metadata=metadata[form],
-        )
-    return content.getvalue()

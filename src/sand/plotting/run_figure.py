@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +16,7 @@ from ..analysis.quantities import material_names
 from ..box import Box
 from ..io.run_folder import replace_file
 from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
-from .render.scene import Scene, draw_largest, draw_scene, make_scene, view_window
+from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
 from .style import MUTED, format_number, format_si, panel_letter, plot_style
 
 if TYPE_CHECKING:
@@ -25,19 +26,16 @@ WIDTH, HEIGHT, DPI = 10.0, 6.25, 160
 """[inches], [inches], [pixels per inch]: 1600 × 1000 pixels."""
 MIN_GRAIN_RADIUS = 11.0
 """Radius of grains in the image [pixels] below which the largest clusters are also shown enlarged."""
-COMPRESSION = 6
-"""zlib level of PNG files; level 9 saves another 5 % and takes ten times as long (1 s)."""
-_PNG: dict[str, Any] = {
-    "format": "png",
-    "dpi": DPI,
-    "facecolor": "auto",  # that of the figure, also with a dark background
-    "metadata": {"Software": "SAND"},
-    "pil_kwargs": {"compress_level": COMPRESSION},
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": "SAND"},
+    "pdf": {"CreationDate": None, "Creator": "SAND", "Producer": "SAND"},
+    "svg": {"Date": None, "Creator": "SAND"},
 }
+"""Metadata of files by format, without time stamps."""
 
 # Positions of the panels in units of the figure size.
 _LEFT, _RIGHT = (0.080, 0.455), (0.485, 0.992)
-_TOP, _BOTTOM = 0.862, 0.075
+_TOP, _BOTTOM, _GAP = 0.862, 0.075, 0.036
 _MARGIN = 0.012
 
 
@@ -45,7 +43,7 @@ class RunFigure(Figure):
     """A figure that notebooks display as PNG with any backend."""
 
     def _repr_png_(self) -> bytes:
-        return png(self)
+        return figure_bytes(self)
 
 
 def run_figure(simulation: Simulation) -> Figure:
@@ -74,10 +72,10 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
     if not simulation.ledger.rows:
         return
     last = simulation.ledger.rows[-1]
-    count = int(last["clusters"])
+    count, mean = int(last["clusters"]), last["mean_cluster_size"]
     facts = [
         f"{count} cluster{'s' if count != 1 else ''}",
-        f"mean size S = {_format_mean(last['mean_cluster_size'])}",
+        f"mean size S = {mean:.0f}" if mean >= 100.0 else f"mean size S = {mean:.3g}",
         f"largest {int(last['largest_cluster'])}",
         f"{int(last['contacts'])} contacts ({int(last['made'])} formed, {int(last['broken'])} broken)",
     ]
@@ -86,31 +84,19 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
     figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
 
 
-def _format_mean(size: float) -> str:
-    return f"{size:.0f}" if size >= 100.0 else f"{size:.3g}"
-
-
 def headline(grains: Any, box: Box, time: float) -> str:
     """Title of a run: '100 grains of iron, r = 10 nm, periodic cube of 1.2 µm, t = 5 µs'."""
+    names = material_names(grains)
+    materials = ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
+    small, large = float(grains.radius.min()), float(grains.radius.max())
+    least = "" if large < 1.001 * small else f"{format_si(small, 'm')} to "
     parts = [
-        f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {_materials(grains)}",
-        f"r = {_radius_range(grains.radius)}",
+        f"{len(grains)} grain{'s' if len(grains) != 1 else ''} of {materials}",
+        f"r = {least}{format_si(large, 'm')}",
         _describe_box(box),
         f"t = {format_si(time, 's')}",
     ]
     return ",  ".join(parts)
-
-
-def _materials(grains: Any) -> str:
-    names = material_names(grains)
-    return ", ".join(names) if len(names) < 4 else f"{len(names)} materials"
-
-
-def _radius_range(radius: np.ndarray) -> str:
-    small, large = float(radius.min()), float(radius.max())
-    if large < 1.001 * small:
-        return format_si(large, "m")
-    return f"{format_si(small, 'm')} to {format_si(large, 'm')}"
 
 
 def _describe_box(box: Box) -> str:
@@ -125,7 +111,9 @@ def _draw_history(figure: Figure, simulation: Simulation) -> None:
     ledger = simulation.ledger
     time = time_unit(ledger)
     unit = energy_unit(ledger, simulation.temperature, len(simulation.grains))
-    panels = [_panel(figure, _LEFT, bottom, height) for bottom, height in _stack((1.0, 1.35, 1.1, 0.5), 0.036)]
+    gap = 4 * _GAP / (_TOP - _BOTTOM - 3 * _GAP)  # relative to the mean height of the four panels
+    place = {"left": _LEFT[0], "right": _LEFT[1], "bottom": _BOTTOM, "top": _TOP, "hspace": gap}
+    panels = list(figure.subplots(4, 1, height_ratios=(1.0, 1.35, 1.1, 0.5), gridspec_kw=place))
     draw_clusters(panels[0], ledger, time)
     draw_energies(panels[1], ledger, time, unit)
     draw_losses(panels[2], ledger, time, unit)
@@ -141,21 +129,14 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
     full = (0.03, 0.85)
     window = view_window(scene, _pixels(full[1])[0] / _pixels(full[1])[1])
     grain_radius = float(np.median(scene.radius)) * _pixels(full[1])[0] / (window[1] - window[0])
-    enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(scene.largest_clusters())
+    enlarge = grain_radius < MIN_GRAIN_RADIUS and bool(largest_clusters(scene.label))
     strip = 0.235
     bottom, height = (full[0] + strip + 0.02, full[1] - strip - 0.02) if enlarge else full
     axes = _panel(figure, _RIGHT, bottom, height)
     draw_scene(axes, scene, _pixels(height))
     panel_letter(axes, "e", 0.0)
     axes.text(
-        0.04,
-        1.004,
-        _caption(scene, lost),
-        transform=axes.transAxes,
-        size=7.5,
-        color=MUTED,
-        va="bottom",
-        ha="left",
+        0.04, 1.004, _caption(scene, lost), transform=axes.transAxes, size=7.5, color=MUTED, va="bottom", ha="left"
     )
     if enlarge:
         axes = _panel(figure, _RIGHT, full[0], strip)
@@ -165,7 +146,7 @@ def _draw_grains(figure: Figure, scene: Scene, lost: int) -> None:
 
 def _caption(scene: Scene, lost: int) -> str:
     parts = []
-    if scene.largest_clusters():
+    if largest_clusters(scene.label):
         parts.append("one colour per cluster, single grains grey")
     if scene.arrow.any():
         parts.append("arrows: moments")
@@ -183,20 +164,21 @@ def _pixels(height: float) -> tuple[int, int]:
     return round((_RIGHT[1] - _RIGHT[0]) * WIDTH * DPI), round(height * HEIGHT * DPI)
 
 
-def _stack(heights: tuple[float, ...], gap: float) -> list[tuple[float, float]]:
-    """Bottom and height of panels on the left from top to bottom, with heights in the given proportions."""
-    scale = (_TOP - _BOTTOM - gap * (len(heights) - 1)) / sum(heights)
-    panels, top = [], _TOP
-    for share in heights:
-        panels.append((top - share * scale, share * scale))
-        top -= share * scale + gap
-    return panels
+def figure_bytes(figure: Figure, form: str = "png", transparent: bool = False) -> bytes:
+    """Encode a figure as a file, without time stamps: equal figures give equal bytes.
 
-
-def png(figure: Figure) -> bytes:
-    """Encode a figure as PNG."""
-    with plot_style():
-        figure.savefig(content := io.BytesIO(), **_PNG)
+    Parameters
+    ----------
+    figure : Figure
+        Figure of matplotlib.
+    form : str, optional
+        "png", "pdf" or "svg".
+    transparent : bool, optional
+        Transparent background.
+    """
+    colour = "none" if transparent else "auto"  # "auto" is the colour of the figure, also with a dark background
+    with plot_style(), matplotlib.rc_context({"svg.hashsalt": "SAND", "pdf.fonttype": 42}):
+        figure.savefig(content := io.BytesIO(), format=form, dpi=DPI, facecolor=colour, metadata=_METADATA[form])
     return content.getvalue()
 
 
@@ -208,7 +190,7 @@ def save(figure: Figure, path: str | Path) -> None:
     FilesFailed
         If the file cannot be written.
     """
-    replace_file(Path(path), png(figure))
+    replace_file(Path(path), figure_bytes(figure))
 
 
 def show(figure: Figure) -> Figure:

@@ -26,19 +26,21 @@ from .style import (
     si_prefix,
 )
 
+WINDOW = 2.5
+"""Half the width of a panel of trajectories, in the unit of length."""
 DOTS = 60
 """Dots along each trajectory, at equal time intervals."""
 LINE_POINTS = 600
 """Points of the line of each trajectory."""
 LAYOUT = ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06)
 """Paddings [inches] that keep labels with subscripts clear of the edges."""
+SPEED = "speed $v_\\infty$ [m/s]"
+"""Label of the axis of speeds."""
 PROBABILITY_MAP = "cividis"
 """Colour map of probabilities: perceptually uniform, also for colour-blind readers."""
 
 
-def trajectories_figure(
-    groups: Sequence[Sequence[Any]], names: Sequence[str], scales: Any, title: str, window: float = 2.5
-) -> Figure:
+def trajectories_figure(groups: Sequence[Sequence[Any]], names: Sequence[str], scales: Any, title: str) -> Figure:
     """Figure with one panel per initial spin: trajectories of both bodies in the x-y plane.
 
     Parameters
@@ -51,8 +53,6 @@ def trajectories_figure(
         Its `capture`, the impact parameter b_max of Eq. 14 [m], is the unit of length; r₁ + r₂ if it is 0.
     title : str
         Description of the two bodies.
-    window : float, optional
-        Half the width of a panel, in the unit of length.
     """
     unit = scales.capture or scales.touch
     unit_name = "b_\\mathrm{max}" if scales.capture else "(r_1+r_2)"
@@ -60,12 +60,9 @@ def trajectories_figure(
         figure = RunFigure(figsize=(4.6 * len(groups) + 0.4, 4.9), dpi=DPI, layout=LAYOUT)
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, len(groups)))):
             for one, colour in zip(groups[k], cycle(LARGEST_COLOURS), strict=False):
-                _draw_trajectory(axes, one, colour, unit, window)
-            axes.set_xlim(-window, window)
-            axes.set_ylim(-window, window)
-            axes.set_aspect("equal")
-            axes.set_xlabel(f"$x/{unit_name}$")
-            axes.set_ylabel(f"$y/{unit_name}$")
+                _draw_trajectory(axes, one, colour, unit)
+            axes.set(xlim=(-WINDOW, WINDOW), ylim=(-WINDOW, WINDOW), aspect="equal")
+            axes.set(xlabel=f"$x/{unit_name}$", ylabel=f"$y/{unit_name}$")
             axes.set_title(f"spin: {names[k]}", loc="left", fontsize=8.0)
             axes.legend(loc="upper left", title=f"$b/{unit_name}$", title_fontsize=7.0, fontsize=6.5, alignment="left")
             panel_letter(axes, "abcdefgh"[k], -0.12)
@@ -74,10 +71,10 @@ def trajectories_figure(
     return figure
 
 
-def _draw_trajectory(axes: Axes, one: Any, colour: str, unit: float, window: float) -> None:
+def _draw_trajectory(axes: Axes, one: Any, colour: str, unit: float) -> None:
     """One trajectory projected along z; dots are spaced over the time that it spends in and near the window."""
-    near = np.abs(one.projectile[:, :2]).max(axis=1) < 1.4 * window * unit
-    near |= np.abs(one.target[:, :2]).max(axis=1) < 1.4 * window * unit
+    reach = np.minimum(*(np.abs(body[:, :2]).max(axis=1) for body in (one.projectile, one.target)))
+    near = reach < 1.4 * WINDOW * unit
     inside = np.flatnonzero(near)
     first, last = (one.time[inside[0]], one.time[inside[-1]]) if inside.size else (one.time[0], one.time[-1])
     label = f"{one.impact_parameter / unit:.4g}: {one.end}"
@@ -133,10 +130,8 @@ def _draw_map(axes: Axes, found: Any) -> Any:
         )
     if found.capture.any():
         axes.plot(speeds, found.capture / unit, "--", color=RED, linewidth=1.4)
-    axes.set_xlim(borders[0], borders[-1])
-    axes.set_ylim(0.0, found.edges.max() / unit)
-    axes.set_xlabel("speed $v_\\infty$ [m/s]")
-    axes.set_ylabel("impact parameter $b/(r_1+r_2)$")
+    axes.set(xlim=(borders[0], borders[-1]), ylim=(0.0, found.edges.max() / unit))
+    axes.set(xlabel=SPEED, ylabel="impact parameter $b/(r_1+r_2)$")
     return mesh
 
 
@@ -149,9 +144,7 @@ def _draw_disc(axes: Axes, found: Any, k: int, mesh: Any) -> None:
         ring = Wedge((0.0, 0.0), high, 0.0, 360.0, width=high - low, facecolor=colour, edgecolor=colour, linewidth=0.4)
         axes.add_patch(ring)
     axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linestyle="--", color=RED, linewidth=1.4))
-    axes.set_xlim(-edges[-1], edges[-1])
-    axes.set_ylim(-edges[-1], edges[-1])
-    axes.set_aspect("equal")
+    axes.set(xlim=(-edges[-1], edges[-1]), ylim=(-edges[-1], edges[-1]), aspect="equal")
     axes.set_title(format_si(float(found.speeds[k]), "m/s"), fontsize=8.0)
 
 
@@ -175,10 +168,8 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
             speeds = [one.speed for one in found]
             right.errorbar(speeds, [one.c for one in found], [one.c_error for one in found], fmt="o", color=BLUE)
             right.axhline(1.0, linestyle="--", color=RED)
-            right.set_xscale("log")
             right.set_ylim(bottom=0.0)
-            right.set_xlabel("speed $v_\\infty$ [m/s]")
-            right.set_ylabel("$c=\\sigma/\\sigma_\\mathrm{Eq.14}$")
+            right.set(xscale="log", xlabel=SPEED, ylabel="$c=\\sigma/\\sigma_\\mathrm{Eq.14}$")
         else:
             _draw_profile(right, found[0])
         panel_letter(left, "a", -0.14)
@@ -190,23 +181,14 @@ def sigma_figure(found: Sequence[Any], title: str) -> Figure:
 def _draw_sigma(axes: Axes, found: Sequence[Any]) -> None:
     size, name = si_prefix(max(c.sigma for c in found) ** 0.5, "m")
     speeds = np.array([c.speed for c in found])
-    axes.errorbar(
-        speeds,
-        [c.sigma / size**2 for c in found],
-        [c.sigma_error / size**2 for c in found],
-        fmt="o",
-        color=BLUE,
-        label="simulated",
-    )
+    sigma, error = (np.array([getattr(c, name) for c in found]) / size**2 for name in ("sigma", "sigma_error"))
+    axes.errorbar(speeds, sigma, error, fmt="o", color=BLUE, label="simulated")
     if found[0].analytic > 0.0:
         fine = np.geomspace(0.8 * speeds.min(), 1.25 * speeds.max(), 50)
         line = found[0].analytic * (fine / speeds[0]) ** (-4.0 / 3.0)
         axes.plot(fine, line / size**2, "--", color=RED, label="Eq. 14")
     axes.axhline(found[0].geometric / size**2, color=MUTED, linewidth=0.9, label="$\\pi(r_1+r_2)^2$")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlabel("speed $v_\\infty$ [m/s]")
-    axes.set_ylabel(f"$\\sigma$ [{name}²]")
+    axes.set(xscale="log", yscale="log", xlabel=SPEED, ylabel=f"$\\sigma$ [{name}²]")
     axes.legend(loc="best")
 
 
@@ -220,7 +202,5 @@ def _draw_profile(axes: Axes, found: Any) -> None:
     axes.errorbar(0.5 * (low + high) / unit, p, error, fmt=".", color=BLUE, elinewidth=0.8)
     axes.axvline(1.0, linestyle="--", color=RED)
     axes.axhline(0.5, color=ORANGE, linewidth=0.5)
-    axes.set_ylim(0.0, 1.05)
-    axes.set_xlim(0.0, high[-1] / unit)
+    axes.set(xlim=(0.0, high[-1] / unit), ylim=(0.0, 1.05), ylabel="collision probability $P(b)$")
     axes.set_xlabel("$b/b_\\mathrm{max}$" if found.analytic > 0.0 else "$b/(r_1+r_2)$")
-    axes.set_ylabel("collision probability $P(b)$")

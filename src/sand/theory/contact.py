@@ -8,7 +8,8 @@ from typing import Any
 
 from ..arguments import checked
 from ..contact import jkr
-from ..contact.law import bond_between
+from ..contact.dmt import tabor_parameter
+from ..contact.law import contact_constants
 from ..contact.mixing import MIXING, pairing_between
 from ..errors import BadInput, did_you_mean
 from ..material import Material, as_material
@@ -151,77 +152,34 @@ def contact(
     limit = None if rolling_limit is None else si(rolling_limit, "m", "rolling_limit", above=0.0)
     pairing = pairing_between(a, b, mixing=mixing, rolling_limit=limit)
     m1, m2 = (m.density * 4.0 / 3.0 * math.pi * r**3 for m, r in ((a, r1), (b, r2)))
-<<<<<<< HEAD
-    return _numbers(contact_constants(jkr.LAW)(pairing, r1, r2, m1, m2), pairing, (r1, r2), (m1, m2))
-
-
-def _numbers(
-    constants: ContactConstants, pairing: Pairing, radii: tuple[float, float], masses: tuple[float, float]
-) -> ContactNumbers:
-    """From the constants of the contact law."""
-    unit = constants.normal.pull_off_force * constants.normal.pull_off_overlap
-    at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
-    cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
-    inverse_mass = sum(1.0 / m for m in masses)
-    inverse_inertia = sum(2.5 / (m * r * r) for m, r in zip(masses, radii, strict=True))
-    inverse_slide = inverse_mass + sum(2.5 / m for m in masses)
-    k_n = jkr.normal_stiffness(constants.rest_radius, pairing.modulus)
-    rolled = constants.roll_stiffness * constants.roll_limit * math.pi * constants.reduced_radius
-    squared_frequencies = (
-        k_n * inverse_mass,
-        constants.slide_stiffness * inverse_slide,
-        constants.roll_stiffness * constants.reduced_radius**2 * inverse_inertia,
-        constants.twist_stiffness * inverse_inertia,
-    )
-    normal, slide, roll, twist = (2.0 * math.pi / math.sqrt(w) for w in squared_frequencies)
-    return ContactNumbers(
-        reduced_radius=constants.reduced_radius,
-        rest_radius=constants.rest_radius,
-        jkr_ratio=constants.rest_radius / constants.reduced_radius,
-        tabor_parameter=tabor_parameter(pairing.surface_energy, pairing.modulus, constants.reduced_radius),
-        pull_off_force=constants.normal.pull_off_force,
-        rest_overlap=jkr.rest_overlap(constants.rest_radius, constants.reduced_radius),
-        pull_off_overlap=constants.normal.pull_off_overlap,
-        break_energy=unit * (at[jkr.ROOT_AT_BREAK] - at[1.0]),
-        cycle_energy=cycle,
-        normal_stiffness=k_n,
-        slide_stiffness=constants.slide_stiffness,
-        roll_stiffness=constants.roll_stiffness,
-        twist_stiffness=constants.twist_stiffness,
-        slide_limit=constants.slide_limit,
-        roll_limit=constants.roll_limit,
-        twist_limit=constants.twist_limit,
-        slide_force=constants.slide_stiffness * constants.slide_limit,
-        roll_moment=constants.roll_stiffness * constants.reduced_radius * constants.roll_limit,
-        twist_moment=constants.twist_stiffness * constants.twist_limit,
-=======
-    bond = bond_between(pairing, r1, r2, m1, m2)
-    unit = bond.pull_off_force * bond.pull_off_overlap
+    c = contact_constants(jkr.LAW)(pairing, r1, r2, m1, m2)
+    unit = c.normal.pull_off_force * c.normal.pull_off_overlap
     at = {y: jkr.energy_at(y, 1.0, 1.0) for y in (1.0, jkr.ROOT_AT_TOUCH, jkr.ROOT_AT_BREAK)}
     cycle = unit * (at[jkr.ROOT_AT_BREAK] - at[jkr.ROOT_AT_TOUCH])
     inverse_mass = 1.0 / m1 + 1.0 / m2
     inverse_inertia = 2.5 / (m1 * r1 * r1) + 2.5 / (m2 * r2 * r2)
     inverse_slide = inverse_mass + (2.5 / m1 + 2.5 / m2)
-    k_n = jkr.normal_stiffness(bond.rest_radius, pairing.modulus)
-    rolled = bond.roll_stiffness * bond.roll_limit * math.pi * bond.reduced_radius
+    k_n = jkr.normal_stiffness(c.rest_radius, pairing.modulus)
+    rolled = c.roll_stiffness * c.roll_limit * math.pi * c.reduced_radius
     squared_frequencies = {
         "normal_period": k_n * inverse_mass,
-        "slide_period": bond.slide_stiffness * inverse_slide,
-        "roll_period": bond.roll_stiffness * bond.reduced_radius**2 * inverse_inertia,
-        "twist_period": bond.twist_stiffness * inverse_inertia,
+        "slide_period": c.slide_stiffness * inverse_slide,
+        "roll_period": c.roll_stiffness * c.reduced_radius**2 * inverse_inertia,
+        "twist_period": c.twist_stiffness * inverse_inertia,
     }
-    constants = {name: value for name, value in bond._asdict().items() if name in ContactNumbers.__dataclass_fields__}
+    constants = c._asdict() | c.normal._asdict()
+    constants = {name: value for name, value in constants.items() if name in ContactNumbers.__dataclass_fields__}
     return ContactNumbers(
         **constants,
-        jkr_ratio=bond.rest_radius / bond.reduced_radius,
-        rest_overlap=jkr.rest_overlap(bond.rest_radius, bond.reduced_radius),
+        jkr_ratio=c.rest_radius / c.reduced_radius,
+        tabor_parameter=tabor_parameter(pairing.surface_energy, pairing.modulus, c.reduced_radius),
+        rest_overlap=jkr.rest_overlap(c.rest_radius, c.reduced_radius),
         break_energy=unit * (at[jkr.ROOT_AT_BREAK] - at[1.0]),
         cycle_energy=cycle,
         normal_stiffness=k_n,
-        slide_force=bond.slide_stiffness * bond.slide_limit,
-        roll_moment=bond.roll_stiffness * bond.reduced_radius * bond.roll_limit,
-        twist_moment=bond.twist_stiffness * bond.twist_limit,
->>>>>>> less-exp
+        slide_force=c.slide_stiffness * c.slide_limit,
+        roll_moment=c.roll_stiffness * c.reduced_radius * c.roll_limit,
+        twist_moment=c.twist_stiffness * c.twist_limit,
         roll_energy_clamped=rolled,
         roll_energy_released=0.5 * rolled,
         **{name: 2.0 * math.pi / math.sqrt(w) for name, w in squared_frequencies.items()},

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.ledger_columns import LedgerColumns
 from ..analysis.tracking import SINGLE, Lineage
-from ..errors import BadInput
+from ..errors import BadInput, NoSuchKey
 from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
@@ -19,9 +19,8 @@ from ..plotting.style import LARGEST_COLOURS
 from ..version import __version__
 from .dimensions import fit_dimension
 from .packets import frame_bytes, frame_packet, grains_packet
-from .ranges import quantity_ranges
 from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, stale_note
-from .series import series_from_frames, series_from_ledger
+from .series import quantity_ranges, series_from_frames, series_from_ledger
 
 if TYPE_CHECKING:
     from .external_field import FieldDescription
@@ -29,6 +28,8 @@ if TYPE_CHECKING:
 FORMAT = 1
 MAX_TRACKED = 8_000_000
 """Grains × frames up to which clusters are tracked through the whole run before the page opens (about 1 s)."""
+REQUESTS = {"manifest": ("since",), "grains": (), "series": (), "frame": ("k",), "dimension": ("k", "grain")}
+"""Requests of the page, and the names of the numbers in them."""
 DIRECTION_TOLERANCE = 1e-9
 """Field directions that differ by less count as constant."""
 
@@ -50,11 +51,11 @@ class RunDataset:
         Returns the run summary; None while the run goes on, `{}` if it is unavailable.
     field : FieldDescription, optional
         External magnetic field.
-    compact : bool, optional
-        Frames in half precision.
 
     Attributes
     ----------
+    compact : bool
+        Whether frames are sent in half precision; False at first.
     notes : list of str
         Notes for the reader of the page.
     unit : float
@@ -70,9 +71,8 @@ class RunDataset:
         ledger: Callable[[], LedgerColumns | None],
         summary: Callable[[], Mapping[str, Any] | None],
         field: FieldDescription | None = None,
-        compact: bool = False,
     ):
-        self.frames, self.name, self.source, self.compact = frames, name, source, compact
+        self.frames, self.name, self.source, self.compact = frames, name, source, False
         self.notes, self._lock = list[str](), threading.RLock()
         self._read_ledger, self._read_summary, self._field = ledger, summary, field
         self._requested = slice(None)
@@ -196,6 +196,27 @@ class RunDataset:
         per_contact = frame_bytes(0, 1, self.compact) - frame_bytes(0, 0, self.compact)
         return len(contacts) * frame_bytes(self.grains_count, 0, self.compact) + int(contacts.sum() * per_contact)
 
+    def answer(self, kind: str, *numbers: int) -> bytes | dict[str, Any]:
+        """Answer a request of the page: a packet, or the content of JSON.
+
+        Parameters
+        ----------
+        kind : str
+            One of REQUESTS, which is also the name of the method that answers it.
+        *numbers : int
+            The numbers in the request.
+
+        Raises
+        ------
+        NoSuchKey
+            If there is no such frame or grain.
+        BadInput
+            If the frame is damaged.
+        """
+        if kind == "manifest":
+            self.refresh()
+        return getattr(self, kind)(*numbers)
+
     def grains(self) -> bytes:
         """Packet of the grain properties that do not change."""
         return self._grains
@@ -215,7 +236,7 @@ class RunDataset:
         """
         with self._lock:
             if not 0 <= k < len(self):
-                raise BadInput(f"there is no frame {k}; there are {len(self)} frames, 0 to {len(self) - 1}")
+                raise NoSuchKey(f"there is no frame {k}; there are {len(self)} frames, 0 to {len(self) - 1}")
             number = self.frame_numbers[k]
             frame = self.frames[number]
             if len(frame) != self.grains_count:
@@ -256,7 +277,7 @@ class RunDataset:
             If there is no such frame or grain.
         """
         if not 0 <= grain < self.grains_count:
-            raise BadInput(f"there is no grain {grain}; there are {self.grains_count}, 0 to {self.grains_count - 1}")
+            raise NoSuchKey(f"there is no grain {grain}; there are {self.grains_count}, 0 to {self.grains_count - 1}")
         return fit_dimension(*self.read(k), grain)
 
     def ranges(self) -> dict[str, list[float]]:

@@ -62,25 +62,17 @@ class Dimensions:
     """Dimensions of the largest clusters, frame by frame; unchanged clusters are not fitted again."""
 
     def __init__(self) -> None:
-        self._previous: dict[int, tuple[bytes, list[float | None] | None]] = {}
+        self._previous: dict[int, tuple[bytes, dict[str, Any]]] = {}
 
     def of(self, frame: Any, names: np.ndarray) -> dict[str, list[float | None]]:
         """Dimension and its error by cluster name, for at most MAX_CLUSTERS clusters of at least 32 grains."""
         clusters, sizes = np.unique(names[names != SINGLE], return_counts=True)
         order = np.argsort(-sizes, kind="stable")[:MAX_CLUSTERS]
-        fits: dict[int, tuple[bytes, list[float | None] | None]] = {}
+        fits: dict[int, tuple[bytes, dict[str, Any]]] = {}
         for name in clusters[order[sizes[order] >= FEWEST]].tolist():
             members = np.flatnonzero(names == name)
             key = members.astype(np.uint32).tobytes()
-            previous = self._previous.get(name)
-            fits[name] = previous if previous is not None and previous[0] == key else (key, _fit(frame, members))
+            previous = self._previous.get(name, (b"", {}))
+            fits[name] = previous if previous[0] == key else (key, fit_dimension(frame, names, members[0]))
         self._previous = fits
-        return {str(name): fit for name, (_, fit) in fits.items() if fit is not None}
-
-
-def _fit(frame: Any, members: np.ndarray) -> list[float | None] | None:
-    try:
-        fit = cluster_dimension(frame, members)
-    except BadInput:
-        return None
-    return list(plain([fit.value, fit.error]))
+        return {str(name): [fit["value"], fit["error"]] for name, (_, fit) in fits.items() if "value" in fit}

@@ -6,7 +6,6 @@ import base64
 import gzip
 import hashlib
 import html
-import json
 import math
 import re
 from collections.abc import Callable
@@ -16,9 +15,10 @@ from typing import Any
 from ..analysis.fractal import FEWEST
 from ..errors import BadInput
 from ..io.page_bundle import read_bundle
-from ..io.run_folder import plain, replacing
+from ..io.run_folder import replacing
 from .dataset import RunDataset
 from .dimensions import Dimensions
+from .packets import compact_json
 
 BASE_POLICY = "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data: blob:; media-src blob:; "
 """Content security policy of both pages: nothing is loaded from or sent to other sites."""
@@ -33,23 +33,18 @@ LOADING = "Reading the frames … If this message stays, the file is incomplete;
 """Shown until the script at the end of the file runs."""
 
 
-def page_title(dataset: RunDataset) -> str:
-    """Title of the page of a run."""
-    return f"{dataset.name} – SAND"
-
-
-def served_page(title: str) -> str:
-    """HTML of the page as served by `server.Server`."""
+def served_page(name: str) -> str:
+    """HTML of the page of a run with this name, as served by `server.Server`."""
     styles = '<link rel="stylesheet" href="grainview.css">\n'
-    return _head(title, styles) + '<script type="module" src="grainview.js"></script>\n' + _FOOT
+    return _head(name, styles) + '<script type="module" src="grainview.js"></script>\n' + _FOOT
 
 
-def _head(title: str, styles: str, content: str = "") -> str:
+def _head(name: str, styles: str, content: str = "") -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="referrer" content="no-referrer">\n'
-        f'<link rel="icon" href="data:,">\n<title>{html.escape(title)}</title>\n{styles}</head>\n<body>\n'
+        f'<link rel="icon" href="data:,">\n<title>{html.escape(name)} – SAND</title>\n{styles}</head>\n<body>\n'
         f'<div id="grainview">{content}</div>\n<noscript>{NO_SCRIPT}</noscript>\n'
     )
 
@@ -57,13 +52,7 @@ def _head(title: str, styles: str, content: str = "") -> str:
 _FOOT = "</body>\n</html>\n"
 
 
-def write_page(
-    dataset: RunDataset,
-    path: str | Path,
-    *,
-    progress: Callable[[int, int], None] | None = None,
-    bundle: tuple[str, str] | None = None,
-) -> int:
+def write_page(dataset: RunDataset, path: str | Path, *, progress: Callable[[], None] | None = None) -> int:
     """Write a single-file page with all selected frames of a dataset, in half precision.
 
     Frames are read, packed and written one by one.
@@ -75,9 +64,7 @@ def write_page(
     path : str or Path
         Path of the HTML file; an existing file is replaced.
     progress : callable, optional
-        Called with the number of frames written so far and in total.
-    bundle : tuple of (str, str), optional
-        Script and style sheet; those of the package by default.
+        Called after each frame.
 
     Returns
     -------
@@ -91,7 +78,7 @@ def write_page(
     FilesFailed
         If the file cannot be written.
     """
-    script, styles = bundle or read_bundle()
+    script, styles = read_bundle()
     script = _escape_script(f"\n{script}\n")
     script_hash = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"{BASE_POLICY}script-src 'sha256-{script_hash}'; style-src 'unsafe-inline'"
@@ -101,14 +88,14 @@ def write_page(
     count, dimensions, stride = len(dataset), [], _dimension_stride(dataset)
     largest_clusters = Dimensions()
     with replacing(Path(path)) as file:
-        file.write(_head(page_title(dataset), head, f"<p>{LOADING}</p>").encode())
+        file.write(_head(dataset.name, head, f"<p>{LOADING}</p>").encode())
         file.write(_packet_element("sand-grains", dataset.grains()))
         for k in range(count):
             frame, names = dataset.read(k)
             file.write(_packet_element(f"sand-frame-{k}", dataset.packet(k, frame, names)))
             dimensions.append(largest_clusters.of(frame, names) if k % stride == 0 else {})
             if progress:
-                progress(k + 1, count)
+                progress()
         manifest = dataset.manifest() | {"running": False, "dimensions": dimensions}
         if stride > 1 and any(dimensions):
             note = f"fractal dimensions of one frame of {stride}"
@@ -134,7 +121,7 @@ def _packet_element(key: str, packet: bytes) -> bytes:
 
 def _json_element(key: str, content: dict[str, Any]) -> str:
     """Script element with JSON, in which `<` is escaped so that no text can end the element."""
-    text = json.dumps(plain(content), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    text = compact_json(content).replace("<", "\\u003c")
     return f'<script type="application/json" id="{key}">{text}</script>\n'
 
 
@@ -155,10 +142,8 @@ def frame_slice(frames: slice, every: int) -> slice:
     Raises
     ------
     BadInput
-        If `every` or the step of the slice is less than 1.
+        If the step of the slice is less than 1.
     """
-    if every < 1:
-        raise BadInput(f"every = {every} must be an integer of at least 1")
     if frames.step is not None and frames.step < 1:
         raise BadInput(f"frames with step {frames.step}: the viewer plays frames forwards; give a step of at least 1")
     return slice(frames.start, frames.stop, (frames.step or 1) * every)

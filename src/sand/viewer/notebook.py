@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import BadInput
 from ..io.page_bundle import read_bundle
 from ..io.run_folder import plain
-from .dataset import RunDataset
+from .dataset import REQUESTS, RunDataset
 
 
 def has_widgets() -> bool:
@@ -22,16 +22,11 @@ def widget(dataset: RunDataset) -> Any:
     Raises
     ------
     BadInput
-        If anywidget or the viewer page is not installed.
+        If the viewer page is not installed.
     """
-    if not has_widgets():
-        raise BadInput("the viewer in a notebook needs anywidget: pip install anywidget")
-    return _widget_class(*read_bundle())(dataset)
+    import anywidget  # an optional dependency
 
-
-def _widget_class(script: str, styles: str) -> Any:
-    """Define the widget class; in a function, because anywidget is an optional dependency."""
-    import anywidget
+    script, styles = read_bundle()
 
     class GrainWidget(anywidget.AnyWidget):
         """Animated view of the grains of a run.
@@ -54,7 +49,7 @@ def _widget_class(script: str, styles: str) -> Any:
         def _on_message(self, _: Any, content: Any, buffers: Any) -> None:
             self.send(*answer_message(self._dataset, content))
 
-    return GrainWidget
+    return GrainWidget(dataset)
 
 
 def answer_message(dataset: RunDataset, content: Any) -> tuple[dict[str, Any], list[bytes]]:
@@ -69,18 +64,12 @@ def answer_message(dataset: RunDataset, content: Any) -> tuple[dict[str, Any], l
     kind = request.get("kind")
     echo = {key: request[key] for key in ("kind", "k", "grain", "since", "id") if key in request}
     try:
-        if kind == "grains":
-            return echo, [dataset.grains()]
-        if kind == "series":
-            return echo | {"series": plain(dataset.series())}, []
-        if kind == "manifest":
-            dataset.refresh()
-            return echo | {"manifest": plain(dataset.manifest(_index(request, "since")))}, []
-        if kind == "frame":
-            return echo, [dataset.frame(_index(request, "k"))]
-        if kind == "dimension":
-            return echo | plain(dataset.dimension(_index(request, "k"), _index(request, "grain"))), []
-        raise BadInput(f"kind = {kind!r}; allowed: manifest, series, grains, frame, dimension")
+        if kind not in REQUESTS:
+            raise BadInput(f"kind = {kind!r}; allowed: {', '.join(REQUESTS)}")
+        answer = dataset.answer(kind, *(_index(request, name) for name in REQUESTS[kind]))
+        if isinstance(answer, bytes):
+            return echo, [answer]
+        return echo | plain(answer if kind == "dimension" else {kind: answer}), []
     except BadInput as error:
         return echo | {"error": str(error)}, []
     except Exception as error:  # the page waits for an answer in any case

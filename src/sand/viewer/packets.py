@@ -24,6 +24,11 @@ SINGLE_PRECISION = ("position", "radius", "mass", "charge")
 """Arrays that are never stored in half precision: 2⁻¹¹ of a box is more than a grain."""
 
 
+def compact_json(content: Mapping[str, Any]) -> str:
+    """JSON without spaces; NaN and infinities become null."""
+    return json.dumps(plain(content), allow_nan=False, separators=(",", ":"))
+
+
 def encode(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray], compact: bool = False) -> bytes:
     """Encode a header and arrays as one packet.
 
@@ -50,7 +55,7 @@ def encode(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray], compact:
         offset += len(parts[-1])
         parts.append(bytes(-offset % 8))
         offset += -offset % 8
-    text = json.dumps(plain({**header, "arrays": entries}), allow_nan=False, separators=(",", ":")).encode()
+    text = compact_json({**header, "arrays": entries}).encode()
     text += b" " * (-(len(MAGIC) + 4 + len(text)) % 8)
     return b"".join([MAGIC, len(text).to_bytes(4, "little"), text, *parts])
 
@@ -67,36 +72,6 @@ def _converted(name: str, array: np.ndarray, compact: bool) -> tuple[str, float,
     peak = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
     scale = peak / HALF_MAX if peak > 1e-300 else 1.0
     return "f2", scale, np.ascontiguousarray(values / scale, TYPES["f2"])
-
-
-def decode(packet: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Decode a packet.
-
-    Returns
-    -------
-    tuple of (dict, dict)
-        Header, and arrays by name; floats as float64.
-
-    Raises
-    ------
-    BadInput
-        If the bytes are not a packet, or the packet is truncated.
-    """
-    if packet[:8] != MAGIC:
-        raise BadInput("these bytes are not a packet of SAND")
-    start = 12 + int.from_bytes(packet[8:12], "little")
-    if len(packet) < 12 or start > len(packet):
-        raise BadInput("the packet is truncated in its header")
-    header = json.loads(packet[12:start])
-    arrays = {}
-    for entry in header["arrays"]:
-        kind, shape, begin = TYPES[entry["type"]], entry["shape"], start + entry["offset"]
-        length = int(np.prod(shape)) * kind.itemsize
-        if begin + length > len(packet):
-            raise BadInput(f"the packet is truncated in array '{entry['name']}'")
-        stored = np.frombuffer(packet, kind, int(np.prod(shape)), begin).reshape(shape)
-        arrays[entry["name"]] = stored.astype(np.float64) * entry.get("scale", 1.0) if kind.kind == "f" else stored
-    return header, arrays
 
 
 def grains_packet(frame: Any, unit: float) -> bytes:
@@ -149,15 +124,10 @@ def frame_packet(number: int, frame: Any, names: np.ndarray, unit: float, compac
     }
     arrays = {
         "position": frame.position / unit,
-        "velocity": frame.velocity,
-        "spin": frame.spin,
-        "moment": frame.moment,
+        **{name: getattr(frame, name) for name in ("velocity", "spin", "moment")},
         "cluster": names.astype(np.uint32),
         "pair": frame.pair.astype(np.uint32),
-        "force": frame.force,
-        "share": frame.share,
-        "overlap": frame.overlap,
-        "formed": frame.formed,
+        **{name: getattr(frame, name) for name in ("force", "share", "overlap", "formed")},
     }
     return encode(header, arrays, compact)
 

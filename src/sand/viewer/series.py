@@ -1,4 +1,4 @@
-"""Time series for the plots of the viewer page: thinned, SI, with line colours for light and dark backgrounds."""
+"""Time series for the plots of the viewer page, thinned, in SI, and ranges of quantities for its colour scales."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import LedgerColumns
+from ..analysis.quantities import measured
 from ..errors import BadInput
 from ..io.run_folder import plain
 from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
@@ -17,6 +18,13 @@ MAX_POINTS = 2000
 """Maximum number of points of a line."""
 MAX_COUNTED = 20_000_000
 """Grains × frames whose clusters are counted if there is no ledger."""
+SAMPLED_FRAMES = 12
+"""Number of frames, spread evenly over the run, from which ranges are computed."""
+PERCENTILES = ("speed", "spin", "kinetic_energy")
+"""Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
+EXTREMES = ("size", "radius", "coordination", "moment", "load")
+"""Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""
+PERCENTILE_LIMITS = (1.0, 99.9)
 
 
 def evenly_spaced(count: int, most: int = MAX_POINTS) -> np.ndarray:
@@ -100,16 +108,13 @@ def _events(ledger: LedgerColumns) -> dict[str, Any]:
     if not {"made", "broken"} <= set(ledger.columns):
         return {"time": [], "made": [], "broken": []}
 
-    def increments(rows: LedgerColumns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    for rows in (ledger, ledger.select(evenly_spaced(len(ledger)))):
         made, broken = (np.maximum(np.diff(rows[name]), 0.0) for name in ("made", "broken"))
-        return np.flatnonzero((made > 0.0) | (broken > 0.0)), made, broken
-
-    events, made, broken = increments(ledger)
-    if len(events) > MAX_POINTS:
-        ledger = ledger.select(evenly_spaced(len(ledger)))
-        events, made, broken = increments(ledger)
+        events = np.flatnonzero((made > 0.0) | (broken > 0.0))
+        if len(events) <= MAX_POINTS:
+            break
     return {
-        "time": _json_numbers(ledger["time"][1:][events], 10),
+        "time": _json_numbers(rows["time"][1:][events], 10),
         "made": made[events].astype(int).tolist(),
         "broken": broken[events].astype(int).tolist(),
     }
@@ -126,3 +131,38 @@ def _line(label: str, colour: str, values: np.ndarray) -> dict[str, Any]:
 def _json_numbers(values: np.ndarray, digits: int = 7) -> list[float | None]:
     """Numbers for JSON, rounded to `digits` significant digits; None for NaN and infinity."""
     return list(plain([float(f"{value:.{digits}g}") for value in np.asarray(values, float).tolist()]))
+
+
+def quantity_ranges(frames: Any) -> dict[str, list[float]]:
+    """Ranges [low, high] of the magnitudes of all quantities in PERCENTILES and EXTREMES, by name, SI.
+
+    Parameters
+    ----------
+    frames : LiveTrajectory or Snapshot
+        Frames of a run, of which SAMPLED_FRAMES are read; damaged frames are skipped.
+    """
+    samples: dict[str, list[np.ndarray]] = {name: [] for name in (*PERCENTILES, *EXTREMES)}
+    for number in evenly_spaced(len(frames), SAMPLED_FRAMES):
+        try:
+            frame = frames[int(number)]
+        except BadInput:
+            continue
+        for name, parts in samples.items():
+            parts.append(_magnitudes(frame, name))
+    return {name: _range(np.concatenate([*parts, np.zeros(0)]), name) for name, parts in samples.items()}
+
+
+def _magnitudes(frame: Any, name: str) -> np.ndarray:
+    """Finite magnitudes of a quantity in a frame; empty if the frame does not have it."""
+    try:
+        values = np.linalg.norm(frame.moment, axis=1) if name == "moment" else np.abs(measured(frame, name))
+    except BadInput:
+        return np.zeros(0)
+    return np.asarray(values[np.isfinite(values)], dtype=np.float64)
+
+
+def _range(values: np.ndarray, name: str) -> list[float]:
+    if not values.size:
+        return [0.0, 0.0]
+    low, high = PERCENTILE_LIMITS if name in PERCENTILES else (0.0, 100.0)
+    return [float(np.percentile(values, low, method="lower")), float(np.percentile(values, high, method="higher"))]

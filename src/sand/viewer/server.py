@@ -8,21 +8,19 @@ of addresses, the number of connections and the time a client may be silent are 
 from __future__ import annotations
 
 import hmac
-import json
 import os
 import re
 import secrets
 import threading
-from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socketserver import TCPServer
 from typing import Any
 
-from ..errors import BadInput
+from ..errors import BadInput, NoSuchKey
 from ..io.page_bundle import read_bundle
-from ..io.run_folder import plain
 from .dataset import RunDataset
-from .html import SERVED_POLICY, page_title, served_page
+from .html import SERVED_POLICY, served_page
+from .packets import compact_json
 
 LOOPBACK = "127.0.0.1"
 HOSTS = (LOOPBACK, "localhost")
@@ -41,14 +39,14 @@ HEADERS = {
 }
 JSON, BINARY = "application/json", "application/octet-stream"
 _NUMBER = "([0-9]{1,9})"
+_REQUEST = re.compile(
+    rf"(manifest)(?:\?since={_NUMBER})?|(grains)|(series)|(frame)/{_NUMBER}|(dimension)/{_NUMBER}/{_NUMBER}"
+)
+"""Address and query of each of `dataset.REQUESTS`."""
 
 
 class HTTPError(Exception):
-    """An error response with a status code and a message."""
-
-    def __init__(self, status: int, message: str):
-        super().__init__(message)
-        self.status = status
+    """An error response; its arguments are a status code and a message."""
 
 
 class Server(ThreadingHTTPServer):
@@ -82,7 +80,7 @@ class Server(ThreadingHTTPServer):
         self.dataset, self.token = dataset, secrets.token_urlsafe(24)
         self._free_connections = threading.BoundedSemaphore(MAX_CONNECTIONS)
         self._files = {
-            "": ("text/html; charset=utf-8", served_page(page_title(dataset))),
+            "": ("text/html; charset=utf-8", served_page(dataset.name)),
             "grainview.js": ("text/javascript; charset=utf-8", script),
             "grainview.css": ("text/css; charset=utf-8", styles),
         }
@@ -115,11 +113,7 @@ class Server(ThreadingHTTPServer):
     def process_request(self, request: Any, client_address: Any) -> None:
         """Serve a connection in a thread of its own, up to MAX_CONNECTIONS at a time."""
         if self._free_connections.acquire(blocking=False):
-            try:
-                super().process_request(request, client_address)
-            except BaseException:  # the thread could not be started
-                self._free_connections.release()
-                raise
+            super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
 
@@ -133,64 +127,25 @@ class Server(ThreadingHTTPServer):
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Print nothing when a client disconnects."""
 
-    def respond(self, address: str, query: str) -> tuple[str, bytes]:
-        """Content type and content for an address below the token.
+    def respond(self, address: str) -> tuple[str, bytes]:
+        """Content type and content for an address below the token, with its query.
 
         Raises
         ------
         HTTPError
             404 if the address is unknown, 500 if the data cannot be read.
         """
-        if address in self._files and not query:
+        if address in self._files:
             content_type, text = self._files[address]
             return content_type, text.encode()
-        for address_pattern, query_pattern, method in self.ADDRESSES:
-            address_match, query_match = re.fullmatch(address_pattern, address), re.fullmatch(query_pattern, query)
-            if address_match and query_match:
-                numbers = [int(number) for number in address_match.groups() + query_match.groups() if number]
-                try:
-                    return method(self, *numbers)
-                except BadInput as error:
-                    raise HTTPError(500, str(error)) from None
-        raise HTTPError(404, "unknown address")
-
-    def _manifest(self, since: int = 0) -> tuple[str, bytes]:
-        self.dataset.refresh()
-        return JSON, _json(self.dataset.manifest(since))
-
-    def _grains(self) -> tuple[str, bytes]:
-        return BINARY, self.dataset.grains()
-
-    def _series(self) -> tuple[str, bytes]:
-        return JSON, _json(self.dataset.series())
-
-    def _frame(self, k: int) -> tuple[str, bytes]:
-        self._require(k)
-        return BINARY, self.dataset.frame(k)
-
-    def _dimension(self, k: int, grain: int) -> tuple[str, bytes]:
-        self._require(k, grain)
-        return JSON, _json(self.dataset.dimension(k, grain))
-
-    def _require(self, k: int, grain: int = 0) -> None:
-        frames, grains = len(self.dataset), self.dataset.grains_count
-        if k >= frames:
-            raise HTTPError(404, f"there is no frame {k}; there are {frames} frames")
-        if grain >= grains:
-            raise HTTPError(404, f"there is no grain {grain}; there are {grains} grains")
-
-    ADDRESSES: tuple[tuple[str, str, Callable[..., tuple[str, bytes]]], ...] = (
-        ("manifest", f"(?:since={_NUMBER})?", _manifest),
-        ("grains", "", _grains),
-        ("series", "", _series),
-        (f"frame/{_NUMBER}", "", _frame),
-        (f"dimension/{_NUMBER}/{_NUMBER}", "", _dimension),
-    )
-    """Patterns of address and query, and the method that answers them; the numbers are its arguments."""
-
-
-def _json(content: dict[str, Any]) -> bytes:
-    return json.dumps(plain(content), allow_nan=False, separators=(",", ":")).encode()
+        if (request := _REQUEST.fullmatch(address)) is None:
+            raise HTTPError(404, "unknown address")
+        kind, *numbers = (group for group in request.groups() if group)
+        try:
+            answer = self.dataset.answer(kind, *map(int, numbers))
+        except BadInput as error:
+            raise HTTPError(404 if isinstance(error, NoSuchKey) else 500, str(error)) from None
+        return (BINARY, answer) if isinstance(answer, bytes) else (JSON, compact_json(answer).encode())
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -203,54 +158,33 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         try:
-            self._send(200, *self.server.respond(*self._checked_address()))
-        except HTTPError as error:
-            self._send(error.status, JSON, _json({"error": str(error)}))
-        except OSError:  # the client has disconnected
-            self.close_connection = True
+            status, (content_type, content) = 200, self.server.respond(self._checked_address())
         except Exception as error:
-            self._send(500, JSON, _json({"error": f"internal error ({type(error).__name__}: {error})"}))
+            internal = (500, f"internal error ({type(error).__name__}: {error})")
+            status, message = error.args if isinstance(error, HTTPError) else internal
+            content_type, content = JSON, compact_json({"error": message}).encode()
+        self.send_response(status)
+        for name, value in {**HEADERS, "Content-Type": content_type, "Content-Length": str(len(content))}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(content)
 
     do_HEAD = do_GET  # noqa: N815, a name of http.server
 
-    def _checked_address(self) -> tuple[str, str]:
-        """Address below the token and query of the request; HTTPError if length, host or token are wrong."""
+    def _checked_address(self) -> str:
+        """Address below the token, with its query; HTTPError if length, host or token are wrong."""
         if len(self.path) > MAX_ADDRESS:
             raise HTTPError(414, f"the address is longer than {MAX_ADDRESS} characters")
         hosts = self.headers.get_all("Host", [])
         if len(hosts) != 1 or hosts[0].partition(":")[0] not in HOSTS:
             raise HTTPError(403, f"this server answers requests to {' and '.join(HOSTS)} only")
-        path, _, query = self.path.partition("?")
-        token, slash, address = path.removeprefix("/").partition("/")
-        if not path.startswith("/") or not hmac.compare_digest(token.encode(), self.server.token.encode()):
+        token, slash, address = self.path.removeprefix("/").partition("/")
+        if not hmac.compare_digest(token.encode(), self.server.token.encode()):
             raise HTTPError(403, "wrong access token: open the address printed by sand view")
         if not slash:
             raise HTTPError(404, "unknown address; the address of the page ends with a slash")
-        return address, query
-
-    def _send(self, status: int, content_type: str, content: bytes) -> None:
-        if self.headers is None or "Content-Length" in self.headers or "Transfer-Encoding" in self.headers:
-            self.close_connection = True  # the body of the request is not read
-        self.send_response(status)
-        for name, value in {**HEADERS, "Content-Type": content_type, "Content-Length": str(len(content))}.items():
-            self.send_header(name, value)
-        if status == 405:
-            self.send_header("Allow", "GET, HEAD")
-        if self.close_connection:
-            self.send_header("Connection", "close")
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(content)
-
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Answer an invalid request in JSON and close the connection."""
-        self.close_connection = True
-        if not hasattr(self, "headers"):
-            self.headers = None  # type: ignore[assignment]
-        if code == 501:
-            self._send(405, JSON, _json({"error": "only GET and HEAD are allowed"}))
-        else:
-            self._send(int(code), JSON, _json({"error": message or "invalid request"}))
+        return address
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing."""

@@ -1,4 +1,4 @@
-"""Display of run data by `view()`: a widget in a notebook, otherwise a page that is written and opened."""
+"""The `view()` methods of simulations and opened runs: a widget in a notebook, otherwise a page, written and opened."""
 
 from __future__ import annotations
 
@@ -6,16 +6,24 @@ import tempfile
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..analysis.ledger_columns import LedgerColumns
 from ..errors import BadInput
+from ..io.frame import Frame, stored_frame
 from ..io.page_bundle import read_bundle
-from ..io.run_folder import VIEW
+from ..io.run_folder import TRAJECTORY, VIEW
 from ..plotting.run_figure import in_notebook
 from .browser import open_page
-from .dataset import RunDataset
+from .dataset import RunDataset, run_dataset
+from .external_field import FieldDescription, describe_field, read_field
 from .html import frame_stride, write_page
 from .notebook import has_widgets, widget
+
+if TYPE_CHECKING:
+    from ..simulation.simulation import Simulation
 
 MAX_BYTES = 150e6
 """Size of frames in a page [bytes] above which `view()` leaves out frames."""
@@ -65,3 +73,56 @@ def show_dataset(dataset: RunDataset, path: str | Path | None, folder: Path | No
     if not open_page(page.resolve().as_uri()):
         warnings.warn(f"wrote {page}, but no browser could be opened; open the file in a browser", stacklevel=4)
     return page
+
+
+def view_simulation(simulation: Simulation, path: str | Path | None) -> Any:
+    """Show the frames of a simulation with a run folder, or the present state of one without (`Simulation.view`)."""
+    record, field = simulation.writer, describe_field(simulation.forces)
+    folder = None if record is None else record.folder
+    if record is not None and (record.folder / TRAJECTORY).exists():
+        record.flush()
+        dataset = run_dataset(record.folder, field)
+    else:
+        dataset = snapshot_dataset(simulation, field)
+    return show_dataset(dataset, path, folder, simulation.figure)
+
+
+def view_folder(folder: Path, path: str | Path | None, fallback: Callable[[], Any]) -> Any:
+    """Show the run in a folder (`sand.open(DIR).view`); `fallback()` if the viewer page is not installed."""
+    return show_dataset(run_dataset(folder, read_field(folder)), path, folder, fallback)
+
+
+class Snapshot:
+    """A single frame with the interface of `io.live_trajectory.LiveTrajectory`."""
+
+    incomplete = generation = 0
+
+    def __init__(self, frame: Frame):
+        self._frame = frame
+        self.times, self.steps = np.array([frame.time]), np.array([frame.step])
+        self.contacts = np.array([len(frame.pair)])
+
+    def refresh(self) -> bool:
+        """Return False: there are no new frames."""
+        return False
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, index: int) -> Frame:
+        return self._frame
+
+    def pairs(self, index: int) -> np.ndarray:
+        """Grains in contact (C, 2)."""
+        return self._frame.pair
+
+
+def snapshot_dataset(simulation: Simulation, field: FieldDescription | None) -> RunDataset:
+    """Present state of a simulation and its ledger so far; later steps do not change the dataset."""
+    state = simulation.state
+    stored: Any = stored_frame(state.steps, state.time, state.grains.copy(), state.box, simulation.contacts)
+    ledger = LedgerColumns(simulation.ledger.columns, simulation.ledger.rows)
+    frames = Snapshot(Frame(stored))
+    dataset = RunDataset(frames, "simulation", "in memory", ledger=lambda: ledger, summary=dict, field=field)
+    dataset.notes.append("this simulation has no run folder: only its present state and its ledger are shown")
+    return dataset

@@ -12,7 +12,7 @@ from ...analysis.clusters import cluster_sizes
 from ...analysis.quantities import MODES, Quantity, material_names
 from ..palettes import DIVERGING, MATERIAL_COLOURS, MODE_COLOURS, SEQUENTIAL, WITHIN_LIMITS_COLOUR
 from ..style import LARGEST_COLOURS, SINGLE_COLOUR, format_si, rgb, si_prefix
-from .scene import cluster_colours
+from .scene import cluster_colours, largest_clusters
 
 MAX_SWATCHES = 9
 """Up to this many different integers are shown as separate swatches."""
@@ -112,8 +112,7 @@ def coloured(values: np.ndarray, what: Quantity, frame: Any, label: np.ndarray) 
 
 def _cluster_swatches(label: np.ndarray) -> tuple[tuple[str, np.ndarray], ...]:
     sizes = cluster_sizes(label)
-    order = np.argsort(-sizes, kind="stable")
-    clusters = [k for k in order if sizes[k] > 1]
+    clusters = largest_clusters(label)
     colour = cluster_colours(label)
     swatches = [(f"{sizes[k]} grains", colour[np.argmax(label == k)]) for k in clusters[: len(LARGEST_COLOURS)]]
     more = len(clusters) - len(LARGEST_COLOURS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
@@ -20,22 +22,13 @@ def draw_colour_keys(figure: Figure, keys: list[ColourKey], scale: float, colour
     """Draw colour keys below each other on the right, as colour bars or as swatches with labels."""
     top = 0.87
     for key in keys:
-        lines = _wrapped(key.title)
+        lines = textwrap.fill(key.title, 18, break_long_words=False, break_on_hyphens=False)
         figure.text(COLUMN, top, lines, size=8.5 * scale, weight="bold", color=colour, va="top", linespacing=1.25)
         top -= 0.034 * (lines.count("\n") + 1) + 0.012
         if key.swatches:
             top = _swatches(figure, key, top, scale, colour) - 0.045
         else:
             top = _bar(figure, key, top, 0.30 if len(keys) == 1 else 0.21, scale, colour) - 0.045
-
-
-def _wrapped(title: str, width: int = 18) -> str:
-    lines = [""]
-    for word in title.split(" "):
-        if lines[-1] and len(lines[-1]) + len(word) >= width:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return "\n".join(lines)
 
 
 def _swatches(figure: Figure, key: ColourKey, top: float, scale: float, colour: str) -> float:

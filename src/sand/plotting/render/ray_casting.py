@@ -90,11 +90,7 @@ class DepthBuffer:
         for begin in range(0, len(items), tiles_at_once):
             which, left, low = items[begin : begin + tiles_at_once][::-1].T
             columns, rows = left[:, None] + step, low[:, None] + step
-            z = intersect(
-                which,
-                (columns + 0.5 - width / 2)[:, None, :],
-                (rows + 0.5 - height / 2)[:, :, None],
-            )
+            z = intersect(which, (columns + 0.5 - width / 2)[:, None, :], (rows + 0.5 - height / 2)[:, :, None])
             inside = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[:, None, :]
             b, r, c = np.nonzero(np.isfinite(z) & inside)
             share = np.clip((z[b, r, c] - self.lowest) / self.range, 1e-30, 1.0).astype(np.float32)

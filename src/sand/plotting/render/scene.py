@@ -104,12 +104,6 @@ class Scene:
             edges.append((corners[tuple(start)], corners[tuple(end)], axis, farthest in (tuple(start), tuple(end))))
         return edges
 
-    def largest_clusters(self) -> list[int]:
-        """Indices of the clusters of at least two grains, largest first."""
-        sizes = cluster_sizes(self.label)
-        order = np.argsort(-sizes, kind="stable")
-        return [int(k) for k in order if sizes[k] > 1]
-
 
 def make_scene(grains: Any, pairs: np.ndarray, box: Box, whole: bool = True) -> Scene:
     """Scene of grains and their contacts; grains whose position is not finite are left out.
@@ -154,18 +148,18 @@ def _arrows(moment: np.ndarray) -> np.ndarray:
     return 0.9 * share * moment / np.where(size > 0.0, size, 1.0)
 
 
+def largest_clusters(label: np.ndarray) -> list[int]:
+    """Indices of the clusters of at least two grains, largest first."""
+    sizes = cluster_sizes(label)
+    return [int(k) for k in np.argsort(-sizes, kind="stable") if sizes[k] > 1]
+
+
 def cluster_colours(label: np.ndarray) -> np.ndarray:
     """Colours (N, 3) of grains by cluster: unique for the largest clusters, grey for single grains."""
-    sizes = cluster_sizes(label)
-    of_cluster = np.tile(rgb(SINGLE_COLOUR), (sizes.size, 1))
-    for rank, k in enumerate(np.argsort(-sizes, kind="stable")):
-        if sizes[k] > 1:
-            name = (
-                LARGEST_COLOURS[rank]
-                if rank < len(LARGEST_COLOURS)
-                else OTHER_COLOURS[(rank - len(LARGEST_COLOURS)) % len(OTHER_COLOURS)]
-            )
-            of_cluster[k] = rgb(name)
+    of_cluster = np.tile(rgb(SINGLE_COLOUR), (cluster_sizes(label).size, 1))
+    names = itertools.chain(LARGEST_COLOURS, itertools.cycle(OTHER_COLOURS))
+    for k, name in zip(largest_clusters(label), names, strict=False):
+        of_cluster[k] = rgb(name)
     return of_cluster[label]
 
 
@@ -269,7 +263,7 @@ def side_by_side(scene: Scene, count: int) -> tuple[Spheres, np.ndarray, list[in
     """
     parts, lower_edges, sizes, x = [], [], [], 0.0
     gap = 3.0 * float(scene.radius.max())
-    for label in scene.largest_clusters()[:count]:
+    for label in largest_clusters(scene.label)[:count]:
         members = np.flatnonzero(scene.label == label)
         spheres = scene.projected(_principal_axes(scene.position[members]), members)
         left, right, bottom, top = spheres.bounds
@@ -293,7 +287,7 @@ def draw_largest(axes: Axes, scene: Scene, pixels: tuple[int, int]) -> None:
     """Draw the largest clusters side by side, enlarged so that grains and moments are distinguishable."""
     aspect = pixels[0] / pixels[1]
     min_height = 2.0 * float(np.median(scene.radius)) * pixels[1] / 76.0  # at most 76 pixels per grain
-    for count in range(min(LARGEST_SHOWN, len(scene.largest_clusters())), 0, -1):
+    for count in range(min(LARGEST_SHOWN, len(largest_clusters(scene.label))), 0, -1):
         spheres, lower_edges, sizes = side_by_side(scene, count)
         left, right, bottom, top = spheres.bounds
         # Further clusters only if they do not make all of them small.

@@ -14,11 +14,11 @@ from ...analysis.quantities import CONTACT_NAMES, GRAIN_NAMES, measured, quantit
 from ...arguments import checked
 from ...box import Box
 from ...errors import BadInput, did_you_mean, refuse_other
-from ..run_figure import DPI, RunFigure, headline, png
+from ..run_figure import DPI, RunFigure, figure_bytes, headline
 from ..style import DARK_BACKGROUND, LIGHT_BACKGROUND, MUTED, MUTED_ON_DARK, TEXT_COLOUR, TEXT_ON_DARK, plot_style, rgb
 from .colouring import ColourKey, coloured
 from .legend import draw_colour_keys, draw_directions
-from .scene import Scene, camera_rotation, draw_scale_bar, make_scene, view_window
+from .scene import Scene, camera_rotation, draw_scale_bar, largest_clusters, make_scene, view_window
 from .shading import Lighting
 from .spheres import Rods, render_spheres
 
@@ -63,7 +63,7 @@ class Still(RunFigure):
 
     def image(self) -> Image.Image:
         """The complete image with annotations, as a Pillow image."""
-        return Image.open(io.BytesIO(png(self)))
+        return Image.open(io.BytesIO(figure_bytes(self)))
 
 
 @checked
@@ -197,7 +197,7 @@ def _coloured_scene(
 
 def _single_cluster(scene: Scene, rank: int) -> Scene:
     """Scene with the cluster of a rank only, in open space."""
-    clusters = scene.largest_clusters()
+    clusters = largest_clusters(scene.label)
     if not 1 <= rank <= len(clusters):
         raise BadInput(f"cluster {rank}: there are {len(clusters)} clusters of two grains or more; 1 is the largest")
     members = scene.label == clusters[rank - 1]
