@@ -30,6 +30,35 @@ except IndexError as error:
 """
 """A function of ours that calls a function of ours that reads beyond the end of an array."""
 
+CACHED = """
+import importlib.util, sys
+import numpy as np
+from sand.compiler.jit import kernel
+spec = importlib.util.spec_from_file_location("sand.inner_of_a_test", sys.argv[1])
+module = importlib.util.module_from_spec(spec)
+sys.modules[spec.name] = module
+spec.loader.exec_module(module)
+inner = module.inner
+assert inner(1.0) == 1.0
+print("from the cache" if sum(inner.stats.cache_hits.values()) else "compiled")
+def outer(x):
+    return inner(x)
+outer.__module__ = "sand.outer_of_a_test"
+try:
+    kernel(outer, cached=False)(-1.0)
+except ValueError as error:
+    print("raised", error)
+"""
+INNER = """
+from sand.compiler.jit import kernel
+@kernel
+def inner(x):
+    if x < 0.0:
+        raise ValueError("below 0")
+    return x
+"""
+"""A kernel that calls a kernel, which the second process loads from the disk cache."""
+
 
 @formula
 def positive(x):
@@ -67,6 +96,18 @@ def test_bounds_that_are_checked_are_told(tmp_path):
     done = subprocess.run([sys.executable, "-c", BEYOND], env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("told")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_an_error_in_a_kernel_from_the_disk_cache_reaches_its_caller(tmp_path):
+    """The exception of an inner kernel is raised in the process that compiles it and in one that loads it."""
+    (tmp_path / "inner.py").write_text(INNER)
+    env = os.environ | {"SAND_CACHE": str(tmp_path / "cache")}
+    words = [sys.executable, "-c", CACHED, str(tmp_path / "inner.py")]
+    for origin in ("compiled", "from the cache"):
+        done = subprocess.run(words, env=env, capture_output=True, text=True)
+        assert done.stdout.splitlines() == [origin, "raised below 0"], done.stderr
 
 
 @pytest.mark.compiled("small")

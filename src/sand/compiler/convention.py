@@ -31,6 +31,8 @@ _ANALYSED = "_ZN4sand", "_ZN5numba7cpython8builtins", "_ZN5numba7cpython7numbers
 _ZERO_STEP = ("range() arg 3 must not be zero",)
 _may_raise: set[str] = set()
 """Names of functions that may raise exceptions, by checks of array bounds for instance, or through a callee."""
+_lowered: set[str] = set()
+"""Names of functions lowered in this process; of others, such as kernels loaded from the disk cache, nothing is known."""
 
 
 class Builder(ir.IRBuilder):
@@ -58,6 +60,11 @@ class Builder(ir.IRBuilder):
         else:
             with super().if_then(pred, likely) as end:
                 yield end
+
+
+def mark_lowered(name: str) -> None:
+    """Record that a function was lowered here, so that `_may_raise` tells whether it raises exceptions."""
+    _lowered.add(name)
 
 
 _flattened_functions: set[str] = set()
@@ -148,7 +155,8 @@ class _CallConvention(CPUCallConv):
         """As in numba, but with a constant status if the callee cannot raise."""
         self.select(callee.name)
         status, result = super().call_function(builder, callee, *args, **options)
-        if callee.name.startswith(_ANALYSED) and callee.name not in _may_raise:
+        analysed = callee.name in _lowered or callee.name.startswith(_ANALYSED[1:])
+        if analysed and callee.name not in _may_raise:
             return status._replace(is_error=_FALSE), result
         _may_raise.add(builder.function.name)
         return status, result

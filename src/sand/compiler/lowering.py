@@ -33,7 +33,7 @@ from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.ir import Arg, Assign
 from numba.core.lowering import Lower
 
-from .convention import Builder, Context, flatten_arguments, takes_aggregates
+from .convention import Builder, Context, flatten_arguments, mark_lowered, takes_aggregates
 
 __all__ = ["FAST_512_BIT", "FunctionCompiler", "KernelCompiler", "LongVectorCompiler", "NoinlineCompiler"]
 
@@ -208,6 +208,7 @@ class _Lower(Lower):
     def lower_normal_function(self, fndesc: Any) -> None:
         """Lower the function, and remove unused instructions."""
         super().lower_normal_function(fndesc)
+        mark_lowered(fndesc.mangled_name)
         _remove_unused_instructions(self.function)
 
 
