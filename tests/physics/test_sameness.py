@@ -90,7 +90,7 @@ def test_a_listed_run_goes_on_from_its_saved_state():
     lists = whole.state.count[LISTED]
     whole.run(steps=6000)
     assert whole.state.count[LISTED] > lists > 1
-    again = start(restart=(saved, {"temperature": 3e5, "wall_seconds": 0.0, "choices": {}}))
+    again = start(restart=(saved, {"temperature": 3e5, "wall_seconds": 0.0}))
     again.run(steps=6000)
     assert state(whole) == state(again)
     cramped.run(steps=9000)

@@ -32,7 +32,7 @@ _ZERO_STEP = ("range() arg 3 must not be zero",)
 _may_raise: set[str] = set()
 """Names of functions that may raise exceptions, by checks of array bounds for instance, or through a callee."""
 _lowered: set[str] = set()
-"""Names of functions lowered in this process; of others, such as kernels loaded from the disk cache, nothing is known."""
+"""Names of functions lowered in this process; of others, such as kernels from the disk cache, nothing is known."""
 
 
 class Builder(ir.IRBuilder):

@@ -123,8 +123,9 @@ class Simulation(ReadOnlySettings):
             arrays, meta = restart
             self._engine.load_state(arrays)
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
-            self._choices_at_start = meta["choices"]
-            self.ledger.from_array(arrays["ledger"], meta["ledger"])
+            self._choices_at_start = meta.get("choices", {})
+            if "ledger" in arrays:  # a state without a ledger starts a new one
+                self.ledger.from_array(arrays["ledger"], meta["ledger"])
         for text in self._engine.warnings:
             warn(text)
         self._built = True
