@@ -129,7 +129,7 @@ def test_numba_is_imported_in_one_package():
 
 @pytest.mark.slow
 def test_only_io_opens_files_and_only_cli_prints():
-    """`open`, `read_text`, `write_text` are called in io/ (and for the digest of sources) alone; print in cli/."""
+    """`open`, `read_text`, `write_text` are called in io/ and compiler/ alone; print in cli/ and by compiler/progress."""
     for path in SOURCES:
         package = package_of(path)
         for node in ast.walk(tree_of(path)):
@@ -138,11 +138,11 @@ def test_only_io_opens_files_and_only_cli_prints():
             name = getattr(node.func, "id", None) or getattr(node.func, "attr", None)
             where = f"{path.relative_to(TOP)}:{node.lineno} calls {name}"
             if name == "print" or (name == "echo" and isinstance(node.func, ast.Attribute)):
-                assert package == "cli", where
+                assert package == "cli" or path == SOURCE / "compiler" / "progress.py", where
             if name in {"read_text", "write_text", "read_bytes", "write_bytes"} or (
                 isinstance(node.func, ast.Name) and name == "open"
             ):
-                assert package == "io" or path == SOURCE / "compiler" / "jit.py", where
+                assert package in ("io", "compiler"), where
 
 
 def loads_of_numpy(tree: ast.AST) -> list[ast.Call]:

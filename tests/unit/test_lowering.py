@@ -1,6 +1,7 @@
 """What the compiler leaves out for our code (`compiler/lowering.py`) must not swallow what is raised."""
 
 import gc
+import json
 import os
 import subprocess
 import sys
@@ -8,9 +9,11 @@ import sys
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 
 import sand
 from sand.compiler.jit import COMPILED, formula, kernel
+from sand.compiler.progress import CompilationListener, compilation_notes, describe
 from sand.integrate.motion import kicked
 
 BEYOND = """
@@ -135,3 +138,35 @@ def test_rubbish_is_collected_again_after_compiling():
             assert gc.isenabled() is wanted
         finally:
             gc.enable()
+
+
+@pytest.mark.compiled("small")
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_a_compilation_is_noted_with_its_last_duration(tmp_path, monkeypatch):
+    """The first note has no time, the second the recorded one; short compilations and a block without notes are silent.
+
+    Functions compiled within a kernel have no note of their own.  An unreadable record counts as empty.
+    """
+    listener = next(each for each in event._registered["numba:compile"] if isinstance(each, CompilationListener))
+    monkeypatch.setattr(listener, "_record", tmp_path / "times.json")
+    noted = []
+
+    def compile_anew():
+        def roots(x):
+            return root_of(x)
+
+        kernel(roots, cached=False, purpose="square roots")(4.0)
+
+    with compilation_notes(lambda *words: noted.append(words)):
+        compile_anew()
+        assert list(json.loads((tmp_path / "times.json").read_text())) == ["square roots"]
+        compile_anew()  # took less than a second: no note
+        (tmp_path / "times.json").write_text('{"square roots": 12.3}')
+        compile_anew()
+        (tmp_path / "times.json").write_text("[]")
+        compile_anew()
+        with compilation_notes(None):
+            (tmp_path / "times.json").unlink()
+            compile_anew()
+    assert noted == [("square roots", None), ("square roots", 12.3), ("square roots", None)]
+    assert describe(*noted[1]) == "compiling square roots (last time 12 s), for this and later runs …"

@@ -8,7 +8,7 @@ import re
 import shlex
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -43,12 +43,10 @@ def note(text: str) -> None:
 
 
 def compiling(quiet: bool = False) -> AbstractContextManager[None]:
-    """Print a note, once, if anything is compiled inside the block."""
-    if quiet:
-        return nullcontext()
-    from ..compiler import jit
+    """Print a note on each kernel that is compiled inside the block, with the time that it took last."""
+    from ..compiler import progress
 
-    return jit.compiling(lambda: note("compiling the loops for this combination of forces, for this and later runs …"))
+    return progress.compilation_notes(None if quiet else lambda what, seconds: note(progress.describe(what, seconds)))
 
 
 def emit(content: dict[str, Any]) -> None:

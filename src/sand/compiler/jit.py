@@ -10,8 +10,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -23,8 +22,9 @@ from numba.extending import register_jitable
 
 from ..errors import warn
 from .cache import private_folder
+from .progress import CompilationListener
 
-_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compiling formula is_builtin kernel loop noinline rare"
+_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder formula is_builtin kernel loop noinline rare"
 __all__ = _NAMES.split()
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
@@ -181,12 +181,20 @@ def _load_without_compiler(compiled: Any) -> None:
     cache.load_overload = load_overload
 
 
+_PURPOSES: dict[int, str] = {}
+"""What each kernel computes, by the id of its dispatcher; kernels are never deleted."""
+if COMPILED:
+    event.register("numba:compile", CompilationListener(_PURPOSES, cache_folder().parent / "compile-times.json"))
+
+
 def is_builtin(function: Callable) -> bool:
     """Whether a formula is part of SAND; compiled code with a user's own formula is not cached on disk."""
     return str(function.__module__).startswith("sand.")
 
 
-def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long_vectors: bool = False) -> Callable:
+def kernel(
+    function: Callable, *, cached: bool = True, nogil: bool = False, long_vectors: bool = False, purpose: str = ""
+) -> Callable:
     """Compile `function` on its first call and cache the result in SAND's cache folder.
 
     numba's global cache folder is restored at once, so that kernels of the user are cached where the user wants.
@@ -201,6 +209,8 @@ def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long
         True for code during which other Python threads may run.
     long_vectors : bool, optional
         True for loops of about 64 iterations and more, which profit from the longest SIMD vectors.
+    purpose : str, optional
+        What is computed, for the note shown while it is compiled; by default from the name of the function.
 
     Returns
     -------
@@ -220,26 +230,5 @@ def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long
         numba.config.CACHE_DIR = global_folder
     if cached:
         _load_without_compiler(compiled)
+    _PURPOSES[id(compiled)] = purpose or f"'{function.__name__.replace('_', ' ')}'"
     return compiled
-
-
-class _Listener(event.Listener):
-    """Listener for compilation events that notifies once."""
-
-    def __init__(self, notify: Callable[[], None]):
-        self._notify: Callable[[], None] | None = notify
-
-    def on_start(self, _event: Any) -> None:
-        if self._notify is not None:
-            notify, self._notify = self._notify, None
-            notify()
-
-    def on_end(self, _event: Any) -> None:
-        pass
-
-
-@contextmanager
-def compiling(notify: Callable[[], None]) -> Iterator[None]:
-    """Call `notify` once if anything is compiled inside the block (not if the cache contains it)."""
-    with event.install_listener("numba:compile", _Listener(notify)):
-        yield

@@ -47,7 +47,7 @@ def energies_kernel(law: ContactLaw) -> Callable:
             for mode in range(4):
                 out[2 + mode] += stored[mode]
 
-    return kernel(measure_energies, cached=is_builtin(law.force))
+    return kernel(measure_energies, cached=is_builtin(law.force), purpose="the energies of contacts")
 
 
 CONTACT_ROWS = (
@@ -118,4 +118,4 @@ def contacts_kernel(law: ContactLaw) -> Callable:
                 out[17 + axis, c] = displacements.slide[axis]
                 out[20 + axis, c] = xi[axis]
 
-    return kernel(measure_contacts, cached=is_builtin(law.force))
+    return kernel(measure_contacts, cached=is_builtin(law.force), purpose="the table of contacts")

@@ -69,9 +69,12 @@ def executor_for(
 
 
 def _leave_signals_to_parent(threads: int) -> None:
-    """Ignore Ctrl-C, which a terminal sends to all processes; only the parent handles it."""
+    """Ignore Ctrl-C, which a terminal sends to all processes; only the parent handles it and shows notes."""
+    from ..compiler.progress import suppress_notes
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     set_threads(threads)
+    suppress_notes()
 
 
 def _nothing() -> None:

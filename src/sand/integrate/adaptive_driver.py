@@ -211,4 +211,6 @@ def adaptive_driver_for(spec: KernelSpec) -> Callable:
         join(parameters)
         return stop
 
-    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide)
+    return kernel(
+        advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the adaptive time steps"
+    )

@@ -297,4 +297,4 @@ def driver_for(spec: KernelSpec) -> Callable:
         join(parameters)
         return stop
 
-    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide)
+    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the time steps")

@@ -167,7 +167,9 @@ def worker_loops(spec: KernelSpec) -> tuple[Callable, Callable]:
             word = read(words, WORD)
         fetch_add(words, ACTIVE, -1)
 
-    return share, kernel(worker_loop, cached=spec.keep, nogil=True, long_vectors=spec.wide)
+    return share, kernel(
+        worker_loop, cached=spec.keep, nogil=True, long_vectors=spec.wide, purpose="the time steps of worker threads"
+    )
 
 
 @loop

@@ -1,0 +1,98 @@
+"""Notes on compilation: what is being compiled, and how long that took the last time."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from numba.core import event
+
+__all__ = ["CompilationListener", "compilation_notes", "describe", "suppress_notes"]
+
+SHORT = 1.0
+"""Wall time [s] of the last compilation below which no note is worth it."""
+
+Notify = Callable[[str, "float | None"], None]
+
+
+def describe(what: str, seconds: float | None) -> str:
+    """The note on one compilation; `seconds` is its last duration, None if that is not known."""
+    last = "" if seconds is None else f" (last time {seconds:.0f} s)"
+    return f"compiling {what}{last}, for this and later runs …"
+
+
+def _on_terminal(what: str, seconds: float | None) -> None:
+    """Note for scripts and interactive sessions: only where somebody looks at the terminal."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print(f"sand: {describe(what, seconds)}", file=sys.stderr, flush=True)
+
+
+_notify: list[Notify] = [_on_terminal]
+"""Functions that show notes; the last one is used."""
+
+
+@contextmanager
+def compilation_notes(notify: Notify | None) -> Iterator[None]:
+    """Within the block, pass `notify` what is compiled and how long it took the last time [s]; None: no notes."""
+    _notify.append(notify or (lambda what, seconds: None))
+    try:
+        yield
+    finally:
+        _notify.pop()
+
+
+def suppress_notes() -> None:
+    """Show no notes in this process, for workers whose parent reports progress."""
+    _notify.append(lambda what, seconds: None)
+
+
+class CompilationListener(event.Listener):
+    """Listener for numba's compilation events: notes for the kernels of SAND, and a record of their durations.
+
+    Parameters
+    ----------
+    purposes : dict[int, str]
+        What each kernel computes, by the id of its dispatcher.
+    record : Path
+        JSON file with the last duration [s] of each kernel; an unreadable file counts as empty.
+    """
+
+    def __init__(self, purposes: dict[int, str], record: Path):
+        self._purposes, self._record = purposes, record
+        self._current, self._depth, self._began = "", 0, 0.0
+
+    def _durations(self) -> dict[str, float]:
+        try:
+            found = json.loads(self._record.read_text("utf-8"))
+            return {str(name): float(seconds) for name, seconds in found.items()}
+        except (OSError, ValueError, AttributeError, TypeError):
+            return {}
+
+    def on_start(self, event: Any) -> None:
+        """Note the start of a kernel; the functions that it calls are compiled within."""
+        self._depth += 1
+        what = self._purposes.get(id(event.data.get("dispatcher")), "")
+        if self._current or not what:
+            return
+        self._current, self._began, self._depth = what, time.perf_counter(), 1
+        last = self._durations().get(what)
+        if last is None or last >= SHORT:
+            _notify[-1](what, last)
+
+    def on_end(self, event: Any) -> None:
+        """Record the duration of a kernel."""
+        self._depth -= 1
+        if self._current and self._depth == 0:
+            durations = self._durations() | {self._current: round(time.perf_counter() - self._began, 3)}
+            self._current = ""
+            try:
+                draft = self._record.with_suffix(".draft")
+                draft.write_text(json.dumps(durations, indent=1), "utf-8")
+                draft.replace(self._record)
+            except OSError:
+                pass  # notes without a time are no error
