@@ -129,7 +129,7 @@ def test_numba_is_imported_in_one_package():
 
 @pytest.mark.slow
 def test_only_io_opens_files_and_only_cli_prints():
-    """`open`, `read_text`, `write_text` are called in io/ and compiler/ alone; print in cli/ and by compiler/progress."""
+    """`open`, `read_text`, `write_text` are called in io/ and compiler/ alone; print in cli/ and compiler/progress."""
     for path in SOURCES:
         package = package_of(path)
         for node in ast.walk(tree_of(path)):
