@@ -1,6 +1,6 @@
 // A running simulation: the page polls its source for new frames.
 
-import { type Dataset, QUANTITIES } from "./data/quantities";
+import { type Dataset, quantitiesOf } from "./data/quantities";
 import type { Manifest, Series, Source } from "./data/types";
 
 /** Seconds between two polls. */
@@ -26,7 +26,7 @@ export interface DataChoices {
 
 /** Set the options that these data allow, which increase while a run continues; returns the names of these settings. */
 export function offerChoices(settings: DataChoices, dataset: Dataset, series: Series): string[] {
-  const available = QUANTITIES.filter((q) => q.available?.(dataset) ?? true);
+  const available = quantitiesOf(dataset.manifest).filter((q) => q.available?.(dataset) ?? true);
   settings.offer("colour", available.map((q) => [q.id, q.label]));
   settings.offer("plot", series.plots.map((p) => [p.id, p.title]));
   return ["colour", "plot"];

@@ -6,7 +6,7 @@ import { clusterMask, unwrappedPositions } from "./data/clusters";
 import { paint, type Painted, type Scale } from "./data/colours";
 import { type KeyPart, keyOf } from "./data/key";
 import { occlusion } from "./data/occlusion";
-import { type Dataset, QUANTITIES, type Quantity } from "./data/quantities";
+import { type Dataset, quantitiesOf, type Quantity } from "./data/quantities";
 import { type Frame, SINGLE } from "./data/types";
 import { ARROW } from "./scene/arrows";
 import { MAX_TRAILS, trailSegments } from "./scene/lines";
@@ -39,7 +39,8 @@ export class Picture {
   }
 
   get quantity(): Quantity {
-    return QUANTITIES.find((q) => q.id === this.settings.get("colour")) ?? QUANTITIES[0];
+    const quantities = quantitiesOf(this.dataset.manifest);
+    return quantities.find((q) => q.id === this.settings.get("colour")) ?? quantities[0];
   }
 
   /** Positions at which grains are drawn. */

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from .box import Box
 from .constants import LIGHT
 from .errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from .material import Material, as_material
-from .schema import BY_NAME, FIELDS, public, stored
+from .schema import BY_NAME, FIELDS, OWN, public, stored
 from .units import in_unit
 
 ROUNDING = 1e-7
@@ -30,6 +30,7 @@ class GrainArrays(NamedTuple):
     mass: np.ndarray
     inertia: np.ndarray
     charge: np.ndarray
+    internal_temperature: np.ndarray
     body_moment: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
@@ -111,6 +112,9 @@ class Grains:
         Scalar or (N,) [C]. Default: zero.
     mass : float or str or array_like, optional
         Scalar or (N,) [kg] > 0. Default: density × volume.
+    own : dict, optional
+        Own quantities (kind "own" of `sand.schema.FIELDS`), such as {"internal_temperature": "300 K"}: scalars
+        or (N,). No force depends on them; checkpoints, frames, figures and the viewer have them. Default: zero.
 
     Raises
     ------
@@ -129,11 +133,17 @@ class Grains:
         moment: Any = None,
         charge: Any = None,
         mass: Any = None,
+        own: Mapping[str, Any] | None = None,
     ):
         count = _count(position)
         problems: list[str] = []
         arrays = {f.name: np.zeros(count if f.width == 1 else (f.width, count)) for f in FIELDS}
         given = {"position": position, "radius": radius, "velocity": velocity, "spin": spin, "charge": charge}
+        for name, values in (own or {}).items():
+            if name in OWN:
+                given[name] = values
+            else:
+                problems.append(f"own: there is no quantity {shown(name)}; {did_you_mean(str(name), OWN)}")
         for name, values in given.items():
             if values is None and name not in ("position", "radius"):
                 continue
@@ -188,6 +198,10 @@ class Grains:
     def __repr__(self) -> str:
         names = ", ".join(m.name for m in self.materials)
         return f"<{len(self)} grains of {names}>"
+
+    def own(self) -> dict[str, np.ndarray]:
+        """The user's own quantities, for `Grains(own=…)`."""
+        return {name: getattr(self, name) for name in OWN}
 
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
         """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""

@@ -35,6 +35,7 @@ KEYS = [
     "note",
     "unit",
     "materials",
+    "own",
     "periodic",
     "field",
     "ranges",

@@ -116,6 +116,14 @@ export const QUANTITIES: Quantity[] = [
   },
 ];
 
+/** All quantities of a run: the table and the own quantities of the user. */
+export function quantitiesOf(manifest: Manifest): Quantity[] {
+  const own = manifest.own.map(({ id, label, unit }): Quantity => ({
+    id, label, unit, kind: "sequential", values: (_, { grains }) => Float32Array.from(grains[id]),
+  }));
+  return [...QUANTITIES, ...own];
+}
+
 /** The smallest and largest finite number, or null. */
 export function extent(values: ArrayLike<number>): [number, number] | null {
   let [low, high] = [Infinity, -Infinity];

@@ -22,6 +22,8 @@ export interface Manifest {
   note: string | null;
   unit: number;
   materials: string[];
+  /** Own quantities of the user that the grains have. */
+  own: { id: string; label: string; unit: string }[];
   periodic: boolean[];
   field: Field | null;
   ranges: Record<string, [number, number]>;
@@ -44,6 +46,8 @@ export interface Grains {
   mass: Float32Array;
   material: Uint8Array;
   charge: Float32Array;
+  /** Own quantities, by their id in the manifest. */
+  [own: string]: Float32Array | Uint8Array;
 }
 
 /** One frame; positions and box in the manifest's `unit`, all others in SI units. */

@@ -2,7 +2,7 @@
 
 import { MODES, limitingMode, normalForce } from "../data/bonds";
 import { measureCluster, membersOf, nearestImage } from "../data/clusters";
-import { type Dataset, QUANTITIES } from "../data/quantities";
+import { type Dataset, quantitiesOf } from "../data/quantities";
 import { type Dimension, type Frame, SINGLE } from "../data/types";
 import { digits, prefixed, quantity } from "../data/units";
 import { h } from "./dom";
@@ -27,8 +27,8 @@ function magnitudeAndComponents(v: number[], unit: string): string {
 
 export function grainRows(i: number, frame: Frame, dataset: Dataset): Row[] {
   const { manifest, grains } = dataset;
-  const names = ["coordination", "kinetic_energy", "alignment", "field_alignment"];
-  const others = QUANTITIES.filter((q) => names.includes(q.id));
+  const names = ["coordination", "kinetic_energy", "alignment", "field_alignment", ...manifest.own.map((q) => q.id)];
+  const others = quantitiesOf(manifest).filter((q) => names.includes(q.id));
   const rows: Row[] = [
     ["position", components(vector(frame.position, i, manifest.unit), "m", 5)],
     ["radius", quantity(grains.radius[i] * manifest.unit, "m")],

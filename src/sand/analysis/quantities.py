@@ -10,6 +10,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..io.frame import MODES as SHARES
+from ..schema import BY_NAME, OWN
 from .clusters import aggregate_moments, cluster_labels, cluster_sizes
 from .shape import coordination
 
@@ -98,6 +99,16 @@ def _floats(of: Callable[[Any], Any]) -> Callable[[Any, np.ndarray | None], np.n
     return lambda frame, _: np.asarray(of(frame), dtype=np.float64)
 
 
+def _own(name: str) -> Callable[[Any, np.ndarray | None], np.ndarray]:
+    """An own quantity of the user; NaN in frames in which no grain has a value."""
+
+    def values(frame: Any, _: np.ndarray | None) -> np.ndarray:
+        found = np.asarray(getattr(frame, name, np.zeros(len(frame.radius))), dtype=np.float64)
+        return found if found.any() else np.full(len(found), np.nan)
+
+    return values
+
+
 GRAINS = (
     Quantity("cluster", "1", "cluster", "categorical", _floats(lambda f: cluster_rank(len(f.radius), f.pair)), ""),
     Quantity("size", "1", "grains in its cluster", "sequential", _floats(_cluster_size), ""),
@@ -123,6 +134,10 @@ GRAINS = (
         "no grain has a moment, or there is no external field",
     ),
     Quantity("material", "1", "material", "categorical", _floats(lambda f: f.material), ""),
+    *(
+        Quantity(name, BY_NAME[name].unit, name.replace("_", " "), "sequential", _own(name), "no grain has a value")
+        for name in OWN
+    ),
 )
 """Quantities of grains (N,)."""
 CONTACTS = (
@@ -132,7 +147,7 @@ CONTACTS = (
 """Quantities of contacts (C,)."""
 GRAIN_NAMES = tuple(one.name for one in GRAINS)
 CONTACT_NAMES = tuple(one.name for one in CONTACTS)
-_BY_NAME: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS)}
+_QUANTITIES: Mapping[str, Quantity] = {one.name: one for one in (*GRAINS, *CONTACTS)}
 
 
 @checked
@@ -140,7 +155,7 @@ def quantity(name: str, allowed: tuple[str, ...] = GRAIN_NAMES) -> Quantity:
     """Look up a quantity by name. Raises BadInput if it is not one of `allowed`."""
     if name not in allowed:
         raise BadInput(f"there is no quantity '{name}'; {did_you_mean(name, allowed)}")
-    return _BY_NAME[name]
+    return _QUANTITIES[name]
 
 
 @checked

@@ -16,6 +16,7 @@ other quantities are SI. Orientations are scalar first, as in GSD.
 | log/particles/moment, spin | A m² and rad/s, laboratory frame |
 | log/particles/position, radius | to full precision [m]; only in files of bodies |
 | bonds/group | grains in contact |
+| log/particles/NAME | own quantities of the user (`sand.schema.OWN`), if any grain has a value |
 | log/bonds/overlap, formed | δ [m] and time of formation [s] |
 | log/bonds/force | force on the first grain of each contact [N] |
 | log/bonds/slide, roll, twist | sliding ζ [m], rolling ξ [m] and twisting φ [rad] displacement |
@@ -38,6 +39,7 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput, shown
 from ..grains import Grains
+from ..schema import OWN
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
@@ -84,6 +86,8 @@ def stored_frame(
         "bonds/twist": contacts["twist"].astype(np.float32),
         "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
     }
+    # absent where no grain has a value
+    frame.log |= {f"particles/{name}": values.copy() for name, values in grains.own().items() if values.any()}
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
@@ -132,6 +136,8 @@ class Frame:
         self.radius = np.array(stored.log.get("particles/radius", 0.5 * np.asarray(p.diameter, float) * scale))
         self.velocity, self.mass = np.asarray(p.velocity), np.asarray(p.mass)
         self.charge = np.asarray(p.charge)
+        for name in OWN:
+            setattr(self, name, np.array(stored.log.get(f"particles/{name}", np.zeros(p.N))))
         names = [name.encode().decode("unicode_escape") for name in p.types]  # GSD takes ASCII
         self.materials, self.material = names, np.asarray(p.typeid)
         self.moment, self.spin = stored.log["particles/moment"], stored.log["particles/spin"]
@@ -150,6 +156,10 @@ class Frame:
     def __len__(self) -> int:
         """Number of grains."""
         return len(self.radius)
+
+    def own(self) -> dict[str, np.ndarray]:
+        """The user's own quantities, for `Grains(own=…)`."""
+        return {name: getattr(self, name) for name in OWN}
 
 
 class NoSuchFrame(BadInput, IndexError):

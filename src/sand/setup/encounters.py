@@ -10,6 +10,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, shown
 from ..grains import Grains
+from ..schema import OWN
 from ..units import MOST, in_unit, si
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def turned(body: Grains, rotation: Rotation) -> Grains:
         spin=spin,
         moment=moment,
         charge=body.charge,
+        own=body.own(),
         mass=body.mass,
     )
 
@@ -117,6 +119,7 @@ def combined(bodies: Sequence[Grains], shifts: Sequence[np.ndarray], velocities:
         spin=all_of("spin"),
         moment=all_of("moment"),
         charge=all_of("charge"),
+        own={name: all_of(name) for name in OWN},
         mass=all_of("mass"),
     )
 

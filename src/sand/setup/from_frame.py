@@ -89,6 +89,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
         spin=frame.spin,
         moment=frame.moment,
         charge=frame.charge,
+        own=frame.own(),
         mass=np.where(rounded, nominal, frame.mass),
     )
     moved = float(np.abs(frame.box.nearest(position - frame.position)).max())

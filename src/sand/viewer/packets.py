@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import BadInput
 from ..io.run_folder import plain
+from ..schema import OWN
 
 MAGIC = b"SANDPKT1"
 TYPES: dict[str, np.dtype[Any]] = {
@@ -20,7 +21,7 @@ TYPES: dict[str, np.dtype[Any]] = {
 }
 HALF_MAX = 65504.0
 """Largest number in half precision; arrays scaled to it keep 11 bits over the nine decades below their maximum."""
-SINGLE_PRECISION = ("position", "radius", "mass", "charge")
+SINGLE_PRECISION = ("position", "radius", "mass", "charge", *OWN)
 """Arrays that are never stored in half precision: 2⁻¹¹ of a box is more than a grain."""
 
 
@@ -74,8 +75,14 @@ def _converted(name: str, array: np.ndarray, compact: bool) -> tuple[str, float,
     return "f2", scale, np.ascontiguousarray(values / scale, TYPES["f2"])
 
 
+def own_quantities(frame: Any) -> dict[str, np.ndarray]:
+    """The own quantities of the user of which a grain of the frame has a value."""
+    found = {name: np.asarray(getattr(frame, name, 0.0)) for name in OWN}
+    return {name: values for name, values in found.items() if values.any()}
+
+
 def grains_packet(frame: Any, unit: float) -> bytes:
-    """Packet of the grain properties that do not change: radius, mass, material and charge.
+    """Packet of the grain properties that do not change: radius, mass, material, charge and own quantities.
 
     Parameters
     ----------
@@ -96,6 +103,7 @@ def grains_packet(frame: Any, unit: float) -> bytes:
         "mass": frame.mass,
         "material": frame.material.astype(np.uint8),
         "charge": frame.charge,
+        **own_quantities(frame),
     }
     return encode({}, arrays)
 

@@ -13,6 +13,7 @@ from ..errors import BadInput
 from ..io.run_folder import plain
 from ..plotting.panels import CHANNEL_LABELS, COUNTS, column, energies_drawn, losses_drawn, peak
 from ..plotting.style import BLUE, MUTED, ON_DARK, SKY, TEXT_COLOUR
+from ..schema import OWN
 
 MAX_POINTS = 2000
 """Maximum number of points of a line."""
@@ -22,7 +23,7 @@ SAMPLED_FRAMES = 12
 """Number of frames, spread evenly over the run, from which ranges are computed."""
 PERCENTILES = ("speed", "spin", "kinetic_energy")
 """Quantities whose range leaves out outliers: from the lower to the upper of PERCENTILE_LIMITS."""
-EXTREMES = ("size", "radius", "coordination", "moment", "load")
+EXTREMES = ("size", "radius", "coordination", "moment", "load", *OWN)
 """Quantities whose range goes from the smallest to the largest value; of `moment` and `load`, the magnitude."""
 PERCENTILE_LIMITS = (1.0, 99.9)
 
