@@ -199,10 +199,6 @@ class Grains:
         names = ", ".join(m.name for m in self.materials)
         return f"<{len(self)} grains of {names}>"
 
-    def own(self) -> dict[str, np.ndarray]:
-        """The user's own quantities, for `Grains(own=…)`."""
-        return {name: getattr(self, name) for name in OWN}
-
     def overlaps(self, pairs: np.ndarray, box: Box) -> np.ndarray:
         """Overlaps δ = r_i + r_j − |x_i − x_j| [m] of pairs (P, 2) of grains; negative for a gap."""
         i, j = np.asarray(pairs).T

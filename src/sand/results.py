@@ -18,7 +18,7 @@ from .io import run_folder as files
 from .io.export import export_frames
 from .io.ledger_table import read_ledger
 from .io.trajectory import Frame, Frames
-from .schema import BY_NAME
+from .schema import BY_NAME, own_values
 from .setup.from_frame import from_frame
 from .simulation.contact_table import Columns
 from .simulation.simulation import Simulation
@@ -195,7 +195,7 @@ class Run:
             "radius": ("grain", whole[0].radius, {"units": "m"}),
             "material": ("grain", np.array(whole[0].materials)[whole[0].material]),
             "axis": ("axis", list("xyz")),
-            **{name: ("grain", v, {"units": BY_NAME[name].unit}) for name, v in whole[0].own().items() if v.any()},
+            **{name: ("grain", v, {"units": BY_NAME[name].unit}) for name, v in own_values(whole[0]).items()},
         }
         return xarray.Dataset(data | {"cluster": (("frame", "grain"), labels)}, coords=coordinates)
 

@@ -45,6 +45,12 @@ OWN = tuple(field.name for field in FIELDS if field.kind == "own")
 """Quantities of `Grains(own=…)`: carried along, stored in checkpoints and frames, and shown."""
 
 
+def own_values(grains: Any) -> dict[str, np.ndarray]:
+    """Own quantities of which any grain has a value, by name; of grains, or of a frame."""
+    found = {name: np.asarray(getattr(grains, name, 0.0), dtype=np.float64) for name in OWN}
+    return {name: values for name, values in found.items() if values.any()}
+
+
 def public(array: np.ndarray) -> np.ndarray:
     """Read-only view in public shape: (N,) or (N, width)."""
     view = array.T if array.ndim == 2 else array.view()

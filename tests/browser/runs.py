@@ -41,6 +41,7 @@ class Body:
     def __post_init__(self) -> None:
         count, rng = len(self.radius), np.random.default_rng(self.seed)
         self.material = (np.arange(count) % 4 == 3).astype(np.uint32)
+        self.internal_temperature = 100.0 + np.arange(count, dtype=float)
         density = np.array([one.density for one in self.materials])[self.material]
         self.mass = density * 4.0 / 3.0 * np.pi * self.radius**3
         self.charge = np.zeros(count)

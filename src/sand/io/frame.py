@@ -39,7 +39,7 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput, shown
 from ..grains import Grains
-from ..schema import OWN
+from ..schema import OWN, own_values
 
 OPEN_MARGIN = 4.0
 """Length of an open axis in the box that the format requires, in diameters of the cloud of grains."""
@@ -87,7 +87,7 @@ def stored_frame(
         "bonds/share": np.column_stack([contacts[f"{mode}_share"] for mode in MODES]).astype(np.float32),
     }
     # absent where no grain has a value
-    frame.log |= {f"particles/{name}": values.copy() for name, values in grains.own().items() if values.any()}
+    frame.log |= {f"particles/{name}": values.copy() for name, values in own_values(grains).items()}
     if exact:
         frame.log["particles/position"] = np.ascontiguousarray(grains.position)
         frame.log["particles/radius"] = np.ascontiguousarray(grains.radius)
@@ -156,10 +156,6 @@ class Frame:
     def __len__(self) -> int:
         """Number of grains."""
         return len(self.radius)
-
-    def own(self) -> dict[str, np.ndarray]:
-        """The user's own quantities, for `Grains(own=…)`."""
-        return {name: getattr(self, name) for name in OWN}
 
 
 class NoSuchFrame(BadInput, IndexError):

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import checked
 from ..errors import BadInput, shown
 from ..grains import Grains
-from ..schema import OWN
+from ..schema import OWN, own_values
 from ..units import MOST, in_unit, si
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def turned(body: Grains, rotation: Rotation) -> Grains:
         spin=spin,
         moment=moment,
         charge=body.charge,
-        own=body.own(),
+        own=own_values(body),
         mass=body.mass,
     )
 

@@ -12,6 +12,7 @@ from ..box import Box
 from ..errors import BadInput, did_you_mean, refuse_other
 from ..grains import Grains
 from ..material import Material
+from ..schema import own_values
 from ..units import format_quantity
 
 APART = 1e-9
@@ -89,7 +90,7 @@ def from_frame(frame: Any, materials: Mapping[str, Material]) -> Start:
         spin=frame.spin,
         moment=frame.moment,
         charge=frame.charge,
-        own=frame.own(),
+        own=own_values(frame),
         mass=np.where(rounded, nominal, frame.mass),
     )
     moved = float(np.abs(frame.box.nearest(position - frame.position)).max())

@@ -16,10 +16,10 @@ from ..io import run_folder as files
 from ..io.live_trajectory import LiveTrajectory
 from ..plotting.palettes import colours, palettes
 from ..plotting.style import LARGEST_COLOURS
-from ..schema import BY_NAME
+from ..schema import BY_NAME, own_values
 from ..version import __version__
 from .dimensions import fit_dimension
-from .packets import frame_bytes, frame_packet, grains_packet, own_quantities
+from .packets import frame_bytes, frame_packet, grains_packet
 from .run_files import PROBLEM, LedgerReader, find_run_folder, read_summary, stale_note
 from .series import quantity_ranges, series_from_frames, series_from_ledger
 
@@ -86,7 +86,7 @@ class RunDataset:
         self.grains_count, self.materials = len(first), list(first.materials)
         self.unit = float(first.radius.mean())
         self.periodic = [length is not None for length in first.box.lengths]
-        self._grains, self.own = grains_packet(first, self.unit), list(own_quantities(first))
+        self._grains, self.own = grains_packet(first, self.unit), list(own_values(first))
         self._lineage = Lineage(self.grains_count, self.frames.pairs)
         self._largest: dict[str, int] | None = None
         self._ranges: tuple[int, dict[str, list[float]]] | None = None

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import BadInput
 from ..io.run_folder import plain
-from ..schema import OWN
+from ..schema import OWN, own_values
 
 MAGIC = b"SANDPKT1"
 TYPES: dict[str, np.dtype[Any]] = {
@@ -75,12 +75,6 @@ def _converted(name: str, array: np.ndarray, compact: bool) -> tuple[str, float,
     return "f2", scale, np.ascontiguousarray(values / scale, TYPES["f2"])
 
 
-def own_quantities(frame: Any) -> dict[str, np.ndarray]:
-    """The own quantities of the user of which a grain of the frame has a value."""
-    found = {name: np.asarray(getattr(frame, name, 0.0)) for name in OWN}
-    return {name: values for name, values in found.items() if values.any()}
-
-
 def grains_packet(frame: Any, unit: float) -> bytes:
     """Packet of the grain properties that do not change: radius, mass, material, charge and own quantities.
 
@@ -103,7 +97,7 @@ def grains_packet(frame: Any, unit: float) -> bytes:
         "mass": frame.mass,
         "material": frame.material.astype(np.uint8),
         "charge": frame.charge,
-        **own_quantities(frame),
+        **own_values(frame),
     }
     return encode({}, arrays)
 
