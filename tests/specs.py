@@ -99,7 +99,7 @@ def parts_of(plan: KernelSpec) -> str:
 @contextmanager
 def watched(use: Callable[[str | None, KernelSpec], None]) -> Iterator[None]:
     """Call `use(name, plan)` before a compiled driver takes steps."""
-    kept = engine.driver_for, engine.adaptive_driver_for
+    kept = engine.driver_for
 
     def wrapped(driver_for: Callable) -> Callable:
         def watched_driver_for(plan: KernelSpec) -> Callable:
@@ -114,8 +114,8 @@ def watched(use: Callable[[str | None, KernelSpec], None]) -> Iterator[None]:
 
         return watched_driver_for
 
-    engine.driver_for, engine.adaptive_driver_for = map(wrapped, kept)
+    engine.driver_for = wrapped(kept)
     try:
         yield
     finally:
-        engine.driver_for, engine.adaptive_driver_for = kept
+        engine.driver_for = kept

@@ -11,14 +11,11 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from ..arguments import MOST_GRAINS, MOST_SEED, MOST_STEPS
 from ..errors import did_you_mean
 from ..grains import moment_size
-from ..integrate.adaptive import Adaptive
+from ..integrate.registry import INTEGRATORS
 from ..integrate.verlet import Verlet
 from ..io.run_folder import checked_name
 from ..simulation.stop import duration
 from ..units import si
-
-INTEGRATORS: dict[str, type] = {"verlet": Verlet, "adaptive": Adaptive}
-"""Integrators by their `method` in [stepping]."""
 
 
 class Section(BaseModel):

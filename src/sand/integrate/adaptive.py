@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from ..arguments import checked
 from ..errors import FORBID_EXTRA, BadInput, shown
 from ..grains import Grains
 from ..units import is_word, si
+from .adaptive_driver import free_flight_for
+from .base import register
 from .step_control import StepCriteria
 from .verlet import Verlet
 
@@ -29,6 +32,7 @@ class ErrorLimits(NamedTuple):
     stride: float  # largest displacement of a grain in one step [m]
 
 
+@register
 @checked
 @dataclass(frozen=True)
 class Adaptive:
@@ -68,7 +72,8 @@ class Adaptive:
     contact_stepping: Verlet = field(default_factory=Verlet)
 
     __pydantic_config__ = FORBID_EXTRA
-    name = "adaptive"
+    name: ClassVar[str] = "adaptive"
+    flight_loop: ClassVar[Callable | None] = staticmethod(free_flight_for)
 
     def __post_init__(self) -> None:
         problems: list[str] = []
@@ -97,9 +102,11 @@ class Adaptive:
         auto = {key: self.tolerance * scale for key, scale in scales.items() if getattr(self, key) == "auto"}
         return replace(self, **auto)
 
-    def error_limits(self, stride: float) -> ErrorLimits:
-        """Limits for the driver, after `resolved`; `stride` is the largest displacement in one step [m]."""
-        return ErrorLimits(self.position_error, self.velocity_error, self.turn_error, self.spin_error, stride)
+    def flight_limits(self, longest_displacement: float) -> ErrorLimits:
+        """Limits for the driver, after `resolved`, with the largest displacement in one step [m]."""
+        return ErrorLimits(
+            self.position_error, self.velocity_error, self.turn_error, self.spin_error, longest_displacement
+        )
 
 
 def natural_scales(grains: Grains, criteria: StepCriteria) -> tuple[float, float, float, float]:

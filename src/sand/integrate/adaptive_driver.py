@@ -1,4 +1,4 @@
-"""The compiled driver of adaptive runs: Runge–Kutta steps while there are no contacts, velocity Verlet otherwise.
+"""Adaptive Runge–Kutta steps of grains without contacts.
 
 One Runge–Kutta step:  rebuild the Verlet list if stale → trial step → repeat with a shorter step if the error is too
 large → shorten the step to the first contact, if there is one → normalise orientations, wrap positions, log the work of
@@ -10,14 +10,13 @@ import math
 from collections.abc import Callable
 
 from ..box import nearest_image
-from ..compiler.jit import kernel, loop
+from ..compiler.jit import loop
 from ..forces.external.loops import external_energy, external_wrap
 from ..neighbours.cell_list import FULL, build_verlet_list
-from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement, reset_skins
+from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement
 from ..numerics.vec import dot, load, put
 from ..state.state import (
     CHECKED,
-    CONTACTS,
     CYCLE,
     FLIGHT,
     GRAIN1,
@@ -31,7 +30,6 @@ from ..state.state import (
     STEPS,
     TIME,
 )
-from .driver import half_steps_for
 from .event_location import NEVER, first_contact_time
 from .kernel_spec import KernelSpec, Stop
 from .runge_kutta import (
@@ -46,7 +44,6 @@ from .runge_kutta import (
 )
 from .step_control import INCREASE_INTERVAL, steps_of_free_grains
 from .step_parts import apply_drag_and_noise, no_gas
-from .task_queue import join_workers, no_workers
 
 ORDER = 5.0
 """The error of a step is proportional to this power of its length."""
@@ -81,7 +78,7 @@ def first_trial(grains, contacts, long_range, clock, count, parameters):
     for i in range(grains.mass.size):
         v = load(grains.velocity, i)
         fastest = max(fastest, dot(v, v))
-    stride = STRIDE_FRACTION * parameters.error_limits.stride
+    stride = STRIDE_FRACTION * parameters.flight_limits.stride
     if fastest * dt * dt > stride * stride:
         dt = stride / math.sqrt(fastest)
     return dt
@@ -114,7 +111,7 @@ def adaptive_step_for(spec: KernelSpec) -> Callable:
                 return 0.0, False, Stop.NO_STEP
             error, limiting_grain = math.inf, -1
             if try_step(grains, long_range, stages, count, parameters, clock[TIME], dt):
-                error, limiting_grain = error_ratio(stages, dt, parameters.error_limits)
+                error, limiting_grain = error_ratio(stages, dt, parameters.flight_limits)
             if not error <= 1.0:
                 count[GRAIN1], count[GRAIN2] = limiting_grain, -1
                 count[REJECTED] += 1
@@ -176,41 +173,3 @@ def free_flight_for(spec: KernelSpec) -> Callable:
         return Stop.NONE
 
     return free_flight
-
-
-@functools.cache
-def adaptive_driver_for(spec: KernelSpec) -> Callable:
-    """Compile the driver `advance` of an adaptive run; like `driver.driver_for`, with the array of stages."""
-    first_half, second_half = half_steps_for(spec)
-    free_flight = free_flight_for(spec)
-    join = join_workers if spec.queue else no_workers
-
-    @loop
-    def steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
-        """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
-        reset_skins(pair_list, count)
-        while True:
-            stop = Stop.NONE
-            if count[STAGE] == 0:
-                if clock[LEFT] == 0.0:
-                    if clock[TIME] >= until:
-                        return Stop.TIME_REACHED
-                    if count[STEPS] >= last:
-                        return Stop.NONE
-                if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
-                    stop = free_flight(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters)
-                else:
-                    stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop == Stop.NONE and count[STAGE] == 1:
-                stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop != Stop.NONE:
-                return stop
-
-    def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
-        stop = steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last)
-        join(parameters)
-        return stop
-
-    return kernel(
-        advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the adaptive time steps"
-    )

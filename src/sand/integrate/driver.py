@@ -182,7 +182,7 @@ def loads_and_kick_loop(spec: KernelSpec) -> Callable:
 def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
     """The two halves of a velocity Verlet step.
 
-    See `driver_for` for the step of length 0 at the start of a run.
+    See `verlet_driver_for` for the step of length 0 at the start of a run.
     """
     drift_with_work = drift_with_work_for(spec.external, large_loops(spec).drift)
     sum_loads, loads_and_kick = loads_loop(spec), loads_and_kick_loop(spec)
@@ -265,8 +265,8 @@ def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
 
 
 @functools.cache
-def driver_for(spec: KernelSpec) -> Callable:
-    """Compile the driver `advance` for one specification.
+def verlet_driver_for(spec: KernelSpec) -> Callable:
+    """Compile the driver `advance` of velocity Verlet for one specification.
 
     A run starts in the middle of a step of length 0 (STAGE 1): its second half builds the lists, finds grains that
     overlap already and sums the loads; its counters and energies are discarded.
@@ -298,3 +298,48 @@ def driver_for(spec: KernelSpec) -> Callable:
         return stop
 
     return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the time steps")
+
+
+@functools.cache
+def flight_driver_for(spec: KernelSpec) -> Callable:
+    """Compile the driver `advance` that takes steps of `spec.flight_loop` while there are no contacts.
+
+    Like `verlet_driver_for`, with the arrays of stages.
+    """
+    assert spec.flight_loop is not None
+    first_half, second_half = half_steps_for(spec)
+    free_flight = spec.flight_loop(spec)
+    join = join_workers if spec.queue else no_workers
+
+    @loop
+    def steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
+        """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
+        reset_skins(pair_list, count)
+        while True:
+            stop = Stop.NONE
+            if count[STAGE] == 0:
+                if clock[LEFT] == 0.0:
+                    if clock[TIME] >= until:
+                        return Stop.TIME_REACHED
+                    if count[STEPS] >= last:
+                        return Stop.NONE
+                if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
+                    stop = free_flight(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters)
+                else:
+                    stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
+            if stop == Stop.NONE and count[STAGE] == 1:
+                stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
+            if stop != Stop.NONE:
+                return stop
+
+    def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
+        stop = steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last)
+        join(parameters)
+        return stop
+
+    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the time steps")
+
+
+def driver_for(spec: KernelSpec) -> Callable:
+    """The compiled driver `advance` for one specification."""
+    return verlet_driver_for(spec) if spec.flight_loop is None else flight_driver_for(spec)

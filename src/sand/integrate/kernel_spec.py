@@ -35,7 +35,7 @@ class KernelSpec(NamedTuple):
     impulse: bool = False  # r-RESPA: long-range forces, less a constant part, as impulses at both ends of a cycle
     taylor: bool = False  # long-range forces extrapolated within a cycle by their first-order Taylor series
     gas: bool = False  # drag and Brownian kicks
-    adaptive: bool = False  # Runge–Kutta steps while there are no contacts
+    flight_loop: Callable | None = None  # steps while there are no contacts (base.Integrator); None: velocity Verlet
     queue: bool = False  # large loops in blocks that worker threads share
     keep: bool = True  # cache the compiled code on disk; False with formulas from outside SAND
     magnetic: bool = True  # some grain has a moment
@@ -93,5 +93,5 @@ class StepParameters(NamedTuple):
     external_work: ExternalWork
     gas: GasSettings
     criteria: Any  # step_control.StepCriteria
-    error_limits: Any = ()  # adaptive.ErrorLimits of Runge–Kutta steps
+    flight_limits: Any = ()  # of `KernelSpec.flight_loop`, such as adaptive.ErrorLimits
     queue: Any = ()  # task_queue.TaskQueue, if `KernelSpec.queue`

@@ -196,7 +196,7 @@ def trial_step_loops(external: Callable, long_range_loads: Callable) -> tuple[Ca
 
     @loop
     def try_step(grains, long_range, stages, count, parameters, begin, dt):
-        stride = parameters.error_limits.stride
+        stride = parameters.flight_limits.stride
         for s in range(1, STAGES):
             if not set_stage(grains, stages, s, dt) <= stride * stride:
                 return False

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from ..arguments import checked
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
+from ..grains import Grains
 from ..units import is_word, si, whole_number
+from .base import register
 from .kernel_spec import RespaSettings
 
 IMPULSE_PERIODS = 0.48
@@ -19,6 +22,7 @@ MAX_FAR_STEPS = 1_000_000
 FAR = ("every step", "impulse", "taylor", "taylor-literal")
 
 
+@register
 @checked
 @dataclass(frozen=True)
 class Verlet:
@@ -61,7 +65,8 @@ class Verlet:
     far_steps: Any = "auto"
 
     __pydantic_config__ = FORBID_EXTRA
-    name = "verlet"
+    name: ClassVar[str] = "verlet"
+    flight_loop: ClassVar[Callable | None] = None
 
     def __post_init__(self) -> None:
         problems: list[str] = []
@@ -96,6 +101,19 @@ class Verlet:
             "far": self.far,
             "far_steps": self.far_steps,
         }
+
+    @property
+    def contact_stepping(self) -> Verlet:
+        """Settings while grains are in contact: these."""
+        return self
+
+    def resolved(self, grains: Grains, criteria: Any) -> Verlet:
+        """These settings: the driver chooses the automatic step."""
+        return self
+
+    def flight_limits(self, longest_displacement: float) -> tuple[()]:
+        """None: grains without contacts are moved in the same way."""
+        return ()
 
     @property
     def max_cycle_steps(self) -> int:

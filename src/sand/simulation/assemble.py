@@ -15,7 +15,7 @@ from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
 from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
 from ..grains import Grains
-from ..integrate.adaptive import Adaptive
+from ..integrate.base import Integrator
 from ..integrate.kernel_spec import ContactParameters, ExternalWork, GasSettings, KernelSpec, StepParameters
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
 from ..integrate.task_queue import uses_task_queue
@@ -70,7 +70,7 @@ def build_engine(
     grains: Grains,
     forces: Sequence[Force],
     box: Box,
-    stepping: Verlet | Adaptive,
+    stepping: Integrator,
     neighbours: Neighbours,
     seed: int = 0,
     *,
@@ -97,13 +97,12 @@ def build_engine(
     by_type = _forces_by_type(forces, grains)
     pair_gap = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
-    flights = isinstance(stepping, Adaptive)
+    flights = stepping.flight_loop is not None
     found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], adaptive_steps=flights)
     long_range = _long_range_loops(by_type, grains, box, [found.search.listed and r is not None for r in cutoffs])
-    verlet = stepping.contact_stepping if isinstance(stepping, Adaptive) else stepping
+    verlet = stepping.contact_stepping
     control = _step_control(grains, verlet, by_type, pair_gap)
-    if isinstance(stepping, Adaptive):
-        stepping = stepping.resolved(grains, control)
+    stepping = stepping.resolved(grains, control)
     external, external_numbers = compose(by_type.external)
     sums, long_range_numbers = compose_long_range([own for _, own, _ in long_range], [own for _, _, own in long_range])
     parameters = StepParameters(
@@ -116,9 +115,9 @@ def build_engine(
         _external_work(by_type.external, box),
         _gas_settings(by_type.gas, grains, seed),
         control,
-        stepping.error_limits(_longest_displacement(grains, box, found)) if isinstance(stepping, Adaptive) else (),
+        stepping.flight_limits(_longest_displacement(grains, box, found)),
     )
-    spec = _kernel_spec(grains, by_type, external, sums, verlet, isinstance(stepping, Adaptive))
+    spec = _kernel_spec(grains, by_type, external, sums, stepping)
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
@@ -155,9 +154,10 @@ def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
 
 
 def _kernel_spec(
-    grains: Grains, forces: ForcesByType, external: Callable, sums: LongRangeSums, verlet: Verlet, adaptive: bool
+    grains: Grains, forces: ForcesByType, external: Callable, sums: LongRangeSums, stepping: Integrator
 ) -> KernelSpec:
     """Specification from which the driver is compiled."""
+    verlet = stepping.contact_stepping
     # without contacts, or with cycles of one step, there is neither extrapolation nor a constant force
     scheme = verlet.far if forces.long_range and forces.contact and verlet.max_cycle_steps > 1 else "every step"
     law = (forces.contact or Contact()).contact_law
@@ -169,7 +169,7 @@ def _kernel_spec(
         impulse=scheme == "impulse",
         taylor=scheme.startswith("taylor"),
         gas=bool(forces.gas),
-        adaptive=adaptive,
+        flight_loop=stepping.flight_loop,
         queue=uses_task_queue(len(grains)),
         keep=is_builtin(law.force) and all(is_builtin(f.formula) for f in forces.external),
         magnetic=bool(grains.body_moment.any()),
@@ -189,7 +189,7 @@ def _new_state(
     needed |= set(RESPA_ARRAYS if spec.impulse else ())
     needed |= set(RATE_ARRAYS if spec.taylor else ())
     needed |= {"packed_position", "source"} if blocks else set()
-    needed |= set(FORCE_ARRAYS if spec.long_range is not NO_LONG_RANGE_FORCE or spec.adaptive else ())
+    needed |= set(FORCE_ARRAYS if spec.long_range is not NO_LONG_RANGE_FORCE or spec.flight_loop else ())
     return State(
         grains,
         box,
@@ -203,7 +203,7 @@ def _new_state(
             blocks,
             unused={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
-        stages=stage_arrays(count if spec.adaptive else 0),
+        stages=stage_arrays(count if spec.flight_loop else 0),
         uniform_contacts=uniform_contacts,
     )
 

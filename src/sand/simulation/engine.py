@@ -15,13 +15,11 @@ from ..contact.law import ContactLaw
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.loops import external_energies_for
 from ..forces.pair.loops import long_range_energies_for
-from ..integrate.adaptive import Adaptive
-from ..integrate.adaptive_driver import adaptive_driver_for
+from ..integrate.base import Integrator
 from ..integrate.driver import driver_for
 from ..integrate.kernel_spec import KernelSpec, StepParameters, Stop
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, worker_loops
-from ..integrate.verlet import Verlet
 from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
@@ -63,7 +61,7 @@ class Engine:
         Long-range forces that act on at least one grain, with their loops and numbers.
     search : str
         Description of the neighbour search and the reason for its choice.
-    stepping : Verlet or Adaptive
+    stepping : Integrator
         The integrator, with all automatic settings resolved.
     neighbours : Neighbours
         Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
@@ -75,7 +73,7 @@ class Engine:
     external: Sequence[ExternalForce]
     long_range: Sequence[tuple[LongRangeForce, Any, Any]]
     search: str
-    stepping: Verlet | Adaptive
+    stepping: Integrator
     neighbours: Neighbours
     _kernel_spec: KernelSpec
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
@@ -83,9 +81,7 @@ class Engine:
     _workers: WorkerThreads | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self._advance = (
-            adaptive_driver_for(self._kernel_spec) if self._kernel_spec.adaptive else driver_for(self._kernel_spec)
-        )
+        self._advance = driver_for(self._kernel_spec)
         if self._kernel_spec.queue:
             self._workers = WorkerThreads(worker_loops(self._kernel_spec)[1])
 
@@ -149,7 +145,7 @@ class Engine:
         """Take steps up to a time [s] or a step, in the present order of the arrays; enlarges arrays that overflow."""
         state = self._state
         while True:
-            stages = (state.stages,) if self._kernel_spec.adaptive else ()
+            stages = (state.stages,) if self._kernel_spec.flight_loop else ()
             arrays = (
                 state.grains.arrays,
                 state.contacts,

@@ -16,8 +16,9 @@ from ..errors import BadInput, FilesFailed, Interrupted, warn
 from ..forces.base import Force
 from ..forces.pair.dipoles import kinetic_temperature
 from ..grains import Grains
-from ..integrate.adaptive import Adaptive
+from ..integrate.base import Integrator
 from ..integrate.kernel_spec import Stop
+from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
@@ -57,7 +58,7 @@ class Simulation(ReadOnlySettings):
         Forces such as `[sand.Contact(), sand.Dipoles()]`, each type at most once; or a single force.
     box : Box or float or str, optional
         A box, or the side length of a periodic cube; open by default.
-    stepping : Verlet or Adaptive or None, optional
+    stepping : Integrator or None, optional
         Integrator: `sand.Verlet()`, the default, or `sand.Adaptive()`.
     neighbours : Neighbours or None, optional
         Settings of the neighbour search, `sand.Neighbours()` by default.
@@ -88,7 +89,7 @@ class Simulation(ReadOnlySettings):
         forces: Sequence[Force] | Force = (),
         *,
         box: Any = None,
-        stepping: Verlet | Adaptive | None = None,
+        stepping: Integrator | None = None,
         neighbours: Neighbours | None = None,
         seed: int | None = None,
         out: str | Path | None = None,
@@ -107,7 +108,8 @@ class Simulation(ReadOnlySettings):
         self.origin = ""  # description of the file that the grains come from
         self.planned = (math.inf, math.inf)  # planned end of a resumed run: time [s] and step
         self.start = grains.copy()
-        parts = (grains, self.forces, self.box, stepping or Verlet(), self.neighbours, int(self.seed or 0))
+        integrator = Verlet() if stepping is None else checked_integrator(stepping)
+        parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
         self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
         self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
         self.temperature = kinetic_temperature(grains)
