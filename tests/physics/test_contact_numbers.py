@@ -12,7 +12,7 @@ from sand.contact.jkr import normal_stiffness, rest_overlap, rest_radius
 from sand.contact.law import contact_constants
 
 from .setups import Imposed, random_aggregate, rest_distance
-from .test_magnetics import swing
+from .test_magnetic_dynamics import swing
 
 LAW = sand.Contact()
 MATERIALS = {m.name: m for m in (sand.ICE, sand.SILICA, sand.IRON)}

@@ -13,7 +13,7 @@ from sand.cli.main import main
 from sand.viewer import browser
 
 from .pages import blocks
-from .reels import reel
+from .synthetic_trajectories import reel
 
 pytestmark = pytest.mark.usefixtures("bundle")
 

@@ -7,7 +7,7 @@ from sand.plotting.palettes import SEQUENTIAL
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import LARGEST_COLOURS, SINGLE_COLOUR, rgb
 
-from .stills import R, alike, at_pixel, frame_of
+from .synthetic_frames import R, alike, at_pixel, frame_of
 
 
 @pytest.mark.slow

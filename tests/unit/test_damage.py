@@ -18,7 +18,7 @@ from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import Frames, TrajectoryWriter, read_frames
 from sand.viewer.dataset import run_dataset
 
-from .reels import grains_of, reel
+from .synthetic_trajectories import grains_of, reel
 
 COLUMNS = ("step", "time", "translation", "normal", "lost_forming", "total", "momentum_x", "contacts")
 

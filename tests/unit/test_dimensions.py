@@ -6,7 +6,7 @@ import sand
 from sand.viewer.dataset import run_dataset
 from sand.viewer.dimensions import Dimensions
 
-from .reels import reel
+from .synthetic_trajectories import reel
 
 
 def test_dimensions(tmp_path, monkeypatch):

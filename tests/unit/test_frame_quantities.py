@@ -7,7 +7,7 @@ import sand
 from sand.box import Box
 from sand.io.trajectory import TrajectoryWriter, read_frames
 
-from .reels import contacts_of
+from .synthetic_trajectories import contacts_of
 
 SINGLE = 6e-8
 """Half a unit of the last place of float32, in which the format holds most numbers."""

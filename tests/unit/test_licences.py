@@ -9,7 +9,7 @@ from sand.io.page_bundle import PAGE, read_bundle
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 
-from .reels import reel
+from .synthetic_trajectories import reel
 
 HOLDERS = {
     "three": "three.js authors",

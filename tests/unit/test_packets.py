@@ -9,7 +9,7 @@ from sand.io.trajectory import Frames
 from sand.viewer.packets import encode, frame_bytes, frame_packet, grains_packet
 
 from .pages import decode
-from .reels import reel
+from .synthetic_trajectories import reel
 
 
 @pytest.fixture(scope="module")

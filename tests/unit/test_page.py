@@ -15,7 +15,7 @@ from sand.viewer.dataset import run_dataset
 from sand.viewer.html import frame_slice, frame_stride, write_page
 
 from .pages import blocks, decode, elements
-from .reels import reel
+from .synthetic_trajectories import reel
 
 pytestmark = pytest.mark.usefixtures("bundle")
 

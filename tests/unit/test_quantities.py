@@ -6,7 +6,7 @@ import pytest
 from sand.analysis.quantities import GRAIN_NAMES, cluster_rank, measured, quantity
 from sand.errors import BadInput
 
-from .stills import R, frame_of
+from .synthetic_frames import R, frame_of
 
 
 def test_quantities_are_what_they_say():

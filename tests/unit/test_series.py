@@ -8,7 +8,7 @@ from sand.analysis.ledger_columns import LedgerColumns
 from sand.viewer.dataset import run_dataset
 from sand.viewer.series import MAX_POINTS, evenly_spaced, series_from_ledger
 
-from .reels import reel
+from .synthetic_trajectories import reel
 
 
 @pytest.mark.compiled("fields")

@@ -14,7 +14,7 @@ from sand.viewer.dataset import run_dataset
 from sand.viewer.server import Server
 
 from .pages import decode
-from .reels import reel
+from .synthetic_trajectories import reel
 
 BUNDLE = ("console.log(1)\n", "body {}\n")
 

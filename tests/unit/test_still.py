@@ -14,7 +14,7 @@ from sand.plotting.render.scene import camera_rotation
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import rgb
 
-from .stills import R, alike, at_pixel, frame_of
+from .synthetic_frames import R, alike, at_pixel, frame_of
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 `become_windows()` takes away the names that Python does not have there, and lets files behave as they do there:
 a folder cannot be opened, a file that is open for reading only cannot be synced, and a file that this process has
-open can be neither replaced nor removed. With `-p tests.elsewhere` pytest runs any tests in such a Python.
+open can be neither replaced nor removed. With `-p tests.windows_emulation` pytest runs any tests in such a Python.
 """
 
 from __future__ import annotations

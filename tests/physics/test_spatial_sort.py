@@ -10,7 +10,7 @@ from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
 from sand.simulation import engine as engines
 from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 
-from .test_sameness import state
+from .test_reproducibility import state
 
 BY_PLACE = ("order", "packed_position", "source", "block_sums", "cell_of")
 """Far arrays that belong to the list, or are filled by each sum."""

@@ -19,7 +19,7 @@ from sand.viewer.external_field import read_field
 from sand.viewer.series import EXTREMES, PERCENTILES
 
 from .pages import decode
-from .reels import append, contacts_of, reel
+from .synthetic_trajectories import append, contacts_of, reel
 
 KEYS = [
     "format",

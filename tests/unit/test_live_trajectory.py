@@ -4,7 +4,7 @@ import pytest
 
 from sand.io.live_trajectory import LiveTrajectory
 
-from .reels import reel
+from .synthetic_trajectories import reel
 
 
 def test_following_is_a_sequence(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 TOP = Path(__file__).parents[2]
 BEGIN = """
 import importlib, pathlib, pkgutil, sys, warnings
-from tests.elsewhere import become_windows
+from tests.windows_emulation import become_windows
 become_windows()
 for package in ("sand", "tests", "benchmarks"):
     warnings.filterwarnings("error", "'encoding' argument not specified", EncodingWarning, rf"{package}\\.")
