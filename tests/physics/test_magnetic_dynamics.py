@@ -1,4 +1,4 @@
-"""Moments in fields: frequencies, energies, and the order of the integrator."""
+"""Magnetic moments in fields: frequencies, energies, and the order of the integrator."""
 
 import math
 
@@ -11,8 +11,8 @@ from sand.constants import MAGNETIC
 from .setups import rest_distance
 
 
-def constant(flux_density):
-    """A field that stays as it is, by the formula of fields that change."""
+def constant_field(flux_density):
+    """A constant field, computed by the formula of time-dependent fields."""
     return sand.Field(flux_density, shape="ramp", final=flux_density, end="1 s")
 
 
@@ -24,8 +24,8 @@ def period_of(signal, time):
     return np.diff(crossings).mean()
 
 
-class Watch(sand.Observer):
-    """Notes one number at every frame."""
+class Recorder(sand.Observer):
+    """Records one number per frame."""
 
     def __init__(self, what):
         self.what, self.time, self.value = what, [], []
@@ -35,30 +35,30 @@ class Watch(sand.Observer):
         self.value.append(self.what(simulation))
 
 
-def swing(grains, forces, what, period, periods=6.2, **options):
-    """The measured period of `what`, with 400 frames per expected one."""
-    watch = Watch(what)
+def measured_period(grains, forces, what, period, periods=6.2, **options):
+    """Period of `what`, recorded with 400 frames per expected period."""
+    watch = Recorder(what)
     sim = sand.Simulation(grains, forces, observers=[watch], frame_every=period / 400, **options)
     sim.run(until=periods * period)
     return period_of(np.array(watch.value), np.array(watch.time)), sim
 
 
 @pytest.mark.validate
-def test_a_single_grain_swings_about_the_field():
-    """ω = √(μB/I) for small angles; the pendulum's θ²/16 (1e-5 here) and Verlet's (ω dt)²/24 stay below 1e-4."""
+def test_oscillation_of_one_grain_in_a_field():
+    """ω = √(μB/I) for small angles; pendulum correction θ²/16 (1e-5) and Verlet's (ω dt)²/24 stay below 1e-4."""
     tilt = 0.01
     size = 200 * sand.IRON.density * 4 / 3 * math.pi * 1e-24
     moment = [[size * math.sin(tilt), 0.0, size * math.cos(tilt)]]
     grains = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=moment)
     expected = 2 * math.pi / math.sqrt(size * 1e-3 / grains.inertia[0])
-    found, sim = swing(grains, [sand.Field("1 mT")], lambda s: s.grains.moment[0, 0], expected)
+    found, sim = measured_period(grains, [sand.Field("1 mT")], lambda s: s.grains.moment[0, 0], expected)
     assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
     assert sim.ledger.drift < 1e-4
 
 
 @pytest.mark.compiled("dipoles")
-def test_two_far_grains_swing_in_each_others_field():
-    """Head to tail, both tilted alike: I θ¨ = −3 (kμ²/D³) θ; tilted oppositely −1; D = 1e4 r holds them still."""
+def test_oscillation_of_two_distant_dipoles():
+    """Head to tail, same tilt: I θ¨ = −3 (kμ²/D³) θ; opposite tilt: −1; at D = 1e4 r the forces are negligible."""
     r, tilt = 1e-8, 0.01
     size = 200 * sand.IRON.density * 4 / 3 * math.pi * r**3
     apart = 10_000 * r
@@ -66,7 +66,7 @@ def test_two_far_grains_swing_in_each_others_field():
         moment = size * np.array([[math.cos(tilt), math.sin(tilt), 0], [math.cos(tilt), sign * math.sin(tilt), 0]])
         grains = sand.Grains([[0, 0, 0], [apart, 0, 0]], r, sand.IRON, moment=moment)
         expected = 2 * math.pi / math.sqrt(factor * MAGNETIC * size**2 / apart**3 / grains.inertia[0])
-        found, _ = swing(
+        found, _ = measured_period(
             grains,
             [sand.Contact(), sand.Dipoles(cutoff="1 cm")],
             lambda s: s.grains.moment[0, 1],
@@ -77,18 +77,18 @@ def test_two_far_grains_swing_in_each_others_field():
 
 
 @pytest.mark.compiled("fields")
-def test_a_quiet_bound_pair_turns_about_the_field():
-    """Two touching grains, moments along their axis, as one body: ω = √(2μB/I), I = 2 (2/5 m r² + m (D/2)²).
+def test_oscillation_of_a_bound_pair_in_a_field():
+    """Two grains in contact, moments along the axis, as a rigid body: ω = √(2μB/I), I = 2 (2/5 m r² + m (D/2)²).
 
-    The contact bends by (ω/ω_roll)² ~ 1e-9; contact steps are 1e4 times shorter than the swing, so only one.
+    The contact bends by (ω/ω_roll)² ~ 1e-9.  Contact steps are 1e4 times shorter than the period: one case only.
     """
     r, m, tilt = 1e-8, sand.IRON, 0.02
     d = rest_distance(m, r, r)
     axis = np.array([math.cos(tilt), math.sin(tilt), 0.0])
     size = 200 * m.density * 4 / 3 * math.pi * r**3
     field = 0.2
-    # start where contact and magnetic pull balance: let it ring and settle is not possible undamped, so
-    # measure the swing of the axis, which ringing along the axis does not touch
+    # the pair vibrates along its axis, as the start is not exactly the equilibrium and nothing damps it:
+    # measure the oscillation of the axis, which this vibration does not affect
     grains = sand.Grains([-0.5 * d * axis, 0.5 * d * axis], r, m, moment=size * np.array([axis, axis]))
     inertia = 2 * (grains.inertia[0] + grains.mass[0] * (d / 2) ** 2)
     expected = 2 * math.pi / math.sqrt(2 * size * field / inertia)
@@ -97,16 +97,20 @@ def test_a_quiet_bound_pair_turns_about_the_field():
         x = sim.grains.position
         return math.atan2(x[1, 1] - x[0, 1], x[1, 0] - x[0, 0])
 
-    found, _ = swing(
-        grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), constant([field, 0, 0])], angle, expected, periods=4.2
+    found, _ = measured_period(
+        grains,
+        [sand.Contact(), sand.Dipoles(cutoff="1 um"), constant_field([field, 0, 0])],
+        angle,
+        expected,
+        periods=4.2,
     )
-    # the pull of the dipoles shortens D by ~1e-5 of itself; pendulum: tilt²/16 = 2.5e-5
+    # dipole attraction shortens D by a fraction of ~1e-5; pendulum correction: tilt²/16 = 2.5e-5
     assert found == pytest.approx(expected, rel=1e-4, abs=0.0)
 
 
-def final_state(step, world):
+def final_state(step, system):
     """Positions and moments after a fixed time with a fixed step."""
-    grains, forces, end = world
+    grains, forces, end = system
     sim = sand.Simulation(grains, forces, stepping=sand.Verlet(step=step))
     sim.run(steps=round(end / step))
     return np.concatenate([sim.grains.position.ravel() / 1e-8, sim.grains.orientation.ravel()])
@@ -121,10 +125,10 @@ def free_pair():
         moment=6.6e-18 * np.eye(3)[:2],
         spin=1e7 * rng.normal(size=(2, 3)),
     )
-    return grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), constant([0, 0, 0.01])], 3.2e-8
+    return grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), constant_field([0, 0, 0.01])], 3.2e-8
 
 
-def ringing_pair():
+def vibrating_pair():
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)
     grains = sand.Grains(
         [[0, 0, 0], [d, 0, 0]], 1e-7, sand.SILICA,
@@ -134,18 +138,18 @@ def ringing_pair():
 
 
 @pytest.mark.compiled("fields", "contacts")
-@pytest.mark.parametrize(("world", "step"), [(free_pair, 8e-11), (ringing_pair, 2e-12)])
-def test_the_integrator_is_of_order_two(world, step):
-    """Halving a fixed step quarters the error against a step 16 times finer: order 1.8 … 2.2."""
-    exact = final_state(step / 16, world())
-    errors = [np.abs(final_state(step / n, world()) - exact).max() for n in (1, 2)]
-    # the reference itself errs by 1/256 and 1/64 of the two
+@pytest.mark.parametrize(("system", "step"), [(free_pair, 8e-11), (vibrating_pair, 2e-12)])
+def test_the_integrator_is_of_order_two(system, step):
+    """Halving a fixed step quarters the error against a step 16 times shorter: order 1.8 … 2.2."""
+    exact = final_state(step / 16, system())
+    errors = [np.abs(final_state(step / n, system()) - exact).max() for n in (1, 2)]
+    # the error of the reference is 1/256 and 1/64 of the two errors
     assert 1.8 < math.log2(errors[0] / errors[1]) < 2.2
 
 
 @pytest.mark.compiled("dipoles", "small")
 def test_loads_against_brute_force_with_images():
-    """Periodic box with a cut-off: forces, torques, energy against a plain double loop in NumPy."""
+    """Periodic box with a cut-off: forces, torques, energy against a double loop in NumPy."""
     box = sand.Box.periodic("0.3 um", "0.25 um", None)
     rng = np.random.default_rng(9)
     position = rng.uniform(-0.12e-6, 0.12e-6, size=(25, 3))

@@ -1,4 +1,4 @@
-"""The same start gives the same bits, however it is watched, cut up, interrupted or compiled."""
+"""Reproducibility: the same bits for any output interval, split, restart, thread count and array size."""
 
 import os
 import subprocess
@@ -23,13 +23,13 @@ def gas_simulation(**options):
 
 
 def state(sim):
-    """All numbers of the world, as bytes."""
+    """All arrays of the state, as bytes."""
     return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
 @pytest.mark.compiled("dipoles")
-def test_output_cadence_changes_nothing():
-    """Frames each 0.1 ns, each 7 ns, or none: the same bits after 20,000 steps, contacts included."""
+def test_the_frame_interval_changes_no_bit():
+    """Frames every 0.1 ns, every 7 ns and none: the same bits after 20,000 steps, contacts included."""
     ends = []
     for every in ("0.1 ns", "7 ns", "1 s"):
         sim = gas_simulation(frame_every=every)
@@ -40,19 +40,19 @@ def test_output_cadence_changes_nothing():
 
 
 @pytest.mark.compiled("dipoles")
-def test_running_in_pieces_changes_nothing():
-    """One run equals many short ones; an observer that reads everything in between changes nothing.
+def test_split_runs_and_observers_change_no_bit():
+    """One run equals many short runs with an observer that reads loads, contacts and grains.
 
-    Each run ends with a cycle of the long-range forces; so does the last piece.
+    Each run ends at the end of an r-RESPA cycle; so does the last short run.
     """
 
-    class Curious(sand.Observer):
+    class Reader(sand.Observer):
         def see(self, simulation, row):
             simulation.loads()
             simulation.contacts["overlap"].sum()
             simulation.grains.position.sum()
 
-    whole, pieces = gas_simulation(), gas_simulation(observers=[Curious()], frame_every="1 ns")
+    whole, pieces = gas_simulation(), gas_simulation(observers=[Reader()], frame_every="1 ns")
     for steps in (1, 2, 997, 4000, 5000, 10_000):
         pieces.run(steps=steps)
     whole.run(steps=int(pieces.state.steps))
@@ -62,10 +62,10 @@ def test_running_in_pieces_changes_nothing():
 
 
 @pytest.mark.compiled("listed")
-def test_a_listed_run_goes_on_from_its_saved_state():
-    """The list is made from the anchors in the saved state: cut where it is old, and the same bits come out.
+def test_restart_with_an_old_pair_list_is_bit_for_bit():
+    """A restart between two list builds gives the same bits: lists are rebuilt from saved anchor positions.
 
-    As they do from a list that had to grow first.
+    A list whose arrays must grow first gives the same bits, too.
     """
 
     def start(**options):
@@ -82,8 +82,8 @@ def test_a_listed_run_goes_on_from_its_saved_state():
         options |= {"neighbours": sand.Neighbours(margin="20 nm")}
         return sand.Simulation(grains, forces, box="1.2 um", seed=2, **options)
 
-    whole, cramped = start(), start()
-    cramped.state.long_range = cramped.state.long_range._replace(neighbour=np.zeros(16, np.uint32))
+    whole, small_arrays = start(), start()
+    small_arrays.state.long_range = small_arrays.state.long_range._replace(neighbour=np.zeros(16, np.uint32))
     assert whole._engine.parameters.search.listed
     whole.run(steps=3000)
     saved = {name: array.copy() for name, array in whole.state.to_arrays().items()}
@@ -93,25 +93,25 @@ def test_a_listed_run_goes_on_from_its_saved_state():
     again = start(restart=(saved, {"temperature": 3e5, "wall_seconds": 0.0}))
     again.run(steps=6000)
     assert state(whole) == state(again)
-    cramped.run(steps=9000)
-    assert state(whole) == state(cramped)
+    small_arrays.run(steps=9000)
+    assert state(whole) == state(small_arrays)
 
 
 @pytest.mark.compiled("contacts")
-def test_growing_arrays_changes_nothing():
-    """With room for 16 contacts and pairs or for many, with constants for all or for each: the same bits."""
+def test_array_sizes_change_no_bit():
+    """Initial room for 16 or 4096 contacts and pairs, constants shared or per contact: the same bits."""
     from sand.contact.columns import constant_names
     from sand.contact.jkr import LAW
     from sand.state.arrays import UNIFORM_ARRAYS, empty_contact_arrays, empty_pair_list
 
     ends = []
-    for room, alike in ((16, True), (4096, True), (16, False), (4096, False)):
+    for room, uniform in ((16, True), (4096, True), (16, False), (4096, False)):
         sim = struck_chain(length=30, offset=0.2)
         n = len(sim.grains)
-        sim.state.contacts = empty_contact_arrays(n, room, len(constant_names(LAW)), uniform_contacts=alike)
-        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=alike), alike
+        sim.state.contacts = empty_contact_arrays(n, room, len(constant_names(LAW)), uniform_contacts=uniform)
+        sim.state.pair_list, sim.state.uniform_contacts = empty_pair_list(n, room, uniform_contacts=uniform), uniform
         rules = sim._engine.parameters
-        sim._engine.parameters = rules._replace(contact=rules.contact._replace(uniform_contacts=alike))
+        sim._engine.parameters = rules._replace(contact=rules.contact._replace(uniform_contacts=uniform))
         sim.run(until=1e-9)
         ends.append({name: bits for name, bits in state(sim).items() if name.partition("/")[2] not in UNIFORM_ARRAYS})
     assert sim.state.count[CONTACTS] > 16
@@ -120,7 +120,10 @@ def test_growing_arrays_changes_nothing():
 
 @pytest.mark.compiled("dipoles")
 def test_a_frame_is_the_first_step_at_or_after_its_time():
-    """Steps are never bent: frames come late by less than one step, or cycle of steps, and carry their true time."""
+    """Steps are not shortened for frames: a frame is late by less than a step or r-RESPA cycle.
+
+    Each frame stores its true time.
+    """
     seen = []
 
     class Note(sand.Observer):
@@ -135,7 +138,7 @@ def test_a_frame_is_the_first_step_at_or_after_its_time():
 
 @pytest.mark.compiled("dipoles")
 def test_resume_is_bit_for_bit(tmp_path):
-    """A run stopped at 7,000 steps and resumed equals the uninterrupted one: state, ledger, trajectory."""
+    """A run stopped after 7,000 steps and resumed equals the uninterrupted run: state, ledger, trajectory."""
     whole = gas_simulation(out=tmp_path / "whole", frame_every="5 ns")
     whole.run(until="60 ns")
     first = gas_simulation(out=tmp_path / "parts", frame_every="5 ns")
@@ -166,8 +169,11 @@ np.savez(sys.argv[1], position=sim.grains.position, spin=sim.grains.spin, lost=s
 
 @pytest.mark.slow
 @pytest.mark.interpreted
-def test_the_compiler_changes_nothing_but_rounding(tmp_path):
-    """120 steps of a breaking, rolling aggregate with the compiler off: equal to 1e-10 (rounding, amplified)."""
+def test_compiled_and_interpreted_runs_agree_to_rounding(tmp_path):
+    """120 steps of an aggregate with breaking and rolling contacts, compiled and interpreted: equal to 1e-10.
+
+    The tolerance is rounding (1e-16), amplified by the collisions.
+    """
     ends = []
     for name, off in (("compiled", "0"), ("plain", "1")):
         env = os.environ | {"NUMBA_DISABLE_JIT": off}
@@ -182,7 +188,7 @@ def test_the_compiler_changes_nothing_but_rounding(tmp_path):
 
 @pytest.mark.compiled("contacts")
 def test_kernels_against_plain_python_loops():
-    """Pair list, contacts and gather of a random aggregate against double loops written out in NumPy."""
+    """Pair list, contact loads and gather against double loops in NumPy, to 1e-9 of the largest load."""
     from sand.contact import jkr, mechanics
     from sand.contact.columns import column_loops
 
@@ -221,8 +227,8 @@ def test_kernels_against_plain_python_loops():
 
 
 @pytest.mark.validate
-def test_the_number_of_threads_changes_nothing():
-    """A lattice of 1000 grains that spin: most contacts move in each step, some break. The same for 1, 2, 3 threads."""
+def test_the_number_of_threads_changes_no_bit():
+    """A lattice of 1000 spinning grains with slipping and breaking contacts: the same bits with 1, 2 and 3 threads."""
     radius, rng = 1e-8, np.random.default_rng(5)
     place = np.stack(np.meshgrid(*[np.arange(10)] * 3, indexing="ij"), -1).reshape(-1, 3)
     place = rest_distance(sand.SILICA, radius, radius) * place

@@ -1,4 +1,4 @@
-"""Cycles of several steps between two sums of the long-range forces."""
+"""r-RESPA: several contact steps per evaluation of the long-range forces."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ MOMENT = 200.0  # A m²/kg
 
 
 def chain(ringing, far="impulse", far_steps=70, length=20, seed=3, step="auto", others=()):
-    """A straight chain of 20 nm iron grains: calm at its rest distance, or touching just so, with moments askew."""
+    """A straight chain of 20 nm iron grains with tilted moments, in equilibrium or just in contact (`ringing`)."""
     distance = 2e-8 - 1e-16 if ringing else rest_distance(sand.IRON, 1e-8, 1e-8)
     position = np.zeros((length, 3))
     position[:, 0] = distance * np.arange(length)
@@ -27,7 +27,7 @@ def chain(ringing, far="impulse", far_steps=70, length=20, seed=3, step="auto", 
 
 
 def energy_error(sim, steps=100_000, looks=20):
-    """Largest change of the total [J] over the steps."""
+    """Largest change of the total energy [J] during the steps."""
     for _ in range(looks):
         sim.run(steps=steps // looks)
     total = sim.ledger["total"]
@@ -36,11 +36,12 @@ def energy_error(sim, steps=100_000, looks=20):
 
 @pytest.mark.validate
 @pytest.mark.parametrize("ringing", [True, False])
-def test_cycles_cost_little_energy(ringing):
-    """A freshly stuck chain and a calm one, 1e5 steps: energy error with k_max = 70 and 12 at most 10 × that of k = 1.
+def test_energy_error_of_long_cycles(ringing):
+    """A ringing and a relaxed chain, 1e5 steps: energy error with k_max = 70 and 12 at most 10 × that with k = 1.
 
-    k = 1 errs by Verlet's (ω dt)²/8 of the ringing.  Cycles of 2.8 contact periods add the far loads' own change
-    within a cycle, second order in it; measured: 1.5 × and 0.9 × (plain impulses without a held part: 600 × when calm).
+    With k = 1 the error is Verlet's (ω dt)²/8 of the ringing energy.  A cycle of 2.8 contact periods adds the change of
+    the long-range force within a cycle, second order in its length; measured: 1.5 × (ringing) and 0.9 × (relaxed).
+    Plain impulses without an extrapolated force give 600 × for the relaxed chain.
     """
     every, usual, long = chain(ringing, "every step"), chain(ringing, far_steps="auto"), chain(ringing)
     error1, error12, error70 = energy_error(every), energy_error(usual), energy_error(long)
@@ -50,8 +51,8 @@ def test_cycles_cost_little_energy(ringing):
     assert error12 < 10.0 * error1
 
 
-def test_the_usual_cycle_stays_below_half_a_period():
-    """0.48 of the steps per period; the paper's 70 for the Taylor series; the user's own otherwise."""
+def test_default_cycle_is_below_half_a_contact_period():
+    """Default cycle: 0.48 of the steps per period; for the paper's Taylor series 70 steps; a given number is kept."""
     found = [sand.Verlet(n).max_cycle_steps for n in (10, 25, 100)]
     assert found == [4, 12, 48]
     assert sand.Verlet(far="taylor").max_cycle_steps == 70
@@ -60,15 +61,15 @@ def test_the_usual_cycle_stays_below_half_a_period():
 
 
 @pytest.mark.validate
-def test_taylor_series_drift():
-    """The literal Taylor series of a ringing chain misplaces its loads: its energy error is far above the default's."""
+def test_energy_drift_of_the_taylor_series():
+    """The paper's Taylor series of the long-range force of a ringing chain drifts far more in energy than r-RESPA."""
     errors = {far: energy_error(chain(True, far), 20_000, 4) for far in ("impulse", "taylor", "taylor-literal")}
     assert errors["impulse"] < 0.3 * errors["taylor"] < 0.3 * errors["taylor-literal"]
 
 
 @pytest.mark.validate
-def test_a_cycle_of_one_step_is_every_step():
-    """k_max = 1: the same bits as summing in every step, whichever way."""
+def test_a_cycle_of_one_step_equals_summing_in_every_step():
+    """k_max = 1 gives the same bits with every option for the long-range force."""
     ends = [chain(True, far, 1, length=5) for far in ("every step", "impulse", "taylor-literal")]
     for sim in ends:
         sim.run(steps=500)
@@ -79,8 +80,8 @@ def test_a_cycle_of_one_step_is_every_step():
 
 
 @pytest.mark.validate
-def test_cycles_converge():
-    """Positions of a ringing chain after 20 ps × 70 against k = 1: the difference falls as the square of k."""
+def test_cycles_converge_with_order_two():
+    """Positions of a ringing chain after 20 ps × 70 against those for k = 1: the difference falls as k²."""
     ends = {}
     for k in (1, 8, 16):
         sim = chain(True, "impulse" if k > 1 else "every step", k, length=6)
@@ -96,8 +97,8 @@ def test_cycles_converge():
 
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize(("longer", "sums"), [(1.0, 1 / 12), (3.0, 1 / 4), (0.5, 1 / 12)])
-def test_a_fixed_step_makes_no_longer_cycles(longer, sums):
-    """12 steps per cycle count in the contacts' own steps: with a step three times that, 4; with half of it, 12."""
+def test_cycle_length_with_a_fixed_step(longer, sums):
+    """A cycle of 12 contact steps has 4 steps if the fixed step is three times longer, 12 if it is half as long."""
     own = chain(True, length=5)
     own.run(steps=20)
     sim = chain(True, far_steps="auto", length=5, step=longer * own.state.clock[CONTACT_STEP])
@@ -107,11 +108,11 @@ def test_a_fixed_step_makes_no_longer_cycles(longer, sums):
 
 @pytest.mark.validate
 @pytest.mark.parametrize(("far", "steps"), [("impulse", 2105.5), ("taylor", 2101.5)])
-def test_a_stop_within_a_cycle_leaves_whole_books(far, steps):
-    """A chain falls so fast that the run must end, near the end of a cycle: the last total is as good as the others.
+def test_energy_after_a_stop_within_a_cycle(far, steps):
+    """A falling chain stops the run near the end of a cycle: the last total energy is as accurate as the others.
 
-    Gravity itself costs Verlet nothing.  From one cycle of 70 steps to the next the total moves by some 2e-20 J;
-    without the impulse that ends a cycle where it is cut, by 1.4e-19.
+    Verlet integrates uniform gravity without an energy error.  Between cycles of 70 steps the total changes by about
+    2e-20 J; without the impulse that completes an interrupted cycle, by 1.4e-19 J.
     """
     own = chain(True, length=6)
     own.run(steps=20)
@@ -129,12 +130,11 @@ def test_a_stop_within_a_cycle_leaves_whole_books(far, steps):
 
 @pytest.mark.validate
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_main_job_does_not_heat_up(seed):
+def test_energy_drift_of_the_readme_gas(seed):
     """6.5e6 steps of the README's gas: |drift| ≤ 1e-3 with the default cycles (H < half the fastest period).
 
-    Measured 7.3e-4 and 8.9e-4, downwards: 1e-5 of the turnover for each new contact, which falls as the square of the
-    step (`test_the_ringing_after_a_touch_has_the_energy_of_before`).  With cycles of 35 or 70 steps the ringing is met
-    in step: before touches were booked this well, the drift then was 1.2e-3 to 5.6e-3, always upwards.
+    Measured: −7.3e-4 and −8.9e-4, that is 1e-5 of the turnover per new contact, which falls as the square of the step
+    (`test_mean_energy_of_the_ringing_after_a_contact_forms`).  Cycles of 35 or 70 steps resonate with the ringing.
     """
     box = sand.Box.periodic("1.2 um")
     grains = sand.setup.gas(

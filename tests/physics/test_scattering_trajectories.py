@@ -1,4 +1,4 @@
-"""Flights of two bodies: other programs, conservation laws, limits."""
+"""Trajectories of two-body scattering: other integrators, conservation laws, limiting cases."""
 
 import math
 import warnings
@@ -18,7 +18,7 @@ IRON = {"radius": "10 nm", "material": sand.IRON, "moment": "200 A m^2/kg", "tem
 THERMAL = IRON | {"speed": 1.0, "speed_unit": "thermal"}
 
 
-def unequal(**options):
+def unequal_pair(**options):
     """Two different grains with a field and given spins."""
     given = {
         "projectile": sand.Grains([[0, 0, 0]], 8e-9, sand.IRON, moment=[[0.0, 2e-18, 1e-18]]),
@@ -33,7 +33,7 @@ def unequal(**options):
 
 
 def bodies_of(flying):
-    """Mass, inertia, size of moment of both."""
+    """Mass, moment of inertia and magnetic moment of both bodies."""
     return [
         (float(g.mass[0]), float(g.inertia[0]), float(np.linalg.norm(g.moment[0])))
         for g in (flying.projectile, flying.target)
@@ -42,11 +42,11 @@ def bodies_of(flying):
 
 @pytest.mark.compiled("scattering")
 def test_against_scipy():
-    """SciPy's DOP853 at 1e-12 with matrices K and vectors of two bodies in the laboratory: same place to 1e-6 of R.
+    """SciPy's DOP853 at 1e-12 with vectors in the laboratory frame: the same positions to 1e-6 of R.
 
-    F = K(μi, r) μj and B = k (3 r̂r̂ᵀ − 1) μ/r³ as physics.md writes them.
+    F = K(μi, r) μj and B = k (3 r̂r̂ᵀ − 1) μ/r³ as in physics.md.
     """
-    flying = unequal()
+    flying = unequal_pair()
     ours = scattering.trajectory(flying, "150 nm")
     (m1, i1, s1), (m2, i2, s2) = bodies_of(flying)
     outer = np.array(flying.field)
@@ -91,8 +91,8 @@ def test_against_scipy():
 
 @pytest.mark.compiled("scattering", "adaptive")
 def test_against_the_simulation():
-    """The same pair in `Simulation` with `Adaptive` steps, quaternions and all: same place to 1e-5 of R."""
-    flying = unequal(field=None)
+    """The same pair in `Simulation` with `Adaptive` steps and quaternions: the same positions to 1e-5 of R."""
+    flying = unequal_pair(field=None)
     ours = scattering.trajectory(flying, "150 nm")
     grains = sand.Grains(
         [ours.projectile[0], ours.target[0]],
@@ -110,9 +110,9 @@ def test_against_the_simulation():
 
 
 @pytest.mark.compiled("scattering")
-def test_momenta_and_energy():
-    """E, and without a field L = m̄ r×u + I1ω1 + I2ω2, at every step to 1e-7: the tolerance times some hundred steps."""
-    flying = unequal(field=None, spin="kT/2", temperature="100 K", orientation="random")
+def test_energy_and_angular_momentum():
+    """E, and without a field L = m̄ r×u + I1ω1 + I2ω2, constant to 1e-7: about a hundred steps at the tolerance."""
+    flying = unequal_pair(field=None, spin="kT/2", temperature="100 K", orientation="random")
     reduced = flying.scales.reduced
     (_, i1, _), (_, i2, _) = bodies_of(flying)
     for number in range(20):
@@ -127,13 +127,13 @@ def test_momenta_and_energy():
 
 
 @pytest.mark.validate
-def test_aggregates_of_one_grain_are_spheres():
-    """The rigid-body kernel with one grain each: the same flights as the kernel of spheres, 1e-6 of R at the end."""
+def test_rigid_bodies_of_one_grain_move_as_spheres():
+    """The rigid-body kernel with one grain per body and the kernel of spheres agree to 1e-6 of R at the end."""
     from sand.experiments.scattering.encounters import body_of
     from sand.experiments.scattering.flight_driver import allocate_workspace, flights_of
     from sand.experiments.scattering.two_aggregates import AGGREGATES, TWO_AGGREGATES, Aggregates
 
-    flying = unequal()
+    flying = unequal_pair()
     one = scattering.trajectory(flying, "150 nm")
     rules = Aggregates(
         MAGNETIC, flying.scales.reduced, body_of(flying.projectile), body_of(flying.target), 8e-9, flying.field
@@ -146,7 +146,7 @@ def test_aggregates_of_one_grain_are_spheres():
         flying.start(0.0), rules, flying.limits(),
     )  # fmt: skip
     apart = one.projectile[-1] - one.target[-1]
-    # both end where they are as far apart as at the start, within a step: compare along the straight way out
+    # both end within a step of the starting distance: compare along the straight outgoing path
     late = results[0, 3] - one.time[-1]
     moved = apart + late * (one.velocity_projectile[-1] - one.velocity_target[-1])
     assert results[0, 0] == MISS == ("hit", "miss").index(one.end)
@@ -154,8 +154,8 @@ def test_aggregates_of_one_grain_are_spheres():
 
 
 @pytest.mark.validate
-def test_aggregates_keep_energy_and_touch_where_grains_do():
-    """A chain of 3 against one of 2, tumbling: energy to 1e-6 of |U_min|, and the first touch is one of grains."""
+def test_energy_and_first_contact_of_aggregates():
+    """Tumbling chains of 3 and 2 grains: energy to 1e-6 of |U_min|; the first contact is between two grains."""
     distance = 2e-8
     chains = [
         sand.Grains(np.array([[k * distance, 0, 0] for k in range(n)]), 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * n)
@@ -172,8 +172,8 @@ def test_aggregates_keep_energy_and_touch_where_grains_do():
 
 
 @pytest.mark.compiled("scattering")
-def test_without_moments_it_is_geometry():
-    """σ = π(r1 + r2)²: all flights below b = r1 + r2 hit, none above; grazes are seen to 1e-4 of it."""
+def test_cross_section_without_moments_is_geometric():
+    """σ = π(r1 + r2)²: all trajectories with b < r1 + r2 hit, none above; grazing ones are resolved to 1e-4."""
     flying = scattering.flight(
         projectile=sand.Grains([[0, 0, 0]], 1e-8, sand.IRON),
         target=sand.Grains([[0, 0, 0]], 3e-8, sand.IRON),
@@ -189,8 +189,8 @@ def test_without_moments_it_is_geometry():
 
 
 @pytest.mark.compiled("scattering")
-def test_cold_grains_stop_at_b_max():
-    """No spin, v_th, from 10 b_max: none of 600 hits at b ≥ 1.03 b_max, all of 200 below 0.7; c = 0.990 ± 0.01."""
+def test_capture_of_cold_grains_ends_at_b_max():
+    """No spin, v_th, from 10 b_max: 0 of 600 hits at b ≥ 1.03 b_max, all of 200 below 0.7; c = 0.990 ± 0.01."""
     flying = scattering.flight(**THERMAL)
     b_max = flying.scales.capture
     beyond = fly(flying, [Task(103, 0, 200), Task(110, 0, 200), Task(118, 0, 200)], 0.01 * b_max)
@@ -203,17 +203,17 @@ def test_cold_grains_stop_at_b_max():
 
 
 @pytest.mark.compiled("scattering")
-def test_aligned_and_cold_is_eq_14():
-    """Moments along the line of centres from the start: the central potential of Eqs. 7–14, c = 1.00 ± 0.01."""
+def test_cross_section_of_aligned_cold_grains_is_eq_14():
+    """Moments along the line of centres: the central potential of Eqs. 7–14, c = 1.00 ± 0.01."""
     found = scattering.cross_section(**THERMAL, orientation="aligned", relative_error=0.004)
     assert found.c == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.compiled("scattering")
-def test_the_trajectories_of_figure_2():
-    """At v_th/16 from 10 b_max: 0.95 b_max meets, 1.0 hands over nearly all energy, 1.025 and 1.05 miss.
+def test_trajectories_of_figure_2():
+    """At v_th/16 from 10 b_max: 0.95 b_max hits, 1.0 transfers nearly all energy, 1.025 and 1.05 miss.
 
-    With the caption's thermal spin none of twenty meets at 0.95 b_max.
+    With the thermal spin of the caption none of twenty trajectories at 0.95 b_max hits.
     """
     slow = IRON | {"speed": 1 / 16, "speed_unit": "thermal", "orientation": "aligned"}
     flying = scattering.flight(**slow)
@@ -228,8 +228,8 @@ def test_the_trajectories_of_figure_2():
 
 
 @pytest.mark.compiled("scattering")
-def test_the_tolerance_does_not_matter():
-    """1e-7, 1e-8 and 1e-9: of 400 cold flights the same ones hit but for one in 200 at the rim, with spin σ agrees."""
+def test_cross_section_does_not_depend_on_the_tolerance():
+    """1e-7, 1e-8, 1e-9: of 400 cold trajectories at most one in 200 near b_max differs; σ with spin agrees."""
     tasks = [Task(k, 0, 25) for k in range(16)]
     ends = [
         fly(f := scattering.flight(**THERMAL, tolerance=t), tasks, f.scales.capture / 15)[:, END] for t in (1e-7, 1e-9)
@@ -243,8 +243,8 @@ def test_the_tolerance_does_not_matter():
 
 
 @pytest.mark.compiled("scattering")
-def test_only_the_relative_motion_counts():
-    """A target that comes towards the projectile: the same flights as one at rest at the sum of the speeds."""
+def test_only_the_relative_velocity_matters():
+    """A moving target gives the trajectories of a target at rest at the sum of the speeds."""
     still = scattering.flight(**IRON, speed=0.3, start="2 um")
     coming = scattering.flight(**IRON, speed=0.1, start="2 um", target_velocity=[-0.2, 0, 0])
     tasks, width = [Task(0, 0, 50), Task(2, 0, 50)], 1e-7
@@ -255,10 +255,10 @@ def test_only_the_relative_motion_counts():
 
 
 @pytest.mark.compiled("scattering")
-def test_a_target_that_moves():
-    """Given: σ is that of the relative motion.  By chance: ⟨σ(u) u⟩/v∞, for Eq. 14 ⟨(u/v)^(−1/3)⟩ of it, 5 %.
+def test_moving_target():
+    """Given velocity: σ of the relative velocity.  Thermal: ⟨σ(u) u⟩/v∞, for Eq. 14 ⟨(u/v)^(−1/3)⟩ of it, 5 %.
 
-    The laboratory sees the projectile at v∞ and the target at the velocity drawn for it.
+    In the laboratory frame the projectile has v∞ and the target its drawn velocity.
     """
     options = IRON | {"orientation": "aligned", "start": "4 um"}
     still = scattering.cross_section(**options, speed=0.3, relative_error=0.02)
@@ -276,8 +276,11 @@ def test_a_target_that_moves():
 
 @pytest.mark.compiled("scattering", "contacts")
 @pytest.mark.parametrize(("radius", "part"), [(1e-4, 0.98), (1e-4, 1.03), (1e-6, 1.5)])
-def test_large_grains_stick_below_their_own_speed(radius, part):
-    """Silica of 100 µm and 1 µm: the contact is slow against the sound in it; a grain of 20 nm rides on the second."""
+def test_sticking_of_large_grains(radius, part):
+    """Silica of 100 µm sticks at 0.98 v_s and bounces at 1.03 v_s; of 1 µm it bounces at 1.5 v_s.
+
+    A grain of 20 nm is attached to the projectile of 1 µm, far from where the contact forms.
+    """
     limit = sand.theory.contact(sand.SILICA, radius).sticking_speed
     ball = sand.Grains([[0, 0, 0]], radius, sand.SILICA)
     rider = sand.Grains([[0, 0, 0], [-radius - 2e-8 + 5e-11, 0, 0]], [radius, 2e-8], sand.SILICA)
@@ -293,8 +296,8 @@ def test_large_grains_stick_below_their_own_speed(radius, part):
 
 @pytest.mark.compiled("scattering", "contacts")
 @pytest.mark.parametrize(("speed", "outcome"), [(76.0, HIT), (82.0, BOUNCE)])
-def test_sticking_through_the_real_contact(speed, outcome):
-    """Head-on and without moments, iron of 10 nm sticks below v_s = 78.9 m/s (theory.contact) and bounces above."""
+def test_sticking_with_simulated_contact(speed, outcome):
+    """Head-on without moments: 10 nm iron sticks below v_s = 78.9 m/s (theory.contact) and bounces above."""
     assert sand.theory.contact(sand.IRON, 1e-8).sticking_speed == pytest.approx(78.9, abs=0.1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -315,8 +318,8 @@ def test_sticking_through_the_real_contact(speed, outcome):
         ({"orientation": "aligned"}, 1.0, 0.01),
     ],
 )
-def test_c_follows_the_start(options, expected, allowed):
-    """c = σ/σ_Eq14 of cold grains at v_th, from planes at several distances (errors 0.002)."""
+def test_c_depends_on_the_starting_plane(options, expected, allowed):
+    """c = σ/σ_Eq14 of cold grains at v_th, started on planes at several distances (standard errors 0.002)."""
     found = scattering.cross_section(**THERMAL, relative_error=0.002, seed=5, **options)
     assert found.c == pytest.approx(expected, abs=allowed)
     assert found.bound == found.failed == 0
@@ -324,8 +327,8 @@ def test_c_follows_the_start(options, expected, allowed):
 
 @pytest.mark.validate
 @pytest.mark.parametrize("start", ["10 b_max", "20 b_max"])
-def test_eq_26(start):
-    """Spin of kT/2 per grain, v_th: σ/π(2R)² = 130 ± 10, with an error below 2."""
+def test_cross_section_of_eq_26(start):
+    """Thermal spin kT/2 per grain, v_th: σ/π(2R)² = 130 ± 10, with a standard error below 2."""
     found = scattering.cross_section(**THERMAL, spin="kT/2", start=start, relative_error=0.01, seed=5)
     assert found.enhancement_error < 2.0
     assert found.enhancement == pytest.approx(130.0, abs=10.0)

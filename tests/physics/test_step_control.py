@@ -1,4 +1,4 @@
-"""The choice of the step must not feed energy into what rings."""
+"""The choice of the step must not feed energy into vibrating contacts."""
 
 import math
 
@@ -31,20 +31,20 @@ def _steps_of(sim, number):
 
 
 @pytest.mark.compiled("contacts")
-def test_a_spinning_pair_does_not_ring_up():
-    """A free pair spins about a transverse axis and slides to and fro at 0.8 ζ_c: no loss, so E must stay.
+def test_sliding_vibration_of_a_spinning_pair_does_not_grow():
+    """A free pair spins about a transverse axis and vibrates in sliding at 0.8 ζ_c: no loss, so E must not drift.
 
-    Verlet at one step keeps p²/2m + ½kx² (1 − (ω dt)²/4): the energy swings by (ω dt)²/4 = 1.6 % of that of the
-    ringing, ½k_s ζ², and comes back; 1.1 times that is allowed.  A step that follows the speed of the grains past each
-    other, v_spin + v_ring, changes in time with the ringing: up to 0.8 % each time, of one sign, which adds up to 60 %.
-    The three v_spin are those at which such a step changes, around δ_c a step.
+    Verlet at a constant step conserves p²/2m + ½kx² (1 − (ω dt)²/4): E oscillates by (ω dt)²/4 = 1.6 % of the vibration
+    energy ½k_s ζ²; 1.1 times that is allowed.  A step that followed the relative surface speed, v_spin + v_vibration,
+    would change with the vibration and add up to 0.8 % per change, always of one sign: 60 % in total.
+    The three v_spin are those near δ_c per step, where such a step would change.
     """
     constants, distance, step = _pair()
-    ringing = 0.8 * constants.slide_limit
+    amplitude = 0.8 * constants.slide_limit
     rate = (
-        0.5 * ringing * math.sqrt(constants.max_squared_frequency) / R
+        0.5 * amplitude * math.sqrt(constants.max_squared_frequency) / R
     )  # spin of both grains that slides them that far
-    stake = 0.5 * constants.slide_stiffness * ringing**2
+    vibration_energy = 0.5 * constants.slide_stiffness * amplitude**2
     for part in (0.8, 0.9, 1.2):
         turning = part * constants.break_overlap / step / distance
         half = 0.5 * distance
@@ -59,12 +59,12 @@ def test_a_spinning_pair_does_not_ring_up():
         sim.run(steps=30_000)
         total = sim.ledger["total"]
         assert sim.ledger.rows[-1]["moved"] == 0
-        assert np.ptp(total) < 1.1 * 0.25 * (2.0 * math.pi / 25.0) ** 2 * stake
+        assert np.ptp(total) < 1.1 * 0.25 * (2.0 * math.pi / 25.0) ** 2 * vibration_energy
 
 
 @pytest.mark.compiled("contacts")
-def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
-    """A grain about to touch needs no shorter a step than its contact will: the contacts' own, to the bit."""
+def test_a_slow_approach_does_not_shorten_the_step():
+    """A grain about to make contact needs no shorter step than its contact will: the step is that of the contacts."""
     constants, distance, step = _pair()
     slow = 0.1 * constants.break_overlap / step
     gap = 100 * slow * step
@@ -79,7 +79,7 @@ def test_a_slow_visitor_does_not_change_the_step_of_what_rings():
 
 @pytest.mark.compiled("contacts")
 def test_a_shorter_step_is_held_for_ten_periods():
-    """Two grains bounce beside a ringing pair: the step falls at once, and grows only HOLD_STEPS steps after that."""
+    """Two grains bounce beside a vibrating pair: the step shortens at once and grows after HOLD_STEPS steps."""
     from sand.integrate.step_control import HOLD_STEPS
 
     constants, distance, step = _pair()
@@ -97,20 +97,20 @@ def test_a_shorter_step_is_held_for_ten_periods():
 
 
 def test_gravity_does_not_shorten_the_step():
-    """A uniform load costs Verlet no energy, however weak the long-range force beside it: the same step without it."""
+    """A uniform force causes no energy error in Verlet, so the step is the same with and without gravity."""
     grains = sand.Grains([[0, 0, 0], [1e-5, 0, 0]], R, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Attraction()])
-    world, control = sim.state, sim._engine.parameters.criteria
+    system, control = sim.state, sim._engine.parameters.criteria
     assert control.energy_scale > 0.0
     steps = []
     for pull in (0.0, 9.81):
-        world.grains.arrays.force[2] = -pull * grains.mass
+        system.grains.arrays.force[2] = -pull * grains.mass
         steps.append(
-            steps_of_free_grains(world.grains.arrays, world.long_range, world.contacts.start, world.count, control)
+            steps_of_free_grains(system.grains.arrays, system.long_range, system.contacts.start, system.count, control)
         )
     assert steps[0] == steps[1]
-    world.long_range.force[2] = -9.81 * grains.mass  # as a long-range force it does count
+    system.long_range.force[2] = -9.81 * grains.mass  # as a long-range force it limits the step
     assert (
-        steps_of_free_grains(world.grains.arrays, world.long_range, world.contacts.start, world.count, control)[0]
+        steps_of_free_grains(system.grains.arrays, system.long_range, system.contacts.start, system.count, control)[0]
         < 0.1 * steps[0][0]
     )

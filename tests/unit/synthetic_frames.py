@@ -1,4 +1,4 @@
-"""Frames made by hand for still pictures, and pictures read back as numbers."""
+"""Synthetic frames for still pictures, and pictures read back as pixel values."""
 
 from types import SimpleNamespace
 
@@ -10,14 +10,14 @@ R = 1e-8
 
 
 class Frame(SimpleNamespace):
-    """What a picture needs of a frame."""
+    """The attributes of a frame that a picture needs."""
 
     def __len__(self):
         return len(self.radius)
 
 
 def frame_of(position, pairs=(), radius=R, box=None, **more):
-    """A frame of iron grains; forces push 1 nN along the line of centres, one mode of each contact is at its limit."""
+    """A frame of iron grains; normal forces of 1 nN, one mode of each contact at its limit."""
     position = np.array(position, float)
     count, pair = len(position), np.array(pairs, dtype=np.uint32).reshape(-1, 2)
     zeros = np.zeros((count, 3))
@@ -42,15 +42,15 @@ def frame_of(position, pairs=(), radius=R, box=None, **more):
 
 
 def at_pixel(picture, point):
-    """Column and row (from below) of a point [m] of the laboratory frame, in pixels, parallel projection."""
+    """Column and row (from below) of a point [m] in pixels, parallel projection."""
     flat = picture.rotation @ point
     left, right, bottom, top = picture.window
     height, width = picture.grains_only.shape[:2]
     return (flat[0] - left) / (right - left) * width, (flat[1] - bottom) / (top - bottom) * height
 
 
-def alike(picture, colour, least=0.5):
-    """(H, W) pixels whose hue is that of a colour: the direction of what differs from grey."""
+def pixels_of_hue(picture, colour, least=0.5):
+    """Mask (H, W) of the pixels with the hue of a colour (direction of the difference from grey)."""
     rest = picture[..., :3] - picture[..., :3].mean(axis=2, keepdims=True)
     hue = np.asarray(colour) - np.mean(colour)
     size = np.linalg.norm(rest, axis=2) * np.linalg.norm(hue)

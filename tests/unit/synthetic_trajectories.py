@@ -1,4 +1,4 @@
-"""Trajectories made by hand, for tests of those who look at them."""
+"""Synthetic trajectories for tests of their readers."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ MODES = ("stretch", "slide", "roll", "twist")
 
 
 def contacts_of(pairs, seed=0):
-    """A contact table of these pairs, by column, with loads of many sizes."""
+    """A contact table of these pairs, by column, with loads of many magnitudes."""
     rng = np.random.default_rng(seed)
     pair = np.array(pairs, dtype=np.uint32).reshape(-1, 2)
     count = len(pair)
@@ -27,7 +27,7 @@ def contacts_of(pairs, seed=0):
 
 
 def grains_of(count, seed=0):
-    """Grains in a row with places, speeds, spins and moments by chance."""
+    """Grains in a row with random offsets, velocities, spins and moments."""
     rng = np.random.default_rng(seed)
     place = np.arange(count)[:, None] * [2e-8, 0.0, 0.0] + rng.normal(size=(count, 3)) * 1e-9
     vectors = {name: rng.normal(size=(count, 3)) for name in ("velocity", "spin", "moment")}
@@ -36,14 +36,14 @@ def grains_of(count, seed=0):
 
 
 def append(writer, pairs_of_frames, count, first=0):
-    """Frames 1 ps and 10 steps apart, flushed."""
+    """Append frames 1 ps and 10 steps apart, and flush."""
     for k, pairs in enumerate(pairs_of_frames, first):
         writer.write(10 * k, 1e-12 * k, grains_of(count, k), Box.periodic(1e-6), contacts_of(pairs, k))
     writer.flush()
 
 
-def reel(path, pairs_of_frames, count):
-    """A trajectory of so many grains with these contacts in its frames."""
+def write_trajectory(path, pairs_of_frames, count):
+    """A trajectory of this many grains with these contact pairs per frame."""
     writer = TrajectoryWriter(path)
     append(writer, pairs_of_frames, count)
     writer.close()

@@ -13,16 +13,16 @@ from sand.cli.main import main
 from sand.viewer import browser
 
 from .pages import blocks
-from .synthetic_trajectories import reel
+from .synthetic_trajectories import write_trajectory
 
 pytestmark = pytest.mark.usefixtures("bundle")
 
 
 @pytest.mark.compiled("fields")
-def test_the_command_writes_a_file(looked_at, tmp_path, capsys):
+def test_the_command_writes_a_file(finished_run, tmp_path, capsys):
     """Not over what is there, without leave; says how large it is; slices and thinning go in."""
     target = tmp_path / "out.html"
-    words = ["view", str(looked_at[0]), "--html", str(target)]
+    words = ["view", str(finished_run[0]), "--html", str(target)]
     assert main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told == {"file": str(target), "bytes": target.stat().st_size}
@@ -31,15 +31,15 @@ def test_the_command_writes_a_file(looked_at, tmp_path, capsys):
     assert main([*words, "--overwrite", "--every", "2", "--frames", "1:"]) == 0
     assert "MB" in capsys.readouterr().out
     manifest, _, packets = blocks(target)
-    assert len(packets) == 3 and manifest["steps"] == [sand.open(looked_at[0]).frames[k].step for k in (1, 3, 5)]
+    assert len(packets) == 3 and manifest["steps"] == [sand.open(finished_run[0]).frames[k].step for k in (1, 3, 5)]
     assert "one frame of 2" in manifest["note"] and manifest["field"]["directions"]
 
 
 @pytest.mark.compiled("fields")
-def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
+def test_a_large_file_is_warned_of(finished_run, tmp_path, capsys, monkeypatch):
     """Above 100 MB it says what to do."""
     monkeypatch.setattr(view_command, "LARGE", 1e3)
-    assert main(["view", str(looked_at[0]), "--html", str(tmp_path / "a.html"), "--quiet"]) == 0
+    assert main(["view", str(finished_run[0]), "--html", str(tmp_path / "a.html"), "--quiet"]) == 0
     told = capsys.readouterr()
     assert "--every" in told.err and told.out == ""
 
@@ -61,24 +61,24 @@ def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
         ([], "DIR"),
     ],
 )
-def test_mistakes(looked_at, capsys, words, said):
+def test_mistakes(finished_run, capsys, words, said):
     """One line, exit 2."""
-    assert main(["view", *(str(looked_at[0]) if word == "RUN" else word for word in words)]) == 2
+    assert main(["view", *(str(finished_run[0]) if word == "RUN" else word for word in words)]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1 and said in lines[0]
 
 
 @pytest.mark.compiled("fields")
-def test_without_the_page(looked_at, bundle, capsys):
+def test_without_the_page(finished_run, bundle, capsys):
     """An installation that lacks the bundle says so, in one line."""
     (bundle / "grainview.js").unlink()
-    assert main(["view", str(looked_at[0])]) == 2
+    assert main(["view", str(finished_run[0])]) == 2
     assert "not part of this installation" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize("form", [[], ["--json"], ["--quiet"]])
-def test_the_command_serves(looked_at, capsys, monkeypatch, form):
+def test_the_command_serves(finished_run, capsys, monkeypatch, form):
     """It prints the address, answers there while it waits, and Ctrl-C ends it with 0."""
     got = {}
 
@@ -94,7 +94,7 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
     ended = []
     monkeypatch.setattr(browser, "remove_redirects", lambda: ended.append(True))
     before = threading.active_count()
-    assert main(["view", str(looked_at[0]), *form]) == 0
+    assert main(["view", str(finished_run[0]), *form]) == 0
     assert got["manifest"]["grains"] == 6 and ended
     told = got["err"] + capsys.readouterr().err
     assert ("ssh -L" in told and "ended" in told) if not form else told == ""
@@ -104,15 +104,15 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
 
 
 @pytest.mark.compiled("fields")
-def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
+def test_a_run_that_has_no_frame_yet_is_waited_for(finished_run, tmp_path, capsys):
     """An empty folder, as while a run is compiled; then a case, then a trajectory: the page has its frames."""
     run = tmp_path / "run"
     run.mkdir()
 
     def begin():
-        (run / "case.toml").write_bytes((looked_at[0] / "case.toml").read_bytes())
+        (run / "case.toml").write_bytes((finished_run[0] / "case.toml").read_bytes())
         # both frames at once: a page may be made after the first as well
-        reel(tmp_path / "made.gsd", [[(0, 1)], []], 3).rename(run / "trajectory.gsd")
+        write_trajectory(tmp_path / "made.gsd", [[(0, 1)], []], 3).rename(run / "trajectory.gsd")
 
     later = threading.Timer(1.0, begin)
     later.start()

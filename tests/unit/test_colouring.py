@@ -7,7 +7,7 @@ from sand.plotting.palettes import SEQUENTIAL
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import LARGEST_COLOURS, SINGLE_COLOUR, rgb
 
-from .synthetic_frames import R, alike, at_pixel, frame_of
+from .synthetic_frames import R, at_pixel, frame_of, pixels_of_hue
 
 
 @pytest.mark.slow
@@ -21,7 +21,7 @@ def test_clusters_have_their_colours():
         if colour == SINGLE_COLOUR:
             assert np.ptp(patch[..., :3], axis=2).max() < 0.08
         else:
-            assert alike(patch, rgb(colour)).all()
+            assert pixels_of_hue(patch, rgb(colour)).all()
 
 
 def test_a_colour_leads_back_to_its_number():
@@ -33,4 +33,4 @@ def test_a_colour_leads_back_to_its_number():
     expected = SEQUENTIAL(np.linspace(0.0, 1.0, 5))[:, :3]
     for k in range(5):
         x, y = at_pixel(picture, frame.position[k])
-        assert alike(picture.grains_only[int(y) : int(y) + 2, int(x) : int(x) + 2], expected[k]).all()
+        assert pixels_of_hue(picture.grains_only[int(y) : int(y) + 2, int(x) : int(x) + 2], expected[k]).all()

@@ -18,7 +18,7 @@ from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import Frames, TrajectoryWriter, read_frames
 from sand.viewer.dataset import run_dataset
 
-from .synthetic_trajectories import grains_of, reel
+from .synthetic_trajectories import grains_of, write_trajectory
 
 COLUMNS = ("step", "time", "translation", "normal", "lost_forming", "total", "momentum_x", "contacts")
 
@@ -148,9 +148,9 @@ def test_a_ledger_from_which_a_run_does_not_go_on_is_kept(tmp_path):
 
 
 @pytest.fixture
-def run(looked_at, tmp_path):
+def run(finished_run, tmp_path):
     """A copy of a finished run."""
-    return shutil.copytree(looked_at[0], tmp_path / "run")
+    return shutil.copytree(finished_run[0], tmp_path / "run")
 
 
 def test_readers_of_a_run_say_so(run, capsys):
@@ -199,7 +199,7 @@ def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
 @pytest.mark.validate
 def test_every_entry_of_an_index_that_is_damaged(tmp_path):
     """Of 40 frames, 30 up to the checkpoint: if some of these are lost it is said and the file kept; else neither."""
-    good = reel(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)
+    good = write_trajectory(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)
     place, entries = read_index(good)
     written, rng = [10 * k for k in range(41)], random.Random(5)
     told = 0
@@ -238,7 +238,7 @@ def test_every_entry_of_an_index_that_is_damaged(tmp_path):
 
 def test_data_without_a_frame(tmp_path):
     """An index that names nothing, of a file that holds something: an error; mended and kept."""
-    path = reel(tmp_path / "trajectory.gsd", [[(0, 1)]] * 5, 3)
+    path = write_trajectory(tmp_path / "trajectory.gsd", [[(0, 1)]] * 5, 3)
     place, entries = read_index(path)
     with open(path, "r+b") as file:
         file.seek(place)
@@ -258,7 +258,7 @@ def test_step_and_materials_are_inside_the_check(tmp_path):
     """Other numbers there are refused, frame by frame."""
     import gsd.hoomd
 
-    path = reel(tmp_path / "new.gsd", [[(0, 1)]] * 3, 3)
+    path = write_trajectory(tmp_path / "new.gsd", [[(0, 1)]] * 3, 3)
     with gsd.hoomd.open(str(path), "r") as file:
         frames = [file[k] for k in range(3)]
     for change, number in (("step", 1), ("types", 0)):

@@ -19,7 +19,7 @@ from sand.viewer.external_field import read_field
 from sand.viewer.series import EXTREMES, PERCENTILES
 
 from .pages import decode
-from .synthetic_trajectories import append, contacts_of, reel
+from .synthetic_trajectories import append, contacts_of, write_trajectory
 
 KEYS = [
     "format",
@@ -45,9 +45,9 @@ KEYS = [
 
 
 @pytest.mark.compiled("fields")
-def test_the_manifest_of_a_run(looked_at):
+def test_the_manifest_of_a_run(finished_run):
     """All keys of the contract, the run's own numbers, nothing that JSON cannot hold."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     told = run_dataset(folder, read_field(folder)).manifest()
     assert list(told) == KEYS
     json.dumps(told, allow_nan=False)
@@ -68,9 +68,9 @@ def test_the_manifest_of_a_run(looked_at):
 
 
 @pytest.mark.compiled("fields")
-def test_times_are_told_from_a_frame_on(looked_at):
+def test_times_are_told_from_a_frame_on(finished_run):
     """`since` leaves out earlier ones and nothing else, and may be beyond the end."""
-    story = run_dataset(looked_at[0])
+    story = run_dataset(finished_run[0])
     whole, late, none = story.manifest(), story.manifest(4), story.manifest(10**8)
     assert late["times"] == whole["times"][4:] and late["steps"] == whole["steps"][4:]
     assert none["times"] == [] and {k: v for k, v in late.items() if k not in ("times", "steps")} == {
@@ -78,9 +78,9 @@ def test_times_are_told_from_a_frame_on(looked_at):
     }
 
 
-def test_frames_of_a_run(looked_at):
+def test_frames_of_a_run(finished_run):
     """A packet holds what the file holds, and names that stay."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     story = run_dataset(folder / "trajectory.gsd")  # the file means the run it lies in
     assert story.manifest()["outcome"]
     head, arrays = decode(story.frame(5))
@@ -93,9 +93,9 @@ def test_frames_of_a_run(looked_at):
         story.frame(6)
 
 
-def test_a_run_that_goes_on(tmp_path, looked_at):
+def test_a_run_that_goes_on(tmp_path, finished_run):
     """Frames that come later are found; names, times and the ledger go on; its summary ends it."""
-    shutil.copy(looked_at[0] / "case.toml", tmp_path)
+    shutil.copy(finished_run[0] / "case.toml", tmp_path)
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     append(writer, [[(1, 2)]], 4)
     story = run_dataset(tmp_path)
@@ -119,9 +119,9 @@ def test_a_run_that_goes_on(tmp_path, looked_at):
 
 def test_a_run_begun_anew_is_another(tmp_path):
     """Where the file is replaced by one of other grains, nothing of the old one is told."""
-    story = run_dataset(reel(tmp_path / "a.gsd", [[(0, 1)]] * 3, 4))
+    story = run_dataset(write_trajectory(tmp_path / "a.gsd", [[(0, 1)]] * 3, 4))
     (tmp_path / "a.gsd").unlink()
-    reel(tmp_path / "a.gsd", [[(2, 3)], [(2, 3)]], 6)
+    write_trajectory(tmp_path / "a.gsd", [[(2, 3)], [(2, 3)]], 6)
     story.refresh()
     assert story.manifest()["grains"] == 6 and len(story) == 2 and story.manifest()["generation"] == 1
     assert decode(story.frame(1))[1]["cluster"].tolist() == [SINGLE, SINGLE, 2, 2, SINGLE, SINGLE]
@@ -130,7 +130,7 @@ def test_a_run_begun_anew_is_another(tmp_path):
 def test_a_run_begun_anew_without_a_frame(tmp_path):
     """Until the new file has a frame the old story stays, though it is looked at again and again."""
     path = tmp_path / "a.gsd"
-    story = run_dataset(reel(path, [[(0, 1)]] * 3, 4))
+    story = run_dataset(write_trajectory(path, [[(0, 1)]] * 3, 4))
     path.unlink()
     writer = TrajectoryWriter(path)
     for _ in range(2):
@@ -171,7 +171,7 @@ def test_a_run_that_ends_while_it_is_looked_at(tmp_path):
 def test_a_run_that_was_killed(tmp_path):
     """Without an end and for hours without a frame: what may have happened, and what to do."""
     (tmp_path / "case.toml").write_text("")
-    path = reel(tmp_path / "trajectory.gsd", [[]], 4)
+    path = write_trajectory(tmp_path / "trajectory.gsd", [[]], 4)
     story = run_dataset(tmp_path)
     assert story.manifest()["note"] is None
     for age, duration in ((7200, "2 h"), (86400 * 3, "3 days")):
@@ -204,7 +204,7 @@ def test_a_damaged_frame_spoils_no_other(tmp_path):
     """Contacts of grains that are none: that frame is an error; manifest, series and the names of others are not."""
     frames = [[(0, 1)], [(0, 1), (1, 2)], [(0, 1), (1, 2), (2, 3)]]
     for damaged in (0, 1):
-        path = reel(tmp_path / f"{damaged}.gsd", frames, 5)
+        path = write_trajectory(tmp_path / f"{damaged}.gsd", frames, 5)
         entries = read_index(path)[1]
         chunk = entries[(entries["frame"] == damaged) & (entries["rows"] == damaged + 1) & (entries["columns"] == 2)]
         with open(path, "r+b") as file:
@@ -224,7 +224,7 @@ def test_a_damaged_frame_spoils_no_other(tmp_path):
 
 def test_a_torn_end_is_left_out(tmp_path):
     """A last frame whose data were never written does not keep the others from being seen, and is mentioned."""
-    path = reel(tmp_path / "a.gsd", [[(0, 1)], [(0, 2)], [(1, 2)]], 5)
+    path = write_trajectory(tmp_path / "a.gsd", [[(0, 1)], [(0, 2)], [(1, 2)]], 5)
     place, entries = read_index(path)
     with open(path, "r+b") as file:  # positions of the last frame are zeros, as after a power cut
         late = entries[(entries["frame"] == 2) & (entries["rows"] == 5) & (entries["columns"] == 3)][0]
@@ -273,7 +273,7 @@ def test_other_numbers_of_grains(tmp_path):
 @pytest.mark.slow
 def test_several_readers_at_once(tmp_path):
     """Eight threads that ask for frames in any order all get the right ones."""
-    story = run_dataset(reel(tmp_path / "a.gsd", [[(k % 5, k % 5 + 1)] for k in range(30)], 9))
+    story = run_dataset(write_trajectory(tmp_path / "a.gsd", [[(k % 5, k % 5 + 1)] for k in range(30)], 9))
     expected, wrong = [story.frame(k) for k in range(30)], []
 
     def ask(seed):
@@ -289,9 +289,9 @@ def test_several_readers_at_once(tmp_path):
     assert not wrong
 
 
-def test_ranges_are_those_of_the_quantities(looked_at, tmp_path):
+def test_ranges_are_those_of_the_quantities(finished_run, tmp_path):
     """Names are those of the table but for `moment`; extremes are those of all frames; without moments 0 to 0."""
-    folder, _ = looked_at
+    folder, _ = finished_run
     ranges, frames = run_dataset(folder).ranges(), sand.open(folder).frames
     assert set(ranges) == {*PERCENTILES, *EXTREMES} and set(ranges) - {"moment"} <= {*GRAIN_NAMES, *CONTACT_NAMES}
     for name in ("size", "radius", "coordination", "load"):
@@ -312,7 +312,7 @@ def test_clusters_that_end_as_the_largest_are_named(tmp_path, monkeypatch):
     Where following them would take long, there are none.
     """
     bonds = [[(0, 1), (4, 5), (6, 7)], [(0, 1), (1, 2), (2, 3), (6, 7)]]
-    path = reel(tmp_path / "a.gsd", bonds, 9)
+    path = write_trajectory(tmp_path / "a.gsd", bonds, 9)
     assert run_dataset(path).manifest()["colours"]["named"] == {"0": 0, "6": 1}
     monkeypatch.setattr("sand.viewer.dataset.MAX_TRACKED", 17)
     assert run_dataset(path).manifest()["colours"]["named"] == {}

@@ -6,7 +6,7 @@ import sand
 from sand.viewer.dataset import run_dataset
 from sand.viewer.dimensions import Dimensions
 
-from .synthetic_trajectories import reel
+from .synthetic_trajectories import write_trajectory
 
 
 def test_dimensions(tmp_path, monkeypatch):
@@ -14,7 +14,7 @@ def test_dimensions(tmp_path, monkeypatch):
     from sand.viewer import dimensions
 
     chain = [(k, k + 1) for k in range(39)]
-    story = run_dataset(reel(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))
+    story = run_dataset(write_trajectory(tmp_path / "a.gsd", [chain, chain, chain[:10]], 42))
     assert story.dimension(0, 5)["value"] == pytest.approx(1.0, abs=0.1)
     assert "at least 32" in story.dimension(2, 5)["reason"]
     assert "has no contact" in story.dimension(0, 41)["reason"]

@@ -9,7 +9,7 @@ from sand.io.page_bundle import PAGE, read_bundle
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 
-from .synthetic_trajectories import reel
+from .synthetic_trajectories import write_trajectory
 
 HOLDERS = {
     "three": "three.js authors",
@@ -49,7 +49,7 @@ def test_script_and_styles_begin_with_the_licences(bundle):
 
 def test_a_file_to_send_carries_them(bundle, tmp_path, monkeypatch):
     """`sand view --html` puts script and sheet into the file, and their first comments with them."""
-    reel(tmp_path / "a.gsd", [[(0, 1)], []], 3)
+    write_trajectory(tmp_path / "a.gsd", [[(0, 1)], []], 3)
     monkeypatch.setattr("sand.viewer.html.read_bundle", lambda: bundle)
     write_page(run_dataset(tmp_path / "a.gsd"), tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text("utf-8")

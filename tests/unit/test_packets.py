@@ -9,13 +9,13 @@ from sand.io.trajectory import Frames
 from sand.viewer.packets import encode, frame_bytes, frame_packet, grains_packet
 
 from .pages import decode
-from .synthetic_trajectories import reel
+from .synthetic_trajectories import write_trajectory
 
 
 @pytest.fixture(scope="module")
 def frame(tmp_path_factory):
     """One of seven grains and two contacts."""
-    return Frames(reel(tmp_path_factory.mktemp("packets") / "a.gsd", [[(0, 1), (5, 3)]], 7))[0]
+    return Frames(write_trajectory(tmp_path_factory.mktemp("packets") / "a.gsd", [[(0, 1), (5, 3)]], 7))[0]
 
 
 def test_a_frame_comes_back(frame):

@@ -11,11 +11,11 @@ from sand.plotting.plots import HISTORY, grains_figure, history_figure
 
 
 @pytest.mark.compiled("fields")
-def test_books_that_are_read_are_those_that_were_written(in_a_field):
+def test_books_that_are_read_are_those_that_were_written(run_in_field):
     """Drift and columns of ledger.csv are the summary's; curves drawn are the ledger's columns."""
-    rows = read_ledger(in_a_field / "ledger.csv")
+    rows = read_ledger(run_in_field / "ledger.csv")
     books = LedgerColumns(tuple(rows[0]), rows)
-    assert books.drift == sand.open(in_a_field).summary["drift"]
+    assert books.drift == sand.open(run_in_field).summary["drift"]
     for name in HISTORY:
         assert history_figure(books, name, 8, 0.0, dark=name == "size").axes
     axes = history_figure(books, "contacts", 8, 0.0).axes[0]
@@ -24,9 +24,9 @@ def test_books_that_are_read_are_those_that_were_written(in_a_field):
 
 
 @pytest.mark.compiled("fields")
-def test_histograms_count_every_grain(in_a_field):
+def test_histograms_count_every_grain(run_in_field):
     """Bars add up to the grains, or clusters, that there are; each lies where its numbers are."""
-    frame = sand.open(in_a_field).frames[0]
+    frame = sand.open(run_in_field).frames[0]
     for name, total in (("speed", 8), ("radius", 8), ("coordination", 8), ("material", 8), ("cluster", 4)):
         axes = grains_figure(frame, name).axes[0]
         assert sum(bar.get_height() for bar in axes.patches) == total

@@ -10,9 +10,9 @@ from sand.cli.main import main
 
 
 @pytest.mark.compiled("fields")
-def test_everything_is_there(looked_at):
+def test_everything_is_there(finished_run):
     """Frames one by one, ledger columns, contacts with forces, case and summary."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     opened = sand.open(folder)
     assert len(opened.frames) == len(sim.ledger) == 6
     assert opened.frames[-1].time == sim.time
@@ -29,10 +29,10 @@ def test_everything_is_there(looked_at):
 
 
 @pytest.mark.compiled("fields")
-def test_tables_for_others(looked_at):
+def test_tables_for_others(finished_run):
     """xarray: dimensions, coordinates, units; pandas: the ledger."""
     pytest.importorskip("xarray", reason="xarray is in the test extra")
-    folder, sim = looked_at
+    folder, sim = finished_run
     opened = sand.open(folder)
     data = opened.to_xarray()
     assert dict(data.sizes) == {"frame": 6, "grain": 6, "axis": 3}
@@ -44,9 +44,9 @@ def test_tables_for_others(looked_at):
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize(("form", "files"), [("xyz", 1), ("lammps-dump", 1), ("lammps-data", 6), ("vtk", 7)])
-def test_the_export_command(looked_at, tmp_path, capsys, form, files):
+def test_the_export_command(finished_run, tmp_path, capsys, form, files):
     """As many files as promised, not overwritten without leave; slices choose frames."""
-    folder, _ = looked_at
+    folder, _ = finished_run
     stem = str(tmp_path / "out")
     assert main(["export", str(folder), "--to", form, "--out", stem, "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["files"]) == files == len(list(tmp_path.iterdir()))
@@ -65,9 +65,9 @@ def test_the_export_command(looked_at, tmp_path, capsys, form, files):
         (["--to", "pdb"], "pdb"),
     ],
 )
-def test_mistakes(looked_at, capsys, words, said):
+def test_mistakes(finished_run, capsys, words, said):
     """One line, exit 2."""
-    assert main(["export", str(looked_at[0]), *words]) == 2
+    assert main(["export", str(finished_run[0]), *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert said in lines[0]
@@ -84,9 +84,9 @@ def test_no_run_there(tmp_path):
 
 
 @pytest.mark.compiled("fields")
-def test_a_picture_from_a_script(in_a_field):
+def test_a_picture_from_a_script(run_in_field):
     """`sand.open(DIR).picture()` is the still of a frame, with the field of the case."""
-    opened = sand.open(in_a_field)
+    opened = sand.open(run_in_field)
     np.testing.assert_allclose(opened.flux_density(0.0), [0.0, 0.0, 1e-3])
     picture = opened.picture(0, colour="field_alignment", size=(300, 200))
     assert "B" in [text.get_text() for axes in picture.axes for text in axes.texts]

@@ -8,13 +8,13 @@ from sand.analysis.ledger_columns import LedgerColumns
 from sand.viewer.dataset import run_dataset
 from sand.viewer.series import MAX_POINTS, evenly_spaced, series_from_ledger
 
-from .synthetic_trajectories import reel
+from .synthetic_trajectories import write_trajectory
 
 
 @pytest.mark.compiled("fields")
-def test_series_are_the_ledgers(looked_at):
+def test_series_are_the_ledgers(finished_run):
     """Plots hold the ledger's columns; the change of the total is computed before numbers are rounded; event counts."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     series = run_dataset(folder).series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
@@ -33,9 +33,9 @@ def test_series_are_the_ledgers(looked_at):
 
 
 @pytest.mark.compiled("fields")
-def test_long_and_broken_ledgers(looked_at):
+def test_long_and_broken_ledgers(finished_run):
     """At most 2000 points, the last among them; no event is lost; what is not a number is null."""
-    row = dict(looked_at[1].ledger.rows[-1])
+    row = dict(finished_run[1].ledger.rows[-1])
     rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
     rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
     series = series_from_ledger(LedgerColumns.from_rows(rows))
@@ -50,7 +50,7 @@ def test_long_and_broken_ledgers(looked_at):
 
 def test_without_a_ledger(tmp_path):
     """A file by itself: clusters and contacts are counted in its frames."""
-    story = run_dataset(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
+    story = run_dataset(write_trajectory(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
     series = story.series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert plots["contacts"]["contacts"] == [0, 1, 2]

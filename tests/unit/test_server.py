@@ -14,7 +14,7 @@ from sand.viewer.dataset import run_dataset
 from sand.viewer.server import Server
 
 from .pages import decode
-from .synthetic_trajectories import reel
+from .synthetic_trajectories import write_trajectory
 
 BUNDLE = ("console.log(1)\n", "body {}\n")
 
@@ -24,7 +24,7 @@ def server(tmp_path_factory):
     """One that tells of three frames."""
     patch = pytest.MonkeyPatch()
     patch.setattr(servers, "read_bundle", lambda: BUNDLE)
-    path = reel(tmp_path_factory.mktemp("served") / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5)
+    path = write_trajectory(tmp_path_factory.mktemp("served") / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5)
     one = Server(run_dataset(path))
     one.start()
     yield one

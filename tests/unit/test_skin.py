@@ -95,7 +95,7 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
     limit, span = INNER_SKIN_FRACTION * sim._engine.parameters.criteria.pair_gap, sim._engine.parameters.span
     for each in (sim, twin):
         each.run(steps=1)
-    looked_at = 0
+    finished_run = 0
     for steps in (2, 3, 4, 5, 6) * 5:
         twin._engine.advance(np.inf, 1)
         picked = twin.state.grains.arrays.position.copy()
@@ -106,8 +106,8 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
             strayed = largest_displacement(sim.state.grains.arrays, picked, span)
             assert 0.0 < strayed < limit
             assert 0.0 < sim.state.pair_list.skin[INNER_SKIN] <= limit - strayed
-            looked_at += 1
-    assert looked_at > 10
+            finished_run += 1
+    assert finished_run > 10
     sim.run(steps=2000)
     while twin.state.steps < sim.state.steps:
         twin._engine.advance(np.inf, 1)

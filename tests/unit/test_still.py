@@ -14,7 +14,7 @@ from sand.plotting.render.scene import camera_rotation
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import rgb
 
-from .synthetic_frames import R, alike, at_pixel, frame_of
+from .synthetic_frames import R, at_pixel, frame_of, pixels_of_hue
 
 
 @pytest.mark.slow
@@ -104,14 +104,14 @@ def test_a_contact_through_a_face_is_drawn_at_both():
     frame = frame_of([[0.901e-7, 0, 0], [-0.901e-7, 0, 0]], [(0, 1)], box=box, share=share, velocity=np.eye(3)[:2])
     how = {"view": "front", "size": (600, 500), "bonds": "mode", "arrows": False, "colour": "material"}
     cut = still_picture(frame, whole=False, **how)
-    red = alike(cut.grains_only, rgb("#D55E00"), 1.5)
+    red = pixels_of_hue(cut.grains_only, rgb("#D55E00"), 1.5)
     columns = np.nonzero(red)[1] + 0.5
     faces = [at_pixel(cut, np.array([x, 0.0, 0.0]))[0] for x in (-1e-7, 1e-7)]
     reach = R * 600 / (cut.window[1] - cut.window[0])
     away = np.abs(columns[:, None] - np.array(faces))
     assert ((away < reach).sum(axis=0) > 10).all() and (away.min(axis=1) < reach).all()
     whole = still_picture(frame, **how)
-    columns = np.nonzero(alike(whole.grains_only, rgb("#D55E00"), 1.5))[1]
+    columns = np.nonzero(pixels_of_hue(whole.grains_only, rgb("#D55E00"), 1.5))[1]
     assert 3 < np.ptp(columns) < 2 * reach
 
 

@@ -23,9 +23,9 @@ def opened(monkeypatch):
 
 
 @pytest.mark.compiled("fields")
-def test_a_simulation_shows_its_run(looked_at, opened, tmp_path):
+def test_a_simulation_shows_its_run(finished_run, opened, tmp_path):
     """`view` writes view.html in the run's folder, or where it is told, opens it, and gives its path."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     path = sim.view()
     assert path == folder / "view.html" and opened == [path.resolve().as_uri()]
     manifest, _, packets = blocks(path)
@@ -53,10 +53,10 @@ def test_a_simulation_without_files_shows_its_state(opened):
 
 
 @pytest.mark.compiled("fields")
-def test_too_much_is_thinned(looked_at, opened, tmp_path, monkeypatch):
+def test_too_much_is_thinned(finished_run, opened, tmp_path, monkeypatch):
     """Where all frames would take too much room, fewer are in the page, and it says so."""
     monkeypatch.setattr(show, "MAX_BYTES", 5000.0)
-    manifest, _, packets = blocks(sand.open(looked_at[0]).view(tmp_path / "a.html"))
+    manifest, _, packets = blocks(sand.open(finished_run[0]).view(tmp_path / "a.html"))
     assert 1 <= len(packets) < 6 and "limit the size" in manifest["note"]
 
 

@@ -9,9 +9,9 @@ from sand.viewer.external_field import describe_field, read_field
 
 
 @pytest.mark.compiled("fields")
-def test_a_field_is_told(looked_at):
+def test_a_field_is_told(finished_run):
     """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     told = run_dataset(folder, read_field(folder)).manifest()["field"]
     assert "rotating" in told["text"] and "1 mT" in told["text"]
     expected = [np.array(sim.forces[2].flux_density_at(t)) * 1e3 for t in sim.ledger["time"]]
@@ -51,9 +51,9 @@ def test_fields_add_up():
 
 
 @pytest.mark.compiled("fields")
-def test_pictures_and_pages_have_the_same_field(looked_at):
+def test_pictures_and_pages_have_the_same_field(finished_run):
     """`flux_density` of an opened run is the field that the page is told; None where no case says so."""
-    folder, sim = looked_at
+    folder, sim = finished_run
     for time in sim.ledger["time"]:
         np.testing.assert_array_equal(sand.open(folder).flux_density(time), read_field(folder)[1](time))
     assert read_field(folder.parent) is None

@@ -15,9 +15,9 @@ pytestmark = pytest.mark.usefixtures("bundle")
 
 
 @pytest.mark.compiled("fields")
-def test_messages_of_the_widget(looked_at):
+def test_messages_of_the_widget(finished_run):
     """Each message is answered from the run dataset, with its id, so that the page knows what it asked for."""
-    story = run_dataset(looked_at[0])
+    story = run_dataset(finished_run[0])
     assert answer_message(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
     assert answer_message(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
     told, none = answer_message(story, {"kind": "manifest", "since": 4})
@@ -42,30 +42,30 @@ def test_messages_of_the_widget(looked_at):
         {"kind": "manifest", "since": None},
     ],
 )
-def test_wrong_messages(looked_at, content):
+def test_wrong_messages(finished_run, content):
     """A sentence, whatever comes; nothing is raised in the kernel."""
-    told, buffers = answer_message(run_dataset(looked_at[0]), content)
+    told, buffers = answer_message(run_dataset(finished_run[0]), content)
     assert isinstance(told["error"], str) and buffers == []
 
 
 @pytest.mark.compiled("fields")
-def test_what_nobody_thought_of(looked_at, monkeypatch):
+def test_what_nobody_thought_of(finished_run, monkeypatch):
     """Any error is answered with a sentence, so that the page does not wait for ever."""
-    story = run_dataset(looked_at[0])
+    story = run_dataset(finished_run[0])
     monkeypatch.setattr(story, "frame", lambda k: 1 / 0)
     told, buffers = answer_message(story, {"kind": "frame", "k": 1, "id": 3})
     assert told["id"] == 3 and "ZeroDivisionError" in told["error"] and buffers == []
 
 
 @pytest.mark.compiled("fields")
-def test_the_widget(looked_at, monkeypatch):
+def test_the_widget(finished_run, monkeypatch):
     """It holds nothing that would be saved with the notebook, runs the bundle, and answers through its own channel."""
     pytest.importorskip("anywidget", reason="anywidget is in the test extra")
-    one = widget(run_dataset(looked_at[0]))
+    one = widget(run_dataset(finished_run[0]))
     assert not {"manifest", "series"} & set(one.get_state()) and SCRIPT in str(one._esm)
     sent = []
     monkeypatch.setattr(one, "send", lambda content, buffers=None: sent.append((content, buffers)))
     one._handle_custom_msg({"kind": "frame", "k": 1}, [])
     assert sent[0][0] == {"kind": "frame", "k": 1} and decode(sent[0][1][0])[0]["frame"] == 1
     monkeypatch.setattr(show, "in_notebook", lambda: True)
-    assert type(sand.open(looked_at[0]).view()).__name__ == "GrainWidget"
+    assert type(sand.open(finished_run[0]).view()).__name__ == "GrainWidget"
