@@ -1,8 +1,8 @@
-"""Python as it is on Windows and macOS, as far as Linux can imitate it.
+"""Emulation of Windows and macOS in Python on Linux.
 
-`become_windows()` takes away the names that Python does not have there, and lets files behave as they do there:
-a folder cannot be opened, a file that is open for reading only cannot be synced, and a file that this process has
-open can be neither replaced nor removed. With `-p tests.windows_emulation` pytest runs any tests in such a Python.
+`become_windows()` removes the names that Python lacks there and changes files: a folder cannot be opened, a file
+opened for reading cannot be synced, and a file that this process has open can be neither replaced nor removed.
+With `-p tests.windows_emulation` pytest runs any tests in this emulation.
 """
 
 from __future__ import annotations

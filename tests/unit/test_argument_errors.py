@@ -1,4 +1,4 @@
-"""Slips of a script: each raises BadInput with one line that says what to write instead. Nothing is compiled."""
+"""Wrong arguments in scripts: each raises BadInput with one line that says what to write. Nothing is compiled."""
 
 import pickle
 import sys
@@ -15,8 +15,8 @@ from sand.simulation.contact_table import ContactTable
 
 
 @pytest.fixture(scope="module")
-def known(tmp_path_factory):
-    """What the expressions may name: two grains, a simulation of them that has not begun, an empty table."""
+def namespace(tmp_path_factory):
+    """Names that the expressions may use: two grains, a simulation before its first step, an empty table."""
     x = [[0, 0, 0], [3e-8, 0, 0]]
     grains = sand.Grains(x, 1e-8, "silica")
     run = tmp_path_factory.mktemp("run")
@@ -216,11 +216,11 @@ SLIPS = [*ARGUMENTS, *SIMULATIONS, *SETUPS, *EXPERIMENTS]
 
 
 @pytest.mark.parametrize(("slip", "line"), SLIPS, ids=[slip for slip, _ in SLIPS])
-def test_a_slip_gives_one_line(known, slip, line):
-    """BadInput, one line, with what is wrong or what to write instead."""
+def test_a_wrong_argument_gives_one_line(namespace, slip, line):
+    """BadInput with one line: what is wrong or what to write instead."""
     with warnings.catch_warnings(), pytest.raises(sand.BadInput) as caught:
         warnings.simplefilter("ignore")
-        eval(slip, dict(known))
+        eval(slip, dict(namespace))
     assert line in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -229,20 +229,21 @@ def test_a_slip_gives_one_line(known, slip, line):
     ("slip", "package"),
     [("table.to_pandas()", "pandas"), ("table.to_xarray()", "xarray"), ("sand.open(run).to_pandas()", "pandas")],
 )
-def test_a_package_that_is_not_installed_is_named(known, monkeypatch, slip, package):
+def test_missing_optional_package_is_named(namespace, monkeypatch, slip, package):
+    """The line names the package to install."""
     monkeypatch.setitem(sys.modules, package, None)  # importing it fails
     with pytest.raises(sand.BadInput, match=f"needs {package}, which is not installed: pip install {package}"):
-        eval(slip, dict(known))
+        eval(slip, dict(namespace))
 
 
-def test_tables_can_be_asked_for_a_name(known):
-    """`in` and `get` work as for any mapping, and `hasattr` for grains and simulations."""
-    assert "overlp" not in known["table"] and known["table"].get("overlp") is None
-    assert not hasattr(known["grains"], "velocty") and not hasattr(known["sim"], "grain")
+def test_membership_and_get_of_tables(namespace):
+    """`in` and `get` work as for any mapping, `hasattr` for grains and simulations."""
+    assert "overlp" not in namespace["table"] and namespace["table"].get("overlp") is None
+    assert not hasattr(namespace["grains"], "velocty") and not hasattr(namespace["sim"], "grain")
 
 
-def test_all_that_is_wrong_with_settings_is_told_at_once():
-    """Kinds and ranges, one line each."""
+def test_all_wrong_settings_are_reported_together():
+    """Types and ranges, one line each."""
     with pytest.raises(sand.BadInput) as caught:
         sand.Contact(slip=3, slide_factor=-1.0, roll_factor="x")
     assert len(caught.value.problems) == 3

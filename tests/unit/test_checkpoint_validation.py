@@ -1,4 +1,4 @@
-"""A checkpoint with a right check sum and impossible numbers: refused in a line before compiled code sees it."""
+"""Checkpoints with a valid checksum and impossible numbers are refused before compiled code reads them."""
 
 import re
 import shutil
@@ -21,8 +21,8 @@ FAR = 2**31 - 1
 """An index that is none."""
 
 
-def refused(folder, arrays, meta=META):
-    """What is said of a checkpoint that is written with a right check sum."""
+def error_of(folder, arrays, meta=META):
+    """The error message for a checkpoint written with a valid checksum."""
     path = write_checkpoint(folder, arrays, dict(meta))
     with pytest.raises(sand.BadInput) as error:
         newest_checkpoint(folder)
@@ -33,19 +33,19 @@ def refused(folder, arrays, meta=META):
 
 
 def test_the_reference_state_is_valid():
-    """Nothing is wrong with what SAND has written."""
+    """The reference checkpoint has no errors."""
     check_state(*read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz"))))
 
 
 def test_every_array_of_a_checkpoint_is_in_the_table():
-    """A new one needs a line there."""
+    """A new array needs a line in the table."""
     assert set(WITH_ORDER) == set(STORED)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(STORED))
-def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
-    """Each array in turn: another type, one column less or more, one axis less, not a number, an index beyond."""
+def test_wrong_types_shapes_and_values(tmp_path, name):
+    """Each array: other type, one column less or more, one axis less, NaN, an index out of range."""
     good = WITH_ORDER[name]
     changed = {
         "type": good.astype({"f": np.float32, "u": np.int64, "i": np.float64}[good.dtype.kind]),
@@ -64,19 +64,19 @@ def test_types_shapes_and_numbers_that_are_none(tmp_path, name):
     if name in ("contacts/every_step", "pair_list/in_contact"):
         changed["neither"] = np.full_like(good, 2)
     for what, array in changed.items():
-        said = refused(tmp_path, {**WITH_ORDER, name: array})
+        said = error_of(tmp_path, {**WITH_ORDER, name: array})
         sizing = what == "shape" and name in (
             "grains/radius",
             "contacts/pair",
             "pair_list/pair",
-        )  # then others do not fit
+        )  # then other arrays are inconsistent
         assert sizing or f"'{name}'" in said, (what, said)
     if STORED[name].required:
         without = {other: array for other, array in WITH_ORDER.items() if other != name}
-        assert re.search(f"there is no array '{name}'", refused(tmp_path, without))
+        assert re.search(f"there is no array '{name}'", error_of(tmp_path, without))
 
 
-def changed_at(name, index, value):
+def changed_entry(name, index, value):
     array = WITH_ORDER[name].copy()
     array[index] = value
     return {**WITH_ORDER, name: array}
@@ -86,13 +86,13 @@ def changed_at(name, index, value):
     ("place", "value"),
     [(CONTACTS, 2), (CONTACTS, 10**15), (CONTACTS, -1), (PAIRS, 4), (STAGE, 1), (STEPS, 61), (GRAIN1, FAR)],
 )
-def test_counters_that_do_not_fit(tmp_path, place, value):
-    """The numbers of contacts and pairs are those of the arrays, the step that of meta.json; a grain is one."""
-    assert f"{COUNT[place]} = {value}" in refused(tmp_path, changed_at("count", place, value))
+def test_inconsistent_counters(tmp_path, place, value):
+    """Numbers of contacts and pairs against the arrays, the step against meta.json, an invalid grain index."""
+    assert f"{COUNT[place]} = {value}" in error_of(tmp_path, changed_entry("count", place, value))
 
 
-def test_lists_that_do_not_fit(tmp_path):
-    """A pair of one grain, contacts in the wrong grain's list, a list that shrinks, a grain twice in the order."""
+def test_inconsistent_lists(tmp_path):
+    """A pair of one grain, a contact in the wrong row, decreasing row starts, a grain twice in the order."""
     for name, index, value, words in (
         ("contacts/pair", (0, 0), ARRAYS["contacts/pair"][1, 0], "the same grain twice"),
         ("pair_list/pair", (1, 0), ARRAYS["pair_list/pair"][0, 0], "the same grain twice"),
@@ -100,14 +100,14 @@ def test_lists_that_do_not_fit(tmp_path):
         ("order", 0, 1, "once"),
         ("grains/id", 0, 1, "once"),
     ):
-        assert words in refused(tmp_path, changed_at(name, index, value))
+        assert words in error_of(tmp_path, changed_entry(name, index, value))
     turned = ARRAYS["contacts/side"][::-1].copy()
-    assert "contacts of each grain" in refused(tmp_path, {**ARRAYS, "contacts/side": turned})
+    assert "contacts of each grain" in error_of(tmp_path, {**ARRAYS, "contacts/side": turned})
 
 
 @pytest.mark.parametrize("name", [*NUMBERS, *PLANNED_END, "choices", "case", "ledger"])
-def test_meta_that_is_none(name):
-    """Text, a list, not a number, endless, below 0, or missing: one line that names it."""
+def test_invalid_metadata(name):
+    """Text, a list, NaN, infinite, negative or missing: one line that names the entry."""
     strange = ["", 3] if name in ("choices", "case", "ledger") else ["", [1], -1, np.nan, np.inf, 10**400, True]
     for value in strange:
         with pytest.raises(sand.BadInput, match=f"meta.json has {name} = "):
@@ -118,12 +118,12 @@ def test_meta_that_is_none(name):
 
 
 @pytest.mark.slow
-def test_commands_refuse_what_would_have_crashed(tmp_path, capsys):
-    """`sand resume` and `sand info`: exit code 2 and a line; materials that the case does not have, too."""
+def test_commands_refuse_invalid_checkpoints(tmp_path, capsys):
+    """`sand resume` and `sand info`: exit code 2 and one line; also materials that the case lacks."""
     for arrays in (
-        changed_at("contacts/pair", (1, 2), FAR),
-        changed_at("pair_list/pair", (1, 2), FAR),
-        changed_at("grains/material", slice(None), 1),
+        changed_entry("contacts/pair", (1, 2), FAR),
+        changed_entry("pair_list/pair", (1, 2), FAR),
+        changed_entry("grains/material", slice(None), 1),
     ):
         folder = tmp_path / "run"
         shutil.copytree(REFERENCE / f"run-v{VERSION}", folder)

@@ -1,4 +1,4 @@
-"""`sand plot`: files made, refusals that leave nothing behind."""
+"""`sand plot`: files written, and refusals that leave nothing behind."""
 
 import json
 
@@ -10,11 +10,11 @@ from sand.plotting.plots import HISTORY
 
 
 @pytest.mark.compiled("fields")
-def test_everything_by_default(run_in_field, tmp_path, capsys):
-    """Five figures over time and a still picture, in DIR/plots, and what was written is told."""
+def test_default_figures(run_in_field, tmp_path, capsys):
+    """Five figures over time and a still picture in DIR/plots; the written files are listed."""
     assert main(["plot", str(run_in_field), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)["files"]
-    assert told == [str(run_in_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]
+    message = json.loads(capsys.readouterr().out)["files"]
+    assert message == [str(run_in_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]
     assert Image.open(run_in_field / "plots" / "still.png").size == (1600, 1000)
     assert main(["plot", str(run_in_field)]) == 2
     assert capsys.readouterr().err.count("exists; give another --out, or --overwrite") == 1
@@ -23,8 +23,8 @@ def test_everything_by_default(run_in_field, tmp_path, capsys):
 
 
 @pytest.mark.compiled("fields")
-def test_chosen_ones_as_other_formats(run_in_field, tmp_path, capsys):
-    """Histograms of quantities, a still of a frame in a size of one's own; PDF and SVG are what they are called."""
+def test_chosen_figures_and_formats(run_in_field, tmp_path, capsys):
+    """Histograms of quantities, a still of a frame with a given size; PDF and SVG."""
     out = str(tmp_path / "there")
     words = ["--what", "speed,still", "--size", "300x200", "--frame", "0", "--bonds", "load", "--colour", "size"]
     for form, start in (("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")):
@@ -37,7 +37,7 @@ def test_chosen_ones_as_other_formats(run_in_field, tmp_path, capsys):
 
 @pytest.mark.compiled("fields")
 def test_a_trajectory_alone(run_in_field, tmp_path, capsys):
-    """A .gsd has no ledger: a still picture by default, beside it."""
+    """A .gsd file has no ledger: a still picture by default, beside it."""
     alone = tmp_path / "alone.gsd"
     alone.write_bytes((run_in_field / "trajectory.gsd").read_bytes())
     assert main(["plot", str(alone), "--size", "300x200"]) == 0
@@ -48,7 +48,7 @@ def test_a_trajectory_alone(run_in_field, tmp_path, capsys):
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["--what", "sise,still"], "'sise' is unknown; did you mean 'size'?"),
         (["--what", ""], "'' is unknown"),
@@ -63,25 +63,25 @@ def test_a_trajectory_alone(run_in_field, tmp_path, capsys):
         (["--out", "/nowhere/at/all"], "cannot be a folder"),
     ],
 )
-def test_mistakes_are_told_and_nothing_is_written(run_in_field, tmp_path, capsys, words, told):
+def test_wrong_arguments_write_nothing(run_in_field, tmp_path, capsys, words, message):
     """One line, exit code 2, no folder."""
     out = [] if "--out" in words else ["--out", str(tmp_path / "there")]
     assert main(["plot", str(run_in_field), *out, *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and told in lines[0]
+    assert len(lines) == 1 and message in lines[0]
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.compiled("fields")
 def test_several_mistakes_have_a_line_each(run_in_field, tmp_path, capsys):
-    """All at once, not one after the other."""
+    """All errors at once."""
     assert main(["plot", str(run_in_field), "--what", "sise", "--view", "botom", "--size", "1x1", "--colour", "x"]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 4
 
 
 @pytest.mark.compiled("fields")
-def test_what_is_not_there(run_in_field, tmp_path, capsys):
-    """No run, no ledger, a ledger without rows, no frame: told, and nothing is written."""
+def test_missing_run_ledger_or_frame(run_in_field, tmp_path, capsys):
+    """No run, no ledger, a ledger without rows, no frame: one line, and nothing is written."""
     assert main(["plot", str(tmp_path)]) == 2
     assert "is not the folder of a run" in capsys.readouterr().err
     (tmp_path / "trajectory.gsd").write_bytes((run_in_field / "trajectory.gsd").read_bytes())

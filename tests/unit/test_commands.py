@@ -1,4 +1,4 @@
-"""Which command a case file is for, and that `sand info` refuses what the command would."""
+"""Which command a case file is for, and that `sand info` refuses what that command refuses."""
 
 import pytest
 
@@ -44,7 +44,7 @@ CASES = {"run": RUN, "collide": COLLIDE, "scatter": SCATTER, "grow": GROW}
 @pytest.mark.parametrize("meant", list(CASES))
 @pytest.mark.parametrize("given", list(CASES))
 def test_a_case_of_another_command(tmp_path, monkeypatch, capsys, meant, given):
-    """One line that names the command to use, and nothing is made; `sand grow` takes cases of `sand run`."""
+    """One line names the right command and nothing is written; `sand grow` takes cases of `sand run`."""
     if given == meant or (given, meant) == ("grow", "run"):
         return
     monkeypatch.chdir(tmp_path)
@@ -54,16 +54,16 @@ def test_a_case_of_another_command(tmp_path, monkeypatch, capsys, meant, given):
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_what_tells_a_case():
-    """Its own tables; a body alone is one of a collision; nothing tells an empty one."""
+def test_command_of_a_case():
+    """By its tables; a body alone means a collision; an empty case has no command."""
     assert command_for({"target": {}, "impcat": {}}) == "collide"
     assert command_for({"projectile": {}, "flight": {}}) == "scatter"
     assert command_for({"forces": {}, "stepping": {}}) is None
 
 
 @pytest.mark.parametrize("name", list(CASES))
-def test_info_reads_every_kind(tmp_path, capsys, name):
-    """It says which command is for it."""
+def test_info_names_the_command_of_a_case(tmp_path, capsys, name):
+    """`sand info` of each kind of case names its command."""
     (tmp_path / "a.toml").write_text(CASES[name])
     assert main(["info", str(tmp_path / "a.toml")]) == 0
     assert (f"sand {name} " in capsys.readouterr().out) is (name != "run")
@@ -87,29 +87,29 @@ def test_info_reads_every_kind(tmp_path, capsys, name):
     ],
 )
 def test_info_refuses_what_collide_refuses(tmp_path, monkeypatch, capsys, old, new, part):
-    """The same lines from both, before anything is made."""
+    """The same lines from both, before any file is written."""
     monkeypatch.chdir(tmp_path)
     assert old in COLLIDE
     (tmp_path / "a.toml").write_text(COLLIDE.replace(old, new))
-    said = []
+    message = []
     for words in (["info", "a.toml"], ["collide", "a.toml"], ["collide", "a.toml", "--seeds", "1"]):
         assert main(words) == 2, capsys.readouterr().out
-        said.append(capsys.readouterr().err)
-    assert said[0] == said[1] == said[2]
-    assert part in said[0] and all(line.startswith("sand: a.toml: ") for line in said[0].splitlines())
+        message.append(capsys.readouterr().err)
+    assert message[0] == message[1] == message[2]
+    assert part in message[0] and all(line.startswith("sand: a.toml: ") for line in message[0].splitlines())
     assert len(list(tmp_path.iterdir())) == 1
 
 
 @pytest.mark.parametrize("given", ['"0"', "0", '"0 nm"', '"0.5 b"', '"10 nm"', '"0b"'])
 def test_impact_parameters(tmp_path, capsys, given):
-    """A length, or a part of the reach; 0 needs no unit."""
+    """A length, or a fraction of the sum of radii; 0 needs no unit."""
     (tmp_path / "a.toml").write_text(COLLIDE.replace('"2 m/s"', f'"2 m/s"\nimpact_parameter = {given}'))
     assert main(["info", str(tmp_path / "a.toml")]) == 0
 
 
 @pytest.mark.parametrize("command", ["collide", "scatter"])
-def test_a_body_is_not_replaced(tmp_path, monkeypatch, capsys, command):
-    """A job that would write over the file of one of its bodies is refused, and the file stays."""
+def test_a_body_file_is_not_overwritten(tmp_path, monkeypatch, capsys, command):
+    """A job whose output would overwrite the file of one of its bodies is refused, and the file stays."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "runs").mkdir()
     source = tmp_path / "runs" / "trajectory.gsd"
@@ -120,6 +120,6 @@ def test_a_body_is_not_replaced(tmp_path, monkeypatch, capsys, command):
     (tmp_path / "a.toml").write_text(body + other)
     before = source.read_bytes()
     assert main([command, "a.toml", "--out", "runs", "--overwrite"]) == 2
-    said = capsys.readouterr().err
-    assert "--overwrite would replace runs/trajectory.gsd, the target of a.toml" in said.replace("\\", "/")
+    message = capsys.readouterr().err
+    assert "--overwrite would replace runs/trajectory.gsd, the target of a.toml" in message.replace("\\", "/")
     assert source.read_bytes() == before

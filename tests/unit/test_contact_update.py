@@ -1,4 +1,4 @@
-"""Contacts that are moved in the pass over all of them, beside those that are settled one by one."""
+"""Contact update: the pass over all contacts against updating each flagged contact separately."""
 
 import copy
 
@@ -50,18 +50,18 @@ def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
     return passed.pending
 
 
-pass_and_settle = kernel(_pass_and_update, cached=False)
+pass_and_update = kernel(_pass_and_update, cached=False)
 
 
-def one_by_one(grains, contacts, near, count, lost, span, law, dt):
-    """The referee, in Python: a pass that moves nothing, then every contact beyond a limit by itself."""
+def update_flagged_only(grains, contacts, near, count, lost, span, law, dt):
+    """Reference: a pass that only flags contacts beyond a limit, then the update of each flagged contact."""
     used = np.uint64(count[CONTACTS])
     flag_contacts(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
     update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
 
 
-def some_contacts(material, box, seed=1):
-    """Pairs of grains of any size in a box, their contacts anywhere below and beyond each limit, also of breaking."""
+def random_contacts(material, box, seed=1):
+    """Pairs of grains in a box with displacements below and above each limit, breaking included."""
     rng = np.random.default_rng(seed)
 
     def vectors(size):
@@ -78,7 +78,7 @@ def some_contacts(material, box, seed=1):
     grains.radius[:], grains.mass[:] = np.concatenate((r1, r2)), mass.ravel()
     grains.velocity[:] = rng.normal(size=(3, 2 * PAIRS))
     grains.spin[:] = 1e8 * rng.normal(size=(3, 2 * PAIRS))
-    contacts.flag[:PAIRS] = 1.0  # much moved in the step before
+    contacts.flag[:PAIRS] = 1.0  # all slipped in the previous step
     contacts.lost[:] = rng.uniform(0.0, 1e-20, contacts.lost.shape)
     for c in range(PAIRS):
         constants = contact_constants(JKR)(pairing, r1[c], r2[c], *mass[:, c])
@@ -86,10 +86,12 @@ def some_contacts(material, box, seed=1):
         slide, roll, twist = rng.uniform(0.0, 1.6, 3)
         slide, roll = scale(slide * constants.slide_limit, across[0]), scale(roll * constants.roll_limit, across[1])
         n1, n2 = pointers_for(slide, roll, n[c], r1[c], r2[c])
-        pressed = rng.uniform(-1.1, 2.0) if c % 10 else rng.uniform(5.0, 20.0)
+        overlap_factor = rng.uniform(-1.1, 2.0) if c % 10 else rng.uniform(5.0, 20.0)
         centre = rng.uniform(-1e-7, 1e-7, 3)
         apart = (
-            r1[c] + r2[c] - pressed * constants.normal.pull_off_overlap * (0.2 if constants.normal.hertz > 0.0 else 1.0)
+            r1[c]
+            + r2[c]
+            - overlap_factor * constants.normal.pull_off_overlap * (0.2 if constants.normal.hertz > 0.0 else 1.0)
         )
         put(grains.position, c, axpy(0.5 * apart, n[c], centre))
         put(grains.position, c + PAIRS, axpy(-0.5 * apart, n[c], centre))
@@ -104,58 +106,58 @@ def some_contacts(material, box, seed=1):
     return grains, contacts, empty_pair_list(2 * PAIRS, 16), count, np.zeros(len(LOST))
 
 
-def law_for(reset=False, follow=False):
+def parameters_for(reset=False, follow=False):
     return ContactParameters(True, np.zeros((10, 1, 1)), reset, follow, False, 25.0)
 
 
 OPTIONS = {
-    "clamped": (SILICA, Box.open(), law_for()),
-    "reset": (SILICA, Box.open(), law_for(reset=True)),
-    "periodic": (SILICA, Box.periodic(2.2e-7, None, 3e-7), law_for()),
-    "following": (SILICA, Box.open(), law_for(follow=True)),
-    "hertzian": (SILICA.but(name="dry", surface_energy=0.0), Box.open(), law_for()),
+    "clamped": (SILICA, Box.open(), parameters_for()),
+    "reset": (SILICA, Box.open(), parameters_for(reset=True)),
+    "periodic": (SILICA, Box.periodic(2.2e-7, None, 3e-7), parameters_for()),
+    "following": (SILICA, Box.open(), parameters_for(follow=True)),
+    "hertzian": (SILICA.but(name="dry", surface_energy=0.0), Box.open(), parameters_for()),
 }
 
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("option", OPTIONS)
-def test_contacts_moved_in_the_pass_are_as_if_moved_one_by_one(option):
-    """Same pointers, twists, loads, losses, to rounding: 1e-12 of the largest of each kind.
+def test_pass_and_separate_update_agree(option):
+    """Same pointers, twists, loads and losses, to 1e-12 of the largest value of each array.
 
-    Pointers have errors of 1e-16, displacements are 1e-3 of a radius: forces and energies are known to some 1e-13.
+    Pointers have errors of 1e-16 and displacements are 1e-3 of a radius, so forces and energies are known to 1e-13.
     """
     material, box, law = OPTIONS[option]
-    world = some_contacts(material, box)
-    other = copy.deepcopy(world)
-    waited = pass_and_settle(*world, box.span, law, STEP)
+    system = random_contacts(material, box)
+    other = copy.deepcopy(system)
+    pending = pass_and_update(*system, box.span, law, STEP)
     with np.errstate(invalid="ignore"):
-        one_by_one(*other, box.span, law, STEP)
-    contacts, expected = world[1], other[1]
+        update_flagged_only(*other, box.span, law, STEP)
+    contacts, expected = system[1], other[1]
     for name in STATE:
         a, b = getattr(contacts, name)[..., :PAIRS], getattr(expected, name)[..., :PAIRS]
         assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max(), name
-    assert (world[3] == other[3]).all()
-    np.testing.assert_allclose(world[4], other[4], rtol=1e-12, atol=1e-12 * np.abs(other[4]).max())
-    flag, waits = contacts.flag[:PAIRS], expected.flag[:PAIRS]
-    assert ((flag == BROKEN_FLAG) == (waits == BROKEN_FLAG)).all() and ((flag > 0) == (waits > 0)).all()
-    # there are all sorts of contacts, and it is the pass that moves them, but for those it must leave alone
-    assert 0 < world[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
+    assert (system[3] == other[3]).all()
+    np.testing.assert_allclose(system[4], other[4], rtol=1e-12, atol=1e-12 * np.abs(other[4]).max())
+    flag, expected_flag = contacts.flag[:PAIRS], expected.flag[:PAIRS]
+    assert ((flag == BROKEN_FLAG) == (expected_flag == BROKEN_FLAG)).all() and ((flag > 0) == (expected_flag > 0)).all()
+    # all kinds of transitions occur, and the pass updates slipping contacts except those it must leave pending
+    assert 0 < system[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
     if option in ("clamped", "reset", "periodic"):
         assert np.sum(flag == SLIPPED_FLAG) > PAIRS / 4 and np.sum(flag == PENDING_FLAG) > 0
-        assert world[3][BROKEN] < waited < PAIRS / 3
-        assert world[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAG)
-        assert (world[4][[SLIDING, ROLLING, TWISTING]] != 0.0).all()
+        assert system[3][BROKEN] < pending < PAIRS / 3
+        assert system[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAG)
+        assert (system[4][[SLIDING, ROLLING, TWISTING]] != 0.0).all()
     if option == "following":
         assert not np.any(flag == SLIPPED_FLAG)
 
 
-def test_the_strain_before_a_step_is_that_of_grains_put_back():
-    """Displacements at the start of a step are those of a world that drifted back; 1e-12 of the largest."""
-    grains, contacts, *_ = some_contacts(SILICA, Box.periodic(2.2e-7, None, 3e-7))
+def test_displacements_before_a_step():
+    """Displacements at the start of a step equal those of grains that drift back, to 1e-12 of the largest."""
+    grains, contacts, *_ = random_contacts(SILICA, Box.periodic(2.2e-7, None, 3e-7))
     span = Box.periodic(2.2e-7, None, 3e-7).span
     back = copy.deepcopy(grains)
     back.inertia[:] = 1.0
-    kick_and_drift_for(False)(back, span, -STEP)  # no loads act
+    kick_and_drift_for(False)(back, span, -STEP)  # no forces act
     found, expected = [], []
     for c in range(PAIRS):
         constants, radii = columns.load(contacts.constants, c), (grains.radius[c], grains.radius[c + PAIRS])
@@ -169,21 +171,21 @@ def test_the_strain_before_a_step_is_that_of_grains_put_back():
 
 
 @pytest.mark.compiled("small")
-def test_what_a_contact_does_not_lose_stays_in_its_record():
-    """Contacts that do not move keep pointers and records bit by bit, whatever their neighbours in a block do."""
-    world = some_contacts(SILICA, Box.open(), seed=2)
-    before = copy.deepcopy(world[1])
-    pass_and_settle(*world, Box.open().span, law_for(), STEP)
-    still = world[1].flag[:PAIRS] == 0.0
+def test_contacts_that_do_not_slip_are_unchanged():
+    """Pointers and losses of contacts that do not slip stay the same bit by bit, whatever others in a block do."""
+    system = random_contacts(SILICA, Box.open(), seed=2)
+    before = copy.deepcopy(system[1])
+    pass_and_update(*system, Box.open().span, parameters_for(), STEP)
+    at_rest = system[1].flag[:PAIRS] == 0.0
     for name in ("pointer1", "pointer2", "lost"):
-        assert (getattr(world[1], name)[:, :PAIRS][:, still] == getattr(before, name)[:, :PAIRS][:, still]).all()
+        assert (getattr(system[1], name)[:, :PAIRS][:, at_rest] == getattr(before, name)[:, :PAIRS][:, at_rest]).all()
 
 
 @pytest.mark.compiled("small")
-def test_a_quiet_block_waits_to_be_settled():
-    """Where nothing moved in the step before, the pass moves nothing; contacts are settled one by one."""
-    world = some_contacts(SILICA, Box.open())
-    world[1].flag[:] = 0.0
-    waited = pass_and_settle(*world, Box.open().span, law_for(), STEP)
-    assert waited > PAIRS / 2 and not np.any(world[1].flag == SLIPPED_FLAG)
-    assert world[3][SLIPPED] > PAIRS / 2
+def test_blocks_without_slip_leave_contacts_pending():
+    """If no contact slipped in the previous step, the pass only flags; contacts are updated separately."""
+    system = random_contacts(SILICA, Box.open())
+    system[1].flag[:] = 0.0
+    pending = pass_and_update(*system, Box.open().span, parameters_for(), STEP)
+    assert pending > PAIRS / 2 and not np.any(system[1].flag == SLIPPED_FLAG)
+    assert system[3][SLIPPED] > PAIRS / 2

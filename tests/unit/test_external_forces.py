@@ -1,4 +1,4 @@
-"""Forces from outside: formulas against their energies, B(t) at times known by hand, settings and their mistakes."""
+"""External forces: formulas against their energies, B(t) at known times, settings and errors."""
 
 import math
 import tomllib
@@ -22,7 +22,7 @@ from sand.forces.external.loops import is_builtin
 EPS = np.finfo(float).eps
 component = st.integers(-100, 100).map(lambda n: n / 100)
 vector = st.tuples(component, component, component).filter(lambda v: np.linalg.norm(v) > 0.3)
-MICRO = 1e-6  # the period of every field that swings here [s]
+MICRO = 1e-6  # the period of every oscillating field in this file [s]
 SWING = sand.Field([0.1, 0.2, 0.3], shape="oscillating", amplitude=[1, 0, -2], frequency="1 MHz", phase="30 deg")
 TURN = sand.Field([0.3, -0.1, 0.2], shape="rotating", amplitude=[1, -1, 0], frequency=1e6, axis=[1, 1, 1])
 RAMP = sand.Field([0, 0, 1], shape="ramp", final=[2, 0, 1], start="1 us", end="3 us")
@@ -31,25 +31,25 @@ FIELDS = [CONSTANT, SWING, TURN, RAMP]
 FORCES = [*FIELDS, sand.Gravity([1.0, -2.0, 3.0]), sand.ElectricField(["1 kV/m", 2.0, 3.0])]
 
 
-def one(position=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), mass=1.0, charge=0.0):
-    """A grain as formulas see it."""
+def grain_state(position=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), mass=1.0, charge=0.0):
+    """A grain as formulas receive it."""
     return GrainState(tuple(position), (0.0,) * 3, (0.0,) * 3, tuple(moment), 1.0, mass, charge)
 
 
 def b_at(field, time):
     """The flux density of a field, from the energies of three unit moments: −U = B·e."""
-    return [-field.formula(time, one(moment=e), field.numbers())[2] for e in np.eye(3)]
+    return [-field.formula(time, grain_state(moment=e), field.numbers())[2] for e in np.eye(3)]
 
 
 # --- formulas ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("force", [sand.Gravity([1.5, -2.0, 3.0]), sand.ElectricField([1.5, -2.0, 3.0])])
 @given(vector)
-def test_force_is_the_slope_of_the_energy(force, place):
-    """F = −∂U/∂x; U is linear, so central differences miss by rounding alone, a few ε |F| (|x| + h)/h, h = 1/2."""
+def test_force_is_minus_the_gradient_of_the_energy(force, place):
+    """F = −∂U/∂x; U is linear, so central differences err by rounding only, ε |F| (|x| + h)/h with h = 1/2."""
     h, mass, charge = 0.5, 3.0, -7.0
 
     def loads(x):
-        return force.formula(0.0, one(x, mass=mass, charge=charge), force.numbers())
+        return force.formula(0.0, grain_state(x, mass=mass, charge=charge), force.numbers())
 
     slope = [(loads(place + h * e)[2] - loads(place - h * e)[2]) / (2 * h) for e in np.eye(3)]
     found, torque, _ = loads(place)
@@ -58,9 +58,9 @@ def test_force_is_the_slope_of_the_energy(force, place):
     assert torque == (0.0, 0.0, 0.0)
 
 
-def test_weight_and_electric_force_by_hand():
-    """F = m g and q E, U = −F·x: signs, and 0 at the origin; a negative charge is pushed against E."""
-    grain = one((0.0, 0.0, 2.0), mass=3.0, charge=-5.0)
+def test_gravity_and_electric_force_by_hand():
+    """F = m g and q E, U = −F·x with 0 at the origin; a negative charge is pushed against E."""
+    grain = grain_state((0.0, 0.0, 2.0), mass=3.0, charge=-5.0)
     down, up = sand.Gravity("9.81 m/s^2"), sand.ElectricField("2 V/m")
     force, _, energy = surroundings.uniform_gravity(0.0, grain, down.numbers())
     assert force == pytest.approx((0, 0, -3 * 9.81), rel=1e-6, abs=0.0)
@@ -69,26 +69,26 @@ def test_weight_and_electric_force_by_hand():
     assert force == pytest.approx((0, 0, -10), rel=1e-6, abs=0.0)
     assert energy == pytest.approx(20, rel=1e-6, abs=0.0)
     for push in (down, up):
-        assert push.formula(0.0, one(mass=3.0, charge=-5.0), push.numbers())[2] == 0.0
+        assert push.formula(0.0, grain_state(mass=3.0, charge=-5.0), push.numbers())[2] == 0.0
 
 
-def turned(v, axis, angle):
-    """v turned about a unit vector, right-handed (Rodrigues)."""
+def rotated(v, axis, angle):
+    """v rotated about a unit vector, right-handed (Rodrigues)."""
     along = axis * (axis @ v)
     return along + (v - along) * math.cos(angle) + np.cross(axis, v) * math.sin(angle)
 
 
 @pytest.mark.parametrize("field", FIELDS)
 @given(vector, st.integers(0, 50).map(lambda n: n * 0.083e-6))
-def test_torque_is_the_slope_of_the_energy(field, moment, time):
-    """M = μ×B(t) = −∂U/∂θ for turns of μ: truncation μB h²/6, rounding ε μB/h."""
+def test_torque_is_minus_the_gradient_of_the_energy(field, moment, time):
+    """M = μ×B(t) = −∂U/∂θ for rotations of μ: truncation μB h²/6, rounding ε μB/h."""
     h, numbers = 1e-5, field.numbers()
 
     def energy(axis, angle):
-        return field.formula(time, one(moment=turned(np.array(moment), axis, angle)), numbers)[2]
+        return field.formula(time, grain_state(moment=rotated(np.array(moment), axis, angle)), numbers)[2]
 
     slope = [(energy(e, h) - energy(e, -h)) / (2 * h) for e in np.eye(3)]
-    force, torque, _ = field.formula(time, one(moment=moment), numbers)
+    force, torque, _ = field.formula(time, grain_state(moment=moment), numbers)
     size = np.linalg.norm(moment) * field.flux_density_size()
     assert torque == pytest.approx([-s for s in slope], abs=size * (h * h + 10 * EPS / h))
     assert torque == pytest.approx(np.cross(moment, b_at(field, time)), abs=10 * EPS * size)
@@ -97,9 +97,9 @@ def test_torque_is_the_slope_of_the_energy(field, moment, time):
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("force", FORCES)
-def test_compiled_formulas_compute_the_same(force):
-    """Force, torque and energy of the compiled formula and of plain Python; rounding of sin and of a few sums."""
-    grain = one((0.3, -2.0, 1.1), (0.5, 1.0, -0.4), mass=3.0, charge=-7.0)
+def test_compiled_formulas_equal_plain_python(force):
+    """Force, torque and energy, to the rounding of sin and of short sums."""
+    grain = grain_state((0.3, -2.0, 1.1), (0.5, 1.0, -0.4), mass=3.0, charge=-7.0)
     plain = force.formula(1.7e-6, grain, force.numbers())
     compiled = kernel(force.formula, cached=False)(1.7e-6, grain, force.numbers())
     size = max(np.abs(np.concatenate([*plain[:2], [plain[2]]])))
@@ -109,46 +109,48 @@ def test_compiled_formulas_compute_the_same(force):
 
 
 # --- B(t) -------------------------------------------------------------------------------------------
-def check_at(field, parts, expected):
-    """B at so many parts of the period, to the rounding of an angle of a few turns."""
+def check_flux_density(field, parts, expected):
+    """B at these fractions of the period, to the rounding of an angle of a few turns."""
     for part, b in zip(parts, expected, strict=True):
         assert b_at(field, part * MICRO) == pytest.approx(b, abs=100 * EPS * field.flux_density_size()), part
 
 
-def test_an_oscillating_field_swings_along_its_amplitude():
-    """B0 + B1 cos(2πft + φ) at whole quarters of the period."""
+def test_oscillating_field():
+    """B0 + B1 cos(2πft + φ) at quarters of the period."""
     b0, b1 = np.array([0.1, 0.2, 0.3]), np.array([1.0, 0.0, -2.0])
     swing = {"shape": "oscillating", "amplitude": b1, "frequency": "1 MHz"}
-    check_at(sand.Field(b0, **swing), (0, 0.25, 0.5, 0.75, 1), (b0 + b1, b0, b0 - b1, b0, b0 + b1))
-    check_at(sand.Field(b0, **swing, phase="90 deg"), (0, 0.25, 0.75), (b0, b0 - b1, b0 + b1))
-    check_at(sand.Field(b0, **swing, phase=math.pi), (0, 0.5), (b0 - b1, b0 + b1))
-    check_at(sand.Field(0, shape="oscillating", amplitude="1 mT", frequency=1e6), (1 / 3,), ([0, 0, -0.5e-3],))
+    check_flux_density(sand.Field(b0, **swing), (0, 0.25, 0.5, 0.75, 1), (b0 + b1, b0, b0 - b1, b0, b0 + b1))
+    check_flux_density(sand.Field(b0, **swing, phase="90 deg"), (0, 0.25, 0.75), (b0, b0 - b1, b0 + b1))
+    check_flux_density(sand.Field(b0, **swing, phase=math.pi), (0, 0.5), (b0 - b1, b0 + b1))
+    check_flux_density(
+        sand.Field(0, shape="oscillating", amplitude="1 mT", frequency=1e6), (1 / 3,), ([0, 0, -0.5e-3],)
+    )
 
 
-def test_a_rotating_field_turns_right_handed_about_its_axis():
+def test_rotating_field_is_right_handed():
     """About z: x → y → −x; about −z: x → −y; about (1,1,1) a third of a turn takes x to y, y to z, z to x."""
     turn = {"shape": "rotating", "frequency": "1 MHz"}
     about_z = sand.Field([0, 0, 0.5], amplitude=[2, 0, 0], axis=[0, 0, 7], **turn)
-    check_at(about_z, (0, 0.25, 0.5, 0.75), ([2, 0, 0.5], [0, 2, 0.5], [-2, 0, 0.5], [0, -2, 0.5]))
+    check_flux_density(about_z, (0, 0.25, 0.5, 0.75), ([2, 0, 0.5], [0, 2, 0.5], [-2, 0, 0.5], [0, -2, 0.5]))
     back = sand.Field(0, amplitude=[2, 0, 0], axis=[0, 0, -1], **turn)
-    check_at(back, (0, 0.25), ([2, 0, 0], [0, -2, 0]))
+    check_flux_density(back, (0, 0.25), ([2, 0, 0], [0, -2, 0]))
     ahead = sand.Field(0, amplitude=[2, 0, 0], axis=[0, 0, 1], phase="90 deg", **turn)
-    check_at(ahead, (0, 0.25), ([0, 2, 0], [-2, 0, 0]))
+    check_flux_density(ahead, (0, 0.25), ([0, 2, 0], [-2, 0, 0]))
     diagonal = sand.Field(0, amplitude=[1, -1, 0], axis=[1, 1, 1], **turn)
-    check_at(diagonal, (0, 1 / 3, 2 / 3), ([1, -1, 0], [0, 1, -1], [-1, 0, 1]))
+    check_flux_density(diagonal, (0, 1 / 3, 2 / 3), ([1, -1, 0], [0, 1, -1], [-1, 0, 1]))
     assert [np.linalg.norm(b_at(diagonal, t)) for t in (1e-7, 3e-7, 8e-7)] == pytest.approx(
         [math.sqrt(2)] * 3, rel=1e-6, abs=0.0
     )
 
 
-def test_a_ramp_rests_at_both_ends():
-    """B0 up to the start, half way in the middle, `final` from the end on; start is 0 unless given."""
+def test_ramp_is_constant_before_and_after():
+    """B0 up to the start, the mean in the middle, `final` from the end on; the default start is 0."""
     b0, b1 = np.array([0.0, 0.0, 1.0]), np.array([2.0, 0.0, 1.0])
-    check_at(RAMP, (-5, 0, 1, 2, 3, 1e6), (b0, b0, b0, (b0 + b1) / 2, b1, b1))
-    check_at(RAMP, (1.5,), (0.75 * b0 + 0.25 * b1,))
+    check_flux_density(RAMP, (-5, 0, 1, 2, 3, 1e6), (b0, b0, b0, (b0 + b1) / 2, b1, b1))
+    check_flux_density(RAMP, (1.5,), (0.75 * b0 + 0.25 * b1,))
     from_zero = sand.Field(0, shape="ramp", final="1 mT", end="4 us")
     assert from_zero.start == 0.0
-    check_at(from_zero, (0, 1, 4, 5), ([0, 0, 0], [0, 0, 0.25e-3], [0, 0, 1e-3], [0, 0, 1e-3]))
+    check_flux_density(from_zero, (0, 1, 4, 5), ([0, 0, 0], [0, 0, 0.25e-3], [0, 0, 1e-3], [0, 0, 1e-3]))
 
 
 @pytest.mark.parametrize(
@@ -160,12 +162,12 @@ def test_a_ramp_rests_at_both_ends():
         (CONSTANT, lambda t: np.zeros(3)),
     ],
 )
-def test_the_energy_changes_though_nothing_moves(field, slope):
-    """∂U/∂t = −μ·dB/dt; dB/dt = Ω×B of a turning field. Central differences: (ωh)²/6 = 7e-8 and ε/ωh."""
+def test_time_derivative_of_the_energy(field, slope):
+    """∂U/∂t = −μ·dB/dt; dB/dt = Ω×B of a rotating field. Central differences: (ωh)²/6 = 7e-8 and ε/ωh."""
     moment, h, time = np.array([0.5, 1.0, -0.4]), 1e-10, 1.37e-6
 
     def energy(t):
-        return field.formula(t, one(moment=moment), field.numbers())[2]
+        return field.formula(t, grain_state(moment=moment), field.numbers())[2]
 
     found = (energy(time + h) - energy(time - h)) / (2 * h)
     largest = np.linalg.norm(moment) * field.flux_density_size() * 2e6 * math.pi
@@ -174,17 +176,17 @@ def test_the_energy_changes_though_nothing_moves(field, slope):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("field", [*FIELDS, sand.Field("-2 mT"), sand.Field(3, shape="ramp", final=-1, end=3e-6)])
-def test_the_size_bounds_the_field_at_all_times_and_is_reached(field):
-    """max |B(t)| over 20000 times of four periods or the ramp; a step of 1.3e-3 rad misses it by 2e-7 at most."""
+def test_flux_density_size_is_the_maximum(field):
+    """max |B(t)| over 20000 times of four periods or the ramp; a step of 1.3e-3 rad misses it by 2e-7."""
     sizes = [np.linalg.norm(b_at(field, t)) for t in np.linspace(0.0, 4e-6, 20001)]
     bound = field.flux_density_size()
     assert max(sizes) <= bound * (1 + 10 * EPS)
     assert max(sizes) == pytest.approx(bound, rel=1e-6, abs=0.0)
 
 
-# --- what forces tell of themselves -----------------------------------------------------------------
-def test_fields_that_change_in_time_say_so():
-    """Work is booked and the step limited where B changes; the constant field keeps its cheap formula."""
+# --- attributes of forces -----------------------------------------------------------------------------
+def test_time_dependent_attribute():
+    """It enables recorded work and limits the step; the constant field uses a cheaper formula."""
     assert [f.formula for f in FIELDS] == [uniform_field, field_in_time, field_in_time, field_in_time]
     assert [f.time_dependent for f in FIELDS] == [False, True, True, True]
     assert [f.longest_step() for f in FIELDS] == pytest.approx(
@@ -193,8 +195,8 @@ def test_fields_that_change_in_time_say_so():
     assert flux_density_at(0.0, RAMP.numbers()) == (0.0, 0.0, 1.0)
 
 
-def test_forces_that_have_a_place_say_so():
-    """Gravity and the electric field store energy in the position; none brings a magnetic field."""
+def test_position_dependent_attribute():
+    """Energies of gravity and electric field depend on position; neither has a magnetic field."""
     for force in FORCES[-2:]:
         assert force.position_dependent
         assert not getattr(force, "time_dependent", False)
@@ -203,14 +205,14 @@ def test_forces_that_have_a_place_say_so():
     assert all(isinstance(f, ExternalForce) for f in FORCES)
 
 
-def test_a_users_force_needs_none_of_the_new_members():
-    """A class without `time_dependent`, `position_dependent` and `longest_step` is an external force."""
+def test_optional_members_of_external_forces():
+    """`time_dependent`, `position_dependent` and `longest_step` may be missing."""
     asked = ("parameters", "check", "numbers", "flux_density_size")
     old = type("Old", (), {"name": "old", "references": "", "formula": None, **dict.fromkeys(asked, lambda self: 0)})
     assert isinstance(old(), ExternalForce)
 
 
-def test_warnings_about_grains_that_feel_nothing():
+def test_forces_that_act_on_no_grain_warn():
     """A field without moments, an electric field without charges."""
     grains = sand.Grains([[0, 0, 0]], 1e-8, "iron")
     magnetic = sand.Grains([[0, 0, 0]], 1e-8, "iron", moment=[[1e-18, 0, 0]])
@@ -227,8 +229,8 @@ def test_warnings_about_grains_that_feel_nothing():
 
 # --- settings ---------------------------------------------------------------------------------------
 @pytest.mark.slow
-def test_sizes_and_units():
-    """One size is along +z, of gravity along −z; text and quantities have units."""
+def test_scalars_and_units():
+    """A scalar is along +z, for gravity along −z; text and quantities have units."""
     assert sand.Gravity("9.81 m/s^2").acceleration == (0.0, 0.0, -9.81)
     assert sand.Gravity([0, "1 cm/s^2", 0]).acceleration == (0.0, 0.01, 0.0)
     assert str(sand.Gravity(0).acceleration) == "(0.0, 0.0, 0.0)"
@@ -240,8 +242,8 @@ def test_sizes_and_units():
 
 
 @pytest.mark.parametrize("force", [*FORCES, sand.Gravity("1 m/s^2"), sand.Field(0, shape="ramp", final=1, end=2)])
-def test_a_case_gives_the_same_force_back(force):
-    """Parameters to TOML and back: an equal object, the same numbers; also straight into the class."""
+def test_case_file_round_trip(force):
+    """Parameters to TOML and back: an equal object and equal numbers; also directly through the class."""
     case = {"run": {"steps": 1}, "grains": {"number": 1, "radius": 1.0}, "forces": {force.name: force.parameters()}}
     read = check_case(tomllib.loads(tomli_w.dumps(case)), "some.toml").forces.build()
     assert read == [force] == [type(force)(**force.parameters())]
@@ -298,8 +300,8 @@ RAMPING = {"shape": "ramp", "final": "1 mT", "end": "5 us"}
         (RAMPING | {"end": -1}, ["end = -1.0 must be after start = 0.0, in s"]),
     ],
 )
-def test_one_mistake_of_a_field_is_one_line(changes, parts):
-    """The line names key, unit, what is allowed or what to do."""
+def test_a_wrong_field_setting_gives_one_line(changes, parts):
+    """The line names key, unit and what is allowed or what to do."""
     with pytest.raises(BadInput) as caught:
         sand.Field(**({"flux_density": "1 mT"} | changes))
     (line,) = caught.value.problems
@@ -308,14 +310,14 @@ def test_one_mistake_of_a_field_is_one_line(changes, parts):
     assert all(part in line for part in parts), line
 
 
-def test_the_amplitude_that_a_message_proposes_is_taken():
-    """Its part across a slanting axis, in nine digits; what rounding leaves along the axis is dropped."""
-    slanting = {"shape": "rotating", "frequency": 1e6, "axis": [0.3, 0.5, 0.8]}
+def test_the_amplitude_suggested_by_the_error_is_accepted():
+    """Its component across an oblique axis, in nine digits; the rest along the axis is dropped."""
+    oblique = {"shape": "rotating", "frequency": 1e6, "axis": [0.3, 0.5, 0.8]}
     with pytest.raises(BadInput, match="must be perpendicular") as caught:
-        sand.Field(0, amplitude=["1 mT", 0, 0], **slanting)
+        sand.Field(0, amplitude=["1 mT", 0, 0], **oblique)
     proposed = [float(part) for part in str(caught.value).rpartition("[")[2].partition("]")[0].split(",")]
-    field = sand.Field(0, amplitude=proposed, **slanting)
-    axis = np.array(slanting["axis"]) / np.linalg.norm(slanting["axis"])
+    field = sand.Field(0, amplitude=proposed, **oblique)
+    axis = np.array(oblique["axis"]) / np.linalg.norm(oblique["axis"])
     assert proposed == pytest.approx(1e-3 * (np.array([1, 0, 0]) - axis[0] * axis), abs=1e-11)
     for time in (0.0, 0.3e-6):
         assert axis @ b_at(field, time) == pytest.approx(0.0, abs=10 * EPS * 1e-3)
@@ -338,16 +340,16 @@ def test_the_amplitude_that_a_message_proposes_is_taken():
         ),
     ],
 )
-def test_one_mistake_of_gravity_and_electric_field_is_one_line(force, line):
-    """Units, shapes, and a size below 0, which would be gravity upwards."""
+def test_a_wrong_gravity_or_electric_field_gives_one_line(force, line):
+    """Units, shapes, and a negative size, which would be gravity upwards."""
     with pytest.raises(BadInput) as caught:
         force()
     assert len(caught.value.problems) == 1
     assert line in caught.value.problems[0]
 
 
-def test_mistakes_are_reported_together():
-    """Of one class, and of a case file, in which each line has its place in front."""
+def test_all_wrong_settings_are_reported_together():
+    """Of one class, and of a case file, whose lines begin with the key."""
     field = {"flux_density": [0, "1 m", math.nan], "shape": "rotating", "frequency": -1, "axis": [0, 0, 0], "final": 1}
     with pytest.raises(BadInput) as caught:
         sand.Field(**field)

@@ -1,4 +1,4 @@
-"""What no user means: refused in one line, at once."""
+"""Extreme and malformed input is refused in one line at once."""
 
 import os
 import subprocess
@@ -67,7 +67,7 @@ def refused(words, capsys):
     ],
 )
 def test_extreme_entries_of_a_case(place, capsys, old, new, part):
-    """One line, with nothing made."""
+    """One line, and no file is written."""
     assert old in CASE
     (place / "small.toml").write_text(CASE.replace(old, new))
     assert part in refused(["run", "small.toml"], capsys)
@@ -127,7 +127,7 @@ def test_extreme_entries_of_a_case(place, capsys, old, new, part):
     ],
 )
 def test_extreme_options(place, capsys, words, part):
-    """Empty names, and numbers that are no number, too large or too small."""
+    """Empty names, and numbers that are malformed, too large or too small."""
     assert part in refused(words, capsys)
     assert sorted(p.name for p in place.iterdir()) == ["small.toml"]
 
@@ -140,29 +140,29 @@ def test_extreme_options(place, capsys, words, part):
         *[(name, ["info"]) for name in ("summary.json", "ledger.csv", "trajectory.gsd", "checkpoint-1.npz")],
     ],
 )
-def test_files_without_an_end(place, capsys, name, words):
-    """A device in place of any file is refused before it fills the memory."""
+def test_device_files_are_refused(place, capsys, name, words):
+    """A device in place of a file is refused before it fills the memory."""
     (place / name).symlink_to("/dev/zero")
     refused([*words, name], capsys)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes that have names")
 def test_a_case_may_come_through_a_pipe(place):
-    """`sand info /dev/stdin` would have no ending; a pipe that is called .toml is read to its end."""
+    """`sand info /dev/stdin` has no file name ending; a pipe named .toml is read to its end."""
     os.mkfifo(place / "piped.toml")
     with subprocess.Popen([sys.executable, "-c", "open('piped.toml', 'w').write(open('small.toml').read())"]):
         assert read_case("piped.toml").grains.number == 8
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
-def test_a_byte_order_mark_is_read(place, encoding):
-    """As Windows' editors write it."""
+def test_files_with_a_byte_order_mark(place, encoding):
+    """As Windows editors write them."""
     (place / "small.toml").write_bytes(CASE.replace("\n", "\r\n").encode(encoding))
     assert read_case("small.toml").grains.number == 8
 
 
-def test_other_encodings_are_named(place):
-    """UTF-16 in one line, with what to do."""
+def test_utf_16_is_refused(place):
+    """One line with what to do."""
     (place / "small.toml").write_bytes(CASE.encode("utf-16"))
     with pytest.raises(BadInput, match="UTF-16; save it as UTF-8") as caught:
         read_toml("small.toml")
@@ -170,8 +170,8 @@ def test_other_encodings_are_named(place):
 
 
 @pytest.mark.parametrize("content", ["[" * 100_000, '{"a": ' + "9" * 5000 + "}", "[1]", "\ufeff{"])
-def test_json_that_cannot_be_read(place, content):
-    """Lists in lists without end, numbers without end."""
+def test_malformed_json(place, content):
+    """Deeply nested lists and endless numbers."""
     (place / "summary.json").write_text(content, encoding="utf-8")
     with pytest.raises(BadInput):
         read_json(place / "summary.json")
@@ -182,11 +182,11 @@ def test_json_that_cannot_be_read(place, content):
 
 @pytest.mark.parametrize(("text", "unit"), [("10 degC", "K"), ("10 °C", "K"), ("1 dB", "1"), ("10 degF", "K")])
 def test_units_without_a_factor_are_refused(text, unit):
-    """10 degrees Celsius are not 10 times what one is."""
+    """10 degrees Celsius are not ten times 1 degree."""
     assert in_unit(text, unit) is None
 
 
-def test_nothing_needs_no_unit():
+def test_zero_needs_no_unit():
     """0 is the same length in all units; 1 is not, and 0 kg is no length."""
     assert si("0", "m", "x") == 0.0 and si("0.0", "K", "x") == 0.0
     for text in ("1", "0 kg"):
@@ -197,8 +197,8 @@ def test_nothing_needs_no_unit():
 
 
 @pytest.mark.parametrize("every", [1e-59, 1e-30])
-def test_frames_closer_than_the_clock_can_tell(every):
-    """The next frame is due after the present time, however close frames are to be; and it is found at once."""
+def test_frame_intervals_below_the_resolution_of_the_clock(every):
+    """The next frame is after the present time for any interval, and is found at once."""
     schedule = Schedule(every, 1e-12)
     assert schedule.due > 1e-12
     schedule.advance(2e-12)
@@ -206,7 +206,7 @@ def test_frames_closer_than_the_clock_can_tell(every):
 
 
 def test_frames_are_due_at_multiples():
-    """As ever: at the first multiple after the time, to the last bit."""
+    """At the first multiple of the interval after the present time, to the last bit."""
     schedule = Schedule(0.1, 0.0)
     for number in range(1, 1000):
         assert schedule.due == number * 0.1

@@ -1,4 +1,4 @@
-"""Loads of contacts at their grains, in whatever order the grains are taken."""
+"""Gathering the loads of contacts at their grains, for any order of the grains."""
 
 import copy
 import shutil
@@ -29,8 +29,8 @@ def _both_at_once(grains, contacts, dt):
 gather_all, both_at_once, kick_all = (kernel(f, cached=False) for f in (_gather_all, _both_at_once, kick))
 
 
-def some(per_grain, count=GRAINS):
-    """Grains that move, and so many contacts per grain between neighbours in memory, with random loads, sorted."""
+def random_contacts(per_grain, count=GRAINS):
+    """Moving grains and this many contacts per grain between neighbours in memory, with random loads, sorted."""
     rng = np.random.default_rng(5)
     grains = sand.Grains(
         rng.normal(size=(count, 3)),
@@ -54,8 +54,8 @@ def some(per_grain, count=GRAINS):
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize(("per_grain", "count"), [(1.0, GRAINS), (4.0, GRAINS), (1.0, 500)])
 def test_sums_are_those_of_brute_force(per_grain, count):
-    """F = Σ ±push, M = Σ torque of each end; terms of 1e-9, at most some 30, rounded to 1e-16 each: 1e-23."""
-    grains, contacts, pair = some(per_grain, count)
+    """F = Σ ±f, M = Σ torque of each end; at most about 30 terms of 1e-9, rounded to 1e-16 each: 1e-23."""
+    grains, contacts, pair = random_contacts(per_grain, count)
     assert contacts.gather_order.size == (count + GATHER_CLASSES if count >= GATHER_ORDER_FROM else 0)
     used = pair.shape[1]
     force, torque = np.zeros((3, count)), np.zeros((3, count))
@@ -69,8 +69,8 @@ def test_sums_are_those_of_brute_force(per_grain, count):
 
 @pytest.mark.compiled("small")
 def test_each_row_has_its_contacts_in_a_fixed_order():
-    """First those that the grain is the first of, then the others, each in the order of the contacts."""
-    _, contacts, pair = some(2.0)
+    """First the contacts whose first grain it is, then the others, each in the order of the contacts."""
+    _, contacts, pair = random_contacts(2.0)
     for g in range(0, GRAINS, 97):
         row = contacts.side[contacts.start[g] : contacts.start[g + 1]].tolist()
         expected = [2 * c for c in np.flatnonzero(pair[0] == g)] + [2 * c + 1 for c in np.flatnonzero(pair[1] == g)]
@@ -78,12 +78,12 @@ def test_each_row_has_its_contacts_in_a_fixed_order():
 
 
 @pytest.mark.compiled("small")
-def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
-    """Each block has its own grains, each once; those with as many contacts of either end come in a row, by number.
+def test_grains_of_a_block_are_sorted_by_number_of_contacts():
+    """Each block holds its own grains once; equal numbers of contacts are adjacent, by index.
 
-    Where contacts are many all come by number.
+    With many contacts per grain all grains are in index order.
     """
-    _, contacts, pair = some(1.0)
+    _, contacts, pair = random_contacts(1.0)
     many = np.minimum([np.bincount(ends, minlength=GRAINS) for ends in pair], LARGEST_CLASS)
     kind = many[0] * (LARGEST_CLASS + 1) + many[1]
     turn = contacts.gather_order[:GRAINS]
@@ -91,14 +91,14 @@ def test_grains_of_a_block_take_turns_by_how_many_contacts_they_have():
     for first in range(0, GRAINS, BLOCK):
         block = np.arange(first, min(first + BLOCK, GRAINS))
         assert turn[block].tolist() == sorted(block.tolist(), key=lambda g: (kind[g], g))
-    _, crowded, _ = some(DENSE_FROM + 0.5)
+    _, crowded, _ = random_contacts(DENSE_FROM + 0.5)
     assert crowded.gather_order[:GRAINS].tolist() == list(range(GRAINS))
 
 
 @pytest.mark.compiled("small")
-def test_gathering_and_kicking_at_once_is_one_after_the_other():
-    """The same loads, v + F dt/m, ω + M dt/I and largest squares of both: the same formulas, so to rounding, 1e-14."""
-    grains, contacts, _ = some(1.0)
+def test_combined_gather_and_kick():
+    """Equal loads, v + F dt/m, ω + M dt/I and largest squares as in two loops, to rounding: 1e-14."""
+    grains, contacts, _ = random_contacts(1.0)
     other = copy.deepcopy(grains)
     gather_all(grains, contacts)
     fastest, quickest = kick_all(grains, 1e-9)
@@ -111,9 +111,9 @@ def test_gathering_and_kicking_at_once_is_one_after_the_other():
 
 
 @pytest.mark.compiled("small")
-def test_grains_without_moments_drift_as_those_with():
-    """Positions and orientations do not depend on moments; those that are there turn with their grains."""
-    grains, _, _ = some(1.0, 300)
+def test_drift_with_and_without_moments():
+    """Positions and orientations do not depend on moments; existing moments rotate with their grains."""
+    grains, _, _ = random_contacts(1.0, 300)
     grains.body_moment[...] = np.random.default_rng(1).normal(size=(3, 300))
     with_moments, without = copy.deepcopy(grains), copy.deepcopy(grains)
     span = sand.Box.open().span
@@ -127,8 +127,8 @@ def test_grains_without_moments_drift_as_those_with():
     assert (without.moment == grains.moment).all() and (with_moments.moment != grains.moment).all()
 
 
-def large(moved=5):
-    """A lattice of more grains than are shared out at once, in which only one grain and those beside it move."""
+def lattice_with_one_moving_grain(moved=5):
+    """A lattice of more grains than one block, in which only one grain and its neighbours move."""
     side = round(GRAINS ** (1 / 3)) + 1
     place = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
     speed = np.zeros((GRAINS, 3))
@@ -138,9 +138,9 @@ def large(moved=5):
 
 @pytest.mark.validate
 @pytest.mark.parametrize("moved", [5, GRAINS - 5])
-def test_the_fastest_grain_of_all_blocks_is_known(moved):
-    """What the step is limited by are the largest squares of speed and spin among all grains."""
-    sim = sand.Simulation(large(moved), [sand.Contact()])
+def test_largest_speeds_over_all_blocks(moved):
+    """The step is limited by the largest squares of speed and spin among all grains."""
+    sim = sand.Simulation(lattice_with_one_moving_grain(moved), [sand.Contact()])
     sim.run(steps=3)
     watch, v, w = sim.state.pair_list.skin, sim.grains.velocity, sim.grains.spin
     assert GRAINS > GRAINS_PER_BLOCK and (v**2).sum(axis=1).argmax() == moved
@@ -149,9 +149,9 @@ def test_the_fastest_grain_of_all_blocks_is_known(moved):
 
 
 @pytest.mark.validate
-def test_a_resumed_world_takes_its_turns(tmp_path):
-    """A checkpoint leaves them out; they are there again, and the run goes on with the same bits."""
-    sim = sand.Simulation(large(), [sand.Contact()], out=tmp_path / "run")
+def test_a_resumed_run_restores_the_gather_order(tmp_path):
+    """Checkpoints omit the order; it is rebuilt, and the run continues with the same bits."""
+    sim = sand.Simulation(lattice_with_one_moving_grain(), [sand.Contact()], out=tmp_path / "run")
     sim.run(steps=3)
     rest = sand.resume(shutil.copytree(tmp_path / "run", tmp_path / "copy"))
     assert sorted(rest.state.contacts.gather_order[:GRAINS].tolist()) == list(range(GRAINS))

@@ -1,4 +1,4 @@
-"""How flights begin: what is drawn by chance has the laws it should have (plain Python, no compiler)."""
+"""Random initial conditions of scattering trajectories have the right distributions (plain Python, no compiler)."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ COUNT = 1500
 HEAT = BOLTZMANN * 100.0
 
 
-def drawn(flying, pose, low=0.0, high=1e-12):
-    """Impact parameters (K,) and states (K, size) of the starts of many flights."""
+def sampled(flying, pose, low=0.0, high=1e-12):
+    """Impact parameters (K,) and states (K, size) of many sampled starts."""
     model, rules = flying.pair()
     start, states, b = flying.start(), np.zeros((COUNT, model.size)), np.zeros(COUNT)
     for k in range(COUNT):
@@ -28,10 +28,10 @@ def drawn(flying, pose, low=0.0, high=1e-12):
 
 @pytest.mark.parametrize(("spin", "part"), [("kT/2", 0.5), ("equipartition", 1.5)])
 def test_spheres(spin, part):
-    """⟨½Iω²⟩ = kT/2 or 3kT/2, moments even over the sphere, b² even over its range, all to 4σ; b across the flight."""
+    """⟨½Iω²⟩ = kT/2 or 3kT/2, moments isotropic, b² uniform, all to 4σ; b perpendicular to the velocity."""
     one, two = (sand.Grains([[0, 0, 0]], r, sand.IRON, moment=[[1e-18, 0, 0]]) for r in (1e-8, 2e-8))
     flying = flight(projectile=one, target=two, temperature="100 K", speed=0.3, spin=spin, start="3 um")
-    b, y = drawn(flying, draw_sphere_pose)
+    b, y = sampled(flying, draw_sphere_pose)
     for grains, row in ((one, SPIN1), (two, SPIN2)):
         energy = 0.5 * grains.inertia[0] * (y[:, row : row + 3] ** 2).sum(axis=1)
         assert energy.mean() / (part * HEAT) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 3 / COUNT))
@@ -50,7 +50,7 @@ def test_aggregates():
     """A chain of three: a third of the rotational energy about each principal axis, to 4σ."""
     chain = sand.setup.aggregates.chain(3, radius="10 nm", material=sand.IRON, moment="1e-18 A m^2")
     flying = flight(projectile=chain, temperature="100 K", speed=0.3, spin="equipartition", start="3 um")
-    _, y = drawn(flying, draw_rigid_pose)
+    _, y = sampled(flying, draw_rigid_pose)
     _, rules = flying.pair()
     inertia = np.array(rules.first.inertia)
     own = np.array([turned_back(tuple(one[TURN1 : TURN1 + 4]), tuple(one[ANGULAR1 : ANGULAR1 + 3])) for one in y])

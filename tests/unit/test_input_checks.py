@@ -1,4 +1,4 @@
-"""What cannot be is refused, what is unusual is warned of. Nothing is compiled."""
+"""Impossible input is refused, unusual input gives a warning. Nothing is compiled."""
 
 import time
 import warnings
@@ -53,7 +53,8 @@ IMPOSSIBLE = [
 
 
 @pytest.mark.parametrize(("build", "line"), IMPOSSIBLE)
-def test_what_cannot_be_is_refused(build, line):
+def test_impossible_input_is_refused(build, line):
+    """BadInput with the expected line."""
     with pytest.raises(sand.BadInput) as caught:
         build()
     assert line in str(caught.value)
@@ -72,15 +73,16 @@ UNUSUAL = [
 
 
 @pytest.mark.parametrize(("build", "line"), UNUSUAL)
-def test_what_is_unusual_is_warned_of(build, line):
+def test_unusual_input_gives_a_warning(build, line):
+    """One warning with the expected line."""
     with pytest.warns(UserWarning) as caught:
         build()
     assert any(line in str(w.message) for w in caught)
     assert all(w.filename == __file__ for w in caught), "a warning names the line of the user"
 
 
-def test_what_is_usual_is_silent():
-    """A grain on the face of the box, 5 mm large, at 4000 K, materials changed under their own name."""
+def test_usual_input_gives_no_warning():
+    """A grain on the face of the box, 5 mm large, at 4000 K; a changed material under its own name."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sand.Simulation(sand.Grains([[0.5, 0, 0]], 5e-3, "silica"), [sand.Contact()], box="1 m")
@@ -89,8 +91,8 @@ def test_what_is_usual_is_silent():
         sand.Simulation(grains(gap=0.0))
 
 
-def test_a_single_vector_is_for_all_grains():
-    """(3,) in Grains and in builders; three sizes for three grains are a vector, too."""
+def test_a_single_vector_applies_to_all_grains():
+    """Shape (3,) in Grains and builders; three sizes for three grains are a vector, too."""
     vector = [0.0, 1e-18, 2e-18]
     three = sand.Grains([[0, 0, 0], [3e-8, 0, 0], [6e-8, 0, 0]], 1e-8, "iron", moment=vector, velocity=[1, 2, 3])
     assert (three.moment == vector).all() and (three.velocity == [1, 2, 3]).all()
@@ -104,20 +106,21 @@ def test_a_single_vector_is_for_all_grains():
 
 @pytest.mark.parametrize("number", [10**30, 10**8, 100_000])
 def test_a_full_box_is_refused_at_once(number):
+    """The fraction filled is too large to place the grains."""
     begun = time.process_time()
     with pytest.raises(sand.BadInput, match=r"the box is too full|whole number from 1 to 1e\+08"):
         sand.setup.gas(number, "1 um", **IRON)
     assert time.process_time() - begun < 1.0
 
 
-def test_a_gas_has_the_same_places_as_ever():
-    """Sum of the coordinates of 300 grains that fill a fifth of a box, as version 0.1.0 placed them."""
+def test_positions_of_a_gas_are_those_of_version_0_1_0():
+    """Sum of the coordinates of 300 grains that fill a fifth of a box."""
     side = (300 * 4.0 / 3.0 * np.pi * 1e-24 / 0.2) ** (1.0 / 3.0)
     assert sand.setup.gas(300, side, seed=3, **IRON).position.sum() == 4.4981630892576375e-07
 
 
-def test_a_run_beyond_patience_is_said_once():
-    """After a second of steps: 1e-3 s in steps of 1e-20 s are 1e17 steps; 1e7 more in 1 s each are 0.3 years."""
+def test_a_very_long_run_warns_once():
+    """After one second: 1e-3 s in steps of 1e-20 s are 1e17 steps; 1e7 more at 1 s each are 0.3 years."""
     pace = RunTimeEstimate(1e-3, np.inf)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

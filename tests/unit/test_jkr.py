@@ -1,4 +1,4 @@
-"""JKR: the curve, its inverse, its energy."""
+"""JKR: force curve, its inverse, its energy."""
 
 import math
 
@@ -11,7 +11,7 @@ from ..reference.jkr import E_BREAK, E_CYCLE, TABLE, fitted_polynomial, root_by_
 
 
 @pytest.mark.parametrize(("x", "force", "overlap", "energy"), TABLE)
-def test_the_curve_passes_through_the_table(x, force, overlap, energy):
+def test_the_curve_agrees_with_the_table(x, force, overlap, energy):
     """Force, overlap and energy at x = a/a0; the table has 6 to 8 decimals, exact points are exact to 1e-9."""
     y = math.sqrt(x)
     digits = 1e-9 if x <= 1.0 and overlap in (-1.0, 0.0) else 6e-7 if x <= 1 else 3e-7
@@ -22,7 +22,10 @@ def test_the_curve_passes_through_the_table(x, force, overlap, energy):
 
 
 def test_special_points_are_exact():
-    """By hand: F = −5/9 and U = 4/45 at the break, F = −8/9 at touch, F = 0 at rest, min F = −1 at y³ = 1/2."""
+    """By hand: F = −5/9 and U = 4/45 at breaking, F = −8/9 at first contact, F = 0 at equilibrium, min F = −1.
+
+    The minimum is at y³ = 1/2.
+    """
     assert jkr.force_at(jkr.ROOT_AT_BREAK, 1.0) == pytest.approx(-5 / 9, abs=1e-15)
     assert jkr.energy_at(jkr.ROOT_AT_BREAK, 1.0, 1.0) == pytest.approx(4 / 45, abs=1e-15)
     assert jkr.overlap_at(jkr.ROOT_AT_BREAK, 1.0) == pytest.approx(-1.0, abs=1e-15)
@@ -34,7 +37,7 @@ def test_special_points_are_exact():
 
 
 def test_energies_of_breaking_and_of_a_cycle():
-    """E_break = U(−δc) − U(rest) = 1.542585, E_cycle = −U(0) + U(−δc) = 0.935503 (Fcδc); six decimals."""
+    """E_break = U(−δc) − U(equilibrium) = 1.542585, E_cycle = −U(0) + U(−δc) = 0.935503 (Fcδc); six decimals."""
     rest = jkr.energy_at(1.0, 1.0, 1.0)
     touch = jkr.energy_at(jkr.ROOT_AT_TOUCH, 1.0, 1.0)
     broken = jkr.energy_at(jkr.ROOT_AT_BREAK, 1.0, 1.0)
@@ -43,8 +46,8 @@ def test_energies_of_breaking_and_of_a_cycle():
 
 
 @pytest.mark.parametrize("function", [jkr.root, jkr.polynomial_root])
-def test_the_inverse_is_good_to_1e_12(function):
-    """a(δ) against bisection in extended precision, −0.99 … 100 δc (polynomial_root: to its 11.25 δc)."""
+def test_the_inverse_is_accurate_to_1e_12(function):
+    """a(δ) against bisection in extended precision, −0.99 … 100 δc (polynomial_root: up to 11.25 δc)."""
     top = 100.0 if function is jkr.root else 11.24
     overlaps = np.concatenate([-1 + np.geomspace(0.01, 1, 200), np.linspace(0, top, 2000)])
     found = np.array([function(jkr.stretch(d, 1.0)) for d in overlaps])
@@ -52,8 +55,8 @@ def test_the_inverse_is_good_to_1e_12(function):
     assert np.abs((found / exact) ** 2 - 1).max() < 1e-12  # a/a0 = y²
 
 
-def test_the_polynomial_is_the_fit():
-    """Stored and refitted polynomial agree as functions to 1e-8, and meet y = y_m + s p(s) to 1e-7.
+def test_the_stored_polynomial_is_the_fit():
+    """Stored and refitted polynomial agree to 1e-8 and satisfy y = y_m + s p(s) to 1e-7.
 
     One Newton step (quadratic) then gives better than 1e-12.
     """
@@ -64,7 +67,7 @@ def test_the_polynomial_is_the_fit():
     assert np.abs(ours - exact).max() < 1e-7
 
 
-def test_force_is_the_slope_of_the_energy():
+def test_force_is_the_derivative_of_the_energy():
     """dU = F dδ by central differences in y: error h² U‴/6 ~ 1e-8 of the largest terms."""
     for y in np.linspace(0.56, 2.0, 40):
         h = 1e-5
@@ -73,8 +76,8 @@ def test_force_is_the_slope_of_the_energy():
         assert work / way == pytest.approx(jkr.force_at(y, 1.0), rel=1e-7, abs=1e-7)
 
 
-def test_stiffness_is_the_slope_of_the_force():
-    """dF/dδ by central differences in y; at rest it is (6/5) E* a0 = (9/5) 6^(−1/3) F_c/δ_c."""
+def test_stiffness_is_the_derivative_of_the_force():
+    """dF/dδ by central differences in y; in equilibrium (6/5) E* a0 = (9/5) 6^(−1/3) F_c/δ_c."""
     for y in np.linspace(0.6, 2.0, 40):
         h = 1e-5
         change = jkr.force_at(y + h, 1.0) - jkr.force_at(y - h, 1.0)
@@ -96,7 +99,7 @@ def test_scales():
     assert product == pytest.approx(expected, rel=3e-6, abs=0.0)
 
 
-def test_stiffness_at_rest_is_the_slope_of_the_force():
+def test_equilibrium_stiffness_is_the_derivative_of_the_force():
     """k_n = dF/dδ at a0 = (6/5) E* a0, by central difference in y."""
     gamma, radius, modulus = 0.07, 1e-7, 1e11
     a0 = jkr.rest_radius(gamma, radius, modulus)

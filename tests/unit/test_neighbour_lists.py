@@ -1,4 +1,4 @@
-"""The list of pairs against all pairs: complete, never too late, and the same forces."""
+"""Neighbour lists against all pairs: complete, rebuilt in time, and with the same forces."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ all_pairs = kernel(_all_pairs, cached=False)
 
 
 def rows(position, box, reach):
-    """The list from positions (N, 3) as a matrix: how often each pair stands in each grain's row."""
+    """The list for positions (N, 3) as a matrix: how often each pair occurs in each grain's row."""
     count = len(position)
     far = empty_long_range_arrays(count, 8)
     far.anchor[...] = position.T
@@ -37,8 +37,8 @@ def rows(position, box, reach):
         far = far._replace(neighbour=np.zeros(2 * far.neighbour.size, np.uint32))
     found = np.zeros((count, count), int)
     for place in range(count):
-        mates = far.order[far.neighbour[far.start[place] : far.start[place + 1]]]
-        np.add.at(found, (far.order[place], mates), 1)
+        neighbours = far.order[far.neighbour[far.start[place] : far.start[place + 1]]]
+        np.add.at(found, (far.order[place], neighbours), 1)
     return found
 
 
@@ -52,7 +52,7 @@ def rows(position, box, reach):
     reach=st.floats(0.01, 0.9),
 )
 def test_each_pair_within_reach_is_listed_once(seed, count, periodic, shape, reach):
-    """Rows = all pairs closer than the reach, each once per grain; any box, flat and long clouds on open axes."""
+    """Rows equal all pairs closer than the reach, each once per grain; any box, flat and long clouds."""
     box = Box(tuple(1.0 if p else None for p in periodic))
     scale = [1.0 if p else s for p, s in zip(periodic, shape, strict=True)]
     position = (np.random.default_rng(seed).random((count, 3)) - 0.5) * scale
@@ -63,7 +63,7 @@ def test_each_pair_within_reach_is_listed_once(seed, count, periodic, shape, rea
 
 
 @pytest.mark.compiled("small")
-def test_grains_on_the_walls_and_in_one_place():
+def test_grains_on_walls_and_coincident_grains():
     """Coordinates of exactly ±L/2, cell borders, and all grains in one cell of an open box."""
     box = Box.periodic(1.0)
     edge = np.array([-0.5, -1 / 6, 0.0, 1 / 6, 0.5 - 1e-16])
@@ -82,7 +82,7 @@ BOXES = [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.3), (None, 0.7, None
 @pytest.mark.parametrize("lengths", BOXES)
 @pytest.mark.parametrize("reach", [0.02, 0.1, 0.166])
 def test_many_grains_in_thin_cells(lengths, reach):
-    """Thousands of grains, half of them in clumps, so that cells along x are thin: a search tree finds the same."""
+    """Thousands of grains, half of them in clumps, so that cells along x are thin: equal to a KD-tree search."""
     rng = np.random.default_rng(7)
     sides = np.array([length or 1.0 for length in lengths])
     spread, clumps = (rng.random((1500, 3)) - 0.5) * sides, (rng.random((20, 3)) - 0.5) * sides
@@ -97,11 +97,11 @@ def test_many_grains_in_thin_cells(lengths, reach):
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0), (1.0, None, 1.0)])
 @pytest.mark.parametrize("cells_across", [3, 4, 11])
-def test_both_grains_have_a_pair_or_neither(lengths, cells_across):
-    """Pairs that rounding puts now within reach, now beyond: the matrix is symmetric, and nothing stands in it twice.
+def test_lists_are_symmetric(lengths, cells_across):
+    """Distances that differ from the reach by rounding: the matrix is symmetric, with no pair twice.
 
-    A lattice as wide as the reach, moved to places that are no round numbers; its neighbours in x, y and z are ε apart
-    from the reach, on either side of it, also across the walls, and so close to the borders of cells.
+    A lattice with the reach as spacing, shifted by irregular offsets: neighbours in x, y and z are ε from the reach on
+    either side, also across the walls and close to borders of cells.
     """
     box, reach = Box(lengths), 1.0 / cells_across
     edge = (np.arange(cells_across) + 0.5) / cells_across - 0.5
@@ -109,8 +109,8 @@ def test_both_grains_have_a_pair_or_neither(lengths, cells_across):
     for seed in range(10):
         rng = np.random.default_rng(seed)
         lattice = np.stack(np.meshgrid(edge, edge, edge), -1).reshape(-1, 3) + rng.uniform(-0.3, 0.3, 3) / cells_across
-        crowd = lattice + rng.choice([-1e-16, 0.0, 1e-16], lattice.shape)
-        found = rows(rng.permutation(crowd), box, reach)
+        perturbed = lattice + rng.choice([-1e-16, 0.0, 1e-16], lattice.shape)
+        found = rows(rng.permutation(perturbed), box, reach)
         assert (found == found.T).all()
         assert found.max() <= 1
         doubtful += found.sum() not in (0, found.size)
@@ -118,8 +118,8 @@ def test_both_grains_have_a_pair_or_neither(lengths, cells_across):
 
 
 @pytest.mark.compiled("small")
-def test_grains_outside_a_periodic_box_are_where_their_images_are():
-    """Moved by whole lengths of the box: the same rows, as no pair is as near the reach as rounding moves it."""
+def test_grains_outside_a_periodic_box():
+    """Grains shifted by whole box lengths: the same rows, as no pair is at the reach to rounding."""
     rng = np.random.default_rng(3)
     box, position = Box((1.0, None, 1.0)), rng.random((200, 3)) - 0.5
     moved = position + rng.integers(-3, 4, (200, 3)) * [1.0, 0.0, 1.0]
@@ -129,8 +129,8 @@ def test_grains_outside_a_periodic_box_are_where_their_images_are():
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("lengths", [(None, None, None), (1.0, 1.0, 1.0)])
 @pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf, 1e300])
-def test_a_grain_that_is_nowhere_is_listed_nowhere(lengths, odd):
-    """A coordinate that is no number, or none to reckon with, harms nothing: its grain has no neighbours."""
+def test_a_grain_with_invalid_coordinates_has_no_neighbours(lengths, odd):
+    """NaN, infinite or huge coordinates cause no error and no entries."""
     position = np.random.default_rng(2).random((90, 3)) - 0.5
     for axis in range(3):
         spoilt = position.copy()
@@ -144,7 +144,7 @@ def test_a_grain_that_is_nowhere_is_listed_nowhere(lengths, odd):
 @pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (1.0, 3.0, 0.6), (0.7, None, 1.0), (None, 1.0, 2.1)])
 @pytest.mark.parametrize("reach", [0.34, 0.49, 0.7])
 def test_boxes_that_are_not_three_cells_wide(lengths, reach):
-    """One or two cells on a periodic side have no neighbours beside them: each pair is listed once all the same."""
+    """One or two cells on a periodic side wrap onto themselves: each pair is still listed once."""
     box = Box(lengths)
     position = (np.random.default_rng(8).random((130, 3)) - 0.5) * [1.0 if x is None else x for x in lengths]
     apart = box.nearest(position[:, None] - position[None])
@@ -154,7 +154,7 @@ def test_boxes_that_are_not_three_cells_wide(lengths, reach):
 
 
 def fast_gas(box, seed, contacts=False, **neighbours):
-    """Dipoles in a box of 1 µm, so fast that lists live for a few steps only."""
+    """Dipoles in a box of 1 µm, so fast that lists last for a few steps only."""
     rng = np.random.default_rng(seed)
     grains = sand.setup.gas(
         120, "1 um", radius="10 nm", material=sand.SILICA, moment="20 A m^2/kg", temperature="100 K", seed=seed
@@ -167,8 +167,8 @@ def fast_gas(box, seed, contacts=False, **neighbours):
     return sand.Simulation(grains, forces, box=box, stepping=stepping, neighbours=Neighbours(**neighbours))
 
 
-def referee(sim):
-    """Far forces, torques and fields of the same world over all pairs."""
+def all_pairs_loads(sim):
+    """Long-range forces, torques and fields of the same state over all pairs."""
     world = sim.state.copy()
     rules, far = sim._engine.parameters, empty_long_range_arrays(len(world.grains), 0)
     all_pairs(world.grains.arrays, far, rules.span, rules.long_range[0])
@@ -187,10 +187,10 @@ def referee(sim):
     ],
 )
 def test_listed_forces_are_those_of_all_pairs(lengths, margin, contacts):
-    """F, M and B of the list = those of all pairs with the same cut-off, to 1e-12 of the largest, in 1000 steps.
+    """F, M and B of the list equal those of all pairs with the same cut-off, to 1e-12 of the largest, in 1000 steps.
 
-    Each step decides anew whether the list still serves; grains move nanometres a step and cross the walls, so that
-    it is made anew many times; a missed pair at 0.9 r_c would show at 1e-3.  Sums in another order: ε × neighbours.
+    Grains move nanometres per step and cross the walls, so the list is rebuilt many times; a missed pair at 0.9 r_c
+    would give an error of 1e-3.  Rounding: sums in another order, ε × neighbours.
     """
     sim = fast_gas(Box(lengths), 3, contacts, search="cells", margin=margin)
     assert sim._engine.parameters.search.listed, sim.choices
@@ -198,18 +198,18 @@ def test_listed_forces_are_those_of_all_pairs(lengths, margin, contacts):
     for step in range(1000):
         sim._engine.advance(np.inf, 1)
         ours = (sim.state.long_range.force, sim.state.long_range.torque, sim.grains.arrays.field)
-        for mine, theirs in zip(ours, referee(sim), strict=True):
-            assert np.abs(mine - theirs).max() < 1e-12 * np.abs(theirs).max()
+        for found, theirs in zip(ours, all_pairs_loads(sim), strict=True):
+            assert np.abs(found - theirs).max() < 1e-12 * np.abs(theirs).max()
         if contacts and step % 20 == 0:
-            assert no_touch_is_missed(sim)
+            assert all_overlapping_pairs_have_contacts(sim)
     assert sim.state.count[LISTED] > (15 if margin != "auto" else 5)
     if contacts:
         assert sim.state.count[MADE] > 0
         assert sim.state.count[REBUILT] > 50
 
 
-def no_touch_is_missed(sim):
-    """Every two grains closer than the sum of their radii share a contact."""
+def all_overlapping_pairs_have_contacts(sim):
+    """True if every two grains closer than the sum of their radii share a contact."""
     position, pairs = sim.grains.position, sim.contacts["pair"]
     apart = sim.box.nearest(position[:, None] - position[None])
     touching = np.sqrt((apart**2).sum(-1)) < 2e-8
@@ -220,8 +220,8 @@ def no_touch_is_missed(sim):
 
 
 @pytest.mark.validate
-def test_a_listed_run_is_the_run_of_all_pairs():
-    """The same gas with a list, a wide one and over all pairs: positions after 300 steps agree to 1e-9 of a radius."""
+def test_a_listed_run_equals_a_run_over_all_pairs():
+    """The same gas with a list, a wide list and all pairs: positions after 300 steps to 1e-9 of a radius."""
     ends = []
     for how in ({"search": "all pairs"}, {"search": "cells"}, {"search": "cells", "margin": "20 nm"}):
         sim = fast_gas("1 um", 5, **how)
@@ -240,7 +240,7 @@ SEARCHES = {"cells": Neighbours("cells"), "list": Neighbours("cells", "2 nm"), "
     "lengths", [(None, None, None), (0.3e-6, 0.3e-6, 0.3e-6), (0.3e-6, None, 0.09e-6), (0.07e-6, 0.3e-6, 0.3e-6)]
 )
 def test_near_pairs_are_those_with_a_small_gap(search, lengths):
-    """Pairs with a gap below the smallest radius, each once, by brute force: of three radii, anywhere in the box."""
+    """Pairs with a gap below the smallest radius, each once, against brute force: three radii, anywhere in the box."""
     rng, box = np.random.default_rng(6), Box(lengths)
     position = (rng.random((400, 3)) - 0.5) * [0.3e-6 if length is None else length for length in lengths]
     radius = rng.choice([5e-9, 3.5e-9, 1e-8], 400)
@@ -261,8 +261,8 @@ def test_near_pairs_are_those_with_a_small_gap(search, lengths):
 
 
 @pytest.mark.compiled("contacts")
-def test_a_row_of_cells_may_need_more_room_than_there_is():
-    """Room for 16 neighbours of one grain is found to be too little, and grows: the same pairs."""
+def test_neighbour_arrays_grow():
+    """With room for 16 neighbours of one grain the overflow is detected and the array grows: the same pairs."""
     grains = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
     once, short = (sand.Simulation(grains, [sand.Contact()], neighbours=Neighbours("cells")) for _ in range(2))
     short.state.long_range = short.state.long_range._replace(neighbour=np.zeros(16, np.uint32))
@@ -278,8 +278,8 @@ def test_a_row_of_cells_may_need_more_room_than_there_is():
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
-def test_a_resumed_run_looks_for_neighbours_as_before(tmp_path, search):
-    """A lattice that collapses, resumed before its contacts form: the same search, and all arrays bit for bit.
+def test_neighbour_search_of_a_resumed_run(tmp_path, search):
+    """A collapsing lattice, resumed before its contacts form: the same search, all arrays bit for bit.
 
     Dozens of contacts form in a step, in the order of the near pairs.
     """
@@ -304,8 +304,8 @@ def test_a_resumed_run_looks_for_neighbours_as_before(tmp_path, search):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("search", SEARCHES)
-def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
-    """A lattice whose grains touch nothing has room for 16 pairs; its 540 are counted, and get a tenth to spare."""
+def test_near_pairs_that_overflow_are_counted(search):
+    """A lattice without contacts has room for 16 pairs; its 540 are counted, and the array gets a tenth to spare."""
     block = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
     grains = sand.Grains(1.2 * block.position, 1e-8, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact()], neighbours=SEARCHES[search])
@@ -316,10 +316,10 @@ def test_near_pairs_that_are_too_many_are_counted_and_then_listed(search):
 
 
 @pytest.mark.compiled("contacts")
-def test_rows_that_are_too_long_are_listed_with_more_room():
-    """Thirty grains in a row, in the order of their cells, beside one that makes cells 0.5 µm wide: 29 pairs are near.
+def test_long_rows_are_rebuilt_with_more_room():
+    """Thirty grains in a row, in cell order, beside one that makes cells 0.5 µm wide: 29 pairs are near.
 
-    Neither room for 9 neighbours nor for 16 pairs is enough.  Until a list is made, its anchors are scratch.
+    Neither room for 9 neighbours nor for 16 pairs suffices.  Until a list is built, its anchors are scratch space.
     """
     position = np.zeros((31, 3))
     position[:, 0] = 2.5e-8 * np.arange(31)
@@ -342,7 +342,7 @@ def test_rows_that_are_too_long_are_listed_with_more_room():
 
 @pytest.mark.compiled("contacts")
 def test_near_pairs_have_the_step_of_their_own_contact():
-    """Two materials, three radii: step 2π/(ω n) and length δ_c of each listed pair follow from its constants, 1e-14."""
+    """Two materials, three radii: step 2π/(ω n) and length δ_c of each pair follow from its constants, to 1e-14."""
     rng = np.random.default_rng(4)
     block = sand.setup.lattice(5, radius="10 nm", material=sand.IRON)
     radius = rng.choice([1e-8, 9e-9, 5e-9], 125)
@@ -360,10 +360,10 @@ def test_near_pairs_have_the_step_of_their_own_contact():
 
 
 @pytest.mark.validate
-def test_ringing_does_not_make_lists():
-    """What counts is the displacement: 30,000 steps of a ringing cluster that goes nowhere need the first lists only.
+def test_vibration_does_not_rebuild_lists():
+    """Rebuilds depend on displacement: 30,000 steps of a vibrating cluster need the first lists only.
 
-    With a margin of 4 nm the sum of ways (Eq. 50) would have called for one each 2 nm: the grains run ten times that.
+    With a margin of 4 nm the path length (Eq. 50) would require a rebuild every 2 nm: the paths are ten times that.
     """
     block = sand.setup.lattice(3, radius="10 nm", material=sand.IRON)
     breathing = 6e7 * (block.position - block.position.mean(axis=0))
@@ -390,8 +390,8 @@ def test_ringing_does_not_make_lists():
         (120, "1 um", {"search": "all pairs"}, "all pairs, as requested"),
     ],
 )
-def test_the_search_is_stated(count, box, how, said):
-    """What was chosen and why, in the run's log."""
+def test_the_log_states_the_search(count, box, how, said):
+    """The log gives the choice and its reason."""
     grains = sand.setup.gas(count, box, radius="10 nm", material=sand.IRON, moment="1e-18 A m^2", seed=1)
     sim = sand.Simulation(grains, [sand.Dipoles(cutoff="0.2 um")], box=box, neighbours=Neighbours(**how))
     assert said in sim.choices["neighbours"]
@@ -399,7 +399,7 @@ def test_the_search_is_stated(count, box, how, said):
 
 @pytest.mark.parametrize("box", ["3 um", (1e-6, None, None), None])
 def test_an_aggregate_within_reach_of_itself_has_no_list(box):
-    """However large the box: each pair would stand in two rows of a list that leaves none out."""
+    """However large the box: each pair would be in two rows of a list that omits none."""
     block = sand.setup.lattice(5, radius="10 nm", material=sand.IRON)
     grains = sand.Grains(block.position, 1e-8, sand.IRON, moment="20 A m^2/kg")
     box = None if box is None else sand.Box(box) if isinstance(box, tuple) else box
@@ -407,8 +407,8 @@ def test_an_aggregate_within_reach_of_itself_has_no_list(box):
     assert sim.choices["neighbours"] == "all pairs: a fraction 1 of the grains is within 330 nm, more than 0.4"
 
 
-def test_a_margin_of_contacts_alone():
-    """Without a cut-off pairs are near up to r1 + r2 + r_min; a margin that is given makes a list that reaches it."""
+def test_margin_without_long_range_forces():
+    """Without a cut-off pairs are near up to r1 + r2 + r_min; a given margin makes a list of that reach."""
     for margin, said in (
         ("auto", "cells, for pairs closer than 30 nm"),
         ("3 nm", "closer than 33 nm (contacts 30 nm,"),
@@ -421,10 +421,10 @@ def test_a_margin_of_contacts_alone():
 @pytest.mark.slow
 @pytest.mark.parametrize("lengths", [(1.0, 1.0, 1.0), (1.0, None, None), (None, None, None)])
 @pytest.mark.parametrize("count", [2, 64, 5000])
-def test_the_share_within_reach(lengths, count):
-    """Pairs within reach over N(N − 1)/2: exact up to 64 grains; of 5000, 64 are looked at, each with 4096 others.
+def test_fraction_of_pairs_within_reach(lengths, count):
+    """Pairs within reach over N(N − 1)/2: exact up to 64 grains; for 5000, 64 grains are sampled with 4096 others.
 
-    One grain's share s varies by less than s from grain to grain, the mean of 64 by s/8: five of these.
+    The fraction s of one grain varies by less than s, the mean of 64 by s/8: tolerance five of these.
     """
     box = Box(lengths)
     position = np.random.default_rng(9).random((count, 3)) - 0.5
@@ -434,7 +434,7 @@ def test_the_share_within_reach(lengths, count):
 
 
 def test_wrong_settings_have_a_line_each():
-    """Unknown word and a margin that is no length."""
+    """An unknown word, and a margin that is no length."""
     with pytest.raises(sand.BadInput) as caught:
         Neighbours(search="cels", margin="-1 nm")
     assert len(caught.value.problems) == 2
@@ -445,8 +445,8 @@ def test_wrong_settings_have_a_line_each():
 @pytest.mark.validate
 @pytest.mark.parametrize("earlier", [Neighbours("all pairs"), Neighbours("cells", "150 nm")])
 @pytest.mark.parametrize("far", ["impulse", "taylor"])
-def test_a_state_without_a_list_or_with_a_wide_one_goes_on(earlier, far):
-    """Runs of earlier versions: their loads and energies are at once those of all pairs, and so is what follows.
+def test_states_of_earlier_versions_continue(earlier, far):
+    """Saved without a list or with a wide one: loads, energies and the continuation equal those of all pairs.
 
     Sums in another order: 1e-12 of the largest.
     """

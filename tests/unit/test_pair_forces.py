@@ -1,4 +1,4 @@
-"""Long-range formulas: central forces, cut-offs, and the rates that foretell them."""
+"""Pair forces: central forces, cut-offs, and the rates that extrapolate them."""
 
 import math
 
@@ -22,23 +22,25 @@ def apart_for(name, rng):
     return direction / np.linalg.norm(direction) * (0.9 if name == "in the shell" else 1.3)
 
 
-def moved(vector, rate, time):
+def displaced(vector, rate, time):
     return tuple(np.asarray(vector) + time * np.asarray(rate))
 
 
 @pytest.mark.parametrize("name", CUTOFFS)
 @pytest.mark.parametrize("seed", range(4))
-def test_taylor_rates_are_finite_differences(name, seed):
+def test_taylor_rates_against_finite_differences(name, seed):
     """Ḟ and Ḃ (Eqs. 51–56 corrected) = central differences of F and B along r + ṙt, μ + μ̇t, to 1e-6.
 
-    Fourth-order differences with h = 1e-3 of the scales err by h⁴ × 1e3 ~ 1e-9, rounding by ε/h ~ 1e-12.
+    Fourth-order differences with h = 1e-3 of the scales have an error of h⁴ × 1e3 ~ 1e-9, rounding ε/h ~ 1e-12.
     """
     rng = np.random.default_rng(seed)
     apart, m1, m2, v, t1, t2 = apart_for(name, rng), *rng.normal(size=(5, 3))
     cutoff, h = CUTOFFS[name], 1e-3
 
     def loads(time):
-        f, b1, b2, _ = pair_load_cut(moved(apart, v, time), moved(m1, t1, time), moved(m2, t2, time), 1.0, cutoff)
+        f, b1, b2, _ = pair_load_cut(
+            displaced(apart, v, time), displaced(m1, t1, time), displaced(m2, t2, time), 1.0, cutoff
+        )
         return np.array([f, b1, b2])
 
     slope = (8 * (loads(h) - loads(-h)) - (loads(2 * h) - loads(-2 * h))) / (12 * h)
@@ -47,10 +49,10 @@ def test_taylor_rates_are_finite_differences(name, seed):
 
 
 @pytest.mark.validate
-def test_taylor_torque_is_the_whole_product_rule():
-    """Ṁ = μ̇×B + μ×Ḃ, as the run keeps it, = difference quotient of μ×B along a real flight, first order in its time.
+def test_taylor_rate_of_the_torque():
+    """Ṁ = μ̇×B + μ×Ḃ equals the difference quotient of μ×B along a trajectory, first order in its duration.
 
-    The paper's Eq. 53 has the moment of the other grain there.
+    Eq. 53 of the paper has the moment of the other grain there.
     """
     rng = np.random.default_rng(2)
     grains = sand.Grains(
@@ -76,7 +78,7 @@ def test_taylor_torque_is_the_whole_product_rule():
     sim = sand.Simulation(grains, [sand.Dipoles()], stepping=sand.Verlet(step="1e-15 s"))
     before = sim.loads()
     w, rules = sim.state, sim._engine.parameters
-    far = empty_long_range_arrays(len(grains), 0)  # a run in single steps has no room for rates
+    far = empty_long_range_arrays(len(grains), 0)  # a run without r-RESPA cycles has no arrays for rates
     kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.long_range[0])
     force_rate, torque_rate = far.force_rate.T.copy(), far.torque_rate.T.copy()
     sim.run(steps=10)
@@ -105,8 +107,8 @@ def test_central_force_is_minus_the_gradient(name, k):
     assert np.abs(rate - slope(lambda x: central_field(x, k, cutoff), v)).max() < 1e-6 * np.abs(rate).max()
 
 
-def test_the_weight_and_its_slopes():
-    """S = 1 up to r_s, 0 from r_c; s = −2 dS/d(r²) and ds/d(r²) by differences; a sharp cut has neither."""
+def test_cutoff_weight_and_its_derivatives():
+    """S = 1 up to r_s, 0 from r_c; s = −2 dS/d(r²) and ds/d(r²) by differences; both 0 for a sharp cut-off."""
     h = 1e-4
     for square in (0.5, 0.7, 0.82, 0.99, 1.2):
         ahead, behind = cut_weight(square + h, SMOOTH), cut_weight(square - h, SMOOTH)
@@ -118,8 +120,8 @@ def test_the_weight_and_its_slopes():
     assert isinstance(SMOOTH, Cutoff)
 
 
-def test_uncut_rates_repeat_the_loads():
-    """The loads that come along with the rates are those of `pair_load_cut` without a cut, to rounding."""
+def test_loads_of_the_rate_loop():
+    """The loads computed together with the rates equal those of `pair_load_cut` without a cut-off, to rounding."""
     rng = np.random.default_rng(1)
     x, m1, m2, v, t1, t2 = (tuple(a) for a in rng.normal(size=(6, 3)))
     f, b1, b2, u, *_ = uncut_rates(x, m1, m2, v, t1, t2, 1.0)
@@ -129,15 +131,15 @@ def test_uncut_rates_repeat_the_loads():
 
 @pytest.mark.validate
 def test_two_charges_and_two_masses():
-    """F = q1 q2/(4πε₀ r²) apart, G m1 m2/r² together; energies of the ledger; a fall of two masses keeps the total."""
+    """F = q1 q2/(4πε₀ r²) repulsive, G m1 m2/r² attractive; ledger energies; two falling masses conserve energy."""
     q, r = 1.6e-19, 1e-7
     ions = sand.Grains([[0, 0, 0], [r, 0, 0]], 1e-8, sand.SILICA, charge=[q, -3 * q])
     loads = sand.Simulation(ions, [sand.Charges()]).loads()
     assert loads["force"][0] == pytest.approx([3 * COULOMB * q**2 / r**2, 0, 0], rel=1e-12, abs=0.0)
     assert loads["energy"]["coulomb"] == pytest.approx(-3 * COULOMB * q**2 / r, rel=1e-12, abs=0.0)
-    stones = sand.Grains([[0, 0, 0], [3.0, 0, 0]], 1.0, sand.SILICA)
-    sim = sand.Simulation(stones, [sand.Attraction()])
-    m = stones.mass[0]
+    masses = sand.Grains([[0, 0, 0], [3.0, 0, 0]], 1.0, sand.SILICA)
+    sim = sand.Simulation(masses, [sand.Attraction()])
+    m = masses.mass[0]
     loads = sim.loads()
     assert loads["force"][0, 0] == pytest.approx(GRAVITATION * m**2 / 9.0, rel=1e-12, abs=0.0)
     assert loads["energy"]["gravitation"] == pytest.approx(-GRAVITATION * m**2 / 3.0, rel=1e-12, abs=0.0)
@@ -149,8 +151,8 @@ def test_two_charges_and_two_masses():
 
 
 @pytest.mark.validate
-def test_listed_charges_are_all_charges():
-    """Coulomb forces, energies and their shares over a list and over all pairs agree to 1e-12."""
+def test_coulomb_forces_over_list_and_all_pairs():
+    """Coulomb forces, energies and shares over a list and over all pairs agree to 1e-12."""
     rng = np.random.default_rng(5)
     grains = sand.Grains(1e-6 * (rng.random((150, 3)) - 0.5), 1e-9, sand.SILICA, charge=1e-18 * rng.normal(size=150))
     found = []
@@ -177,7 +179,7 @@ def test_listed_charges_are_all_charges():
         (lambda: sand.Verlet(far_steps=0), "stepping: far_steps = 0"),
     ],
 )
-def test_mistakes_are_told(make, line):
+def test_wrong_arguments_are_refused(make, line):
     """One clear line each."""
     with pytest.raises(sand.BadInput, match="^" + line.replace("(", r"\(")):
         make()
@@ -191,8 +193,8 @@ def test_a_cutoff_beyond_half_the_box_is_refused():
             sand.Simulation(grains, [force], box="1 um")
 
 
-def test_nothing_charged_is_a_warning():
-    """Switched on, but nothing to act on."""
+def test_charges_force_without_charges_warns():
+    """The force is switched on but no grain is charged."""
     grains = sand.Grains([[0, 0, 0]], 1e-8, sand.SILICA)
     with pytest.warns(UserWarning, match="charges are switched on but no grain is charged"):
         sand.Simulation(grains, [sand.Charges()])
@@ -200,7 +202,7 @@ def test_nothing_charged_is_a_warning():
 
 @pytest.mark.validate
 def test_energies_at_grains_add_up():
-    """Shares of pairs and of per-grain forces sum to the ledger's columns; −½ μ·B of two dipoles is half of U each."""
+    """Shares of pairs and external forces add up to the ledger; −½ μ·B of two dipoles is half of U each."""
     u = MAGNETIC * 2 * (6e-18) ** 2 / (3e-8) ** 3
     grains = sand.Grains([[0, 0, 0], [0, 0, 3e-8]], 1e-8, sand.IRON, moment="6e-18 A m^2", charge=[1e-19, 2e-19])
     sim = sand.Simulation(grains, [sand.Dipoles(), sand.Charges(), sand.Field("1 mT"), sand.Gravity("9.81 m/s^2")])

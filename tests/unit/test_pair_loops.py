@@ -1,4 +1,4 @@
-"""Sums of long-range loads in blocks beside the same sums at once, for forces together in any order."""
+"""Sums of long-range loads in blocks against sums in one loop, for combined forces in any order."""
 
 import itertools
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 def cloud():
-    """40 charged magnetic grains of iron in open space."""
+    """40 charged magnetic iron grains in open space."""
     rng = np.random.default_rng(6)
     moment = 6e-18 * rng.normal(size=(40, 3))
     charge = 1e-17 * rng.normal(size=40)
@@ -30,10 +30,10 @@ def cloud():
     [p for name in ("listed dipoles", "dipoles") for p in itertools.permutations([name, "listed charges"])],
     ids=" then ".join,
 )
-def test_blocks_of_forces_together_are_their_sum(order):
-    """begin, blocks, end give what `loads` gives: F, M and B to rounding (1e-12 of the largest).
+def test_blocked_sums_of_combined_forces(order):
+    """begin, blocks and end give the result of `loads`: F, M and B to 1e-12 of the largest.
 
-    The functions are ordinary Python here.  Charges are summed whole, and use the same rooms of `far` as dipoles.
+    The functions run as plain Python.  Charges are summed in one loop; they share the arrays of `long_range`.
     """
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
@@ -47,11 +47,11 @@ def test_blocks_of_forces_together_are_their_sum(order):
     }
     sums, own = compose_long_range([loops[name] for name in order], [numbers[name] for name in order])
     span, found = sim._engine.parameters.span, []
-    for way in ("at once", "in blocks"):
+    for loop in ("at once", "in blocks"):
         arrays, far = sim.state.copy().grains.arrays, empty_long_range_arrays(40, 4000)
         build_verlet_list(arrays, far, sim.state.count.copy(), span, sim._engine.parameters.search)
         clear_long_range_loads(far)
-        if way == "at once":
+        if loop == "at once":
             sums.loads(arrays, far, span, own)
         else:
             sums.blocked.begin(arrays, far, span, own)
@@ -66,9 +66,9 @@ def test_blocks_of_forces_together_are_their_sum(order):
 
 @pytest.mark.compiled("dipoles")
 def test_forces_of_contacts_are_those_of_the_contact_law():
-    """Two magnetic grains head to tail in contact: the table has F = F_JKR n, without the dipoles' attraction.
+    """Two magnetic grains head to tail in contact: the table has F = F_JKR n, without the dipole attraction.
 
-    That acts along n as well, and is a thousandth of it and more: it would be seen at 1e-9.
+    The attraction acts along n and is at least a thousandth of the contact force: it would show at 1e-9.
     """
     grains = sand.Grains([[0, 0, 0], [1.985e-8, 0, 0]], 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * 2)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 mm")])
@@ -78,16 +78,16 @@ def test_forces_of_contacts_are_those_of_the_contact_law():
 
 
 @pytest.mark.compiled("small")
-def test_a_formula_from_outside_may_print(capfd):
-    """What a user registers is compiled by numba as always: it may do what needs numba's environment."""
+def test_a_registered_formula_may_print(capfd):
+    """Formulas that users register are compiled by plain numba and may use its runtime environment."""
 
     @formula
-    def talkative(x):
+    def printing_formula(x):
         print("x is", x)
         return 2.0 * x
 
     def call(x):
-        return talkative(x)
+        return printing_formula(x)
 
     assert kernel(call, cached=False)(1.5) == 3.0
     assert "x is 1.5" in capfd.readouterr().out

@@ -1,4 +1,4 @@
-"""Rotation parameters against the paper's matrix, its differential equation, and SciPy."""
+"""Rotation by quaternions against the paper's matrix, its differential equation, and SciPy."""
 
 import math
 
@@ -31,8 +31,8 @@ def paper_matrix(q):
 
 
 @given(quaternion, angle)
-def test_turned_is_the_papers_matrix(q, v):
-    """R(ϱ) v of Eq. 30, SciPy's active rotation (scalar last), and back again."""
+def test_turned_equals_the_papers_matrix(q, v):
+    """R(ϱ) v of Eq. 30, SciPy's active rotation (scalar last), and the inverse."""
     q = normalised(q)
     assert turned(q, v) == pytest.approx(paper_matrix(q) @ v, abs=1e-15)
     assert turned(q, v) == pytest.approx(Rotation.from_quat(q).apply(v), abs=1e-15)
@@ -41,7 +41,7 @@ def test_turned_is_the_papers_matrix(q, v):
 
 @given(quaternion, angle)
 def test_turn_is_a_rotation_in_the_laboratory_frame(q, step):
-    """ϱ after ω dt equals exp(ω dt)·R; the angle errs by h⁷/420, h half of it, here ≤ 9e-11."""
+    """ϱ after ω dt equals exp(ω dt)·R; error of the angle h⁷/420 with h half of it, here ≤ 9e-11."""
     q = normalised(q)
     exact = Rotation.from_rotvec(step) * Rotation.from_quat(q)
     found = Rotation.from_quat(turn(q, step))
@@ -63,15 +63,15 @@ def test_turn_follows_the_papers_differential_equation():
     assert [(f - g) / (2 * dt) for f, g in zip(ahead, behind, strict=True)] == pytest.approx(rate, abs=1e-9)
 
 
-def test_turn_back_undoes_turn():
-    """turn(turn(ϱ, a), −a) = ϱ to rounding: the books rely on it to find where a grain came from."""
+def test_turn_by_the_opposite_angle_is_the_inverse():
+    """turn(turn(ϱ, a), −a) = ϱ to rounding; dissipation is computed from this earlier orientation."""
     q = normalised((0.1, 0.9, -0.3, 0.2))
     step = (0.01, -0.02, 0.03)
     assert turn(turn(q, step), tuple(-x for x in step)) == pytest.approx(q, abs=1e-15)
 
 
 def test_ten_thousand_turns_stay_normalised():
-    """Renormalisation keeps |ϱ| = 1 to rounding, and the angle adds up."""
+    """Renormalisation keeps |ϱ| = 1 to rounding, and the angles add up."""
     q = (0.0, 0.0, 0.0, 1.0)
     for _ in range(10_000):
         q = turn(q, (0.0, 0.0, 2 * math.pi / 1000))

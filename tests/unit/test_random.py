@@ -1,4 +1,4 @@
-"""Random numbers: the published vectors, the same with and without the compiler, and evenly spread."""
+"""Counter-based random numbers: published test vectors, equal with and without the compiler, distributions."""
 
 import math
 
@@ -33,7 +33,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="too many numbers with the co
 
 
 def filled(way, rows, kind, addresses, types=(np.int64, np.int64, np.uint32, np.int64)):
-    """Words or normals of many addresses; the types are those the driver has for them."""
+    """Words or normal deviates of many addresses, with the argument types of the driver."""
     columns = [np.ascontiguousarray(c).astype(t) for c, t in zip(np.broadcast_arrays(*addresses), types, strict=True)]
     out = np.empty((rows, columns[0].size), kind)
     way(*columns, out)
@@ -50,7 +50,7 @@ def words_of(text):
 
 @pytest.mark.interpreted
 @pytest.mark.parametrize(("counter", "key", "result"), KNOWN)
-def test_philox_gives_the_published_words(counter, key, result):
+def test_philox_gives_the_published_vectors(counter, key, result):
     """Philox4x32-10 of Random123's known answers, in plain Python; exact."""
     assert philox(words_of(counter), words_of(key)) == words_of(result)
 
@@ -59,7 +59,7 @@ def test_philox_gives_the_published_words(counter, key, result):
 @pytest.mark.interpreted
 @pytest.mark.parametrize(("counter", "key", "result"), KNOWN)
 def test_an_address_is_counter_and_key(counter, key, result):
-    """Key = seed, low word first; counter = number, low word first, grain, stream.  Compiled; exact."""
+    """Key = seed, low word first; counter = number, low word first, grain, stream. Compiled; exact."""
     c, k = ([int(w) for w in words_of(text)] for text in (counter, key))
     address = ([k[0] + (k[1] << 32)], [c[0] + (c[1] << 32)], [c[2]], [c[3]])
     assert tuple(filled(compiled_words, 4, np.uint64, address, (np.uint64,) * 4)[:, 0]) == words_of(result)
@@ -68,11 +68,11 @@ def test_an_address_is_counter_and_key(counter, key, result):
 
 @pytest.mark.compiled("small")
 @pytest.mark.interpreted
-def test_the_compiler_and_the_type_of_an_address_change_nothing():
-    """Plain int, int64, uint32 and uint64 give the same words, exactly, and no type but uint64 ever comes out.
+def test_words_do_not_depend_on_compiler_or_integer_type():
+    """int, int64, uint32 and uint64 give equal words, returned as uint64.
 
-    The normals are roots, logarithms and cosines of the C library in both cases; a rounding of the angle, ≤ 2π, is
-    worth 4.4e-16 of a size ≤ 6.8: 6e-15.
+    Normal deviates use sqrt, log and cos of the C library in both cases; a rounding error of the angle, ≤ 2π, changes a
+    deviate of size ≤ 6.8 by 4.4e-16 of it: 6e-15.
     """
     rng, signed = np.random.default_rng(3), (np.int64, np.int64, np.uint32, np.int64)
     for types in (signed, (np.uint64,) * 4, (np.uint32, np.int32, np.int64, np.uint8)):
@@ -103,10 +103,10 @@ def test_a_uniform_is_never_0_or_1():
 
 @pytest.mark.compiled("small")
 @compiled
-def test_words_are_evenly_spread():
-    """1e6 addresses, counted up as a run counts them: each of 128 bits is set in half of the words.
+def test_bits_are_evenly_distributed():
+    """1e6 consecutive addresses as in a run: each of 128 bits is set in half of the words.
 
-    Share of set bits ±½/√n; the largest of 128 deviates stays below 4.5 σ but once in 1150 runs (the seed is fixed).
+    The fraction of set bits is ½ ± ½/√n; the largest of 128 deviations exceeds 4.5 σ once in 1150 runs (fixed seed).
     """
     n = 1_000_000
     words = filled(compiled_words, 4, np.uint64, (5, np.arange(n) // 1000, np.arange(n) % 1000, 0))
@@ -118,7 +118,7 @@ def test_words_are_evenly_spread():
 @pytest.mark.compiled("small")
 @compiled
 def test_moments_of_the_normals():
-    """Mean 0, ⟨ξ²⟩ = 1, ⟨ξ³⟩ = 0, ⟨ξ⁴⟩ = 3 for each component, with σ² = 1, 2, 15, 96 over n = 1e6; within 4 σ."""
+    """Mean 0, ⟨ξ²⟩ = 1, ⟨ξ³⟩ = 0, ⟨ξ⁴⟩ = 3 per component, with σ² = 1, 2, 15, 96 over n = 1e6; within 4 σ."""
     n = 1_000_000
     x = normals(1, np.arange(n) // 1000, np.arange(n) % 1000, 0)
     for power, mean, variance in ((1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96)):
@@ -127,8 +127,8 @@ def test_moments_of_the_normals():
 
 @pytest.mark.compiled("small")
 @compiled
-def test_the_normals_are_normal():
-    """Kolmogorov–Smirnov on each component, n = 2e5: p > 1e-3.  A χ² of |ξ|² (3 degrees of freedom) likewise."""
+def test_normal_deviates_are_normal():
+    """Kolmogorov–Smirnov per component, n = 2e5: p > 1e-3.  A χ² of |ξ|² (3 degrees of freedom) likewise."""
     n = 200_000
     x = normals(2, np.arange(n), 7, 1)
     for component in x:
@@ -139,10 +139,10 @@ def test_the_normals_are_normal():
 @pytest.mark.compiled("small")
 @compiled
 @pytest.mark.parametrize("power", [1, 2])
-def test_neighbouring_addresses_know_nothing_of_each_other(power):
-    """Correlation of ξ, and of ξ², between components, grains, kicks, streams and seeds: 0 ± 1/√n, n = 2e5.
+def test_neighbouring_addresses_are_uncorrelated(power):
+    """Correlation of ξ and of ξ² between components, grains, kicks, streams and seeds: 0 ± 1/√n, n = 2e5.
 
-    45 numbers of each kind; the largest stays below 4 σ but once in 350 runs (the seed is fixed).
+    45 correlations of each kind; the largest exceeds 4 σ once in 350 runs (fixed seed).
     """
     n = 200_000
     kicks, grains = np.arange(n) // 500, np.arange(n) % 500
@@ -166,9 +166,9 @@ def test_neighbouring_addresses_know_nothing_of_each_other(power):
 @pytest.mark.compiled("small")
 @compiled
 def test_sums_over_kicks_and_over_grains_are_normal():
-    """Σ ξ over 500 kicks of a grain, or over 500 grains of a kick, has variance 500 (1 ± √(2/m)), m sums; within 4 σ.
+    """Σ ξ over 500 kicks of a grain or 500 grains of a kick has variance 500 (1 ± √(2/m)), m sums; within 4 σ.
 
-    A correlation over a longer way than one neighbour would show here.
+    This detects correlations beyond the next neighbour.
     """
     kicks, grains = np.meshgrid(np.arange(500), np.arange(500), indexing="ij")
     x = normals(6, kicks.ravel(), grains.ravel(), 0).reshape(3, 500, 500)

@@ -1,4 +1,4 @@
-"""Which ball or rod each ray meets first: against the equations of spheres and cones."""
+"""The first sphere or cone that each ray meets, against their equations."""
 
 import dataclasses
 import tracemalloc
@@ -12,11 +12,11 @@ from sand.plotting.render.spheres import Rods, Spheres, render_spheres
 
 
 @pytest.mark.parametrize("w", [0.0, 1 / 300.0])
-def test_the_nearer_of_two_balls_wins_everywhere(w):
-    """Every sample of two balls that run into each other shows the one that its ray meets first.
+def test_two_overlapping_spheres(w):
+    """Every sample of two overlapping spheres shows the one that its ray meets first.
 
-    Rays are the lines (X(1 − wz), Y(1 − wz), z); both quadratic equations are solved in double precision, and samples
-    whose two depths differ by less than 0.01 (the depth has 24 bits of 300) are left out.
+    Rays are the lines (X(1 − wz), Y(1 − wz), z).  Both quadratic equations are solved in double precision; samples with
+    depths that differ by less than 0.01 (the depth has 24 bits of 300) are left out.
     """
     centre, radius = np.array([[-12.0, 3.0, 5.0], [14.0, -2.0, -9.0]]), np.array([40.0, 33.0])
     rods = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2))
@@ -27,13 +27,13 @@ def test_the_nearer_of_two_balls_wins_everywhere(w):
     for k in range(2):
         p, d = np.stack([x, y, 0.0 * x]) - centre[k][:, None, None], np.stack([-w * x, -w * y, 1.0 + 0.0 * x])
         a, b, c = (d * d).sum(axis=0), (p * d).sum(axis=0), (p * p).sum(axis=0) - radius[k] ** 2
-        met = b * b > a * c
-        depth[k][met] = (-b[met] + np.sqrt(b[met] ** 2 - a[met] * c[met])) / a[met]
-    met = np.isfinite(depth).any(axis=0)
+        hits = b * b > a * c
+        depth[k][hits] = (-b[hits] + np.sqrt(b[hits] ** 2 - a[hits] * c[hits])) / a[hits]
+    hits = np.isfinite(depth).any(axis=0)
     with np.errstate(invalid="ignore"):
-        clear = met & ~(np.abs(depth[0] - depth[1]) < 0.01)
+        clear = hits & ~(np.abs(depth[0] - depth[1]) < 0.01)
     r, c = np.nonzero(clear)
-    assert clear.sum() > 5000 and ((canvas.nearest > 0) == met).mean() > 0.9995
+    assert clear.sum() > 5000 and ((canvas.nearest > 0) == hits).mean() > 0.9995
     r, c = np.nonzero(clear & (canvas.nearest > 0))
     which, point, normal = canvas.surface(r, c)
     np.testing.assert_array_equal(which, depth.argmax(axis=0)[r, c])
@@ -42,37 +42,37 @@ def test_the_nearer_of_two_balls_wins_everywhere(w):
 
 
 @pytest.mark.parametrize("w", [0.0, 1 / 400.0])
-def test_rods_are_met_where_they_are(w):
+def test_cones_and_cylinders(w):
     """Points on a cone and a cylinder fulfil their equations: the radius changes linearly between the ends.
 
-    Tolerance 0.01 samples: the depth has 24 bits of some hundred samples.
+    Tolerance 0.01 samples: the depth has 24 bits of about a hundred samples.
     """
     start, end = (
         np.array([[-60.0, -30.0, -20.0], [10.0, -20.0, 30.0]]),
         np.array([[40.0, 35.0, 25.0], [60.0, 40.0, -30]]),
     )
     end_radii = np.array([[14.0, 0.0], [6.0, 6.0]])
-    balls = np.zeros((0, 3)), np.zeros(0)
-    canvas = DepthBuffer((140, 180), Solids(*balls, start, end, end_radii, np.eye(3)[:2], np.ones(2)), w)
+    spheres = np.zeros((0, 3)), np.zeros(0)
+    canvas = DepthBuffer((140, 180), Solids(*spheres, start, end, end_radii, np.eye(3)[:2], np.ones(2)), w)
     which, point, normal = canvas.surface(*np.nonzero(canvas.nearest))
     for k in range(2):
         q, axis = point[which == k] - start[k], end[k] - start[k]
         along = q @ axis / (axis @ axis)
         away = np.linalg.norm(q - along[:, None] * axis, axis=1)
-        lids = (np.abs(along) < 1e-3) | (np.abs(along - 1.0) < 1e-3)
+        caps = (np.abs(along) < 1e-3) | (np.abs(along - 1.0) < 1e-3)
         expected = end_radii[k, 0] + (end_radii[k, 1] - end_radii[k, 0]) * along
         assert len(q) > 300 and (along > -1e-3).all() and (along < 1.0 + 1e-3).all()
-        np.testing.assert_allclose(away[~lids], expected[~lids], atol=0.01)
+        np.testing.assert_allclose(away[~caps], expected[~caps], atol=0.01)
     facing = (normal * np.column_stack([-w * point[:, 0], -w * point[:, 1], np.ones(len(point))])).sum(axis=1)
-    assert (facing > -0.1).all()  # nothing is seen from behind
+    assert (facing > -0.1).all()  # no back faces are visible
 
 
 @pytest.mark.validate
 def test_chunks_bound_the_memory(monkeypatch):
-    """Ten thousand grains in pieces, in small pieces and at once: the same picture, and only at once more memory.
+    """Ten thousand grains in chunks of two sizes and in one: the same picture; only the last needs more memory.
 
-    With pieces of MAX_SAMPLES the peak is that of the picture itself, as with pieces a twentieth of it; without a
-    bound it is twice as much.  The picture is full in the middle.
+    With chunks of MAX_SAMPLES the peak is that of the picture itself, as with chunks a twentieth of it; with one chunk
+    it is twice as much.  The picture is densest in the middle.
     """
     rng = np.random.default_rng(5)
     grains = Spheres(
@@ -91,8 +91,8 @@ def test_chunks_bound_the_memory(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_ball_larger_than_the_picture_is_cut_into_squares():
-    """A ball that fills the picture is drawn, in pieces that are within what is looked at in one go."""
+def test_a_sphere_larger_than_the_picture_is_drawn_in_tiles():
+    """The sphere is drawn in tiles within the sample limit of one chunk."""
     one = Spheres(np.zeros((1, 3)), np.ones(1), np.full((1, 3), 0.5), np.zeros((1, 3)))
     assert (render_spheres(one, (-0.4, 0.4, -0.3, 0.3), 400, 300)[..., 3] == 1.0).all()
 

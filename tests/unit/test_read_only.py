@@ -1,4 +1,4 @@
-"""What cannot be changed once it is built is refused in a line; what can be is checked. Nothing is compiled."""
+"""Attributes that cannot change after construction are refused in one line; others are checked. Nothing is compiled."""
 
 import pytest
 
@@ -18,20 +18,21 @@ RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer",
 
 @pytest.mark.parametrize("name", ARGUMENTS)
 def test_arguments_cannot_be_assigned(sim, name):
-    """They would be written to the files while the dynamics go on with the old ones: build a new simulation."""
+    """An assigned argument would be written to files while the dynamics use the old one: build a new simulation."""
     with pytest.raises(sand.BadInput, match=rf"^{name} of a simulation .*build a new one: sand\.Simulation\("):
         setattr(sim, name, None)
 
 
 @pytest.mark.parametrize("name", RESULTS)
 def test_results_cannot_be_assigned(sim, name):
+    """Results are computed, so assignment is refused."""
     with pytest.raises(sand.BadInput, match=rf"^{name} of a simulation follows from its run"):
         setattr(sim, name, 0)
 
 
 @pytest.mark.parametrize("name", [*(field.name for field in FIELDS), "material", "materials", "id"])
 def test_quantities_of_grains_cannot_be_assigned(sim, name):
-    """Neither of a running simulation nor of grains that are not in one yet: the arrays stay as they were."""
+    """Neither of a simulation nor of grains outside of one: the arrays do not change."""
     before = {field.name: getattr(sim.grains, field.name).copy() for field in FIELDS}
     for grains in (sim.grains, sim.start):
         with pytest.raises(sand.BadInput, match=rf"^{name} of grains cannot be assigned; make new grains"):
@@ -41,6 +42,7 @@ def test_quantities_of_grains_cannot_be_assigned(sim, name):
 
 
 def test_misspelt_names_are_refused(sim):
+    """Assignment to an unknown attribute suggests the right name."""
     with pytest.raises(sand.BadInput, match="a simulation has no 'focres'; did you mean 'forces'"):
         sim.focres = []
     with pytest.raises(sand.BadInput, match="grains have no 'velocty'; did you mean 'velocity'"):
@@ -48,7 +50,8 @@ def test_misspelt_names_are_refused(sim):
     assert not hasattr(sim, "focres") and not hasattr(sim.grains, "velocty")
 
 
-def test_forces_are_no_list_to_be_changed(sim):
+def test_the_forces_of_a_simulation_cannot_change(sim):
+    """`forces` is no list that could be appended to."""
     assert isinstance(sim.forces, tuple)
     with pytest.raises(sand.BadInput, match=r"slip of sand\.Contact cannot be assigned; make a new one"):
         sim.forces[0].slip = "reset"
@@ -57,8 +60,8 @@ def test_forces_are_no_list_to_be_changed(sim):
     assert list(sim.forces) == [sand.Contact()]
 
 
-def test_what_can_be_assigned_is_checked(sim):
-    """`frame_every` and `observers` take effect in the next `run`."""
+def test_assignable_attributes_are_checked(sim):
+    """`frame_every` and `observers` apply from the next `run` on."""
     sim.frame_every = "1 ns"
     assert sim.frame_every == 1e-9
     one = sand.Observer()
@@ -73,12 +76,15 @@ def test_what_can_be_assigned_is_checked(sim):
     assert sim.frame_every == 1e-9
 
 
-def test_a_single_force_stands_for_a_list():
+def test_a_single_force_is_accepted_as_a_list():
+    """A force without brackets is a list of one."""
     grains = sand.Grains([[0, 0, 0]], 1e-8, "silica")
     assert list(sand.Simulation(grains, sand.Contact()).forces) == [sand.Contact()]
 
 
 def test_derived_classes_may_have_attributes_of_their_own():
+    """Subclasses may assign new attributes."""
+
     class Mine(sand.Simulation):
         def __init__(self, *given, label, **more):
             super().__init__(*given, **more)

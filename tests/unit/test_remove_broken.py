@@ -1,4 +1,4 @@
-"""Broken contacts are taken out of the arrays, and every number of the others goes where its contact goes."""
+"""Broken contacts are removed from the arrays; all columns of the other contacts move together."""
 
 import numpy as np
 import pytest
@@ -14,10 +14,10 @@ BY_GRAIN = {"side", "start", "gather_order"}
 
 @pytest.mark.parametrize("broken", [[0], [1, 2, 5], [6], [], list(range(7))])
 def test_each_column_moves_with_its_contact(broken):
-    """Seven contacts with numbers by chance: what is left is what NumPy leaves of every array, to the bit.
+    """Seven contacts with random values: each array equals NumPy's selection of it, to the bit.
 
-    Room for more contacts than there are, constants and losses for each, and damping, so that nothing is left out.
-    The loop is called as plain Python.
+    There is room for more contacts, constants and losses are per contact, and damping is on, so that every array is
+    covered.  The loop runs as plain Python.
     """
     contacts = empty_contact_arrays(9, 20, 15, channels=6)
     rng, count = np.random.default_rng(4), np.zeros(len(COUNT), np.int64)

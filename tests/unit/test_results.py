@@ -1,4 +1,4 @@
-"""A run's folder opened to be looked at, its export, and files that are not what they were."""
+"""Results of a run opened with `sand.open`, their export, and unreadable folders."""
 
 import json
 
@@ -10,8 +10,8 @@ from sand.cli.main import main
 
 
 @pytest.mark.compiled("fields")
-def test_everything_is_there(finished_run):
-    """Frames one by one, ledger columns, contacts with forces, case and summary."""
+def test_frames_ledger_case_and_summary(finished_run):
+    """Frames by index, ledger columns, contacts with forces, case and summary."""
     folder, sim = finished_run
     opened = sand.open(folder)
     assert len(opened.frames) == len(sim.ledger) == 6
@@ -29,7 +29,7 @@ def test_everything_is_there(finished_run):
 
 
 @pytest.mark.compiled("fields")
-def test_tables_for_others(finished_run):
+def test_xarray_and_pandas_tables(finished_run):
     """xarray: dimensions, coordinates, units; pandas: the ledger."""
     pytest.importorskip("xarray", reason="xarray is in the test extra")
     folder, sim = finished_run
@@ -45,7 +45,7 @@ def test_tables_for_others(finished_run):
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize(("form", "files"), [("xyz", 1), ("lammps-dump", 1), ("lammps-data", 6), ("vtk", 7)])
 def test_the_export_command(finished_run, tmp_path, capsys, form, files):
-    """As many files as promised, not overwritten without leave; slices choose frames."""
+    """The announced number of files; existing files are kept without --overwrite; slices choose frames."""
     folder, _ = finished_run
     stem = str(tmp_path / "out")
     assert main(["export", str(folder), "--to", form, "--out", stem, "--json"]) == 0
@@ -57,7 +57,7 @@ def test_the_export_command(finished_run, tmp_path, capsys, form, files):
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["--to", "vtk", "--frames", "a:b"], "--frames"),
         (["--to", "vtk", "--frames", "50:60"], "no frame"),
@@ -65,18 +65,18 @@ def test_the_export_command(finished_run, tmp_path, capsys, form, files):
         (["--to", "pdb"], "pdb"),
     ],
 )
-def test_mistakes(finished_run, capsys, words, said):
-    """One line, exit 2."""
+def test_wrong_arguments_of_export(finished_run, capsys, words, message):
+    """One line, exit code 2."""
     assert main(["export", str(finished_run[0]), *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
     assert len(lines) == 1
-    assert said in lines[0]
+    assert message in lines[0]
 
 
-def test_no_run_there(tmp_path):
+def test_folders_without_a_run(tmp_path):
     """A missing folder, and one without a run."""
-    for path, said in ((tmp_path / "none", "no folder"), (tmp_path, "not the folder of a run")):
-        with pytest.raises(sand.BadInput, match=said):
+    for path, message in ((tmp_path / "none", "no folder"), (tmp_path, "not the folder of a run")):
+        with pytest.raises(sand.BadInput, match=message):
             sand.open(path)
     (tmp_path / "case.toml").write_text("")
     with pytest.raises(sand.BadInput, match="wait until its run has written a frame"):
@@ -84,7 +84,7 @@ def test_no_run_there(tmp_path):
 
 
 @pytest.mark.compiled("fields")
-def test_a_picture_from_a_script(run_in_field):
+def test_picture_of_a_frame(run_in_field):
     """`sand.open(DIR).picture()` is the still of a frame, with the field of the case."""
     opened = sand.open(run_in_field)
     np.testing.assert_allclose(opened.flux_density(0.0), [0.0, 0.0, 1e-3])

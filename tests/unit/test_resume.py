@@ -1,4 +1,4 @@
-"""Ctrl-C in every command: one line that says how to go on, code 130; `sand resume` ends as if nothing had been."""
+"""Interruption of every command by Ctrl-C: one line with the command to continue, exit code 130, the same bits."""
 
 import json
 import os
@@ -59,13 +59,13 @@ def place(tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def _empty_figures(monkeypatch):
-    """Figures are files without content: drawing takes longer than all the rest."""
+    """Figures are empty files: drawing takes longer than everything else."""
     monkeypatch.setattr("sand.plotting.run_figure.run_figure", lambda simulation: None)
     monkeypatch.setattr("sand.plotting.collisions.collision_figure", lambda results: None)
     monkeypatch.setattr("sand.plotting.run_figure.save", lambda figure, path: path.write_bytes(b""))
 
 
-def interrupt(patch, when):
+def interrupt_when(patch, when):
     """Press Ctrl-C between two steps, once `when(simulation)` holds."""
 
     def tick(self, simulation):
@@ -83,7 +83,7 @@ def same_run(one, other):
     return all(a[name].tobytes() == b[name].tobytes() for name in a)
 
 
-def has_made(simulation):
+def has_formed_a_contact(simulation):
     return simulation.ledger.rows[-1]["made"] > 0
 
 
@@ -91,26 +91,26 @@ def flies(simulation):
     return simulation.steps > 0
 
 
-def looked_twice(simulation):
-    return has_made(simulation) and len(simulation.ledger.rows) > 40
+def has_two_frames(simulation):
+    return has_formed_a_contact(simulation) and len(simulation.ledger.rows) > 40
 
 
 @pytest.fixture(scope="module")
-def hit(tmp_path_factory):
-    """The folder of a collision that was left alone."""
+def uninterrupted_run(tmp_path_factory):
+    """The folder of a collision that was not interrupted."""
     top = tmp_path_factory.mktemp("hit")
     (top / "hit.toml").write_text(COLLISION)
     assert main(["collide", str(top / "hit.toml"), "--seeds", "2", "--out", str(top / "whole"), "--json"]) == 0
     return top / "whole"
 
 
-@pytest.mark.parametrize("moments", [[has_made], [flies, has_made, looked_twice]])
-def test_a_collision_goes_on(place, hit, capsys, monkeypatch, moments):
-    """Interrupted before, while and after bodies meet, once or often: the same bits, and collision.json."""
+@pytest.mark.parametrize("moments", [[has_formed_a_contact], [flies, has_formed_a_contact, has_two_frames]])
+def test_interrupted_collision(place, uninterrupted_run, capsys, monkeypatch, moments):
+    """Interrupted before, during and after the impact, once or several times: same bits and collision.json."""
     words = ["collide", "hit.toml", "--seeds", "2", "--out", "cut"]
     for when in moments:
         with monkeypatch.context() as patch:
-            interrupt(patch, when)
+            interrupt_when(patch, when)
             assert main(words) == 130
         assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; continue with: sand resume cut"
         assert not (place / "cut" / "collision.json").exists() and not (place / "cut" / "figure.png").exists()
@@ -120,9 +120,9 @@ def test_a_collision_goes_on(place, hit, capsys, monkeypatch, moments):
     assert main(["collide", "hit.toml", "--seeds", "2", "--out", "cut"]) == 2
     assert "sand resume cut" in capsys.readouterr().err
     assert main(["resume", "cut", "--quiet"]) == 0
-    ours, theirs = (json.loads((one / "collision.json").read_text()) for one in (place / "cut", hit))
+    ours, theirs = (json.loads((one / "collision.json").read_text()) for one in (place / "cut", uninterrupted_run))
     assert ours["collisions"] == theirs["collisions"] and ours["counts"] == theirs["counts"]
-    assert same_run(place / "cut", hit)
+    assert same_run(place / "cut", uninterrupted_run)
     assert (place / "cut" / "figure.png").exists()
     before = (place / "cut" / "collision.json").stat().st_mtime_ns
     assert main(["resume", "cut"]) == 0
@@ -130,16 +130,16 @@ def test_a_collision_goes_on(place, hit, capsys, monkeypatch, moments):
     assert (place / "cut" / "collision.json").stat().st_mtime_ns == before
 
 
-def test_a_collision_that_was_killed_goes_on(place, hit, capsys):
-    """Without a checkpoint it begins anew; with all looks taken and no outcome it only judges."""
-    shutil.copytree(hit, place / "late")
+def test_killed_collision(place, uninterrupted_run, capsys):
+    """Without a checkpoint it starts again; with all frames but no outcome it only evaluates the outcome."""
+    shutil.copytree(uninterrupted_run, place / "late")
     (place / "late" / "collision.json").unlink()
     (place / "early").mkdir()
-    shutil.copy(hit / "collision.toml", place / "early")
+    shutil.copy(uninterrupted_run / "collision.toml", place / "early")
     for name in ("late", "early"):
         assert main(["resume", name, "--json"]) == 0
         told = json.loads(capsys.readouterr().out)
-        assert told["collisions"] == json.loads((hit / "collision.json").read_text())["collisions"]
+        assert told["collisions"] == json.loads((uninterrupted_run / "collision.json").read_text())["collisions"]
 
 
 @pytest.mark.parametrize(
@@ -150,9 +150,9 @@ def test_a_collision_that_was_killed_goes_on(place, hit, capsys):
         ("[forces.contact]", "[forces.contact]\nslip = 'reset'"),
     ],
 )
-def test_a_collision_cannot_change_on_its_way(place, hit, capsys, old, new):
-    """Another speed, another body, another force: one line."""
-    shutil.copytree(hit, place / "cut")
+def test_resume_refuses_a_changed_collision(place, uninterrupted_run, capsys, old, new):
+    """Another speed, body or force: one line."""
+    shutil.copytree(uninterrupted_run, place / "cut")
     (place / "cut" / "collision.json").unlink()
     path = place / "cut" / "collision.toml"
     text = path.read_text().replace("2 m/s", "2.0 m/s")
@@ -163,8 +163,8 @@ def test_a_collision_cannot_change_on_its_way(place, hit, capsys, old, new):
     assert err.count("\n") == 1 and "start a new collision in another folder" in err
 
 
-def test_many_collisions_go_on(place, capsys, monkeypatch):
-    """What is finished is kept and not done again; collision.json is that of a job that was left alone."""
+def test_interrupted_series_of_collisions(place, capsys, monkeypatch):
+    """Finished collisions are kept and not repeated; collision.json equals that of an uninterrupted job."""
     assert main(["collide", "hit.toml", "--out", "whole", "--json"]) == 0
     capsys.readouterr()
     real = GrowingOutcomes.add
@@ -178,7 +178,7 @@ def test_many_collisions_go_on(place, capsys, monkeypatch):
         assert main(["collide", "hit.toml", "--out", "cut", "--seeds", "1-3"]) == 130
     assert capsys.readouterr().err == "sand: interrupted; continue with: sand resume cut\n"
     with (place / "cut" / "collisions.jsonl").open("a") as file:
-        file.write('{"seed": 2, "outc')  # torn by a kill
+        file.write('{"seed": 2, "outc')  # an incomplete line, as after a kill
     assert main(["info", "cut"]) == 0
     assert "sand resume cut" in capsys.readouterr().out
     done, run = [], collision_case.run_seed
@@ -195,8 +195,8 @@ def test_many_collisions_go_on(place, capsys, monkeypatch):
     assert not (place / "cut" / "collisions.jsonl").exists()
 
 
-def test_outcomes_of_another_case_are_not_taken(place, capsys, monkeypatch):
-    """A case that was changed while its job was interrupted: one line, and nothing is mixed."""
+def test_resume_refuses_outcomes_of_another_case(place, capsys, monkeypatch):
+    """A case changed while its job was interrupted: one line, and outcomes are not mixed."""
     monkeypatch.setattr(
         collision_case, "run_seed", lambda text, seed, **options: (_ for _ in ()).throw(KeyboardInterrupt)
     )
@@ -208,11 +208,11 @@ def test_outcomes_of_another_case_are_not_taken(place, capsys, monkeypatch):
     assert "holds outcomes of another case" in capsys.readouterr().err
 
 
-def test_boxes_go_on(place, capsys, monkeypatch):
-    """The second box interrupted: the first is kept as it is, growth.json comes at the end, the bits are the same."""
+def test_interrupted_growth(place, capsys, monkeypatch):
+    """Interrupted in the second box: the first is kept, growth.json is written at the end, the bits are the same."""
     assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "whole", "--quiet", "--threads", "1"]) == 0
     with monkeypatch.context() as patch:
-        interrupt(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
+        interrupt_when(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
         assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--quiet"]) == 130
     assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; continue with: sand resume cut"
     finished = [path for path in (place / "cut" / "seed-1").iterdir() if path.name != ".lock"]
@@ -237,11 +237,11 @@ def test_boxes_go_on(place, capsys, monkeypatch):
     assert "--threads" in capsys.readouterr().err
 
 
-# --- the figure, and the first moments ------------------------------------------------------------------
+# --- the figure, and interrupts during start-up ------------------------------------------------------------
 
 
-def test_an_interrupted_run_does_not_wait_for_its_figure(place, capsys, monkeypatch):
-    """None is drawn after Ctrl-C; and Ctrl-C while one is drawn leaves it out of a run that is finished."""
+def test_interrupted_runs_draw_no_figure(place, capsys, monkeypatch):
+    """No figure after Ctrl-C; Ctrl-C while a figure is drawn omits it from the finished run."""
     drawn = []
 
     def slow(simulation):
@@ -253,7 +253,7 @@ def test_an_interrupted_run_does_not_wait_for_its_figure(place, capsys, monkeypa
     out, err = capsys.readouterr()
     assert "done" in out and "sand: the figure is not drawn" in err and len(drawn) == 1
     assert json.loads((place / "done" / "summary.json").read_text())["outcome"] == "finished"
-    interrupt(monkeypatch, flies)
+    interrupt_when(monkeypatch, flies)
     assert main(["run", "box.toml", "--out", "cut"]) == 130
     assert len(drawn) == 1 and "resume with: sand resume cut" in capsys.readouterr().err
 
@@ -261,8 +261,8 @@ def test_an_interrupted_run_does_not_wait_for_its_figure(place, capsys, monkeypa
 @pytest.mark.parametrize(
     ("module", "words"), [("click", ["cite"]), ("numpy", ["info", "box.toml"]), ("pydantic", ["info", "box.toml"])]
 )
-def test_interrupted_while_it_is_loaded(place, module, words):
-    """Ctrl-C in the first moments, while modules are imported, also where an import makes another error of it."""
+def test_interrupted_while_modules_are_imported(place, module, words):
+    """Ctrl-C during imports gives exit code 130, also where an import turns it into another exception."""
     program = (
         "import importlib.abc, os, signal, sys\n"
         "class Finder(importlib.abc.MetaPathFinder):\n"
@@ -280,16 +280,18 @@ def test_interrupted_while_it_is_loaded(place, module, words):
     assert (ended.returncode, ended.stderr, ended.stdout) == (130, "sand: interrupted\n", "")
 
 
-def test_advice_where_the_folder_has_vanished(place, capsys, monkeypatch):
-    """Nothing that cannot be done is advised."""
-    interrupt(monkeypatch, lambda simulation: shutil.rmtree(place / "gone", ignore_errors=True) or simulation.steps > 0)
+def test_no_advice_if_the_folder_was_removed(place, capsys, monkeypatch):
+    """The message advises nothing that cannot be done."""
+    interrupt_when(
+        monkeypatch, lambda simulation: shutil.rmtree(place / "gone", ignore_errors=True) or simulation.steps > 0
+    )
     assert main(["run", "box.toml", "--out", "gone"]) in (2, 130)
     err = capsys.readouterr().err
     assert "sand resume" not in err and "has been removed" in err
 
 
 def test_control_characters_do_not_reach_the_terminal(place, capsys):
-    """A name that would clear the screen, turn the text round or begin a new line is shown as it would be typed."""
+    """A name that would clear the screen, reverse text or start a new line is shown escaped."""
     name = "a\x1b[2Jb\x9bc\u202ed\ne\x7f.toml"
     (place / name).write_text(BOX)
     (place / "twisted.toml").write_text(BOX + '["\\u001b[31mred"]\n')
@@ -312,7 +314,7 @@ def test_control_characters_do_not_reach_the_terminal(place, capsys):
 
 @pytest.mark.compiled("contacts")
 def test_the_summary_of_an_interrupted_run_is_that_of_its_last_step(tmp_path):
-    """Contacts and drift of summary.json are those of the state, not of the last frame; the ledger has no new row."""
+    """Contacts and drift in summary.json are those of the final state, not of the last frame; no new ledger row."""
     sim = struck_chain()
     sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="1 s")
 
@@ -331,8 +333,8 @@ def test_the_summary_of_an_interrupted_run_is_that_of_its_last_step(tmp_path):
     assert summary["time"] == sim.time > sim.ledger.rows[-1]["time"]
 
 
-def test_a_folder_of_case_files_is_no_job(tmp_path, capsys):
-    """`sand resume` of a folder in which the user keeps a case file of `sand collide` starts nothing."""
+def test_resume_refuses_a_folder_of_case_files(tmp_path, capsys):
+    """`sand resume` of a folder with a user's collision case starts nothing."""
     shutil.copy(Path(__file__).parents[2] / "examples" / "collision.toml", tmp_path)
     assert main(["resume", str(tmp_path)]) == 2
     assert "to start it: sand collide" in capsys.readouterr().err
@@ -340,7 +342,7 @@ def test_a_folder_of_case_files_is_no_job(tmp_path, capsys):
 
 
 def test_advice_can_be_followed(tmp_path, capsys, monkeypatch):
-    """What `sand collide`, `sand run` and `sand resume` advise about a folder depends on what it holds."""
+    """What `sand collide`, `sand run` and `sand resume` advise about a folder depends on its content."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own").mkdir()
     shutil.copy(Path(__file__).parents[2] / "examples" / "collision.toml", tmp_path / "own" / "case.toml")
@@ -362,10 +364,10 @@ def test_advice_can_be_followed(tmp_path, capsys, monkeypatch):
     assert "sand resume begun" in capsys.readouterr().err
 
 
-def test_an_interrupted_job_says_how_to_continue_to_machines_too(place, capsys, monkeypatch):
-    """With --json, Ctrl-C gives one object with the line of the terminal and the exit code."""
+def test_json_of_an_interrupted_job(place, capsys, monkeypatch):
+    """With --json, Ctrl-C gives one object with the advice and the exit code."""
     with monkeypatch.context() as patch:
-        interrupt(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
+        interrupt_when(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
         assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--json"]) == 130
     told = json.loads(capsys.readouterr().out)
     assert told == {"error": ["interrupted; continue with: sand resume cut"], "exit_code": 130}

@@ -1,4 +1,4 @@
-"""A gas of grains: thermal, apart, seeded."""
+"""A gas of grains: thermal velocities, no overlaps, reproducible."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ def test_no_two_grains_are_closer_than_the_clearance():
         assert ((distance < 3e-8) & across).sum() >= 20
 
 
-def test_momentum_is_zero_and_numbers_are_thermal():
-    """Maxwell: components N(0, kT/m) and spins N(0, kT/3I); Kolmogorov–Smirnov at p > 1e-3 (seed fixed)."""
+def test_momentum_is_zero_and_velocities_are_thermal():
+    """Maxwell: velocities N(0, kT/m), spins N(0, kT/3I) per component; Kolmogorov–Smirnov p > 1e-3 (seed fixed)."""
     grains = gas(2000, sand.Box.periodic("5 um"), seed=5, **ARGS)
     momentum = (grains.mass[:, None] * grains.velocity).sum(axis=0)
     assert np.abs(momentum).max() < 1e-12 * (grains.mass[:, None] * np.abs(grains.velocity)).sum()
@@ -42,16 +42,16 @@ def test_momentum_is_zero_and_numbers_are_thermal():
     assert stats.kstest(cosine, "uniform", args=(-1, 2)).pvalue > 1e-3
 
 
-def test_spin_choices():
-    """Mean rotational energy kT/2, (3/2)kT or none; ratio of equipartition to kT/2 exactly 3."""
+def test_spin_options():
+    """Mean rotational energy kT/2, (3/2)kT or none; the ratio of equipartition to kT/2 is exactly 3."""
     box = sand.Box.periodic("2 um")
     half, full, none = (gas(50, box, seed=1, spins=s, **ARGS) for s in ("kT/2", "equipartition", "none"))
     assert (full.spin**2).sum() == pytest.approx(3 * (half.spin**2).sum(), rel=1e-6, abs=0.0)
     assert not none.spin.any()
 
 
-def test_same_seed_same_grains():
-    """Bit for bit; another seed, other grains; a hotter gas keeps its places (separate streams)."""
+def test_the_seed_determines_the_grains():
+    """Bit for bit; another seed gives other grains; another temperature the same positions (separate streams)."""
     box = sand.Box.periodic("1 um")
     one, two, other = (gas(30, box, seed=s, **ARGS) for s in (7, 7, 8))
     assert (one.position == two.position).all()

@@ -1,4 +1,4 @@
-"""What spares looking at every grain in every step, beside looking."""
+"""Skins of pair lists and the inner list, against checks of every grain in every step."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ from sand.state.state import (
 )
 
 
-def crowd(forces=None, margin="auto", **options):
-    """Sixty grains in a periodic box, in cells or listed, fast enough to make lists anew every few dozen steps."""
+def dense_gas(forces=None, margin="auto", **options):
+    """Sixty grains in a periodic box, with cells or a list, so fast that lists are rebuilt every few dozen steps."""
     box = sand.Box.periodic("0.16 um")
     moment = "100 A m^2/kg"
     grains = sand.setup.gas(60, box, radius=1e-8, material=sand.SILICA, temperature="3e4 K", seed=5, moment=moment)
@@ -29,7 +29,7 @@ def crowd(forces=None, margin="auto", **options):
     return sand.Simulation(grains, forces, box=box, neighbours=sand.Neighbours("cells", margin), seed=6, **options)
 
 
-WAYS = {
+CASES = {
     "contacts": {},
     "contacts, listed": {"margin": "5 nm"},
     "cycles and gas": {"forces": (sand.Contact(), sand.Dipoles(), sand.Gas("3e4 K", pressure="1 bar"))},
@@ -38,13 +38,13 @@ WAYS = {
 
 
 @pytest.mark.validate
-@pytest.mark.parametrize("way", WAYS)
-def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(way):
-    """A call of the driver begins with a look at all grains: 600 calls of one step, and one call of 600, same bits.
+@pytest.mark.parametrize("way", CASES)
+def test_rebuilds_do_not_depend_on_driver_calls(way):
+    """Every call of the driver checks all grains: 600 calls of one step and one call of 600 give the same bits.
 
-    Contacts form and break meanwhile, cycles and gas kick, flights move.
+    Contacts form and break, and r-RESPA cycles, gas kicks or adaptive steps are active.
     """
-    once, often = crowd(**WAYS[way]), crowd(**WAYS[way])
+    once, often = dense_gas(**CASES[way]), dense_gas(**CASES[way])
     once.run(steps=600)
     often.run(steps=1)
     while often.state.steps < once.state.steps:
@@ -57,13 +57,13 @@ def test_lists_are_made_anew_in_the_same_steps_whether_all_are_looked_at_or_not(
 
 @pytest.mark.validate
 @pytest.mark.parametrize("blocks", [False, True])
-def test_no_grain_is_farther_than_its_skin_allows(monkeypatch, blocks):
-    """Remaining skin + the largest displacement ≤ the limit of each list, after any number of steps; speeds are exact.
+def test_displacements_stay_within_the_skin(monkeypatch, blocks):
+    """Remaining skin + the largest displacement ≤ the limit of each list after any number of steps; speeds are exact.
 
-    Also where loops are cut into blocks for threads.
+    Also with loops in blocks for threads.
     """
     monkeypatch.setattr(translate, "uses_task_queue", lambda grains: blocks)
-    sim = crowd(margin="5 nm")
+    sim = dense_gas(margin="5 nm")
     control, search = sim._engine.parameters.criteria, sim._engine.parameters.search
     limits = {
         LONG_RANGE_SKIN: ("long_range", "anchor", 0.5 * search.margin),
@@ -73,39 +73,40 @@ def test_no_grain_is_farther_than_its_skin_allows(monkeypatch, blocks):
     spared = 0
     for steps in (1, 2, 3, 5, 8, 13, 21, 34, 55):
         sim._engine.advance(np.inf, steps)
-        w, span = sim.state, sim._engine.parameters.span
+        system, span = sim.state, sim._engine.parameters.span
         for place, (group, name, limit) in limits.items():
-            strayed = largest_displacement(w.grains.arrays, getattr(getattr(w, group), name), span)
-            assert w.pair_list.skin[place] <= limit - strayed + 1e-12 * limit
-            spared += w.pair_list.skin[place] > 0.0
+            displacement = largest_displacement(system.grains.arrays, getattr(getattr(system, group), name), span)
+            assert system.pair_list.skin[place] <= limit - displacement + 1e-12 * limit
+            spared += system.pair_list.skin[place] > 0.0
         speeds = np.linalg.norm(sim.grains.velocity, axis=1).max(), np.linalg.norm(sim.grains.spin, axis=1).max()
-        assert np.sqrt(w.pair_list.skin[[SQUARED_SPEED, SQUARED_SPIN]]) == pytest.approx(speeds, rel=1e-14)
-        assert np.sqrt(largest_squared_speeds(w.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
+        assert np.sqrt(system.pair_list.skin[[SQUARED_SPEED, SQUARED_SPIN]]) == pytest.approx(speeds, rel=1e-14)
+        assert np.sqrt(largest_squared_speeds(system.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
     assert spared > 10
 
 
 @pytest.mark.validate
-def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
-    """Remaining skin + the largest displacement since the build, in the first step of a call, ≤ its part of the reach.
+def test_inner_list_is_rebuilt_in_time():
+    """Remaining skin + the largest displacement since the build ≤ the inner skin, in the first step of a call.
 
-    A contact that forms uses up the skin, and so does one that breaks: 2000 steps are as many calls of one step, which
-    pick in each.
+    A contact that forms or breaks consumes the skin: 2000 steps are 2000 calls of one step, which rebuild in each.
     """
-    sim, twin = crowd(), crowd()
+    sim, twin = dense_gas(), dense_gas()
     limit, span = INNER_SKIN_FRACTION * sim._engine.parameters.criteria.pair_gap, sim._engine.parameters.span
     for each in (sim, twin):
         each.run(steps=1)
     finished_run = 0
     for steps in (2, 3, 4, 5, 6) * 5:
         twin._engine.advance(np.inf, 1)
-        picked = twin.state.grains.arrays.position.copy()
+        built = twin.state.grains.arrays.position.copy()
         twin._engine.advance(np.inf, steps - 1)
         events = sim.state.count[[MADE, BROKEN, REBUILT]]
         sim._engine.advance(np.inf, steps)
-        if np.array_equal(sim.state.count[[MADE, BROKEN, REBUILT]], events):  # else they are picked once more
-            strayed = largest_displacement(sim.state.grains.arrays, picked, span)
-            assert 0.0 < strayed < limit
-            assert 0.0 < sim.state.pair_list.skin[INNER_SKIN] <= limit - strayed
+        if np.array_equal(
+            sim.state.count[[MADE, BROKEN, REBUILT]], events
+        ):  # otherwise the inner list is rebuilt again
+            displacement = largest_displacement(sim.state.grains.arrays, built, span)
+            assert 0.0 < displacement < limit
+            assert 0.0 < sim.state.pair_list.skin[INNER_SKIN] <= limit - displacement
             finished_run += 1
     assert finished_run > 10
     sim.run(steps=2000)
@@ -117,10 +118,10 @@ def test_what_may_touch_soon_is_picked_anew_before_a_grain_is_too_far():
 
 
 @pytest.mark.validate
-def test_a_pair_that_parts_and_comes_back_at_once_is_seen():
-    """Charges draw two grains together again that have just parted: one call of the driver, and one for each step.
+def test_a_pair_that_separates_and_meets_again_is_found():
+    """Charges pull two grains together again just after their contact broke: one driver call, and one per step.
 
-    The pair was in contact when those that may touch soon were picked, and meets again before any grain is too far.
+    The pair was in contact when the inner list was built, and meets again before the list is outdated.
     """
     seen, every_step = 0, sand.Verlet(far="every step")
     for speed in np.linspace(5.25, 8.25, 13):
@@ -141,8 +142,8 @@ def test_a_pair_that_parts_and_comes_back_at_once_is_seen():
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.TOO_FAST, 2), (0.0, Stop.SPINS_TOO_FAST, 0)])
-def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
-    """Grain 0 spins too fast for the user's step, grain 2 flies too fast or rests."""
+def test_an_outcome_names_the_limiting_grain(speed, stop, culprit):
+    """Grain 0 spins too fast for the user's step; grain 2 flies too fast or rests."""
     position, still = np.diag([0.0, 1e-7, 2e-7]), np.zeros((3, 3))
     velocity, spin = still.copy(), still.copy()
     velocity[2, 0], spin[0, 0] = speed, 1e13
@@ -154,9 +155,9 @@ def test_the_stop_names_the_grain_that_it_is_about(speed, stop, culprit):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_what_is_no_number_is_the_largest(sign):
-    """A grain that is nowhere makes lists stale, and its speed is not passed over; processors make NaN with a sign."""
-    arrays = crowd().grains.copy().arrays
+def test_nan_counts_as_the_largest_value(sign):
+    """A NaN position makes lists outdated, and a NaN speed counts as too fast, whatever its sign bit."""
+    arrays = dense_gas().grains.copy().arrays
     anchor, span = arrays.position.copy(), sand.Box.open().span
     arrays.velocity[0, 7] = arrays.position[1, 9] = np.copysign(np.nan, sign)
     assert np.isnan(largest_squared_speeds(arrays)[0]) and np.isfinite(largest_squared_speeds(arrays)[1])
@@ -169,7 +170,7 @@ def test_what_is_no_number_is_the_largest(sign):
 )
 @pytest.mark.parametrize("radius", [[1e-8, 1e-8, 1e-8], [1e-8, 1e-8, 9e-9]], ids=["alike", "unlike"])
 def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
-    """Two contacts: one column less of what is kept for each is BadInput; equal grains keep one for all."""
+    """Two contacts, one column of per-contact arrays missing: BadInput; equal grains share one column."""
     place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [1.998e-8 + 0.999 * (radius[1] + radius[2]), 0, 0]])
     sim = sand.Simulation(sand.Grains(place, radius, sand.SILICA), [sand.Contact()])
     sim.run(steps=1)

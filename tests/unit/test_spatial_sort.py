@@ -1,4 +1,4 @@
-"""Numbering along a space-filling curve."""
+"""Morton order of grains."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,8 @@ import sand
 from sand.neighbours.spatial_sort import morton_keys
 
 
-def test_places_interleave_the_bits():
-    """x, y, z of 21 bits each: bit b of axis a is bit 3b + a of the place (corners of a cube, and a power of two)."""
+def test_morton_codes_interleave_bits():
+    """x, y, z have 21 bits each: bit b of axis a is bit 3b + a of the code (cube corners, a power of two)."""
     top = 2**21 - 1
     corners = np.array([[0, 0, 0], [top, 0, 0], [0, top, 0], [0, 0, top], [top, top, top], [2**7, 0, 2**20]], float)
     spread = sum(1 << (3 * b) for b in range(21))
@@ -17,8 +17,8 @@ def test_places_interleave_the_bits():
 
 
 @pytest.mark.compiled("small")
-def test_the_same_grains_in_another_order():
-    """Every quantity goes along; contacts of an aggregate are nearer in memory than in the order of its growth."""
+def test_reordering_grains():
+    """Every quantity is permuted; contacts of an aggregate are closer in memory than in the order of growth."""
     grains = sand.setup.bpca(2000, radius="0.1 um", material=sand.SILICA, seed=3)
     grains.arrays.velocity[...] = grains.arrays.position * 2.0
     ordered = sand.setup.in_space_order(grains)
@@ -35,8 +35,8 @@ def test_the_same_grains_in_another_order():
     assert distance(ordered) < 0.1 * distance(grains)
 
 
-def test_points_in_one_place_or_a_plane():
-    """No extent along an axis, or none at all, is no error."""
+def test_morton_order_of_degenerate_points():
+    """No extent along one axis or all axes is no error."""
     assert (morton_keys(np.zeros((3, 3))) == 0).all()
     plane = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
     assert len(set(morton_keys(plane).tolist())) == 3

@@ -1,4 +1,4 @@
-"""The minima of the step's choice, and the pairs that may touch soon, beside plain searches."""
+"""Minima in the choice of the step, and the inner list, against plain searches."""
 
 import math
 
@@ -15,7 +15,7 @@ from sand.numerics.simd import float_bits, float_from_bits
 from sand.state.state import INNER_COUNT, INNER_SKIN, PAIRS
 
 
-def crowd():
+def dense_gas():
     """150 grains of 10 to 20 nm in a periodic box, some of them close, fast in all directions."""
     rng = np.random.default_rng(7)
     box = sand.Box.periodic("0.23 um")
@@ -26,27 +26,27 @@ def crowd():
     return sim
 
 
-def test_ranks_are_ordered_as_numbers():
-    """x < y ⇔ float_bits(x) < float_bits(y) for x, y ≥ 0, subnormal numbers and infinity; NaN is above all of them."""
+def test_float_bits_are_ordered_as_numbers():
+    """x < y ⇔ float_bits(x) < float_bits(y) for x, y ≥ 0, subnormal and infinite; NaN is above all of them."""
     numbers = [0.0, 5e-324, 1e-310, 1e-30, 1.0, 1.0 + 2e-16, 1e300, math.inf]
-    ranks = [float_bits(x) for x in numbers]
-    assert ranks == sorted(ranks) and len(set(ranks)) == len(ranks)
-    assert [float_from_bits(bits) for bits in ranks] == numbers
+    keys = [float_bits(x) for x in numbers]
+    assert keys == sorted(keys) and len(set(keys)) == len(keys)
+    assert [float_from_bits(bits) for bits in keys] == numbers
     assert float_bits(math.nan) > float_bits(math.inf)
 
 
 @pytest.mark.compiled("contacts")
-def test_choices_are_the_least_of_all():
-    """The loops that vectorise give the least of what grains and pairs allow one by one in Python, to rounding."""
-    sim = crowd()
+def test_vectorised_minima_equal_plain_minima():
+    """The vectorised loops give the minimum over grains and pairs evaluated one by one in Python, to rounding."""
+    sim = dense_gas()
     w, rules = sim.state, sim._engine.parameters
     arrays, span, control = w.grains.arrays, rules.span, rules.criteria
 
-    def look(grains, far, start, near, count, span, control):
+    def minima(grains, far, start, near, count, span, control):
         step, cycle = steps_of_free_grains(grains, far, start, count, control)
         return step, cycle, closing_step(grains, near, count, span, control, math.inf)
 
-    step, cycle, closing = kernel(look, cached=False)(
+    step, cycle, closing = kernel(minima, cached=False)(
         arrays, w.long_range, w.contacts.start, w.pair_list, w.count, span, control
     )
     each = [grain_step(arrays, w.long_range, w.contacts.start, control, i) for i in range(150)]
@@ -59,16 +59,16 @@ def test_choices_are_the_least_of_all():
 
 
 @pytest.mark.compiled("contacts")
-def test_what_may_touch_soon_is_what_is_close():
-    """All pairs of grains apart by less than twice the way that makes the pick stale, and no others.
+def test_inner_list_holds_the_close_pairs():
+    """All pairs with a gap below twice the displacement that makes the list outdated, and no others.
 
-    Where they have no room (an array has one place more than that), all near pairs are looked at.
+    Without room for all of them (an array has one entry more than pairs), all near pairs are searched.
     """
-    sim = crowd()
+    sim = dense_gas()
     w, reach = sim.state, sim._engine.parameters.criteria.pair_gap
     gap = 2.0 * INNER_SKIN_FRACTION * reach
 
-    def picked(room):
+    def inner_list(room):
         near = w.pair_list._replace(inner=np.zeros(room, np.uint32), skin=w.pair_list.skin.copy())
         build_inner_list(w.grains.arrays, near, w.count, sim._engine.parameters.span, gap)
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
@@ -87,6 +87,6 @@ def test_what_may_touch_soon_is_what_is_close():
             if apart < radius[i] + radius[j] + gap and (j, i) not in bound:
                 close.add((j, i))
     assert len(close) > 3
-    assert picked(w.pair_list.inner.size) == picked(len(close) + 1) == close
+    assert inner_list(w.pair_list.inner.size) == inner_list(len(close) + 1) == close
     every = {tuple(sorted(pair)) for pair in w.pair_list.pair[:, : w.count[PAIRS]].T.tolist()}
-    assert picked(len(close)) == picked(1) == every > close
+    assert inner_list(len(close)) == inner_list(1) == every > close

@@ -1,4 +1,4 @@
-"""The processor that code is made for: this machine's, or the one that NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name."""
+"""The processor that code is compiled for: this machine's, or that of NUMBA_CPU_NAME and NUMBA_CPU_FEATURES."""
 
 import json
 import os
@@ -73,15 +73,14 @@ def compiled_for(folder, name, features=""):
 
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="LLVM knows these names on x86 only")
-def test_code_is_made_for_the_processor_that_is_named(tmp_path):
-    """Zen gathers numbers one by one; Intel's since Sapphire Rapids take 512 bits in long loops, and there alone.
+def test_code_is_compiled_for_the_named_processor(tmp_path):
+    """Zen gathers numbers one by one; Intel's since Sapphire Rapids use 512 bits in long loops only.
 
-    All three share one cache, and a fourth process finds what the first has kept: no code of another processor is
-    taken for its own.
+    All three share one cache, and a fourth process finds the code of the first: code of another processor is not used.
     """
     for name, expected in EXPECTED.items():
         found = compiled_for(tmp_path, name)
-        assert found["hits"] == (0 if "long loop" in expected else 1), name  # or the long loop is the other one
+        assert found["hits"] == (0 if "long loop" in expected else 1), name  # otherwise the long loop is the other one
         for loop, attributes in expected.items():
             assert found["attributes"][loop] == attributes, (name, loop)
         for loop, instructions in INSTRUCTIONS[name].items():
@@ -101,14 +100,14 @@ def test_code_is_made_for_the_processor_that_is_named(tmp_path):
         ("apple-m1", "+neon", False),
     ],
 )
-def test_features_that_are_named_count_more_than_the_name(name, features, expected):
-    """As for LLVM, which adds them to what the name stands for."""
+def test_named_features_override_the_processor_name(name, features, expected):
+    """As in LLVM, which adds them to the features of the name."""
     assert lowering._fast_512_bit(name, features) is expected
 
 
 @pytest.mark.compiled("small")
-def test_long_vectors_give_the_same():
-    """A long loop, told to take the longest vectors or not, on whatever processor this is."""
+def test_vector_width_does_not_change_results():
+    """A long loop with and without the longest vectors, on any processor."""
 
     def doubled(x):
         for i in range(x.size):

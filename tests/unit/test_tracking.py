@@ -1,4 +1,4 @@
-"""Names of clusters: they stay while clusters grow, and do not depend on what was asked for before."""
+"""Cluster tracking: ids persist while clusters grow and do not depend on the order of requests."""
 
 import gc
 import time
@@ -13,14 +13,14 @@ from sand.analysis.tracking import SINGLE, Lineage, inherit_names
 from sand.errors import BadInput
 
 
-def names_of(before, count, pairs):
-    """Names from contacts."""
+def ids_of(before, count, pairs):
+    """Cluster ids from contacts."""
     start = np.full(count, SINGLE, np.uint32) if before is None else before
     return inherit_names(start, cluster_labels(count, np.array(pairs).reshape(-1, 2)))
 
 
-def referee(before, labels):
-    """The same by words of the rule, cluster by cluster."""
+def reference_ids(before, labels):
+    """The same rule applied cluster by cluster."""
     count, clusters = len(labels), {}
     for i, label in enumerate(labels):
         clusters.setdefault(int(label), []).append(i)
@@ -46,33 +46,33 @@ def referee(before, labels):
     return np.array([names.get(int(label), SINGLE) for label in labels], np.uint32)
 
 
-def test_a_cluster_keeps_its_name_while_it_grows():
-    """Born with the number of its lowest grain, it keeps that although a lower grain joins."""
-    first = names_of(None, 5, [(2, 3)])
+def test_a_growing_cluster_keeps_its_id():
+    """Its first id is its lowest grain; it keeps that although a lower grain joins."""
+    first = ids_of(None, 5, [(2, 3)])
     assert first.tolist() == [SINGLE, SINGLE, 2, 2, SINGLE]
-    second = names_of(first, 5, [(2, 3), (0, 3), (1, 4)])
+    second = ids_of(first, 5, [(2, 3), (0, 3), (1, 4)])
     assert second.tolist() == [2, 1, 2, 2, 1]
 
 
-def test_a_merger_has_the_larger_ones_name():
-    """Three grains outvote two; of two that are as many the lower name wins."""
-    first = names_of(None, 7, [(0, 1), (2, 3), (3, 4), (5, 6)])
-    assert names_of(first, 7, [(0, 1), (2, 3), (3, 4), (1, 2)]).tolist() == [2] * 5 + [SINGLE] * 2
-    assert names_of(first, 7, [(0, 1), (5, 6), (1, 5)]).tolist() == [0, 0, SINGLE, SINGLE, SINGLE, 0, 0]
+def test_a_merger_has_the_id_of_the_larger_cluster():
+    """Three grains against two: that of the three; of equal sizes the lower id."""
+    first = ids_of(None, 7, [(0, 1), (2, 3), (3, 4), (5, 6)])
+    assert ids_of(first, 7, [(0, 1), (2, 3), (3, 4), (1, 2)]).tolist() == [2] * 5 + [SINGLE] * 2
+    assert ids_of(first, 7, [(0, 1), (5, 6), (1, 5)]).tolist() == [0, 0, SINGLE, SINGLE, SINGLE, 0, 0]
 
 
-def test_the_larger_part_keeps_the_name():
-    """A cluster of five splits into two and three: the three keep its name, the two get one that nobody has or had."""
-    first = names_of(None, 6, [(0, 1), (1, 2), (2, 3), (3, 4)])
+def test_after_a_split_the_larger_part_keeps_the_id():
+    """A cluster of five splits into two and three: the three keep the id, the two get a new one."""
+    first = ids_of(None, 6, [(0, 1), (1, 2), (2, 3), (3, 4)])
     assert set(first[:5]) == {0}
-    second = names_of(first, 6, [(0, 1), (2, 3), (3, 4)])
+    second = ids_of(first, 6, [(0, 1), (2, 3), (3, 4)])
     assert second.tolist() == [1, 1, 0, 0, 0, SINGLE]  # 0 is taken: the lowest free number
-    assert names_of(second, 6, []).tolist() == [SINGLE] * 6
+    assert ids_of(second, 6, []).tolist() == [SINGLE] * 6
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_as_the_rule_says(seed):
-    """Random contacts that come and go: the same as cluster by cluster, names unique, random access as in order."""
+def test_random_contacts_against_the_reference(seed):
+    """Random contacts: equal to the rule applied cluster by cluster; ids unique; random access as in order."""
     rng = np.random.default_rng(seed)
     count, pairs, frames = 40, np.zeros((0, 2), int), []
     for _ in range(60):
@@ -82,7 +82,7 @@ def test_as_the_rule_says(seed):
     names, expected = np.full(count, SINGLE, np.uint32), []
     for held in frames:
         labels = cluster_labels(count, held)
-        want = referee(names, labels)
+        want = reference_ids(names, labels)
         names = inherit_names(names, labels)
         assert (names == want).all()
         bound = np.bincount(labels)[labels] > 1
@@ -95,8 +95,8 @@ def test_as_the_rule_says(seed):
         assert (walk.names(int(k)) == expected[int(k)]).all()
 
 
-def test_frames_that_cannot_be_read_leave_names_as_they_were():
-    """One that raises, and one of grains that are none; in whichever order names are asked for."""
+def test_unreadable_frames_do_not_change_ids():
+    """One frame raises, one has invalid grain indices; requests in any order."""
     bonds = {0: [(0, 1)], 2: [(0, 1), (2, 9)], 3: [(0, 1), (1, 2)]}
 
     def pairs(number):
@@ -112,9 +112,9 @@ def test_frames_that_cannot_be_read_leave_names_as_they_were():
 
 @pytest.mark.slow
 def test_memory_is_bounded(monkeypatch):
-    """With room for eight frames no more of the answers stay in memory, and the last one; names stay the same.
+    """With room for eight frames no more results stay in memory, and the last one; ids stay the same.
 
-    No two frames in a row have the same contacts, so that each answer is an array of its own.
+    Contacts differ from frame to frame, so that each result is an array of its own.
     """
     frames = [np.array([(0, 1)] * (k % 2) + [(2, k % 3 + 3)]) for k in range(100)]
     full = Lineage(10, frames.__getitem__)
@@ -128,16 +128,16 @@ def test_memory_is_bounded(monkeypatch):
         assert (small.names(k) == full.names(k)).all()
 
 
-def test_unchanged_contacts_cost_nothing(monkeypatch):
-    """Frames whose contacts are those of the frame before are not looked at again."""
+def test_unchanged_contacts_are_not_processed_again(monkeypatch):
+    """Frames with the contacts of the previous frame reuse its result."""
     calls = []
     monkeypatch.setattr(lineage, "cluster_labels", lambda *a: calls.append(a) or cluster_labels(*a))
     Lineage(4, lambda k: np.array([(0, 1)])).names(50)
     assert len(calls) == 1
 
 
-def test_many_grains_take_little_time():
-    """A hundred thousand grains in a fraction of a second: nothing goes grain by grain."""
+def test_many_grains_are_processed_by_vectorised_code():
+    """A hundred thousand grains in a fraction of a second."""
     rng = np.random.default_rng(3)
     count = 100_000
     labels = cluster_labels(count, rng.integers(0, count, (60_000, 2)))

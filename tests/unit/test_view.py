@@ -1,4 +1,4 @@
-"""`view()` of a simulation and of an opened run, and browsers that are opened or not."""
+"""`view()` of a simulation and of an opened run, and opening of browsers."""
 
 import os
 import stat
@@ -15,19 +15,19 @@ pytestmark = pytest.mark.usefixtures("bundle")
 
 
 @pytest.fixture
-def opened(monkeypatch):
-    """Addresses that a browser is sent to."""
+def opened_addresses(monkeypatch):
+    """Addresses opened in a browser."""
     seen = []
     monkeypatch.setattr(show, "open_page", lambda url: seen.append(url) or True)
     return seen
 
 
 @pytest.mark.compiled("fields")
-def test_a_simulation_shows_its_run(finished_run, opened, tmp_path):
-    """`view` writes view.html in the run's folder, or where it is told, opens it, and gives its path."""
+def test_view_of_a_run(finished_run, opened_addresses, tmp_path):
+    """`view` writes view.html in the run's folder or a given path, opens it, and returns its path."""
     folder, sim = finished_run
     path = sim.view()
-    assert path == folder / "view.html" and opened == [path.resolve().as_uri()]
+    assert path == folder / "view.html" and opened_addresses == [path.resolve().as_uri()]
     manifest, _, packets = blocks(path)
     assert len(packets) == 6 and "rotating" in manifest["field"]["text"]
     assert sim.view(tmp_path / "b.html") == tmp_path / "b.html"
@@ -39,8 +39,8 @@ def test_a_simulation_shows_its_run(finished_run, opened, tmp_path):
 
 
 @pytest.mark.compiled("contacts")
-def test_a_simulation_without_files_shows_its_state(opened):
-    """One frame, that of now, and the ledger's rows; before the first step, too."""
+def test_view_without_files(opened_addresses):
+    """One frame of the present state, and the rows of the ledger; also before the first step."""
     grains = sand.Grains([[0.0, 0.0, 0.0], [2.5e-8, 0.0, 0.0]], "10 nm", sand.SILICA, velocity=np.eye(2, 3))
     sim = sand.Simulation(grains, forces=[sand.Contact()])
     manifest, series, packets = blocks(sim.view())
@@ -53,16 +53,16 @@ def test_a_simulation_without_files_shows_its_state(opened):
 
 
 @pytest.mark.compiled("fields")
-def test_too_much_is_thinned(finished_run, opened, tmp_path, monkeypatch):
-    """Where all frames would take too much room, fewer are in the page, and it says so."""
+def test_large_runs_are_thinned(finished_run, opened_addresses, tmp_path, monkeypatch):
+    """If all frames exceed the size limit, the page has fewer and says so."""
     monkeypatch.setattr(show, "MAX_BYTES", 5000.0)
     manifest, _, packets = blocks(sand.open(finished_run[0]).view(tmp_path / "a.html"))
     assert 1 <= len(packets) < 6 and "limit the size" in manifest["note"]
 
 
 @pytest.mark.compiled("contacts")
-def test_the_figure_where_there_is_no_page(bundle, opened):
-    """With one warning that says why; nothing is written or opened."""
+def test_without_the_page_the_figure_is_returned(bundle, opened_addresses):
+    """With one warning that gives the reason; nothing is written or opened."""
     from matplotlib.figure import Figure
 
     (bundle / "grainview.css").unlink()
@@ -70,11 +70,11 @@ def test_the_figure_where_there_is_no_page(bundle, opened):
     sim = sand.Simulation(grains, forces=[sand.Contact()])
     with pytest.warns(UserWarning, match="not part of this installation"):
         assert isinstance(sim.view(), Figure)
-    assert not opened
+    assert not opened_addresses
 
 
-def test_no_browser_is_opened_without_leave(monkeypatch):
-    """SAND_NO_BROWSER, or no screen: none; otherwise the user's, and its errors are nobody's trouble."""
+def test_when_a_browser_is_opened(monkeypatch):
+    """Not with SAND_NO_BROWSER or without a screen; otherwise the user's browser, whose errors are ignored."""
     import webbrowser
 
     calls = []
@@ -93,8 +93,8 @@ def test_no_browser_is_opened_without_leave(monkeypatch):
     assert not browser.has_display()
 
 
-def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
-    """The browser gets a page that only this user can read and that leads to the server; it goes at the end."""
+def test_the_token_is_not_passed_on_the_command_line(tmp_path, monkeypatch):
+    """The browser opens a page, readable by this user only, that redirects to the server; it is removed."""
     import tempfile
     import webbrowser
 
@@ -112,5 +112,5 @@ def test_a_token_is_not_on_a_command_line(tmp_path, monkeypatch):
         assert stat.S_IMODE(page.stat().st_mode) == 0o600
     browser.remove_redirects()
     assert not page.exists()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))  # nowhere to write: the address is typed by hand
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))  # no writable folder: the user types the address
     assert not browser.open_page(address) and len(calls) == 1

@@ -1,4 +1,4 @@
-"""The magnetic field of a run in words and numbers."""
+"""Description of a run's external magnetic field for the viewer."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from sand.viewer.external_field import describe_field, read_field
 
 
 @pytest.mark.compiled("fields")
-def test_a_field_is_told(finished_run):
-    """One that turns has a direction in each frame, one that keeps its direction has one, none is null."""
+def test_description_of_a_field(finished_run):
+    """A rotating field has a direction per frame, a fixed one has one direction, no field is null."""
     folder, sim = finished_run
     told = run_dataset(folder, read_field(folder)).manifest()["field"]
     assert "rotating" in told["text"] and "1 mT" in told["text"]
@@ -29,13 +29,13 @@ def test_a_field_is_told(finished_run):
     assert all(said in text for said, text in texts.items()), texts
 
 
-class Homemade:
-    """A force of a user's own that brings a field along."""
+class UserField:
+    """A user's own force that brings a magnetic field."""
 
     name = "homemade"
 
     def flux_density_size(self):
-        """Its largest."""
+        """Its largest magnitude."""
         return 2e-3
 
     def flux_density_at(self, time):
@@ -44,15 +44,15 @@ class Homemade:
 
 
 def test_fields_add_up():
-    """Of two, one of them a user's own, the sum is told, and both are named."""
-    text, at = describe_field([sand.Field([1e-3, 0.0, 0.0]), sand.Contact(), Homemade()])
+    """Of two fields, one of a user's own force, the sum is described and both are named."""
+    text, at = describe_field([sand.Field([1e-3, 0.0, 0.0]), sand.Contact(), UserField()])
     assert text == "1 mT, constant + homemade"
     np.testing.assert_allclose(at(0.5), [1e-3, 1e-3, 0.0])
 
 
 @pytest.mark.compiled("fields")
 def test_pictures_and_pages_have_the_same_field(finished_run):
-    """`flux_density` of an opened run is the field that the page is told; None where no case says so."""
+    """`flux_density` of an opened run equals the field sent to the page; None without a case."""
     folder, sim = finished_run
     for time in sim.ledger["time"]:
         np.testing.assert_array_equal(sand.open(folder).flux_density(time), read_field(folder)[1](time))

@@ -1,4 +1,4 @@
-"""SAND on other systems: a Python without what Windows lacks, and files that behave as they do there."""
+"""SAND on other systems: Python without what Windows lacks, and files that behave as on Windows."""
 
 import os
 import subprocess
@@ -75,8 +75,8 @@ for path in sorted(pathlib.Path("benchmarks").glob("*.py")):
 """
 
 
-def elsewhere(program: str, folder: Path, *, compiled: bool) -> str:
-    """What a program prints that runs in such a Python, with or without the compiler."""
+def run_as_windows(program: str, folder: Path, *, compiled: bool) -> str:
+    """Output of a program that runs in the emulation, with or without the compiler."""
     paths = [str(TOP), str(TOP / "src"), os.environ.get("PYTHONPATH", "")]
     environment = os.environ | {
         "NUMBA_DISABLE_JIT": str(int(not compiled)),
@@ -92,15 +92,15 @@ def elsewhere(program: str, folder: Path, *, compiled: bool) -> str:
 
 
 def test_every_module_and_the_commands_work(tmp_path):
-    """All modules can be imported; help, info, build, run, resume and overwriting do their work."""
+    """All modules can be imported; help, info, build, run, resume and --overwrite work."""
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
-    elsewhere(PACKAGE + COMMANDS, tmp_path, compiled=False)
+    run_as_windows(PACKAGE + COMMANDS, tmp_path, compiled=False)
     assert (tmp_path / "run" / "summary.json").stat().st_size > 0
 
 
 @pytest.mark.validate
 def test_every_test_can_be_imported():
-    """pytest can collect all tests; only those that need other programs are skipped as a whole."""
-    told = elsewhere(TESTS, TOP, compiled=True)
+    """pytest can collect all tests; only modules that need other programs are skipped."""
+    told = run_as_windows(TESTS, TOP, compiled=True)
     needless = [line for line in told.splitlines() if not line.startswith(("tests/peers", "tests/browser"))]
     assert not needless, needless
