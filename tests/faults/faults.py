@@ -60,7 +60,7 @@ FAULTS = (
           "unit/test_pair_forces.py::test_taylor_rates_against_finite_differences"),
     Fault("friction of a spin with r^3 for r^4", "forgotten unit", "formula", "forces/gas/drag.py",
           "accommodation * density * speed * radius**4", "accommodation * density * speed * radius**3",
-          "unit/test_gas_drag.py::test_the_shortest_time"),
+          "unit/test_gas_drag.py::test_shortest_relaxation_time"),
     Fault("a quaternion product with one wrong sign", "sign", "formula", "numerics/quaternion.py",
           "cosine * q[1] + y * q[3] + z * q[0] - x * q[2]", "cosine * q[1] + y * q[3] - z * q[0] - x * q[2]",
           "unit/test_quaternion.py::test_turn_is_a_rotation_in_the_laboratory_frame"),

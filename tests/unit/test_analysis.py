@@ -88,12 +88,12 @@ def test_projected_area_against_monte_carlo():
     """300 discs of several sizes: 4e5 random points agree within four standard deviations, √(p(1−p)/n)."""
     place, radius = RNG.uniform(-5, 5, (300, 3)), RNG.uniform(0.1, 0.8, 300)
     area, _ = projected_area(place, radius, np.array([[0.0, 0.0, 1.0]]))
-    points_sampled = RNG.uniform(-6, 6, (400_000, 2))
-    hit = np.zeros(len(points_sampled), bool)
+    random_points = RNG.uniform(-6, 6, (400_000, 2))
+    hit = np.zeros(len(random_points), bool)
     for (x, y, _), r in zip(place, radius, strict=True):
-        hit |= (points_sampled[:, 0] - x) ** 2 + (points_sampled[:, 1] - y) ** 2 < r * r
+        hit |= (random_points[:, 0] - x) ** 2 + (random_points[:, 1] - y) ** 2 < r * r
     share = hit.mean()
-    assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(points_sampled))
+    assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(random_points))
 
 
 @pytest.mark.validate
@@ -222,7 +222,10 @@ def test_ensemble_dimension():
 
 
 def test_power_laws():
-    """Exact data are recovered to rounding; the error for noisy data is that of least squares, σ/√Σ(u−ū)², within 20 %."""
+    """Exact data are recovered to rounding; for noisy data the error is that of least squares, σ/√Σ(u−ū)².
+
+    The latter within 20 %.
+    """
     x = np.geomspace(1, 100, 400)
     exact = power_law(x, 3.0 * x**0.63)
     assert (exact.exponent, exact.prefactor) == (pytest.approx(0.63, rel=1e-12), pytest.approx(3.0, rel=1e-12))

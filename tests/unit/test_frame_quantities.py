@@ -15,10 +15,10 @@ SINGLE = 6e-8
 
 @pytest.mark.parametrize("box", [Box.open(), Box.periodic("1 um", None, "0.8 um")])
 def test_a_frame_holds_grains_and_contacts(tmp_path, box):
-    """Unequal grains of two materials, turned by chance, and three contacts: all of them by name, in SI.
+    """Unequal grains of two materials, random orientations, three contacts: all by name, in SI.
 
-    Numbers that the format has in float32 come back to its rounding, positions to that of a mean radius times the size
-    of the cloud in mean radii; what is logged comes back to the last bit.
+    Values in float32 return to its rounding, positions to that of a mean radius times the extent in mean radii; logged
+    values return to the last bit.
     """
     rng = np.random.default_rng(3)
     grains = sand.Grains(
