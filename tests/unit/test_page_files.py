@@ -1,4 +1,4 @@
-"""What is said where the page was not built, and that it is read where it was."""
+"""The page bundle is read where it was built; a missing bundle gives one line with the reason."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ from sand.io import page_bundle as page
 def test_bundle_is_read(tmp_path):
     (tmp_path / "grainview.js").write_text("let µ = 1;\n", "utf-8")
     (tmp_path / "grainview.css").write_text("body {}\n")
-    (tmp_path / "missing.txt").write_text("an old reason.\n")  # of a build that failed before a developer's own
+    (tmp_path / "missing.txt").write_text("an old reason.\n")  # of a failed build before the developer's own
     assert page.read_bundle(tmp_path) == ("let µ = 1;\n", "body {}\n")
 
 
 @pytest.mark.parametrize("there", [(), ("grainview.js",), ("grainview.css",)])
 def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
-    """Half a bundle is none."""
+    """An incomplete bundle counts as missing."""
     for name in there:
         (tmp_path / name).write_text("x")
     with pytest.raises(BadInput) as told:
@@ -31,7 +31,7 @@ def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
 
 
 def test_remedy_fits_the_installation(tmp_path, monkeypatch):
-    """In a clone the sources can be bundled; elsewhere SAND is installed again."""
+    """In a clone the sources can be bundled; elsewhere SAND must be reinstalled."""
     place = tmp_path / "src" / "sand" / "viewer" / "page"
     monkeypatch.setattr(page, "PAGE", place)
     with pytest.raises(BadInput, match="--force-reinstall"):
@@ -42,7 +42,7 @@ def test_remedy_fits_the_installation(tmp_path, monkeypatch):
         page.read_bundle(place)
 
 
-def test_both_sides_agree_on_the_place():
+def test_build_hook_and_reader_use_the_same_folder():
     """The hook writes where `read_bundle` reads."""
     hook = (Path(__file__).parents[2] / "hatch_build.py").read_text("utf-8")
     assert 'PAGE = Path("src", "sand", "viewer", "page")' in hook

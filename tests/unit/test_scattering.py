@@ -1,4 +1,4 @@
-"""Cross-sections: replay, executors, interruptions, the command, mistakes."""
+"""Cross-sections: replay, executors, interruptions, the command, errors."""
 
 import json
 import os
@@ -39,8 +39,8 @@ seed = 3
 """
 
 
-class Backwards(Executor):
-    """Does the work when it is asked for, the last first."""
+class ReversingExecutor(Executor):
+    """Runs tasks when results are requested, the last first."""
 
     def __init__(self):
         self.waiting = []
@@ -56,7 +56,7 @@ class Backwards(Executor):
 
 
 def numbers(found):
-    """All that does not depend on the clock."""
+    """Everything that does not depend on wall time."""
     told = found.to_dict()
     told.pop("seconds")
     return json.dumps({k: np.asarray(v).tolist() for k, v in told.items()})
@@ -70,8 +70,8 @@ def here():
 
 
 @pytest.mark.compiled("scattering")
-def test_a_flight_of_a_batch_can_be_flown_alone(here):
-    """A row of 200 and its replay: the same end, time and distance, to the bit."""
+def test_replay_of_one_trajectory(here):
+    """A row of a batch of 200 and its replay: the same end, time and distance, to the bit."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
     width = float(here.profile[0, 1])
     rows = fly(flying, [Task(5, 100, 300)], width, seed=9)
@@ -86,10 +86,10 @@ def test_a_flight_of_a_batch_can_be_flown_alone(here):
 
 @pytest.mark.compiled("scattering")
 def test_any_split_gives_the_same_numbers(here, monkeypatch):
-    """Pieces of 64 in two processes, or backwards here: the bits of one process."""
+    """Batches of 64 in two processes, or in reverse order here: the bits of one process."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     monkeypatch.setattr(scattering, "MOST", 64)
-    again = scattering.measure(flying, relative_error=0.05, seed=3, executor=Backwards())
+    again = scattering.measure(flying, relative_error=0.05, seed=3, executor=ReversingExecutor())
     assert numbers(again) == numbers(here)
     with executor_for(2) as pool:
         assert numbers(scattering.measure(flying, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
@@ -99,7 +99,7 @@ def test_any_split_gives_the_same_numbers(here, monkeypatch):
 
 @pytest.mark.validate
 def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
-    """dask.distributed with two workers, one of which is killed after the first piece: the same numbers."""
+    """dask.distributed with two workers, one killed after the first batch: the same numbers."""
     distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
     monkeypatch.setattr(scattering, "MOST", 32)
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
@@ -121,8 +121,8 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
 
 
 @pytest.mark.compiled("scattering")
-def test_what_is_known_is_not_flown_again(here):
-    """With the rows of half the flights the other half is flown, and the result is the same."""
+def test_resume_computes_missing_trajectories_only(here):
+    """With the rows of half the trajectories the other half is computed; the same result."""
     flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     rows, later = [], []
     whole = scattering.measure(flying, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
@@ -134,8 +134,8 @@ def test_what_is_known_is_not_flown_again(here):
 
 
 @pytest.mark.compiled("scattering")
-def test_a_map():
-    """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all flights are told."""
+def test_hit_map():
+    """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all trajectories are listed."""
     flights = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
     found = probability_map(flights, cells=6, per_cell=16)
     assert (found.flights == 16).all()
@@ -149,7 +149,7 @@ def test_a_map():
 
 @pytest.mark.compiled("scattering")
 def test_the_command(tmp_path, capsys):
-    """Two speeds: files, figure, JSON; the folder is not overwritten; a resume finds all flights and flies none."""
+    """Two speeds: files, figure, JSON; the folder is not overwritten; resuming computes no trajectory."""
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE)
     assert main(["scatter", str(case), "--out", str(out), "--json"]) == 0
@@ -180,8 +180,8 @@ def test_the_command(tmp_path, capsys):
 
 
 @pytest.mark.validate
-def test_a_killed_job_goes_on(tmp_path):
-    """Killed while it flies, a torn line at the end: resumed, its files are those of one that was left alone."""
+def test_killed_job_is_resumed(tmp_path):
+    """Killed, with an incomplete last line: resumed, its files equal those of an undisturbed job."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace("[1, 2]", "[1, 1.5, 2]").replace("0.05", "0.01").replace('"4 b_max"', '"20 b_max"'))
     whole, cut = tmp_path / "whole", tmp_path / "cut"
@@ -244,23 +244,23 @@ def test_a_killed_job_goes_on(tmp_path):
         ({"relative_error": 0.9}, "relative_error"),
     ],
 )
-def test_mistakes_are_told(options, said):
-    """One line each, with what was given."""
+def test_wrong_arguments_are_refused(options, said):
+    """One line each, with the given value."""
     given = GRAINS | {"speed": 0.2} | options
     with pytest.raises(sand.BadInput, match=said) as caught:
         scattering.cross_section(**given)
     assert len(caught.value.problems) == 1
 
 
-def test_all_mistakes_at_once():
+def test_all_errors_are_reported_together():
     """Three at a time."""
     with pytest.raises(sand.BadInput) as caught:
         scattering.flight(**(GRAINS | {"temperature": "3 m"}), speed=-1, spin="none", start_shape="cube")
     assert len(caught.value.problems) == 3
 
 
-def test_impact_parameters_that_cannot_be():
-    """Below 0, in b_max without moments, outside the sphere of starts."""
+def test_impossible_impact_parameters():
+    """Negative, in b_max without moments, outside the sphere of starts."""
     flying = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
     plain = scattering.flight(radius="10 nm", material="iron", speed=0.2)
     for one, b, said in (
@@ -286,8 +286,8 @@ def test_impact_parameters_that_cannot_be():
         (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
     ],
 )
-def test_wrong_cases_leave_nothing(tmp_path, capsys, change, said):
-    """Exit 2, one line with the file's name, no folder."""
+def test_wrong_cases_write_nothing(tmp_path, capsys, change, said):
+    """Exit code 2, one line with the file's name, no folder."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace(*change))
     assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
@@ -299,7 +299,7 @@ def test_wrong_cases_leave_nothing(tmp_path, capsys, change, said):
 @pytest.mark.slow
 @pytest.mark.parametrize(("address", "said"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")])
 def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, said):
-    """One line, exit 2, nothing written."""
+    """One line, exit code 2, nothing written."""
     from sand.experiments import executors
 
     monkeypatch.setattr(executors, "ANSWER", 0.5)
@@ -321,7 +321,7 @@ class Done(Future):
 
 @pytest.mark.compiled("scattering")
 def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
-    """One line with the way to go on, exit 2; then the rest is flown."""
+    """One line with the command to continue, exit code 2; then the rest is computed."""
     from concurrent.futures import process
 
     case, out = tmp_path / "case.toml", tmp_path / "out"
@@ -342,8 +342,8 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
 
 @stops_others
 @pytest.mark.compiled("scattering")
-def test_sigterm_says_how_to_go_on(tmp_path):
-    """SIGTERM while it flies: exit 130 and one line with --resume."""
+def test_sigterm_tells_how_to_resume(tmp_path):
+    """SIGTERM during the job: exit code 130 and one line with --resume."""
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE.replace("0.05", "0.001").replace('"4 b_max"', '"4 b_max"\nspin = "equipartition"'))
     words = [sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(out)]
@@ -359,7 +359,7 @@ def test_sigterm_says_how_to_go_on(tmp_path):
 
 
 def test_a_map_needs_speeds_that_differ(tmp_path, capsys):
-    """One line; and speeds in any order make the same map."""
+    """One line; speeds in any order give the same map."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace("[1, 2]", "[1, 1]").replace("relative_error = 0.05", 'job = "map"'))
     assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
