@@ -40,7 +40,7 @@ NAMES = {
 
 
 def become_windows() -> None:
-    """Change this process, for good."""
+    """Change this process permanently."""
     for module, names in NAMES.items():
         module.__class__ = _without(frozenset(names.split()))
     builtins.__import__ = _refusing(builtins.__import__)
@@ -55,7 +55,7 @@ def _is_ours(module: str) -> bool:
 
 
 def _without(names: frozenset[str]) -> type[ModuleType]:
-    """The class of a module that lacks names where we ask for them; it and others still find them."""
+    """A class of modules that lack these names for SAND's code; other code still finds them."""
 
     class Narrowed(ModuleType):
         def __getattribute__(self, name: str) -> Any:
@@ -86,7 +86,7 @@ def _without_folders(plain: Callable[..., int]) -> Callable[..., int]:
 
 
 def _by_library() -> bool:
-    """Whether a module of Python asks that does the same in another way on Windows."""
+    """Whether the caller is a standard-library module that has other code for Windows."""
     return sys._getframe(2).f_globals.get("__name__") in ("shutil", "tempfile")
 
 
@@ -103,7 +103,7 @@ def _for_writers(plain: Callable[[Any], None]) -> Callable[[Any], None]:
 
 
 def _of_closed_files(plain: Callable[..., None]) -> Callable[..., None]:
-    """Refuses files that are open here; where /proc does not tell which are (not Linux), all are taken for closed."""
+    """Refuse files open in this process; where /proc does not list open files (not Linux), all count as closed."""
 
     def changed(*paths: Any, **options: Any) -> None:
         if not any(value is not None for value in options.values()) and not _by_library():
@@ -133,5 +133,5 @@ def _is_open(path: Any) -> bool:
 
 
 def pytest_configure() -> None:
-    """As a plugin of pytest."""
+    """Activate the emulation as a pytest plugin."""
     become_windows()

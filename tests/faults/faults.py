@@ -1,8 +1,7 @@
-"""Single-line faults, and the tests that should catch each of them; `tests.faults.plant` plants them.
+"""Single-line faults, and the test that should catch each of them; `tests.faults.plant` plants them.
 
-They are slips that people make: a sign, a factor 2, an image or a unit that is forgotten, one too many or too few, a
-row that is lost, an error that is swallowed.  They lie in formulas, loops, settings, files, commands, set-up and
-analysis.
+They are typical programming errors: a sign, a factor 2, a forgotten image or unit, an index off by one, a lost row, a
+swallowed error; in formulas, loops, settings, files, commands, set-up and analysis.
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ SOURCES, TESTS = "src/sand/", "tests/"
 
 @dataclass(frozen=True)
 class Fault:
-    """One line that is wrong.
+    """A fault in one line.
 
     Attributes:
         name: for the table.
         kind: of KINDS.
         area: of AREAS.
-        file: below SOURCES.
-        old, new: part of a line that occurs once in the file, and what stands there instead.
-        test: below TESTS, the test that should fail, of the checkout that this file belongs to.
+        file: path below SOURCES.
+        old, new: part of a line that occurs once in the file, and its replacement.
+        test: path below TESTS and name of the test that should fail.
     """
 
     name: str
@@ -37,12 +36,12 @@ class Fault:
 
     @property
     def named(self) -> str:
-        """The test to run first, from the top of the checkout."""
+        """The test to run first, relative to the root of the checkout."""
         return TESTS + self.test
 
     @property
     def searched(self) -> str:
-        """What words of the command line are looked for in."""
+        """The text in which words of the command line are searched."""
         return f"{self.name} | {self.kind} | {self.area} | {self.file}"
 
 
@@ -79,7 +78,7 @@ FAULTS = (
     Fault("sliding forgets where it ends", "factor 2", "formula", "contact/mechanics.py",
           "slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))",
           "slide = dot(start.slide, sub(end.slide, left.slide))",
-          "generic/test_contact_laws.py::test_what_yielding_dissipates"),
+          "generic/test_contact_laws.py::test_dissipation_of_slip"),
     # loops
     Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "neighbours/cell_list.py",
           "(0, high - nx + 1)", "(0, high - nx)",
@@ -90,10 +89,10 @@ FAULTS = (
     Fault("no reaction of a dipole's force", "sign", "loop", "forces/pair/dipole_loops.py",
           "accrue(force, j, (-f[0], -f[1], -f[2]))", "accrue(force, j, f)",
           "physics/test_magnetic_dynamics.py::test_loads_against_brute_force_with_images"),
-    Fault("a touch is given a whole kick", "factor 2", "loop", "contact/events.py",
+    Fault("a forming contact is given a whole kick", "factor 2", "loop", "contact/events.py",
           "impulse - 0.5 * dt * dot(load(contacts.force, c), n)", "impulse - dt * dot(load(contacts.force, c), n)",
           "physics/test_conservation.py::test_contact_formation_conserves_the_modified_energy_of_verlet"),
-    Fault("half the speed at the start of a curve", "factor 2", "loop", "integrate/event_location.py",
+    Fault("half the velocity at the start of the interpolation", "factor 2", "loop", "integrate/event_location.py",
           "v0 = scale(dt / 5.0, ", "v0 = scale(dt / 10.0, ",
           "unit/test_event_location.py::test_interpolation_of_quintic_motion_is_exact"),
     Fault("the second half of a kick is a whole one", "factor 2", "loop", "integrate/driver.py",
@@ -103,20 +102,20 @@ FAULTS = (
           "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
           "unit/test_remove_broken.py::test_each_column_moves_with_its_contact"),
     # settings and units
-    Fault("a tesla without a second", "forgotten unit", "settings", "units.py",
+    Fault("tesla with 1/s instead of 1/s²", "forgotten unit", "settings", "units.py",
           '"T": (0, 0, 1, -2, -1, 0)', '"T": (0, 0, 1, -1, -1, 0)',
           "unit/test_units.py::test_built_in_units_agree_with_pint"),
     Fault("a run of no steps", "off by one", "settings", "config/sections.py",
           "Steps = Annotated[int, Field(ge=1, le=MOST_STEPS", "Steps = Annotated[int, Field(ge=0, le=MOST_STEPS",
           "unit/test_case.py::test_a_wrong_entry_gives_one_line"),
-    Fault("a material with a number that cannot be", "swallowed error", "settings", "material.py",
+    Fault("a material with an impossible value", "swallowed error", "settings", "material.py",
           "problems += error.problems", "problems += []",
           "unit/test_grains.py::test_materials_are_checked"),
     Fault("a moment per mass taken for a moment", "forgotten unit", "settings", "grains.py",
           "per_mass * mass", "per_mass",
           "unit/test_grains.py::test_derived_quantities"),
     # files
-    Fault("orientations are read one place off", "off by one", "files", "io/frame.py",
+    Fault("quaternion components are read one position off", "off by one", "files", "io/frame.py",
           "np.roll(np.asarray(p.orientation), -1, axis=1)", "np.roll(np.asarray(p.orientation), 1, axis=1)",
           "unit/test_frame_quantities.py::test_a_frame_holds_grains_and_contacts"),
     Fault("a check sum without the numbers", "swallowed error", "files", "io/checkpoint.py",
@@ -129,14 +128,14 @@ FAULTS = (
           "[grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment,",
           "[grains.position / ANGSTROM, grains.radius, grains.moment,",
           "unit/test_builders.py::test_bodies_round_trip_through_files"),
-    Fault("a full disk is not told", "swallowed error", "files", "io/run_folder.py",
+    Fault("a full disk is not reported", "swallowed error", "files", "io/run_folder.py",
           'raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error', "return",
           "unit/test_files.py::test_a_failed_write_leaves_the_old_file"),
     # commands
     Fault("the last frame of a slice", "off by one", "command", "cli/export.py",
           "first + 1 if first != -1 else None", "first + 1",
           "unit/test_results.py::test_the_export_command"),
-    Fault("a mistake ends with exit code 0", "swallowed error", "command", "cli/program.py",
+    Fault("wrong input ends with exit code 0", "swallowed error", "command", "cli/program.py",
           "return str(error).splitlines(), BAD_INPUT", "return str(error).splitlines(), DONE",
           "unit/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
     Fault("an end before the start", "swallowed error", "command", "simulation/stop.py",

@@ -119,8 +119,8 @@ def test_time_reversed_scattering_returns_to_the_start():
     back = sand.Grains(
         g.position, R, sand.IRON, moment=g.moment, velocity=-g.velocity, spin=-g.spin,
     )  # fmt: skip
-    home = run_to(adaptive_run(back), 2e-8).grains
-    found, start = state_of(home), state_of(there.start)
+    returned = run_to(adaptive_run(back), 2e-8).grains
+    found, start = state_of(returned), state_of(there.start)
     assert np.abs(found - start * np.array([1, -1, 1, -1])[:, None, None]).max() < 1e-6
     assert np.abs(state_of(g)[0] - start[0]).max() > 10
 
@@ -217,8 +217,8 @@ def test_momentum_angular_momentum_and_energy():
     corners = np.array([[x, y, z] for x in range(2) for y in range(2) for z in range(2)])
     moment = rng.normal(size=(8, 3))
     moment *= SIZE / np.linalg.norm(moment, axis=1)[:, None]
-    place = 7e-8 * corners + 5e-9 * rng.normal(size=(8, 3))
-    grains = sand.Grains(place, R, sand.IRON, moment=moment, velocity=rng.normal(size=(8, 3)))
+    positions = 7e-8 * corners + 5e-9 * rng.normal(size=(8, 3))
+    grains = sand.Grains(positions, R, sand.IRON, moment=moment, velocity=rng.normal(size=(8, 3)))
     changes = []
     for tolerance in (1e-9, 1e-12):
         sim = adaptive_run(grains, sand.Adaptive(tolerance=tolerance))
@@ -434,7 +434,7 @@ def test_case_file_round_trip():
     assert sim.stepping.contact_stepping == sand.Verlet(steps_per_period=50)
     again = check_case(tomllib.loads(tomli_w.dumps(case_of(sim, 1e-9, math.inf))), "case.toml")
     assert again.stepping == sim.stepping
-    for text, said in (
+    for text, expected in (
         ("tolerence = 1e-9", ["stepping.tolerence", "did you mean 'tolerance'?"]),
         ("step = 1e-9", ["stepping.step", "no such key"]),
         ("tolerance = -1", ["stepping: tolerance = -1 must be above 0"]),
@@ -446,6 +446,6 @@ def test_case_file_round_trip():
         with pytest.raises(BadInput) as caught:
             check_case(tomllib.loads(CASE + text), "some.toml")
         assert len(caught.value.problems) == 1
-        assert all(part in caught.value.problems[0] for part in said), caught.value.problems
+        assert all(part in caught.value.problems[0] for part in expected), caught.value.problems
     with pytest.raises(BadInput, match="did you mean 'adaptive'"):
         check_case(tomllib.loads(CASE.replace('"adaptive"', '"adaptiv"')), "some.toml")

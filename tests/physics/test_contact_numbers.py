@@ -118,10 +118,10 @@ def test_periods_of_the_four_contact_modes(mode):
 
     Sliding: with the distance D = 2r − δ0 the exact value is k_s (2/m + D²/(2I)), which is 7k_s/m up to O(δ0/r).
     """
-    square, start, watch = MODES[mode]
+    square, start, coordinate = MODES[mode]
     expected = 2 * math.pi / math.sqrt(square)
     found, _ = measured_period(
-        pair_at_rest(**start), [LAW], watch, expected, periods=8.2, stepping=sand.Verlet(steps_per_period=100)
+        pair_at_rest(**start), [LAW], coordinate, expected, periods=8.2, stepping=sand.Verlet(steps_per_period=100)
     )
     assert found == pytest.approx(expected, rel=1e-3, abs=0.0)
 

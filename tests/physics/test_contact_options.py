@@ -134,12 +134,12 @@ def test_contact_time_without_adhesion_is_that_of_hertz():
     grains = sand.Grains(
         [[0, 0, 0], [2.001 * R, 0, 0]], R, [bare, sand.SILICA], velocity=[[speed / 2, 0, 0], [-speed / 2, 0, 0]]
     )
-    touching, steps = [], []
+    contact_frames, steps = [], []
 
     class ContactRecorder(sand.Observer):
         def see(self, simulation, row):
             if row["contacts"]:
-                touching.append(row["time"])
+                contact_frames.append(row["time"])
                 steps.append(simulation.state.clock[1])
 
     sim = sand.Simulation(
@@ -156,7 +156,7 @@ def test_contact_time_without_adhesion_is_that_of_hertz():
     assert sim.ledger.dissipated == pytest.approx(0.0, abs=1e-6 * last["translation"])
     modulus = sand.SILICA.young_modulus / (2 * (1 - sand.SILICA.poisson_ratio**2))
     expected = 2.868 * ((grains.mass[0] / 2) ** 2 / (R / 2 * modulus**2 * speed)) ** 0.2
-    assert touching[-1] - touching[0] == pytest.approx(expected, abs=2.5 * max(steps[1:]))
+    assert contact_frames[-1] - contact_frames[0] == pytest.approx(expected, abs=2.5 * max(steps[1:]))
 
 
 @pytest.mark.parametrize(

@@ -22,11 +22,11 @@ def collision_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("frames") / "crash"
     cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=1)
     corner = np.array([1.4e-7, 0.9e-7, 1.4e-7])
-    place = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
-    place = sand.Box.periodic("0.3 um").wrap(place + corner)
+    positions = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
+    positions = sand.Box.periodic("0.3 um").wrap(positions + corner)
     speed = np.zeros((41, 3))
     speed[40] = [0.3, 0.4, -30.0]
-    grains = sand.Grains(place, RADIUS, "silica", velocity=speed, moment="2 A m^2/kg")
+    grains = sand.Grains(positions, RADIUS, "silica", velocity=speed, moment="2 A m^2/kg")
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box="0.3 um", out=folder, frame_every="0.25 ns")
     sim.run(until="10 ns")
     return folder, read_frames(folder / "trajectory.gsd"), sim
@@ -125,16 +125,16 @@ def test_position_correction_of_random_packings():
         pairs = box.close_pairs(true, 2.2 * RADIUS)
         apart = np.linalg.norm(box.nearest(true[pairs[:, 0]] - true[pairs[:, 1]]), axis=1)
         overlap = radius[pairs].sum(axis=1) - apart
-        held = overlap > -0.01 * RADIUS  # some of them stretched
-        touching = pairs[held]
+        kept = overlap > -0.01 * RADIUS  # some of them stretched
+        in_contact = pairs[kept]
         rounded = np.float64(np.float32(true / RADIUS)) * RADIUS
-        found = restore_overlaps(rounded, radius, box, touching, overlap[held])
-        apart = np.linalg.norm(box.nearest(found[touching[:, 0]] - found[touching[:, 1]]), axis=1)
-        assert radius[touching].sum(axis=1) - apart == pytest.approx(
-            overlap[held], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
+        found = restore_overlaps(rounded, radius, box, in_contact, overlap[kept])
+        apart = np.linalg.norm(box.nearest(found[in_contact[:, 0]] - found[in_contact[:, 1]]), axis=1)
+        assert radius[in_contact].sum(axis=1) - apart == pytest.approx(
+            overlap[kept], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
         )
         assert np.abs(box.nearest(found - rounded)).max() < 12 * SINGLE * RADIUS * 10
-        assert held.sum() > 400
+        assert kept.sum() > 400
 
 
 def test_position_correction_of_a_rigid_packing():
@@ -167,12 +167,12 @@ def test_a_frame_with_nan_is_refused(collision_run):
 
 def test_overlap_by_rounding_makes_no_contact():
     """Two grains with a tiny gap that overlap once rounded are separated again."""
-    place = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
+    positions = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
     none = np.zeros((0, 2), int)
-    found = restore_overlaps(place, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
+    found = restore_overlaps(positions, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
     gap = np.linalg.norm(found[0] - found[1]) / (2 * RADIUS) - 1
     assert 0 < gap < 2e-9
-    assert (found[2] == place[2]).all()
+    assert (found[2] == positions[2]).all()
 
 
 def captured(capsys):
@@ -185,9 +185,9 @@ def test_the_command(collision_run, tmp_path, monkeypatch, capsys):
     folder, frames, _ = collision_run
     monkeypatch.chdir(tmp_path)
     assert main(["run", "--from", str(folder), "--frame", "20", "--until", "0.1 ns"]) == 0
-    told = " ".join(captured(capsys).out.split())
-    assert f"trajectory.gsd, step {frames[20].step}" in told
-    assert f"{len(frames[20].pair)} contacts kept" in told
+    message = " ".join(captured(capsys).out.split())
+    assert f"trajectory.gsd, step {frames[20].step}" in message
+    assert f"{len(frames[20].pair)} contacts kept" in message
     new = sand.open("crash-from-20")
     assert new.frames[0].time == 0.0
     assert (new.frames[0].pair == frames[20].pair).all()
@@ -251,9 +251,9 @@ def test_wrong_requests_are_refused(collision_run, tmp_path, monkeypatch, capsys
     before = sorted(tmp_path.iterdir())
     meant = {"RUN": str(folder), "STRETCHED": str(stretched)}
     assert main(["run", *(meant.get(word, word) for word in words)]) == 2
-    told = "\n".join(line for line in captured(capsys).err.splitlines() if "compiling" not in line)
-    assert told.count("\n") == 0, told
-    assert all(part in told for part in parts), told
+    message = "\n".join(line for line in captured(capsys).err.splitlines() if "compiling" not in line)
+    assert message.count("\n") == 0, message
+    assert all(part in message for part in parts), message
     assert sorted(tmp_path.iterdir()) == before
 
 

@@ -48,10 +48,10 @@ def content(folder):
 @pytest.fixture(scope="module")
 def undisturbed_run(tmp_path_factory):
     """Case and folder of a run on a large enough disk."""
-    place = tmp_path_factory.mktemp("room")
-    (place / "case.toml").write_text(CASE)
-    assert main(["run", str(place / "case.toml"), "--out", str(place / "run"), "--quiet"]) == 0
-    return place / "case.toml", place / "run"
+    parent = tmp_path_factory.mktemp("room")
+    (parent / "case.toml").write_text(CASE)
+    assert main(["run", str(parent / "case.toml"), "--out", str(parent / "run"), "--quiet"]) == 0
+    return parent / "case.toml", parent / "run"
 
 
 @contextlib.contextmanager
@@ -151,10 +151,10 @@ def test_a_folder_removed_during_a_run(undisturbed_run, tmp_path):
     assert "Traceback" not in job.stderr
 
 
-def small_disk(place, kilobytes):
+def small_disk(parent, kilobytes):
     """A file system of this many kB; skips the test where mounting is not allowed."""
-    place.mkdir(exist_ok=True)
-    words = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(place)]
+    parent.mkdir(exist_ok=True)
+    words = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(parent)]
     if shutil.which("mount") is None or not IS_ROOT or subprocess.run(words, capture_output=True).returncode:
         pytest.skip("no leave to mount a small file system")
 

@@ -72,19 +72,19 @@ def content(folder):
 @pytest.fixture(scope="module")
 def undisturbed_run(tmp_path_factory):
     """Folder of a run without interruptions, and its wall time [s]."""
-    place = tmp_path_factory.mktemp("whole")
-    (place / "case.toml").write_text(CASE)
-    folder = place / "run"
+    parent = tmp_path_factory.mktemp("whole")
+    (parent / "case.toml").write_text(CASE)
+    folder = parent / "run"
     begun = time.monotonic()
-    assert sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet").wait() == 0
-    return place, folder, time.monotonic() - begun
+    assert sand_command("run", str(parent / "case.toml"), "--out", str(folder), "--quiet").wait() == 0
+    return parent, folder, time.monotonic() - begun
 
 
 def killed_and_resumed(undisturbed_run, tmp_path, rng, kills, kind=KILL):
     """Stop a run and each of its resumes by a signal after a random time, then let the last one finish."""
-    place, _, seconds = undisturbed_run
+    parent, _, seconds = undisturbed_run
     folder = tmp_path / "run"
-    job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
+    job = sand_command("run", str(parent / "case.toml"), "--out", str(folder), "--quiet")
     flushed = 0
     for _ in range(kills):
         try:
@@ -95,7 +95,7 @@ def killed_and_resumed(undisturbed_run, tmp_path, rng, kills, kind=KILL):
             assert job.wait() in (ended, INTERRUPTED, DONE), job.stderr.read()
         if not list(folder.glob("checkpoint-*.npz")):
             shutil.rmtree(folder, ignore_errors=True)
-            job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
+            job = sand_command("run", str(parent / "case.toml"), "--out", str(folder), "--quiet")
             continue
         frames = read_frames(folder / "trajectory.gsd")
         assert len(frames) >= flushed

@@ -37,10 +37,10 @@ class Recorder(sand.Observer):
 
 def measured_period(grains, forces, what, period, periods=6.2, **options):
     """Period of `what`, recorded with 400 frames per expected period."""
-    watch = Recorder(what)
-    sim = sand.Simulation(grains, forces, observers=[watch], frame_every=period / 400, **options)
+    recorder = Recorder(what)
+    sim = sand.Simulation(grains, forces, observers=[recorder], frame_every=period / 400, **options)
     sim.run(until=periods * period)
-    return period_of(np.array(watch.value), np.array(watch.time)), sim
+    return period_of(np.array(recorder.value), np.array(recorder.time)), sim
 
 
 @pytest.mark.validate

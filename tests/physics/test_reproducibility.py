@@ -197,13 +197,13 @@ def test_kernels_against_plain_python_loops():
     sim.run(steps=50)
     g, w = sim.grains, sim.state
     listed = {frozenset(p) for p in w.pair_list.pair[:, : w.count[3]].T.tolist()}
-    touching = {
+    in_contact = {
         frozenset((i, j))
         for i in range(40)
         for j in range(i)
         if np.linalg.norm(g.position[i] - g.position[j]) < g.radius[i] + g.radius[j]
     }
-    assert touching <= listed
+    assert in_contact <= listed
     force, torque = np.zeros((40, 3)), np.zeros((40, 3))
     for c in range(w.count[CONTACTS]):
         i, j = (int(k) for k in w.contacts.pair[:, c])
@@ -230,13 +230,13 @@ def test_kernels_against_plain_python_loops():
 def test_the_number_of_threads_changes_no_bit():
     """A lattice of 1000 spinning grains with slipping and breaking contacts: the same bits with 1, 2 and 3 threads."""
     radius, rng = 1e-8, np.random.default_rng(5)
-    place = np.stack(np.meshgrid(*[np.arange(10)] * 3, indexing="ij"), -1).reshape(-1, 3)
-    place = rest_distance(sand.SILICA, radius, radius) * place
-    given = {"velocity": rng.normal(size=place.shape), "spin": rng.normal(scale=3e9, size=place.shape)}
+    positions = np.stack(np.meshgrid(*[np.arange(10)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    positions = rest_distance(sand.SILICA, radius, radius) * positions
+    given = {"velocity": rng.normal(size=positions.shape), "spin": rng.normal(scale=3e9, size=positions.shape)}
     ends = []
     for number in (1, 2, 3):
         set_threads(number)
-        sim = sand.Simulation(sand.Grains(place, radius, sand.SILICA, **given), [sand.Contact()])
+        sim = sand.Simulation(sand.Grains(positions, radius, sand.SILICA, **given), [sand.Contact()])
         try:
             sim.run(steps=200)
         finally:

@@ -26,10 +26,10 @@ def chain(ringing, far="impulse", far_steps=70, length=20, seed=3, step="auto", 
     return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="10 um"), *others], stepping=stepping)
 
 
-def energy_error(sim, steps=100_000, looks=20):
+def energy_error(sim, steps=100_000, samples=20):
     """Largest change of the total energy [J] during the steps."""
-    for _ in range(looks):
-        sim.run(steps=steps // looks)
+    for _ in range(samples):
+        sim.run(steps=steps // samples)
     total = sim.ledger["total"]
     return np.abs(total - total[0]).max()
 

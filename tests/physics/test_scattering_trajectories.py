@@ -32,11 +32,11 @@ def unequal_pair(**options):
     return scattering.flight(**(given | options))
 
 
-def bodies_of(flying):
+def bodies_of(pair):
     """Mass, moment of inertia and magnetic moment of both bodies."""
     return [
         (float(g.mass[0]), float(g.inertia[0]), float(np.linalg.norm(g.moment[0])))
-        for g in (flying.projectile, flying.target)
+        for g in (pair.projectile, pair.target)
     ]
 
 
@@ -46,10 +46,10 @@ def test_against_scipy():
 
     F = K(μi, r) μj and B = k (3 r̂r̂ᵀ − 1) μ/r³ as in physics.md.
     """
-    flying = unequal_pair()
-    ours = scattering.trajectory(flying, "150 nm")
-    (m1, i1, s1), (m2, i2, s2) = bodies_of(flying)
-    outer = np.array(flying.field)
+    pair = unequal_pair()
+    ours = scattering.trajectory(pair, "150 nm")
+    (m1, i1, s1), (m2, i2, s2) = bodies_of(pair)
+    outer = np.array(pair.field)
 
     def field(moment, r):
         size = np.linalg.norm(r)
@@ -92,15 +92,15 @@ def test_against_scipy():
 @pytest.mark.compiled("scattering", "adaptive")
 def test_against_the_simulation():
     """The same pair in `Simulation` with `Adaptive` steps and quaternions: the same positions to 1e-5 of R."""
-    flying = unequal_pair(field=None)
-    ours = scattering.trajectory(flying, "150 nm")
+    pair = unequal_pair(field=None)
+    ours = scattering.trajectory(pair, "150 nm")
     grains = sand.Grains(
         [ours.projectile[0], ours.target[0]],
         [8e-9, 1.3e-8],
         sand.IRON,
         velocity=[ours.velocity_projectile[0], ours.velocity_target[0]],
         spin=[ours.spin_projectile[0], ours.spin_target[0]],
-        moment=[flying.projectile.moment[0], flying.target.moment[0]],
+        moment=[pair.projectile.moment[0], pair.target.moment[0]],
     )
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], stepping=sand.Adaptive(tolerance=1e-11))
     sim.run(until=float(0.9 * ours.time[-1]))
@@ -112,11 +112,11 @@ def test_against_the_simulation():
 @pytest.mark.compiled("scattering")
 def test_energy_and_angular_momentum():
     """E, and without a field L = m̄ r×u + I1ω1 + I2ω2, constant to 1e-7: about a hundred steps at the tolerance."""
-    flying = unequal_pair(field=None, spin="kT/2", temperature="100 K", orientation="random")
-    reduced = flying.scales.reduced
-    (_, i1, _), (_, i2, _) = bodies_of(flying)
+    pair = unequal_pair(field=None, spin="kT/2", temperature="100 K", orientation="random")
+    reduced = pair.scales.reduced
+    (_, i1, _), (_, i2, _) = bodies_of(pair)
     for number in range(20):
-        one = scattering.trajectory(flying, "60 nm", number=number)
+        one = scattering.trajectory(pair, "60 nm", number=number)
         apart = one.projectile - one.target
         moving = one.velocity_projectile - one.velocity_target
         angular = reduced * np.cross(apart, moving) + i1 * one.spin_projectile + i2 * one.spin_target
@@ -133,17 +133,15 @@ def test_rigid_bodies_of_one_grain_move_as_spheres():
     from sand.experiments.scattering.flight_driver import allocate_workspace, flights_of
     from sand.experiments.scattering.two_aggregates import AGGREGATES, TWO_AGGREGATES, Aggregates
 
-    flying = unequal_pair()
-    one = scattering.trajectory(flying, "150 nm")
-    rules = Aggregates(
-        MAGNETIC, flying.scales.reduced, body_of(flying.projectile), body_of(flying.target), 8e-9, flying.field
-    )
+    pair = unequal_pair()
+    one = scattering.trajectory(pair, "150 nm")
+    rules = Aggregates(MAGNETIC, pair.scales.reduced, body_of(pair.projectile), body_of(pair.target), 8e-9, pair.field)
     results, ends = np.zeros((1, 8)), np.zeros((1, AGGREGATES))
     square = np.array([1.5e-7**2])
     nought = np.zeros(1, np.uint64)
     flights_of(TWO_AGGREGATES)(
         np.uint64(0), nought, nought, square, square, allocate_workspace(AGGREGATES), results, ends,
-        flying.start(0.0), rules, flying.limits(),
+        pair.start(0.0), rules, pair.limits(),
     )  # fmt: skip
     apart = one.projectile[-1] - one.target[-1]
     # both end within a step of the starting distance: compare along the straight outgoing path
@@ -161,29 +159,29 @@ def test_energy_and_first_contact_of_aggregates():
         sand.Grains(np.array([[k * distance, 0, 0] for k in range(n)]), 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * n)
         for n in (3, 2)
     ]
-    flying = scattering.flight(
+    pair = scattering.flight(
         projectile=chains[0], target=chains[1], speed=0.3, temperature="100 K", spin="equipartition", start="0.5 um"
     )
-    rows = fly(flying, [Task(0, 0, 20)], 1e-7)
+    rows = fly(pair, [Task(0, 0, 20)], 1e-7)
     assert rows[:, COLUMNS.index("drift")].max() < 1e-6
     hit = rows[:, END] == HIT
     assert hit.sum() > 10
-    assert np.abs(rows[hit, COLUMNS.index("closest")]).max() < 1e-6 * flying.scales.touch
+    assert np.abs(rows[hit, COLUMNS.index("closest")]).max() < 1e-6 * pair.scales.touch
 
 
 @pytest.mark.compiled("scattering")
 def test_cross_section_without_moments_is_geometric():
     """σ = π(r1 + r2)²: all trajectories with b < r1 + r2 hit, none above; grazing ones are resolved to 1e-4."""
-    flying = scattering.flight(
+    pair = scattering.flight(
         projectile=sand.Grains([[0, 0, 0]], 1e-8, sand.IRON),
         target=sand.Grains([[0, 0, 0]], 3e-8, sand.IRON),
         speed=1.0,
     )
-    inside = fly(flying, [Task(0, 0, 300)], 4e-8 * (1 - 2e-4))
-    outside = fly(flying, [Task(1, 0, 300)], 4e-8 * (1 + 1e-9))
+    inside = fly(pair, [Task(0, 0, 300)], 4e-8 * (1 - 2e-4))
+    outside = fly(pair, [Task(1, 0, 300)], 4e-8 * (1 + 1e-9))
     assert (inside[:, END] == HIT).all()
     assert (outside[:, END] == MISS).all()
-    found = scattering.measure(flying, relative_error=0.01)
+    found = scattering.measure(pair, relative_error=0.01)
     assert found.interval[0] < found.geometric < found.interval[1]
     assert np.isnan(found.c)
 
@@ -191,13 +189,13 @@ def test_cross_section_without_moments_is_geometric():
 @pytest.mark.compiled("scattering")
 def test_capture_of_cold_grains_ends_at_b_max():
     """No spin, v_th, from 10 b_max: 0 of 600 hits at b ≥ 1.03 b_max, all of 200 below 0.7; c = 0.990 ± 0.01."""
-    flying = scattering.flight(**THERMAL)
-    b_max = flying.scales.capture
-    beyond = fly(flying, [Task(103, 0, 200), Task(110, 0, 200), Task(118, 0, 200)], 0.01 * b_max)
+    pair = scattering.flight(**THERMAL)
+    b_max = pair.scales.capture
+    beyond = fly(pair, [Task(103, 0, 200), Task(110, 0, 200), Task(118, 0, 200)], 0.01 * b_max)
     assert (beyond[:, END] == MISS).all()
-    within = fly(flying, [Task(0, 0, 200)], 0.7 * b_max)
+    within = fly(pair, [Task(0, 0, 200)], 0.7 * b_max)
     assert (within[:, END] == HIT).all()
-    found = scattering.measure(flying, relative_error=0.004)
+    found = scattering.measure(pair, relative_error=0.004)
     assert found.c == pytest.approx(0.990, abs=0.01)
     assert found.drift < 1e-6
 
@@ -216,8 +214,8 @@ def test_trajectories_of_figure_2():
     With the thermal spin of the caption none of twenty trajectories at 0.95 b_max hits.
     """
     slow = IRON | {"speed": 1 / 16, "speed_unit": "thermal", "orientation": "aligned"}
-    flying = scattering.flight(**slow)
-    paths = [scattering.trajectory(flying, f"{b} b_max") for b in (0.95, 1.0, 1.025, 1.05)]
+    pair = scattering.flight(**slow)
+    paths = [scattering.trajectory(pair, f"{b} b_max") for b in (0.95, 1.0, 1.025, 1.05)]
     assert [one.end for one in paths] == ["hit", "miss", "miss", "miss"]
     exchanged = [one.exchanged for one in paths[1:]]
     assert exchanged[0] > 0.9 > exchanged[1] > exchanged[2] > 0.3
@@ -267,8 +265,8 @@ def test_moving_target():
     assert coming.c == pytest.approx(1.0, abs=0.03)
     chance = scattering.cross_section(**options, speed=0.2, target_velocity="thermal", relative_error=0.02)
     assert chance.c == pytest.approx(1.0, abs=0.05)
-    flying = scattering.flight(**options, speed=0.2, target_velocity="thermal")
-    path = scattering.trajectory(flying, "2 um", number=3)
+    pair = scattering.flight(**options, speed=0.2, target_velocity="thermal")
+    path = scattering.trajectory(pair, "2 um", number=3)
     assert np.linalg.norm(path.velocity_projectile[0] - [0.2, 0, 0]) < 1e-12
     assert 0.02 < np.linalg.norm(path.velocity_target[0]) < 1.0
     assert np.isnan(path.exchanged)
@@ -287,10 +285,10 @@ def test_sticking_of_large_grains(radius, part):
     projectile = ball if radius > 1e-5 else rider
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        flying = scattering.flight(
+        pair = scattering.flight(
             projectile=projectile, target=ball, speed=part * limit, outcome="stick", orientation="given"
         )
-        rows = fly(flying, [Task(0, 0, 1)], 1e-4 * radius)
+        rows = fly(pair, [Task(0, 0, 1)], 1e-4 * radius)
     assert (rows[:, END] == (HIT if part < 1.0 else BOUNCE)).all()
 
 
@@ -301,8 +299,8 @@ def test_sticking_with_simulated_contact(speed, outcome):
     assert sand.theory.contact(sand.IRON, 1e-8).sticking_speed == pytest.approx(78.9, abs=0.1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        flying = scattering.flight(radius="10 nm", material=sand.IRON, speed=speed, outcome="stick", start="0.2 um")
-        rows = fly(flying, [Task(0, 0, 3)], 1e-11)
+        pair = scattering.flight(radius="10 nm", material=sand.IRON, speed=speed, outcome="stick", start="0.2 um")
+        rows = fly(pair, [Task(0, 0, 3)], 1e-11)
     assert (rows[:, END] == outcome).all()
 
 

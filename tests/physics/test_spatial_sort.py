@@ -63,11 +63,11 @@ def vibrating_aggregate(order, far=()):
 
 def listed_pairs(system):
     """Pairs (grain, neighbour) of the long-range list."""
-    far, place = (
+    far, row = (
         system.long_range,
         np.repeat(np.arange(len(system.grains)), np.diff(system.long_range.start.astype(int))),
     )
-    return set(zip(far.order[place].tolist(), far.order[far.neighbour[: far.start[-1]]].tolist(), strict=True))
+    return set(zip(far.order[row].tolist(), far.order[far.neighbour[: far.start[-1]]].tolist(), strict=True))
 
 
 def contacts_per_grain(system):
@@ -140,13 +140,13 @@ def test_observers_and_split_runs_change_no_bit():
             simulation.loads()
             simulation.grains.position.sum()
 
-    whole, pieces, watched = hot_gas(), hot_gas(), hot_gas(observers=[Reader()], frame_every="20 ps")
+    whole, pieces, observed = hot_gas(), hot_gas(), hot_gas(observers=[Reader()], frame_every="20 ps")
     for steps in (1, 2, SORT_EVERY - 50, 100, SORT_EVERY, 3 * SORT_EVERY):
         pieces.run(steps=steps)
     whole.run(steps=pieces.steps)
-    watched.run(steps=pieces.steps)
+    observed.run(steps=pieces.steps)
     assert whole.state.count[ORDERED] >= 4 * SORT_EVERY
-    assert state(whole) == state(pieces) == state(watched)
+    assert state(whole) == state(pieces) == state(observed)
 
 
 @pytest.mark.compiled("listed")
@@ -276,7 +276,7 @@ def test_grains_kept_by_an_observer_are_in_the_users_order():
     """An observer keeps `grains` from one frame and reads it in every tick, also after an exception ends the run."""
 
     class Keeper(sand.Observer):
-        looks, kept = 0, None
+        calls, kept = 0, None
 
         def see(self, simulation, row):
             self.kept = simulation.grains

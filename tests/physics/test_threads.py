@@ -175,8 +175,8 @@ def test_worker_threads_end_with_their_simulation():
 def test_workers_are_used_where_they_save_time(number, forces, workers):
     """1000 contacts take less time than waking a worker, 4200 take more; sums of dipoles are shared, of charges not."""
     sand.set_threads(2)
-    place = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
-    chain = sand.Grains(place, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
+    positions = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
+    chain = sand.Grains(positions, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
     sim = sand.Simulation(chain, [sand.Contact(), *forces])
     sim.run(steps=1)
     assert sim._engine._kernel_spec.queue

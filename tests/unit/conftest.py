@@ -35,7 +35,7 @@ def _run(grains, field, folder):
 @pytest.fixture(scope="session")
 def run_in_field(tmp_path_factory):
     """A short run of eight magnetic grains, two of them in contact, in a field."""
-    place = tmp_path_factory.mktemp("plot") / "run"
+    run_folder = tmp_path_factory.mktemp("plot") / "run"
     grains = sand.Grains(
         [[2e-8 * 0.998 * (k % 2), 5e-8 * (k // 2), 0.0] for k in range(8)],
         "10 nm",
@@ -47,11 +47,11 @@ def run_in_field(tmp_path_factory):
         grains,
         [sand.Contact(), sand.Dipoles(), sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")],
         box="400 nm",
-        out=str(place),
+        out=str(run_folder),
         frame_every="1 ns",
     )
     sim.run(until="3 ns")
-    return place
+    return run_folder
 
 
 @pytest.fixture

@@ -29,10 +29,10 @@ def contacts_of(pairs, seed=0):
 def grains_of(count, seed=0):
     """Grains in a row with random offsets, velocities, spins and moments."""
     rng = np.random.default_rng(seed)
-    place = np.arange(count)[:, None] * [2e-8, 0.0, 0.0] + rng.normal(size=(count, 3)) * 1e-9
+    positions = np.arange(count)[:, None] * [2e-8, 0.0, 0.0] + rng.normal(size=(count, 3)) * 1e-9
     vectors = {name: rng.normal(size=(count, 3)) for name in ("velocity", "spin", "moment")}
     vectors["moment"] *= 1e-18
-    return sand.Grains(place, rng.uniform(0.5e-8, 1e-8, count), sand.IRON, charge=1.6e-19, **vectors)
+    return sand.Grains(positions, rng.uniform(0.5e-8, 1e-8, count), sand.IRON, charge=1.6e-19, **vectors)
 
 
 def append(writer, pairs_of_frames, count, first=0):

@@ -36,21 +36,21 @@ def test_gyration_of_exact_shapes():
     """
     assert gyration_radius(ROD) == pytest.approx(math.sqrt((81 - 1) / 3), rel=1e-14, abs=0)
     assert gyration_radius(ROD, radius=1.0) ** 2 == pytest.approx(80 / 3 + 0.6, rel=1e-14, abs=0)
-    place, mass = RNG.normal(size=(20, 3)), RNG.uniform(1, 3, 20)
-    brute = sum(mass[i] * mass[j] * ((place[i] - place[j]) ** 2).sum() for i in range(20) for j in range(20))
-    assert gyration_radius(place, mass) == pytest.approx(math.sqrt(brute / 2) / mass.sum(), rel=1e-13, abs=0)
+    points, mass = RNG.normal(size=(20, 3)), RNG.uniform(1, 3, 20)
+    brute = sum(mass[i] * mass[j] * ((points[i] - points[j]) ** 2).sum() for i in range(20) for j in range(20))
+    assert gyration_radius(points, mass) == pytest.approx(math.sqrt(brute / 2) / mass.sum(), rel=1e-13, abs=0)
 
 
 def test_inertia_against_the_definition():
     """I = Σ m (x² 1 − x xᵀ) about the centre of mass + ⅖mr² each, also for one sphere."""
-    place, mass, radius = RNG.normal(size=(7, 3)), RNG.uniform(1, 3, 7), RNG.uniform(0.1, 0.4, 7)
-    x = place - np.average(place, axis=0, weights=mass)
+    points, mass, radius = RNG.normal(size=(7, 3)), RNG.uniform(1, 3, 7), RNG.uniform(0.1, 0.4, 7)
+    x = points - np.average(points, axis=0, weights=mass)
     one = np.eye(3)
     each = zip(x, mass, radius, strict=True)
     brute = sum(m * (p @ p * one - np.outer(p, p)) + 0.4 * m * r * r * one for p, m, r in each)
     # with extent the tensor uses the mass average of r², which is the same sum
-    assert inertia_tensor(place, mass, radius) == pytest.approx(brute, rel=1e-12, abs=1e-12)
-    assert inertia_tensor(place[:1], mass[:1], radius[:1]) == pytest.approx(0.4 * mass[0] * radius[0] ** 2 * np.eye(3))
+    assert inertia_tensor(points, mass, radius) == pytest.approx(brute, rel=1e-12, abs=1e-12)
+    assert inertia_tensor(points[:1], mass[:1], radius[:1]) == pytest.approx(0.4 * mass[0] * radius[0] ** 2 * np.eye(3))
 
 
 def test_lengths_and_elongation():
@@ -86,11 +86,11 @@ def test_projected_area_of_exact_shapes():
 @pytest.mark.compiled("small")
 def test_projected_area_against_monte_carlo():
     """300 discs of several sizes: 4e5 random points agree within four standard deviations, √(p(1−p)/n)."""
-    place, radius = RNG.uniform(-5, 5, (300, 3)), RNG.uniform(0.1, 0.8, 300)
-    area, _ = projected_area(place, radius, np.array([[0.0, 0.0, 1.0]]))
+    points, radius = RNG.uniform(-5, 5, (300, 3)), RNG.uniform(0.1, 0.8, 300)
+    area, _ = projected_area(points, radius, np.array([[0.0, 0.0, 1.0]]))
     random_points = RNG.uniform(-6, 6, (400_000, 2))
     hit = np.zeros(len(random_points), bool)
-    for (x, y, _), r in zip(place, radius, strict=True):
+    for (x, y, _), r in zip(points, radius, strict=True):
         hit |= (random_points[:, 0] - x) ** 2 + (random_points[:, 1] - y) ** 2 < r * r
     share = hit.mean()
     assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(random_points))
@@ -144,18 +144,18 @@ def test_longest_shortest_path_of_trees(seed):
 def sierpinski(depth):
     """Corners of a tetrahedral gasket: D = ln 4/ln 2 = 2."""
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
-    place = np.zeros((1, 3))
+    points = np.zeros((1, 3))
     for level in range(depth):
-        place = np.concatenate([place + 2.0**level * corner for corner in corners])
-    return place
+        points = np.concatenate([points + 2.0**level * corner for corner in corners])
+    return points
 
 
 def dust(depth):
     """A Cantor dust of eight corners, thirds: D = ln 8/ln 3 = 1.893."""
-    place = np.zeros((1, 3))
+    points = np.zeros((1, 3))
     for level in range(depth):
-        place = np.concatenate([place + 2.0 * 3.0**level * np.array(c) for c in itertools.product((0, 1), repeat=3)])
-    return place
+        points = np.concatenate([points + 2.0 * 3.0**level * np.array(c) for c in itertools.product((0, 1), repeat=3)])
+    return points
 
 
 EXACT = {
@@ -187,8 +187,8 @@ def test_dimensions_of_exact_shapes(name):
     Boxes at the surface are partly empty: a factor (1 + 1/n)^D for n boxes per side.  Within r of a grain the surface
     matters, too, for r up to 0.7 r_g in bodies this small.
     """
-    place, exact = EXACT[name]
-    by_pairs, by_boxes = correlation_dimension(place), box_dimension(place)
+    points, exact = EXACT[name]
+    by_pairs, by_boxes = correlation_dimension(points), box_dimension(points)
     assert by_pairs.value == pytest.approx(exact, abs=0.3 if name == "ball" else 0.06)
     assert exact - 0.5 < by_boxes.value < exact + 0.05
     assert 0.0 <= by_pairs.error < 0.5 and 0.0 < by_boxes.error < 0.5
@@ -204,10 +204,10 @@ def test_dimensions_converge_with_size():
 
 def test_pair_counts_against_brute_force():
     """The tree counts the same pairs as brute force."""
-    place, radii = RNG.normal(size=(300, 3)), np.array([0.3, 1.0])
-    apart = np.linalg.norm(place[:50, None] - place[None], axis=2)
+    points, radii = RNG.normal(size=(300, 3)), np.array([0.3, 1.0])
+    apart = np.linalg.norm(points[:50, None] - points[None], axis=2)
     brute = [(apart <= r).sum() / 50 for r in radii]
-    assert grains_within(place[:50], place, radii) == pytest.approx(brute, rel=1e-12)
+    assert grains_within(points[:50], points, radii) == pytest.approx(brute, rel=1e-12)
 
 
 def test_ensemble_dimension():

@@ -40,12 +40,12 @@ def test_in_turns_takes_the_median_of_paired_ratios():
 @pytest.mark.parametrize(("kind", "contacts"), [("loose", 12), ("fcc", 36), ("gas", 0)])
 def test_benchmark_systems_have_the_expected_contacts(kind, contacts):
     """BPCA: N − 1. A grain and its 12 neighbours: 24 more (edges of a cuboctahedron). A gas: none."""
-    place = worlds.PLACES[kind](13)
-    apart = np.linalg.norm(place[:, None] - place[None], axis=2)[np.triu_indices(13, 1)]
-    touching = int((apart < 2 * worlds.RADIUS).sum())
-    assert touching == contacts
-    sim = sand.Simulation(worlds.shaken(place), [sand.Contact()])
-    assert len(sim.contacts["pair"]) == touching
+    positions = worlds.PLACES[kind](13)
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)[np.triu_indices(13, 1)]
+    in_contact = int((apart < 2 * worlds.RADIUS).sum())
+    assert in_contact == contacts
+    sim = sand.Simulation(worlds.shaken(positions), [sand.Contact()])
+    assert len(sim.contacts["pair"]) == in_contact
 
 
 @pytest.mark.compiled("contacts", "small")

@@ -26,7 +26,7 @@ GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fracta
 MIXED = {"radius": "lognormal(0.1 um, 0.4)", "material": {"silica": 0.6, "ice": 0.4}}
 
 
-def touching(body):
+def pairs_in_contact(body):
     """Brute force over all pairs: those in contact (C, 2), their distances, and equilibrium distances."""
     i, j = np.triu_indices(len(body), 1)
     d = np.linalg.norm(body.position[i] - body.position[j], axis=1)
@@ -59,7 +59,7 @@ def test_contacts_are_in_equilibrium_without_overlaps(kind, what):
     One cluster; trees except for rbd; centre of mass at the origin; the same seed gives the same bits.
     """
     body = GROWN[kind](150, seed=7, **what)
-    pairs, distance, rest = touching(body)
+    pairs, distance, rest = pairs_in_contact(body)
     assert np.abs(distance / rest - 1.0).max() < 1e-13
     assert number_of_clusters(body, pairs) == 1
     assert len(pairs) == 149 if kind != "rbd" else len(pairs) > 200
@@ -88,7 +88,7 @@ def test_spheres_cut_from_a_heap_are_one_cluster(make):
     for count in range(20, 400, 13):
         kept = cut_sphere(heap.position, heap.radius, count)
         body = sand.Grains(heap.position[kept] - heap.position[kept].mean(axis=0), R, M)
-        assert len(body) == count and number_of_clusters(body, touching(body)[0]) == 1
+        assert len(body) == count and number_of_clusters(body, pairs_in_contact(body)[0]) == 1
         assert size_of(body) < 2.0 * np.sqrt(0.6) * R * (count / 0.1) ** (1 / 3)
 
 
@@ -98,26 +98,26 @@ def test_spheres_cut_from_a_heap_are_one_cluster(make):
 def test_few_grains(kind, count):
     """One, two and three grains make an aggregate, too."""
     body = GROWN[kind](count, radius=R, material=M)
-    pairs, _, _ = touching(body)
+    pairs, _, _ = pairs_in_contact(body)
     assert len(body) == count and number_of_clusters(body, pairs) == 1
 
 
 def test_hexagonal_packing():
     """Each inner grain has twelve contacts, all in equilibrium; the number for 5³ grains by brute force."""
     body = hexagonal(5, radius=R, material=M)
-    pairs, distance, rest = touching(body)
+    pairs, distance, rest = pairs_in_contact(body)
     contacts = np.bincount(pairs.ravel())
     inside = (np.abs(body.position) < 1.4 * R).all(axis=1)
     assert inside.any() and (contacts[inside] == 12).all() and contacts.max() == 12
     assert distance == pytest.approx(rest, rel=1e-12, abs=0.0)
     layer = hexagonal(5, 5, 1, radius=R, material=M)
-    assert np.bincount(touching(layer)[0].ravel()).max() == 6
+    assert np.bincount(pairs_in_contact(layer)[0].ravel()).max() == 6
 
 
 def test_a_chain_of_unequal_grains():
     """N − 1 contacts in equilibrium, straight."""
     body = chain(40, seed=3, **MIXED)
-    pairs, distance, rest = touching(body)
+    pairs, distance, rest = pairs_in_contact(body)
     assert (np.diff(pairs, axis=1) == 1).all() and len(pairs) == 39
     assert distance == pytest.approx(rest, rel=1e-12, abs=0.0)
 
@@ -270,7 +270,7 @@ def test_bodies_round_trip_through_files(tmp_path, ending):
     assert again.radius == pytest.approx(body.radius, rel=1e-15, abs=0.0)
     assert again.moment == pytest.approx(body.moment, rel=1e-15, abs=0.0)
     assert [again.materials[k] for k in again.material] == [body.materials[k] for k in body.material]
-    _, distance, rest = touching(again)
+    _, distance, rest = pairs_in_contact(again)
     assert len(rest) == 59 and np.abs(distance / rest - 1.0).max() < 1e-13
     with pytest.raises(sand.BadInput, match="exists; give another name"):
         write_body(path, body)
@@ -383,13 +383,13 @@ def test_the_command(tmp_path, capsys, monkeypatch, kind):
     """`sand build KIND` writes a body and reports its properties; the dimension of a chain is 1."""
     monkeypatch.chdir(tmp_path)
     assert main(["build", kind, "--grains", "64", "--out", "a.xyz", "--seed", "2", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["grains"] == 64 and told["file"] == "a.xyz"
+    output = json.loads(capsys.readouterr().out)
+    assert output["grains"] == 64 and output["file"] == "a.xyz"
     body = body_from_file("a.xyz")
-    assert told["radius_of_gyration"] == pytest.approx(size_of(body))
-    assert told["contacts"] == len(touching(body)[0])
+    assert output["radius_of_gyration"] == pytest.approx(size_of(body))
+    assert output["contacts"] == len(pairs_in_contact(body)[0])
     if kind == "chain":
-        assert told["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)
+        assert output["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)
     assert main(["build", kind, "--grains", "64", "--out", "a.xyz"]) == 2
     assert "exists" in capsys.readouterr().err
 
@@ -439,8 +439,8 @@ def test_built_bodies_in_collide_and_run(tmp_path, capsys, monkeypatch):
         text = f'[run]\nsteps = 3\n[grains]\nkind = "file"\nfile = "{file}"\n[forces.contact]\n'
         (tmp_path / f"{name}.toml").write_text(text)
         assert main(["run", f"{name}.toml", "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert told["grains"] == 12
+        output = json.loads(capsys.readouterr().out)
+        assert output["grains"] == 12
 
 
 @pytest.mark.validate

@@ -28,13 +28,13 @@ def home(tmp_path, monkeypatch):
     os.umask(before)
 
 
-def chosen(*said):
+def chosen(*expected):
     """The folder, which must exist and be safe, chosen with one warning that contains all these words."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         folder = cache.private_folder("digest")
-    assert len(caught) == (1 if said else 0), [str(w.message) for w in caught]
-    for words in said:
+    assert len(caught) == (1 if expected else 0), [str(w.message) for w in caught]
+    for words in expected:
         assert words in str(caught[0].message) and "\n" not in str(caught[0].message)
     assert folder.name == "digest" and cache.unsafe(folder) is None
     return folder

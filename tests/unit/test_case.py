@@ -35,8 +35,8 @@ temperature = "300 K"
 def changed(**changes):
     """The valid case with changes: `grains__radius="1 K"`; None removes."""
     content = copy.deepcopy(GOOD)
-    for place, value in changes.items():
-        *sections, key = place.split("__")
+    for key_path, value in changes.items():
+        *sections, key = key_path.split("__")
         section = content
         for name in sections:
             section = section.setdefault(name, {})
@@ -140,9 +140,9 @@ def test_several_mistakes_are_reported_together(tmp_path):
     problems = caught.value.problems
     assert len(problems) == 8
     assert all(line.startswith(f"{path}: ") and "\n" not in line for line in problems)
-    places = ["run.until", "box.periodic", "grains.radius", "grains.temprature", "grains.material", "dipoles.cutof"]
-    for place in [*places, "step = '3 m'", "accuracy = -1"]:
-        assert sum(place in line for line in problems) == 1, place
+    key_paths = ["run.until", "box.periodic", "grains.radius", "grains.temprature", "grains.material", "dipoles.cutof"]
+    for key_path in [*key_paths, "step = '3 m'", "accuracy = -1"]:
+        assert sum(key_path in line for line in problems) == 1, key_path
 
 
 @pytest.mark.parametrize(
@@ -252,6 +252,6 @@ def test_an_empty_name_of_a_material_is_refused():
 
 def test_an_index_of_a_list_is_named():
     """Errors in entry 0 of a list are named like those of other entries."""
-    for seeds, place in (([-1, 2], "grow.seeds.0"), ([2, -1], "grow.seeds.1")):
-        with pytest.raises(sand.BadInput, match=place):
+    for seeds, key_path in (([-1, 2], "grow.seeds.0"), ([2, -1], "grow.seeds.1")):
+        with pytest.raises(sand.BadInput, match=key_path):
             validate(GrowSection, {"seeds": seeds}, "c", table="grow")

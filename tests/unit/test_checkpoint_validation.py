@@ -26,10 +26,10 @@ def error_of(folder, arrays, meta=META):
     path = write_checkpoint(folder, arrays, dict(meta))
     with pytest.raises(sand.BadInput) as error:
         newest_checkpoint(folder)
-    said, last = error.value.problems
-    assert said.startswith(f"{path} cannot be resumed: ") and "no checkpoint to continue from" in last
+    message, last = error.value.problems
+    assert message.startswith(f"{path} cannot be resumed: ") and "no checkpoint to continue from" in last
     assert path.exists()
-    return said
+    return message
 
 
 def test_the_reference_state_is_valid():
@@ -64,13 +64,13 @@ def test_wrong_types_shapes_and_values(tmp_path, name):
     if name in ("contacts/every_step", "pair_list/in_contact"):
         changed["neither"] = np.full_like(good, 2)
     for what, array in changed.items():
-        said = error_of(tmp_path, {**WITH_ORDER, name: array})
+        message = error_of(tmp_path, {**WITH_ORDER, name: array})
         sizing = what == "shape" and name in (
             "grains/radius",
             "contacts/pair",
             "pair_list/pair",
         )  # then other arrays are inconsistent
-        assert sizing or f"'{name}'" in said, (what, said)
+        assert sizing or f"'{name}'" in message, (what, message)
     if STORED[name].required:
         without = {other: array for other, array in WITH_ORDER.items() if other != name}
         assert re.search(f"there is no array '{name}'", error_of(tmp_path, without))
@@ -129,9 +129,9 @@ def test_commands_refuse_invalid_checkpoints(tmp_path, capsys):
         shutil.copytree(REFERENCE / f"run-v{VERSION}", folder)
         path = write_checkpoint(folder, arrays, dict(META))
         assert main(["resume", str(folder)]) == 2
-        said = capsys.readouterr().err.strip().splitlines()
-        assert str(folder) in said[0] and not [line for line in said if "internal" in line]
+        message = capsys.readouterr().err.strip().splitlines()
+        assert str(folder) in message[0] and not [line for line in message if "internal" in line]
         if arrays["grains/material"][0] == 0:
-            assert f"names grain {FAR}, but the grains are 0 to 3" in said[0]
+            assert f"names grain {FAR}, but the grains are 0 to 3" in message[0]
             assert main(["info", str(path)]) == 2
         shutil.rmtree(folder)

@@ -40,7 +40,7 @@ SAND = [sys.executable, "-m", "sand.cli.main"]
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def workdir(tmp_path, monkeypatch):
     """An empty working folder with a case file."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(CASE)
@@ -48,11 +48,11 @@ def place(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def done(place, capsys):
+def done(workdir, capsys):
     """The folder after `sand run small.toml`."""
     assert main(["run", "small.toml", "--quiet"]) == 0
     capsys.readouterr()
-    return place / "small"
+    return workdir / "small"
 
 
 def heavy_modules(*words):
@@ -80,7 +80,7 @@ def test_info_of_a_run_needs_no_compiler(done):
 
 
 @pytest.mark.compiled("dipoles")
-def test_output_of_run(place, capsys):
+def test_output_of_run(workdir, capsys):
     """Grains, box and cut-off with its reason at the start; outcome and files, the figure included, at the end."""
     assert main(["run", "small.toml"]) == 0
     out, err = capsys.readouterr()
@@ -90,28 +90,28 @@ def test_output_of_run(place, capsys):
         assert part in out
     assert "sand: note: contacts of iron" in err
     assert "%|" not in err  # no progress bar where there is no terminal
-    assert {p.name for p in (place / "small").iterdir()} >= {"case.toml", "summary.json", "figure.png"}
+    assert {p.name for p in (workdir / "small").iterdir()} >= {"case.toml", "summary.json", "figure.png"}
 
 
-def test_run_prints_settings_that_differ_from_defaults(place, capsys):
+def test_run_prints_settings_that_differ_from_defaults(workdir, capsys):
     """For each force its name and the user's settings."""
-    (place / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nslip = "reset"'))
-    (place / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
+    (workdir / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nslip = "reset"'))
+    (workdir / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
     assert main(["info", "small.toml"]) == 0
     assert "contact (slip = reset), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
 
 
 @pytest.mark.compiled("dipoles")
-def test_run_as_json_prints_the_summary_alone(place, capsys):
+def test_run_as_json_prints_the_summary_alone(workdir, capsys):
     """--json: one object, the content of summary.json and the folder."""
     assert main(["run", "small.toml", "--json", "--out", "there"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == {**json.loads((place / "there" / "summary.json").read_text()), "folder": "there"}
+    assert printed == {**json.loads((workdir / "there" / "summary.json").read_text()), "folder": "there"}
     assert printed["outcome"] == "finished"
 
 
 @pytest.mark.compiled("dipoles")
-def test_quiet_run_prints_nothing_to_stdout(place, capsys):
+def test_quiet_run_prints_nothing_to_stdout(workdir, capsys):
     """--quiet leaves notes on stderr, nothing else."""
     assert main(["run", "small.toml", "--quiet"]) == 0
     out, err = capsys.readouterr()
@@ -120,7 +120,7 @@ def test_quiet_run_prints_nothing_to_stdout(place, capsys):
 
 
 @pytest.mark.compiled("dipoles")
-def test_options_override_the_case(place, capsys):
+def test_options_override_the_case(workdir, capsys):
     """--until takes text with a unit or SI seconds, as in a case; --seed and --out override the case."""
     assert main(["run", "small.toml", "--until", "6 ns", "--seed", "7", "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
@@ -128,14 +128,14 @@ def test_options_override_the_case(place, capsys):
     second = json.loads(capsys.readouterr().out)
     assert first["time"] == second["time"] == pytest.approx(6e-9, rel=1e-2, abs=0.0)
     assert first["seed"] == 7
-    case = read_case(place / "again" / "case.toml")
+    case = read_case(workdir / "again" / "case.toml")
     assert (case.run.until, case.run.seed) == (6e-9, 7)
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_case_may_end_at_a_number_of_steps(place, capsys):
+def test_a_case_may_end_at_a_number_of_steps(workdir, capsys):
     """[run] steps: the run takes that many; `sand resume` then has nothing to do."""
-    (place / "small.toml").write_text(CASE.replace('until = "20 ns"', "steps = 500"))
+    (workdir / "small.toml").write_text(CASE.replace('until = "20 ns"', "steps = 500"))
     assert main(["run", "small.toml"]) == 0
     assert "to step 500" in capsys.readouterr().out
     assert main(["resume", "small"]) == 0
@@ -171,10 +171,10 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
         (["--json"], "No such option"),
     ],
 )
-def test_wrong_input_gives_lines_and_exit_code_2(place, capsys, words, part):
+def test_wrong_input_gives_lines_and_exit_code_2(workdir, capsys, words, part):
     """One line on stderr names the error; with --json on stdout as well; no traceback."""
-    (place / "picture.png").write_bytes(b"\x89PNG")
-    before = sorted(place.rglob("*"))
+    (workdir / "picture.png").write_bytes(b"\x89PNG")
+    before = sorted(workdir.rglob("*"))
     assert main(words) == 2
     out, err = capsys.readouterr()
     assert part in err
@@ -187,26 +187,26 @@ def test_wrong_input_gives_lines_and_exit_code_2(place, capsys, words, part):
     message = json.loads(out)
     assert message["exit_code"] == 2
     assert [f"sand: {line}" for line in message["error"]] == err.splitlines()
-    assert sorted(place.rglob("*")) == before
+    assert sorted(workdir.rglob("*")) == before
 
 
-def test_every_mistake_of_a_case_is_a_line(place, capsys):
+def test_every_mistake_of_a_case_is_a_line(workdir, capsys):
     """Two errors, two lines, each with the name of the file; no folder is created."""
-    (place / "small.toml").write_text(CASE.replace("10 nm", "10 ns").replace("seed", "sead"))
+    (workdir / "small.toml").write_text(CASE.replace("10 nm", "10 ns").replace("seed", "sead"))
     assert main(["run", "small.toml"]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
     assert all(line.startswith("sand: small.toml: ") for line in lines)
-    assert not (place / "small").exists()
+    assert not (workdir / "small").exists()
 
 
-def test_errors_of_combined_settings_name_the_file(place, capsys):
+def test_errors_of_combined_settings_name_the_file(workdir, capsys):
     """A box too small for its grains is found when grains are placed; the line names the case."""
-    (place / "small.toml").write_text(CASE.replace("400 nm", "30 nm"))
+    (workdir / "small.toml").write_text(CASE.replace("400 nm", "30 nm"))
     for command in ("run", "info"):
         assert main([command, "small.toml"]) == 2
         assert capsys.readouterr().err.startswith("sand: small.toml: a box of 30 nm is too small")
-    assert not (place / "small").exists()
+    assert not (workdir / "small").exists()
 
 
 @pytest.mark.compiled("dipoles")
@@ -240,15 +240,15 @@ def test_overwrite_never_replaces_the_case_it_reads(done, capsys):
 
 @pytest.mark.skipif(IS_ROOT, reason="root may write everywhere")
 @keeps_modes
-def test_a_folder_without_permission(place, capsys):
+def test_a_folder_without_permission(workdir, capsys):
     """One line before anything is computed."""
-    (place / "locked").mkdir(mode=0o500)
+    (workdir / "locked").mkdir(mode=0o500)
     assert main(["run", "small.toml", "--out", "locked/run"]) == 2
     assert "no permission in" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_full_disk_gives_one_line(place, capsys, monkeypatch):
+def test_a_full_disk_gives_one_line(workdir, capsys, monkeypatch):
     """Files that cannot be written: exit code 2, one line, no traceback."""
 
     def full(*_):
@@ -262,7 +262,7 @@ def test_a_full_disk_gives_one_line(place, capsys, monkeypatch):
 # --- internal errors and interruptions --------------------------------------------------------------------
 
 
-def test_an_internal_error_is_one_line_unless_debug(place, capsys, monkeypatch):
+def test_an_internal_error_is_one_line_unless_debug(workdir, capsys, monkeypatch):
     """Exit code 1 and how to see more; --debug, before or after the command, shows the traceback."""
 
     def broken(_path):
@@ -278,7 +278,7 @@ def test_an_internal_error_is_one_line_unless_debug(place, capsys, monkeypatch):
             main(words)
 
 
-def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
+def test_interrupted_before_anything_ran(workdir, capsys, monkeypatch):
     """Ctrl-C while the case is read: 130, one line."""
 
     def slow(_path):
@@ -291,7 +291,7 @@ def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
 
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
+def test_interrupted_before_the_first_step(workdir, capsys, monkeypatch, number):
     """Ctrl-C or SIGTERM during compilation: 130, and the same command works afterwards."""
 
     def slow(_self, _until=None, **_):
@@ -306,7 +306,7 @@ def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
 
 
 @pytest.mark.compiled("dipoles")
-def test_an_interrupt_swallowed_by_the_compiler_ends_the_run(place, capsys, monkeypatch):
+def test_an_interrupt_swallowed_by_the_compiler_ends_the_run(workdir, capsys, monkeypatch):
     """Ctrl-C in a callback of the compiler: the exception is lost there; the run ends all the same."""
     real = Simulation.run
 
@@ -319,10 +319,10 @@ def test_an_interrupt_swallowed_by_the_compiler_ends_the_run(place, capsys, monk
     monkeypatch.setattr(Simulation, "run", swallow)
     assert main(["run", "small.toml", "--quiet"]) == 130
     assert "interrupted before the first step" in capsys.readouterr().err
-    assert not list((place / "small").glob("checkpoint-*"))
+    assert not list((workdir / "small").glob("checkpoint-*"))
 
 
-def test_a_closed_pipe_is_no_error(place):
+def test_a_closed_pipe_is_no_error(workdir):
     """`sand info … | head -0`: nothing on stderr."""
     with subprocess.Popen([*SAND, "cite"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as started:
         started.stdout.close()
@@ -331,15 +331,15 @@ def test_a_closed_pipe_is_no_error(place):
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_run_stopped_by_an_outcome(place, capsys):
+def test_a_run_stopped_by_an_outcome(workdir, capsys):
     """A fixed step that is too long: exit code 3, one sentence, the grains, a readable checkpoint."""
-    (place / "small.toml").write_text(CASE + '[stepping]\nstep = "10 ns"\n')
+    (workdir / "small.toml").write_text(CASE + '[stepping]\nstep = "10 ns"\n')
     assert main(["run", "small.toml"]) == 3
     err = capsys.readouterr().err
     assert "stopped by physics at t = " in err
     assert "step is too long (grains " in err
     path = err.strip().rsplit(" ", 1)[1]
-    assert read_checkpoint(place / path)[1]["until"] == 2e-8
+    assert read_checkpoint(workdir / path)[1]["until"] == 2e-8
     assert main(["run", "small.toml", "--json", "--overwrite"]) == 3
     summary = json.loads(capsys.readouterr().out)
     assert summary["outcome"] == "too_fast"
@@ -359,13 +359,13 @@ def same_state(one, other):
 @stops_others
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.validate)])
-def test_interrupted_and_resumed_run_is_bit_for_bit(place, capsys, number):
+def test_interrupted_and_resumed_run_is_bit_for_bit(workdir, capsys, number):
     """Exit code 130 with time and advice; `sand resume` gives the bits of an uninterrupted run."""
     words = [*SAND, "run", "small.toml", "--until", "1 s"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(words, **pipes) as started:
         for _ in range(1200):
-            if started.poll() is not None or list((place / "small").glob("checkpoint-*.npz")):
+            if started.poll() is not None or list((workdir / "small").glob("checkpoint-*.npz")):
                 break
             time.sleep(0.05)
         time.sleep(0.3)
@@ -378,7 +378,7 @@ def test_interrupted_and_resumed_run_is_bit_for_bit(place, capsys, number):
     last = err.splitlines()[-1]
     assert last.startswith("sand: interrupted at t = ")
     assert last.endswith("resume with: sand resume small")
-    meta = newest_checkpoint(place / "small")[1]
+    meta = newest_checkpoint(workdir / "small")[1]
     assert meta["steps"] > 0
     assert main(["info", "small"]) == 0
     assert "sand resume small" in capsys.readouterr().out
@@ -386,7 +386,7 @@ def test_interrupted_and_resumed_run_is_bit_for_bit(place, capsys, number):
     assert main(["resume", "small", "--until", end, "--quiet"]) == 0
     assert "instead of 1 s" in capsys.readouterr().err
     assert main(["run", "small.toml", "--until", end, "--out", "whole", "--quiet"]) == 0
-    assert same_state(place / "small", place / "whole")
+    assert same_state(workdir / "small", workdir / "whole")
 
 
 # --- resume and info -------------------------------------------------------------------------------------
@@ -453,10 +453,10 @@ def test_info_of_a_run_that_was_killed(done, capsys):
 
 @pytest.mark.parametrize("name", ["summary.json", "ledger.csv", "trajectory.gsd", "checkpoint-000000000000000.npz"])
 @pytest.mark.parametrize("content", [b"", b"{", b"{}", b"a,b\n1,2\n", b"\xff\x00"])
-def test_info_of_broken_files(place, capsys, name, content):
+def test_info_of_broken_files(workdir, capsys, name, content):
     """A file with other content than its name says: one line with its name, exit code 2; the same for its folder."""
-    (place / "case.toml").write_text(CASE)
-    (place / name).write_bytes(content)
+    (workdir / "case.toml").write_text(CASE)
+    (workdir / name).write_bytes(content)
     assert main(["info", name]) == 2
     err = capsys.readouterr().err
     assert name in err
@@ -486,7 +486,7 @@ class Terminal(io.StringIO):
 
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("by", ["until", "steps"])
-def test_progress_shows_time_and_numbers(place, monkeypatch, by):
+def test_progress_shows_time_and_numbers(workdir, monkeypatch, by):
     """Physical time, rate, clusters, S and drift, for an end time or a number of steps."""
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     simulation = simulation_of(read_case("small.toml"), None)

@@ -200,7 +200,7 @@ def test_a_damaged_checkpoint_is_reported_and_kept(run, capsys):
 def test_every_entry_of_a_damaged_index(tmp_path):
     """Of 40 frames, 30 are before the checkpoint: if one of these is lost it is reported and the file kept."""
     good = write_trajectory(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)
-    place, entries = read_index(good)
+    offset, entries = read_index(good)
     written, rng = [10 * k for k in range(41)], random.Random(5)
     message = 0
     for number in sorted(rng.sample(range(len(entries)), 40)):
@@ -210,7 +210,7 @@ def test_every_entry_of_a_damaged_index(tmp_path):
             bad = entries.copy()
             bad[number][field] = value
             content = bytearray(good.read_bytes())
-            content[place : place + len(entries) * ENTRY.itemsize] = bad.tobytes()
+            content[offset : offset + len(entries) * ENTRY.itemsize] = bad.tobytes()
             path.write_bytes(content)
             with pytest.raises(sand.BadInput):
                 Frames(path)
@@ -239,9 +239,9 @@ def test_every_entry_of_a_damaged_index(tmp_path):
 def test_a_trajectory_whose_index_is_empty(tmp_path):
     """A file with data but no index entry: an error; repaired and kept."""
     path = write_trajectory(tmp_path / "trajectory.gsd", [[(0, 1)]] * 5, 3)
-    place, entries = read_index(path)
+    offset, entries = read_index(path)
     with open(path, "r+b") as file:
-        file.seek(place)
+        file.seek(offset)
         file.write(bytes(len(entries) * ENTRY.itemsize))
     for read in (read_frames, LiveTrajectory, Frames):
         with pytest.raises(sand.BadInput, match="holds data but no frame"):

@@ -153,13 +153,13 @@ def test_a_run_that_ends_between_two_refreshes(tmp_path):
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     append(writer, [[]], 4)
     dataset = run_dataset(tmp_path)
-    look = dataset.frames.refresh
+    reader = dataset.frames.refresh
 
     def late():
-        found = look()
+        found = reader()
         append(writer, [[], []], 4, first=1)
         (tmp_path / "summary.json").write_text('{"steps": 20, "outcome_text": "done"}')
-        dataset.frames.refresh = look
+        dataset.frames.refresh = reader
         return found
 
     dataset.frames.refresh = late

@@ -38,10 +38,10 @@ def test_interpolation_of_quintic_motion_is_exact(box, seed):
     grains, stages, apart = quintic_motion(np.random.default_rng(seed), box)
     points = separation_curve(grains, stages, box.span, 0, 1, STEP)
     for part in np.linspace(0.0, 1.0, 11):
-        place, slope = curve_at(points, part)
+        separation, slope = curve_at(points, part)
         h = 1e-3
         nearby = [apart((part + k * h) * STEP) for k in (-2, -1, 1, 2)]
-        assert place == pytest.approx(apart(part * STEP), abs=1e-13)
+        assert separation == pytest.approx(apart(part * STEP), abs=1e-13)
         # fourth-order differences have an error of h⁴/30 of the fifth derivative, about 1e-9
         assert slope == pytest.approx((nearby[0] - 8 * nearby[1] + 8 * nearby[2] - nearby[3]) / (12 * h), abs=1e-8)
 

@@ -44,17 +44,17 @@ def b_at(field, time):
 # --- formulas ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize("force", [sand.Gravity([1.5, -2.0, 3.0]), sand.ElectricField([1.5, -2.0, 3.0])])
 @given(vector)
-def test_force_is_minus_the_gradient_of_the_energy(force, place):
+def test_force_is_minus_the_gradient_of_the_energy(force, position):
     """F = −∂U/∂x; U is linear, so central differences err by rounding only, ε |F| (|x| + h)/h with h = 1/2."""
     h, mass, charge = 0.5, 3.0, -7.0
 
     def loads(x):
         return force.formula(0.0, grain_state(x, mass=mass, charge=charge), force.numbers())
 
-    slope = [(loads(place + h * e)[2] - loads(place - h * e)[2]) / (2 * h) for e in np.eye(3)]
-    found, torque, _ = loads(place)
+    slope = [(loads(position + h * e)[2] - loads(position - h * e)[2]) / (2 * h) for e in np.eye(3)]
+    found, torque, _ = loads(position)
     size = np.linalg.norm(found)
-    assert found == pytest.approx([-s for s in slope], abs=8 * EPS * size * (np.linalg.norm(place) + h) / h)
+    assert found == pytest.approx([-s for s in slope], abs=8 * EPS * size * (np.linalg.norm(position) + h) / h)
     assert torque == (0.0, 0.0, 0.0)
 
 

@@ -25,7 +25,7 @@ radius = "10 nm"
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def workdir(tmp_path, monkeypatch):
     """An empty folder to work in, with a case file."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(CASE)
@@ -66,12 +66,12 @@ def refused(words, capsys):
         ('"10 nm"', '"1 Ym^9 Ym^9 Ym^9 m^-9 m^-9 m^-8"', "is not"),
     ],
 )
-def test_extreme_entries_of_a_case(place, capsys, old, new, part):
+def test_extreme_entries_of_a_case(workdir, capsys, old, new, part):
     """One line, and no file is written."""
     assert old in CASE
-    (place / "small.toml").write_text(CASE.replace(old, new))
+    (workdir / "small.toml").write_text(CASE.replace(old, new))
     assert part in refused(["run", "small.toml"], capsys)
-    assert sorted(p.name for p in place.iterdir()) == ["small.toml"]
+    assert sorted(p.name for p in workdir.iterdir()) == ["small.toml"]
 
 
 @pytest.mark.parametrize(
@@ -126,10 +126,10 @@ def test_extreme_entries_of_a_case(place, capsys, old, new, part):
         (["build", "pca", "--grains", "8", "--out", "a.xyz", "--material", "silica:nan,iron:1"], "nan"),
     ],
 )
-def test_extreme_options(place, capsys, words, part):
+def test_extreme_options(workdir, capsys, words, part):
     """Empty names, and numbers that are malformed, too large or too small."""
     assert part in refused(words, capsys)
-    assert sorted(p.name for p in place.iterdir()) == ["small.toml"]
+    assert sorted(p.name for p in workdir.iterdir()) == ["small.toml"]
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="a system without /dev/zero")
@@ -140,44 +140,44 @@ def test_extreme_options(place, capsys, words, part):
         *[(name, ["info"]) for name in ("summary.json", "ledger.csv", "trajectory.gsd", "checkpoint-1.npz")],
     ],
 )
-def test_device_files_are_refused(place, capsys, name, words):
+def test_device_files_are_refused(workdir, capsys, name, words):
     """A device in place of a file is refused before it fills the memory."""
-    (place / name).symlink_to("/dev/zero")
+    (workdir / name).symlink_to("/dev/zero")
     refused([*words, name], capsys)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes that have names")
-def test_a_case_may_come_through_a_pipe(place):
+def test_a_case_may_come_through_a_pipe(workdir):
     """`sand info /dev/stdin` has no file name ending; a pipe named .toml is read to its end."""
-    os.mkfifo(place / "piped.toml")
+    os.mkfifo(workdir / "piped.toml")
     with subprocess.Popen([sys.executable, "-c", "open('piped.toml', 'w').write(open('small.toml').read())"]):
         assert read_case("piped.toml").grains.number == 8
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
-def test_files_with_a_byte_order_mark(place, encoding):
+def test_files_with_a_byte_order_mark(workdir, encoding):
     """As Windows editors write them."""
-    (place / "small.toml").write_bytes(CASE.replace("\n", "\r\n").encode(encoding))
+    (workdir / "small.toml").write_bytes(CASE.replace("\n", "\r\n").encode(encoding))
     assert read_case("small.toml").grains.number == 8
 
 
-def test_utf_16_is_refused(place):
+def test_utf_16_is_refused(workdir):
     """One line with what to do."""
-    (place / "small.toml").write_bytes(CASE.encode("utf-16"))
+    (workdir / "small.toml").write_bytes(CASE.encode("utf-16"))
     with pytest.raises(BadInput, match="UTF-16; save it as UTF-8") as caught:
         read_toml("small.toml")
     assert len(caught.value.problems) == 1
 
 
 @pytest.mark.parametrize("content", ["[" * 100_000, '{"a": ' + "9" * 5000 + "}", "[1]", "\ufeff{"])
-def test_malformed_json(place, content):
+def test_malformed_json(workdir, content):
     """Deeply nested lists and endless numbers."""
-    (place / "summary.json").write_text(content, encoding="utf-8")
+    (workdir / "summary.json").write_text(content, encoding="utf-8")
     with pytest.raises(BadInput):
-        read_json(place / "summary.json")
+        read_json(workdir / "summary.json")
     with pytest.raises(BadInput, match="there is no file"):
-        read_json(place / "nothing.json")
-    assert read_text(place / "summary.json") == content.removeprefix("\ufeff")
+        read_json(workdir / "nothing.json")
+    assert read_text(workdir / "summary.json") == content.removeprefix("\ufeff")
 
 
 @pytest.mark.parametrize(("text", "unit"), [("10 degC", "K"), ("10 °C", "K"), ("1 dB", "1"), ("10 degF", "K")])

@@ -111,13 +111,13 @@ def test_clusters_drawn_are_the_ledgers(run_with_clusters, figure):
 @pytest.mark.slow
 def test_energies_drawn_are_the_ledgers(run_with_clusters, figure):
     """Kinetic, contact, magnetic and outside energies are sums of columns over N k_B T of the start."""
-    unit, books = 4 * BOLTZMANN * 100.0, run_with_clusters.ledger
+    unit, ledger = 4 * BOLTZMANN * 100.0, run_with_clusters.ledger
     drawn = lines(figure.axes[1])
     expected = {
-        "kinetic": books["translation"] + books["rotation"],
-        "contacts (elastic, adhesion)": books["normal"] + books["sliding"],
-        "magnetic": books["magnetic"],
-        "field": books["field"],
+        "kinetic": ledger["translation"] + ledger["rotation"],
+        "contacts (elastic, adhesion)": ledger["normal"] + ledger["sliding"],
+        "magnetic": ledger["magnetic"],
+        "field": ledger["field"],
     }
     assert set(drawn) == set(expected)
     for label, energy in expected.items():
@@ -363,14 +363,14 @@ def test_nothing_global_changes(run_with_clusters):
     """Neither matplotlib's settings nor its list of open figures change."""
     from matplotlib import pyplot
 
-    before, opened = dict(matplotlib.rcParams), pyplot.get_fignums()
+    before, open_figures = dict(matplotlib.rcParams), pyplot.get_fignums()
     with matplotlib.rc_context({"font.size": 31.0, "axes.grid": True}):
         figure = run_figure(run_with_clusters)
         figure_bytes(figure)
         assert matplotlib.rcParams["font.size"] == 31.0
     assert figure.texts[0].get_size() < 31.0
     assert dict(matplotlib.rcParams) == before
-    assert pyplot.get_fignums() == opened
+    assert pyplot.get_fignums() == open_figures
     assert show(figure) is figure
 
 

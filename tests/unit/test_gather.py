@@ -130,10 +130,10 @@ def test_drift_with_and_without_moments():
 def lattice_with_one_moving_grain(moved=5):
     """A lattice of more grains than one block, in which only one grain and its neighbours move."""
     side = round(GRAINS ** (1 / 3)) + 1
-    place = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
+    positions = 1.9995e-7 * np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:GRAINS]
     speed = np.zeros((GRAINS, 3))
     speed[moved] = 0.1
-    return sand.Grains(place * (1.0, 1.0, 1.2), 1e-7, sand.SILICA, velocity=speed)
+    return sand.Grains(positions * (1.0, 1.0, 1.2), 1e-7, sand.SILICA, velocity=speed)
 
 
 @pytest.mark.validate
@@ -142,10 +142,10 @@ def test_largest_speeds_over_all_blocks(moved):
     """The step is limited by the largest squares of speed and spin among all grains."""
     sim = sand.Simulation(lattice_with_one_moving_grain(moved), [sand.Contact()])
     sim.run(steps=3)
-    watch, v, w = sim.state.pair_list.skin, sim.grains.velocity, sim.grains.spin
+    monitor, v, w = sim.state.pair_list.skin, sim.grains.velocity, sim.grains.spin
     assert GRAINS > GRAINS_PER_BLOCK and (v**2).sum(axis=1).argmax() == moved
-    assert watch[SQUARED_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
-    assert watch[SQUARED_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and watch[SQUARED_SPIN] > 0.0
+    assert monitor[SQUARED_SPEED] == pytest.approx((v**2).sum(axis=1).max(), rel=1e-14)
+    assert monitor[SQUARED_SPIN] == pytest.approx((w**2).sum(axis=1).max(), rel=1e-14) and monitor[SQUARED_SPIN] > 0.0
 
 
 @pytest.mark.validate

@@ -15,10 +15,10 @@ COUNT = 1500
 HEAT = BOLTZMANN * 100.0
 
 
-def sampled(flying, pose, low=0.0, high=1e-12):
+def sampled(pair, pose, low=0.0, high=1e-12):
     """Impact parameters (K,) and states (K, size) of many sampled starts."""
-    model, rules = flying.pair()
-    start, states, b = flying.start(), np.zeros((COUNT, model.size)), np.zeros(COUNT)
+    model, rules = pair.pair()
+    start, states, b = pair.start(), np.zeros((COUNT, model.size)), np.zeros(COUNT)
     for k in range(COUNT):
         address = (np.uint64(5), np.uint64(2), np.uint64(k))
         b[k] = draw_path(states[k], address, low, high, start)
@@ -30,8 +30,8 @@ def sampled(flying, pose, low=0.0, high=1e-12):
 def test_spheres(spin, part):
     """⟨½Iω²⟩ = kT/2 or 3kT/2, moments isotropic, b² uniform, all to 4σ; b perpendicular to the velocity."""
     one, two = (sand.Grains([[0, 0, 0]], r, sand.IRON, moment=[[1e-18, 0, 0]]) for r in (1e-8, 2e-8))
-    flying = flight(projectile=one, target=two, temperature="100 K", speed=0.3, spin=spin, start="3 um")
-    b, y = sampled(flying, draw_sphere_pose)
+    pair = flight(projectile=one, target=two, temperature="100 K", speed=0.3, spin=spin, start="3 um")
+    b, y = sampled(pair, draw_sphere_pose)
     for grains, row in ((one, SPIN1), (two, SPIN2)):
         energy = 0.5 * grains.inertia[0] * (y[:, row : row + 3] ** 2).sum(axis=1)
         assert energy.mean() / (part * HEAT) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 3 / COUNT))
@@ -42,16 +42,16 @@ def test_spheres(spin, part):
         assert np.abs((axis**2).mean(axis=0) - 1 / 3).max() < 4 * np.sqrt(4 / 45 / COUNT)
     assert (b**2).mean() / 1e-12 == pytest.approx(0.5, abs=4 / np.sqrt(12 * COUNT))
     assert np.linalg.norm(y[:, R + 1 : R + 3], axis=1) == pytest.approx(b, rel=1e-9, abs=0)
-    assert (y[:, R] == -flying.distance).all()
+    assert (y[:, R] == -pair.distance).all()
     assert (y[:, U] == 0.3).all()
 
 
 def test_aggregates():
     """A chain of three: a third of the rotational energy about each principal axis, to 4σ."""
     chain = sand.setup.aggregates.chain(3, radius="10 nm", material=sand.IRON, moment="1e-18 A m^2")
-    flying = flight(projectile=chain, temperature="100 K", speed=0.3, spin="equipartition", start="3 um")
-    _, y = sampled(flying, draw_rigid_pose)
-    _, rules = flying.pair()
+    pair = flight(projectile=chain, temperature="100 K", speed=0.3, spin="equipartition", start="3 um")
+    _, y = sampled(pair, draw_rigid_pose)
+    _, rules = pair.pair()
     inertia = np.array(rules.first.inertia)
     own = np.array([turned_back(tuple(one[TURN1 : TURN1 + 4]), tuple(one[ANGULAR1 : ANGULAR1 + 3])) for one in y])
     energies = 0.5 * own**2 / inertia

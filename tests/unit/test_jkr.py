@@ -39,10 +39,10 @@ def test_special_points_are_exact():
 def test_energies_of_breaking_and_of_a_cycle():
     """E_break = U(−δc) − U(equilibrium) = 1.542585, E_cycle = −U(0) + U(−δc) = 0.935503 (Fcδc); six decimals."""
     rest = jkr.energy_at(1.0, 1.0, 1.0)
-    touch = jkr.energy_at(jkr.ROOT_AT_TOUCH, 1.0, 1.0)
+    formation = jkr.energy_at(jkr.ROOT_AT_TOUCH, 1.0, 1.0)
     broken = jkr.energy_at(jkr.ROOT_AT_BREAK, 1.0, 1.0)
     assert broken - rest == pytest.approx(E_BREAK, abs=6e-7)
-    assert broken - touch == pytest.approx(E_CYCLE, abs=6e-7)
+    assert broken - formation == pytest.approx(E_CYCLE, abs=6e-7)
 
 
 @pytest.mark.parametrize("function", [jkr.root, jkr.polynomial_root])

@@ -257,7 +257,7 @@ def grow(**changed):
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "expected"),
     [
         (lambda: kinetics.constant("1 m"), "rate"),
         (lambda: kinetics.power(RATE, 0.0, 1, 0), "mass"),
@@ -291,9 +291,9 @@ def grow(**changed):
         (lambda: kernel_table.for_dustpy(np.ones((2, 2)), np.ones((3, 3))), "scale heights"),
     ],
 )
-def test_wrong_arguments_are_refused(call, said):
+def test_wrong_arguments_are_refused(call, expected):
     """One line with the name."""
-    with pytest.raises(sand.BadInput, match=said) as caught:
+    with pytest.raises(sand.BadInput, match=expected) as caught:
         call()
     assert len(caught.value.problems) == 1
 

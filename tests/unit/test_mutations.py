@@ -90,18 +90,18 @@ def test_the_time_and_memory_limits_work():
 
 def mutated(good, rng):
     """The bytes truncated, or with some changed, removed or inserted."""
-    bad, kind, place = bytearray(good), rng.randrange(5), rng.randrange(len(good))
+    bad, kind, offset = bytearray(good), rng.randrange(5), rng.randrange(len(good))
     if kind == 0:
-        del bad[place:]
+        del bad[offset:]
     elif kind == 1:
         for _ in range(rng.randrange(1, 8)):
             bad[rng.randrange(len(bad))] = rng.randrange(256)
     elif kind == 2:
-        bad[place : place + 100] = rng.randbytes(min(100, len(bad) - place))
+        bad[offset : offset + 100] = rng.randbytes(min(100, len(bad) - offset))
     elif kind == 3:
-        del bad[place : place + rng.randrange(1, 100)]
+        del bad[offset : offset + rng.randrange(1, 100)]
     else:
-        bad[place:place] = rng.randbytes(rng.randrange(1, 50))
+        bad[offset:offset] = rng.randbytes(rng.randrange(1, 50))
     return bytes(bad)
 
 

@@ -36,9 +36,9 @@ def rows(position, box, reach):
     while cells.rebuild_verlet_list(far, box.span, reach) == cells.FULL:
         far = far._replace(neighbour=np.zeros(2 * far.neighbour.size, np.uint32))
     found = np.zeros((count, count), int)
-    for place in range(count):
-        neighbours = far.order[far.neighbour[far.start[place] : far.start[place + 1]]]
-        np.add.at(found, (far.order[place], neighbours), 1)
+    for k in range(count):
+        neighbours = far.order[far.neighbour[far.start[k] : far.start[k + 1]]]
+        np.add.at(found, (far.order[k], neighbours), 1)
     return found
 
 
@@ -169,10 +169,10 @@ def fast_gas(box, seed, contacts=False, **neighbours):
 
 def all_pairs_loads(sim):
     """Long-range forces, torques and fields of the same state over all pairs."""
-    world = sim.state.copy()
-    rules, far = sim._engine.parameters, empty_long_range_arrays(len(world.grains), 0)
-    all_pairs(world.grains.arrays, far, rules.span, rules.long_range[0])
-    return far.force, far.torque, world.grains.arrays.field
+    state = sim.state.copy()
+    rules, far = sim._engine.parameters, empty_long_range_arrays(len(state.grains), 0)
+    all_pairs(state.grains.arrays, far, rules.span, rules.long_range[0])
+    return far.force, far.torque, state.grains.arrays.field
 
 
 @pytest.mark.validate
@@ -212,11 +212,11 @@ def all_overlapping_pairs_have_contacts(sim):
     """True if every two grains closer than the sum of their radii share a contact."""
     position, pairs = sim.grains.position, sim.contacts["pair"]
     apart = sim.box.nearest(position[:, None] - position[None])
-    touching = np.sqrt((apart**2).sum(-1)) < 2e-8
-    np.fill_diagonal(touching, False)
-    bound = np.zeros_like(touching)
+    in_contact = np.sqrt((apart**2).sum(-1)) < 2e-8
+    np.fill_diagonal(in_contact, False)
+    bound = np.zeros_like(in_contact)
     bound[pairs[:, 0], pairs[:, 1]] = bound[pairs[:, 1], pairs[:, 0]] = True
-    return (bound | ~touching).all()
+    return (bound | ~in_contact).all()
 
 
 @pytest.mark.validate
@@ -284,8 +284,8 @@ def test_neighbour_search_of_a_resumed_run(tmp_path, search):
     Dozens of contacts form in a step, in the order of the near pairs.
     """
     block = sand.setup.lattice(6, radius="10 nm", material=sand.SILICA)
-    place = 1.1 * block.position + 1e-11 * np.random.default_rng(0).normal(size=block.position.shape)
-    grains = sand.Grains(place, 1e-8, sand.SILICA, velocity=-2e7 * place)
+    k = 1.1 * block.position + 1e-11 * np.random.default_rng(0).normal(size=block.position.shape)
+    grains = sand.Grains(k, 1e-8, sand.SILICA, velocity=-2e7 * k)
     whole, begun = (
         sand.Simulation(grains.copy(), [sand.Contact()], neighbours=SEARCHES[search], out=tmp_path / name)
         for name in ("whole", "begun")
@@ -327,17 +327,17 @@ def test_long_rows_are_rebuilt_with_more_room():
     radius = np.full(31, 1e-8)
     radius[30] = 2e-7
     sim = sand.Simulation(sand.Grains(position, radius, sand.SILICA), [sand.Contact()], neighbours=Neighbours("cells"))
-    world = sim.state
-    world.long_range = world.long_range._replace(neighbour=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
-    assert world.pair_list.pair.shape[1] == 16
+    state = sim.state
+    state.long_range = state.long_range._replace(neighbour=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
+    assert state.pair_list.pair.shape[1] == 16
     sim.run(steps=1)
-    world = sim.state
+    state = sim.state
     assert (
-        world.long_range.source.shape == (1, world.long_range.neighbour.size) and world.long_range.neighbour.size > 29
+        state.long_range.source.shape == (1, state.long_range.neighbour.size) and state.long_range.neighbour.size > 29
     )
-    assert world.count[REBUILT] == 1 and world.count[PAIRS] == 29
-    assert {tuple(sorted(pair)) for pair in world.pair_list.pair[:, :29].T.tolist()} == {(k, k + 1) for k in range(29)}
-    assert np.array_equal(world.pair_list.anchor.T, position)
+    assert state.count[REBUILT] == 1 and state.count[PAIRS] == 29
+    assert {tuple(sorted(pair)) for pair in state.pair_list.pair[:, :29].T.tolist()} == {(k, k + 1) for k in range(29)}
+    assert np.array_equal(state.pair_list.anchor.T, position)
 
 
 @pytest.mark.compiled("contacts")
@@ -381,7 +381,7 @@ def test_vibration_does_not_rebuild_lists():
 
 
 @pytest.mark.parametrize(
-    ("count", "box", "how", "said"),
+    ("count", "box", "how", "expected"),
     [
         (120, "1 um", {}, "cells and a list of pairs closer than 220 nm (cut-off 200 nm, margin 20 nm)"),
         (120, "0.45 um", {}, "all pairs: a fraction 0.49 of the grains is within 220 nm, more than 0.4"),
@@ -390,11 +390,11 @@ def test_vibration_does_not_rebuild_lists():
         (120, "1 um", {"search": "all pairs"}, "all pairs, as requested"),
     ],
 )
-def test_the_log_states_the_search(count, box, how, said):
+def test_the_log_states_the_search(count, box, how, expected):
     """The log gives the choice and its reason."""
     grains = sand.setup.gas(count, box, radius="10 nm", material=sand.IRON, moment="1e-18 A m^2", seed=1)
     sim = sand.Simulation(grains, [sand.Dipoles(cutoff="0.2 um")], box=box, neighbours=Neighbours(**how))
-    assert said in sim.choices["neighbours"]
+    assert expected in sim.choices["neighbours"]
 
 
 @pytest.mark.parametrize("box", ["3 um", (1e-6, None, None), None])
@@ -409,13 +409,13 @@ def test_an_aggregate_within_reach_of_itself_has_no_list(box):
 
 def test_margin_without_long_range_forces():
     """Without a cut-off pairs are near up to r1 + r2 + r_min; a given margin makes a list of that reach."""
-    for margin, said in (
+    for margin, expected in (
         ("auto", "cells, for pairs closer than 30 nm"),
         ("3 nm", "closer than 33 nm (contacts 30 nm,"),
     ):
         grains = sand.setup.gas(120, "1 um", radius="10 nm", material=sand.IRON, seed=1)
         sim = sand.Simulation(grains, [sand.Contact()], box="1 um", neighbours=Neighbours(margin=margin))
-        assert said in sim.choices["neighbours"]
+        assert expected in sim.choices["neighbours"]
 
 
 @pytest.mark.slow

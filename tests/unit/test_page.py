@@ -24,9 +24,9 @@ pytestmark = pytest.mark.usefixtures("bundle")
 def test_a_file_holds_the_run(finished_run, tmp_path):
     """Frames decode to the positions in single precision, others within 2⁻¹¹; manifest and series."""
     dataset = run_dataset(finished_run[0])
-    told = []
-    size = write_page(dataset, tmp_path / "a.html", progress=lambda: told.append(1))
-    assert size == (tmp_path / "a.html").stat().st_size and len(told) == 6
+    calls = []
+    size = write_page(dataset, tmp_path / "a.html", progress=lambda: calls.append(1))
+    assert size == (tmp_path / "a.html").stat().st_size and len(calls) == 6
     manifest, series, packets = blocks(tmp_path / "a.html")
     assert series == json.loads(json.dumps(dataset.series())) and len(packets) == 6
     assert manifest["dimensions"] == [{}] * 6 and not manifest["running"]

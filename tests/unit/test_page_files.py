@@ -20,26 +20,26 @@ def test_missing_bundle_is_one_line_with_the_reason(tmp_path, there):
     """An incomplete bundle counts as missing."""
     for name in there:
         (tmp_path / name).write_text("x")
-    with pytest.raises(BadInput) as told:
+    with pytest.raises(BadInput) as caught:
         page.read_bundle(tmp_path)
-    assert "It was not built when SAND was installed." in str(told.value)
+    assert "It was not built when SAND was installed." in str(caught.value)
     (tmp_path / "missing.txt").write_text("npm failed: no network.\n")
-    with pytest.raises(BadInput) as told:
+    with pytest.raises(BadInput) as caught:
         page.read_bundle(tmp_path)
-    assert len(told.value.problems) == 1 and "\n" not in str(told.value)
-    assert "npm failed: no network." in str(told.value) and "pip" in str(told.value)
+    assert len(caught.value.problems) == 1 and "\n" not in str(caught.value)
+    assert "npm failed: no network." in str(caught.value) and "pip" in str(caught.value)
 
 
 def test_remedy_fits_the_installation(tmp_path, monkeypatch):
     """In a clone the sources can be bundled; elsewhere SAND must be reinstalled."""
-    place = tmp_path / "src" / "sand" / "viewer" / "page"
-    monkeypatch.setattr(page, "PAGE", place)
+    folder = tmp_path / "src" / "sand" / "viewer" / "page"
+    monkeypatch.setattr(page, "PAGE", folder)
     with pytest.raises(BadInput, match="--force-reinstall"):
-        page.read_bundle(place)
+        page.read_bundle(folder)
     (tmp_path / "grainview").mkdir()
     (tmp_path / "grainview" / "package.json").write_text("{}")
     with pytest.raises(BadInput, match="npm run build"):
-        page.read_bundle(place)
+        page.read_bundle(folder)
 
 
 def test_build_hook_and_reader_use_the_same_folder():

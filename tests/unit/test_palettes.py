@@ -38,13 +38,13 @@ def test_diverging_map_is_symmetric_in_lightness():
 
 
 def test_the_page_has_the_pictures_colours():
-    """64 steps from end to end, dark first; a colour per mode, per material, and for contacts within limits."""
-    told = palettes()
-    assert list(told) == ["deep", "cividis", "viridis", "diverging"]
-    assert all(np.shape(steps) == (64, 3) for steps in told.values())
+    """The first map is "deep", 64 steps from end to end; colours of modes, materials, contacts within limits."""
+    colour_maps = palettes()
+    assert list(colour_maps) == ["deep", "cividis", "viridis", "diverging"]
+    assert all(np.shape(steps) == (64, 3) for steps in colour_maps.values())
     for name, way in (("deep", SEQUENTIAL), ("diverging", DIVERGING)):
         ends = np.rint(255 * way(np.array([0.0, 1.0]))[:, :3])
-        assert [told[name][0], told[name][-1]] == ends.tolist()
+        assert [colour_maps[name][0], colour_maps[name][-1]] == ends.tolist()
     named = colours()
     assert list(named) == ["big", "small", "single", "modes", "within", "materials"]
     assert named["modes"] == list(MODE_COLOURS) and len(MODE_COLOURS) == len(MODES) - 1

@@ -70,10 +70,10 @@ print(jit.HAS_NOINLINE, jit.LONG_VECTORS)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("version", "jit", "told"),
+    ("version", "jit", "number"),
     [((0, 99), True, True), ((0, 61), True, True), ((0, 68), True, False), ((0, 99), False, False)],
 )
-def test_untested_numba_warns_once(version, jit, told, tmp_path):
+def test_untested_numba_warns_once(version, jit, number, tmp_path):
     """One line with the consequences and the tested versions; nothing if there are no consequences."""
     env = os.environ | {"SAND_CACHE": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0" if jit else "1"}
     done = subprocess.run(
@@ -81,7 +81,12 @@ def test_untested_numba_warns_once(version, jit, told, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[0] == str(version == (0, 68))
-    said = done.stderr.splitlines()
-    assert len(said) == told
-    for words in [f"numba {version[0]}.{version[1]}.0", "0.62 to 0.68", "three times as long", "one thread"] * told:
-        assert words in said[0]
+    lines = done.stderr.splitlines()
+    assert len(lines) == number
+    for words in [
+        f"numba {version[0]}.{version[1]}.0",
+        "0.62 to 0.68",
+        "three times as long",
+        "one thread",
+    ] * number:
+        assert words in lines[0]

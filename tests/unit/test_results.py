@@ -13,19 +13,19 @@ from sand.cli.main import main
 def test_frames_ledger_case_and_summary(finished_run):
     """Frames by index, ledger columns, contacts with forces, case and summary."""
     folder, sim = finished_run
-    opened = sand.open(folder)
-    assert len(opened.frames) == len(sim.ledger) == 6
-    assert opened.frames[-1].time == sim.time
-    assert [frame.step for frame in opened.frames[1:4]] == [int(s) for s in sim.ledger["step"][1:4]]
-    assert (opened.ledger["total"] == sim.ledger["total"]).all()
-    assert opened.frames.times == pytest.approx(sim.ledger["time"], rel=1e-15, abs=0)
-    contacts = opened.contacts()
+    run = sand.open(folder)
+    assert len(run.frames) == len(sim.ledger) == 6
+    assert run.frames[-1].time == sim.time
+    assert [frame.step for frame in run.frames[1:4]] == [int(s) for s in sim.ledger["step"][1:4]]
+    assert (run.ledger["total"] == sim.ledger["total"]).all()
+    assert run.frames.times == pytest.approx(sim.ledger["time"], rel=1e-15, abs=0)
+    contacts = run.contacts()
     assert (contacts["pair"] == sim.contacts["pair"]).all()
     assert contacts["force"] == pytest.approx(sim.contacts["force"], rel=1e-6, abs=0)
-    assert opened.summary["outcome"] == "finished"
-    assert opened.case["grains"]["number"] == 6
+    assert run.summary["outcome"] == "finished"
+    assert run.case["grains"]["number"] == 6
     with pytest.raises(IndexError, match="from 0 to 5"):
-        opened.frames[6]
+        run.frames[6]
 
 
 @pytest.mark.compiled("fields")
@@ -33,13 +33,13 @@ def test_xarray_and_pandas_tables(finished_run):
     """xarray: dimensions, coordinates, units; pandas: the ledger."""
     pytest.importorskip("xarray", reason="xarray is in the test extra")
     folder, sim = finished_run
-    opened = sand.open(folder)
-    data = opened.to_xarray()
+    run = sand.open(folder)
+    data = run.to_xarray()
     assert dict(data.sizes) == {"frame": 6, "grain": 6, "axis": 3}
     assert data.position.attrs["units"] == "m"
     assert data.position.values[-1] == pytest.approx(sim.grains.position, abs=1e-6 * 1e-8 * 20)
     assert len(set(data.cluster.values[-1].tolist())) == 2
-    assert list(opened.to_pandas()["total"]) == list(sim.ledger["total"])
+    assert list(run.to_pandas()["total"]) == list(sim.ledger["total"])
 
 
 @pytest.mark.compiled("fields")
@@ -86,9 +86,9 @@ def test_folders_without_a_run(tmp_path):
 @pytest.mark.compiled("fields")
 def test_picture_of_a_frame(run_in_field):
     """`sand.open(DIR).picture()` is the still of a frame, with the field of the case."""
-    opened = sand.open(run_in_field)
-    np.testing.assert_allclose(opened.flux_density(0.0), [0.0, 0.0, 1e-3])
-    picture = opened.picture(0, colour="field_alignment", size=(300, 200))
+    run = sand.open(run_in_field)
+    np.testing.assert_allclose(run.flux_density(0.0), [0.0, 0.0, 1e-3])
+    picture = run.picture(0, colour="field_alignment", size=(300, 200))
     assert "B" in [text.get_text() for axes in picture.axes for text in axes.texts]
     assert picture._repr_png_()[:4] == b"\x89PNG"
     assert "t = 0 s" in [text.get_text() for text in picture.texts]

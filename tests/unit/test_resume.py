@@ -49,7 +49,7 @@ temperature = "300 K"
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def workdir(tmp_path, monkeypatch):
     """An empty folder to work in, with a case of each kind."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hit.toml").write_text(COLLISION)
@@ -105,7 +105,7 @@ def uninterrupted_run(tmp_path_factory):
 
 
 @pytest.mark.parametrize("moments", [[has_formed_a_contact], [flies, has_formed_a_contact, has_two_frames]])
-def test_interrupted_collision(place, uninterrupted_run, capsys, monkeypatch, moments):
+def test_interrupted_collision(workdir, uninterrupted_run, capsys, monkeypatch, moments):
     """Interrupted before, during and after the impact, once or several times: same bits and collision.json."""
     words = ["collide", "hit.toml", "--seeds", "2", "--out", "cut"]
     for when in moments:
@@ -113,33 +113,33 @@ def test_interrupted_collision(place, uninterrupted_run, capsys, monkeypatch, mo
             interrupt_when(patch, when)
             assert main(words) == 130
         assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; continue with: sand resume cut"
-        assert not (place / "cut" / "collision.json").exists() and not (place / "cut" / "figure.png").exists()
+        assert not (workdir / "cut" / "collision.json").exists() and not (workdir / "cut" / "figure.png").exists()
         words = ["resume", "cut", "--threads", "1"]
     assert main(["info", "cut"]) == 0
     assert "continue with  sand resume cut" in capsys.readouterr().out
     assert main(["collide", "hit.toml", "--seeds", "2", "--out", "cut"]) == 2
     assert "sand resume cut" in capsys.readouterr().err
     assert main(["resume", "cut", "--quiet"]) == 0
-    ours, theirs = (json.loads((one / "collision.json").read_text()) for one in (place / "cut", uninterrupted_run))
+    ours, theirs = (json.loads((one / "collision.json").read_text()) for one in (workdir / "cut", uninterrupted_run))
     assert ours["collisions"] == theirs["collisions"] and ours["counts"] == theirs["counts"]
-    assert same_run(place / "cut", uninterrupted_run)
-    assert (place / "cut" / "figure.png").exists()
-    before = (place / "cut" / "collision.json").stat().st_mtime_ns
+    assert same_run(workdir / "cut", uninterrupted_run)
+    assert (workdir / "cut" / "figure.png").exists()
+    before = (workdir / "cut" / "collision.json").stat().st_mtime_ns
     assert main(["resume", "cut"]) == 0
     assert "cut is finished" in capsys.readouterr().out
-    assert (place / "cut" / "collision.json").stat().st_mtime_ns == before
+    assert (workdir / "cut" / "collision.json").stat().st_mtime_ns == before
 
 
-def test_killed_collision(place, uninterrupted_run, capsys):
+def test_killed_collision(workdir, uninterrupted_run, capsys):
     """Without a checkpoint it starts again; with all frames but no outcome it only evaluates the outcome."""
-    shutil.copytree(uninterrupted_run, place / "late")
-    (place / "late" / "collision.json").unlink()
-    (place / "early").mkdir()
-    shutil.copy(uninterrupted_run / "collision.toml", place / "early")
+    shutil.copytree(uninterrupted_run, workdir / "late")
+    (workdir / "late" / "collision.json").unlink()
+    (workdir / "early").mkdir()
+    shutil.copy(uninterrupted_run / "collision.toml", workdir / "early")
     for name in ("late", "early"):
         assert main(["resume", name, "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert told["collisions"] == json.loads((uninterrupted_run / "collision.json").read_text())["collisions"]
+        output = json.loads(capsys.readouterr().out)
+        assert output["collisions"] == json.loads((uninterrupted_run / "collision.json").read_text())["collisions"]
 
 
 @pytest.mark.parametrize(
@@ -150,11 +150,11 @@ def test_killed_collision(place, uninterrupted_run, capsys):
         ("[forces.contact]", "[forces.contact]\nslip = 'reset'"),
     ],
 )
-def test_resume_refuses_a_changed_collision(place, uninterrupted_run, capsys, old, new):
+def test_resume_refuses_a_changed_collision(workdir, uninterrupted_run, capsys, old, new):
     """Another speed, body or force: one line."""
-    shutil.copytree(uninterrupted_run, place / "cut")
-    (place / "cut" / "collision.json").unlink()
-    path = place / "cut" / "collision.toml"
+    shutil.copytree(uninterrupted_run, workdir / "cut")
+    (workdir / "cut" / "collision.json").unlink()
+    path = workdir / "cut" / "collision.toml"
     text = path.read_text().replace("2 m/s", "2.0 m/s")
     assert old in text
     path.write_text(text.replace(old, new))
@@ -163,7 +163,7 @@ def test_resume_refuses_a_changed_collision(place, uninterrupted_run, capsys, ol
     assert err.count("\n") == 1 and "start a new collision in another folder" in err
 
 
-def test_interrupted_series_of_collisions(place, capsys, monkeypatch):
+def test_interrupted_series_of_collisions(workdir, capsys, monkeypatch):
     """Finished collisions are kept and not repeated; collision.json equals that of an uninterrupted job."""
     assert main(["collide", "hit.toml", "--out", "whole", "--json"]) == 0
     capsys.readouterr()
@@ -177,7 +177,7 @@ def test_interrupted_series_of_collisions(place, capsys, monkeypatch):
         patch.setattr(GrowingOutcomes, "add", add)
         assert main(["collide", "hit.toml", "--out", "cut", "--seeds", "1-3"]) == 130
     assert capsys.readouterr().err == "sand: interrupted; continue with: sand resume cut\n"
-    with (place / "cut" / "collisions.jsonl").open("a") as file:
+    with (workdir / "cut" / "collisions.jsonl").open("a") as file:
         file.write('{"seed": 2, "outc')  # an incomplete line, as after a kill
     assert main(["info", "cut"]) == 0
     assert "sand resume cut" in capsys.readouterr().out
@@ -190,41 +190,41 @@ def test_interrupted_series_of_collisions(place, capsys, monkeypatch):
     monkeypatch.setattr(collision_case, "run_seed", counted)
     assert main(["resume", "cut"]) == 0
     assert done == [2, 3] and "outcomes" in capsys.readouterr().out
-    ours, theirs = (json.loads((place / name / "collision.json").read_text()) for name in ("cut", "whole"))
+    ours, theirs = (json.loads((workdir / name / "collision.json").read_text()) for name in ("cut", "whole"))
     assert ours["collisions"] == theirs["collisions"] and ours["counts"] == theirs["counts"]
-    assert not (place / "cut" / "collisions.jsonl").exists()
+    assert not (workdir / "cut" / "collisions.jsonl").exists()
 
 
-def test_resume_refuses_outcomes_of_another_case(place, capsys, monkeypatch):
+def test_resume_refuses_outcomes_of_another_case(workdir, capsys, monkeypatch):
     """A case changed while its job was interrupted: one line, and outcomes are not mixed."""
     monkeypatch.setattr(
         collision_case, "run_seed", lambda text, seed, **options: (_ for _ in ()).throw(KeyboardInterrupt)
     )
     assert main(["collide", "hit.toml", "--out", "cut"]) == 130
-    path = place / "cut" / "case.toml"
+    path = workdir / "cut" / "case.toml"
     path.write_text(path.read_text().replace("2 m/s", "3 m/s"))
     capsys.readouterr()
     assert main(["resume", "cut"]) == 2
     assert "holds outcomes of another case" in capsys.readouterr().err
 
 
-def test_interrupted_growth(place, capsys, monkeypatch):
+def test_interrupted_growth(workdir, capsys, monkeypatch):
     """Interrupted in the second box: the first is kept, growth.json is written at the end, the bits are the same."""
     assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "whole", "--quiet", "--threads", "1"]) == 0
     with monkeypatch.context() as patch:
         interrupt_when(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
         assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--quiet"]) == 130
     assert capsys.readouterr().err.splitlines()[-1] == "sand: interrupted; continue with: sand resume cut"
-    finished = [path for path in (place / "cut" / "seed-1").iterdir() if path.name != ".lock"]
+    finished = [path for path in (workdir / "cut" / "seed-1").iterdir() if path.name != ".lock"]
     before = {path: path.stat().st_mtime_ns for path in finished}
     assert main(["info", "cut"]) == 0
     assert "sand resume cut" in capsys.readouterr().out
     assert main(["resume", "cut", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["outcomes"] == {"1": "finished", "2": "finished"}
     assert before == {path: path.stat().st_mtime_ns for path in before}
-    assert same_run(place / "cut" / "seed-2", place / "whole" / "seed-2")
-    told = json.loads((place / "cut" / "growth.json").read_text())
-    assert told["seeds"] == [1, 2] and told["boxes"]["seed-2"]["outcome"] == "finished"
+    assert same_run(workdir / "cut" / "seed-2", workdir / "whole" / "seed-2")
+    output = json.loads((workdir / "cut" / "growth.json").read_text())
+    assert output["seeds"] == [1, 2] and output["boxes"]["seed-2"]["outcome"] == "finished"
     assert main(["resume", "cut"]) == 0
     assert "cut is finished" in capsys.readouterr().out
     assert main(["info", "cut"]) == 0
@@ -240,7 +240,7 @@ def test_interrupted_growth(place, capsys, monkeypatch):
 # --- the figure, and interrupts during start-up ------------------------------------------------------------
 
 
-def test_interrupted_runs_draw_no_figure(place, capsys, monkeypatch):
+def test_interrupted_runs_draw_no_figure(workdir, capsys, monkeypatch):
     """No figure after Ctrl-C; Ctrl-C while a figure is drawn omits it from the finished run."""
     drawn = []
 
@@ -252,7 +252,7 @@ def test_interrupted_runs_draw_no_figure(place, capsys, monkeypatch):
     assert main(["run", "box.toml", "--out", "done"]) == 0
     out, err = capsys.readouterr()
     assert "done" in out and "sand: the figure is not drawn" in err and len(drawn) == 1
-    assert json.loads((place / "done" / "summary.json").read_text())["outcome"] == "finished"
+    assert json.loads((workdir / "done" / "summary.json").read_text())["outcome"] == "finished"
     interrupt_when(monkeypatch, flies)
     assert main(["run", "box.toml", "--out", "cut"]) == 130
     assert len(drawn) == 1 and "resume with: sand resume cut" in capsys.readouterr().err
@@ -261,7 +261,7 @@ def test_interrupted_runs_draw_no_figure(place, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("module", "words"), [("click", ["cite"]), ("numpy", ["info", "box.toml"]), ("pydantic", ["info", "box.toml"])]
 )
-def test_interrupted_while_modules_are_imported(place, module, words):
+def test_interrupted_while_modules_are_imported(workdir, module, words):
     """Ctrl-C during imports gives exit code 130, also where an import turns it into another exception."""
     program = (
         "import importlib.abc, os, signal, sys\n"
@@ -280,21 +280,21 @@ def test_interrupted_while_modules_are_imported(place, module, words):
     assert (ended.returncode, ended.stderr, ended.stdout) == (130, "sand: interrupted\n", "")
 
 
-def test_no_advice_if_the_folder_was_removed(place, capsys, monkeypatch):
+def test_no_advice_if_the_folder_was_removed(workdir, capsys, monkeypatch):
     """The message advises nothing that cannot be done."""
     interrupt_when(
-        monkeypatch, lambda simulation: shutil.rmtree(place / "gone", ignore_errors=True) or simulation.steps > 0
+        monkeypatch, lambda simulation: shutil.rmtree(workdir / "gone", ignore_errors=True) or simulation.steps > 0
     )
     assert main(["run", "box.toml", "--out", "gone"]) in (2, 130)
     err = capsys.readouterr().err
     assert "sand resume" not in err and "has been removed" in err
 
 
-def test_control_characters_do_not_reach_the_terminal(place, capsys):
+def test_control_characters_do_not_reach_the_terminal(workdir, capsys):
     """A name that would clear the screen, reverse text or start a new line is shown escaped."""
     name = "a\x1b[2Jb\x9bc\u202ed\ne\x7f.toml"
-    (place / name).write_text(BOX)
-    (place / "twisted.toml").write_text(BOX + '["\\u001b[31mred"]\n')
+    (workdir / name).write_text(BOX)
+    (workdir / "twisted.toml").write_text(BOX + '["\\u001b[31mred"]\n')
     for words in (
         ["info", name],
         ["info", name + "x"],
@@ -364,10 +364,10 @@ def test_advice_can_be_followed(tmp_path, capsys, monkeypatch):
     assert "sand resume begun" in capsys.readouterr().err
 
 
-def test_json_of_an_interrupted_job(place, capsys, monkeypatch):
+def test_json_of_an_interrupted_job(workdir, capsys, monkeypatch):
     """With --json, Ctrl-C gives one object with the advice and the exit code."""
     with monkeypatch.context() as patch:
         interrupt_when(patch, lambda simulation: simulation.seed == 2 and simulation.time > 0.5e-9)
         assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "cut", "--json"]) == 130
-    told = json.loads(capsys.readouterr().out)
-    assert told == {"error": ["interrupted; continue with: sand resume cut"], "exit_code": 130}
+    output = json.loads(capsys.readouterr().out)
+    assert output == {"error": ["interrupted; continue with: sand resume cut"], "exit_code": 130}

@@ -62,8 +62,8 @@ def test_sums_with_seeded_roots_agree(count):
     Rows that fill whole vectors and rows that do not; from 1000 grains on in blocks.
     """
     rng = np.random.default_rng(3)
-    place = rng.permutation(11**3)[:count, None] // [1, 11, 121] % 11
-    grains = sand.Grains(place * 1e-7, 1e-8, sand.IRON, moment=6e-18 * rng.normal(size=(count, 3)))
+    positions = rng.permutation(11**3)[:count, None] // [1, 11, 121] % 11
+    grains = sand.Grains(positions * 1e-7, 1e-8, sand.IRON, moment=6e-18 * rng.normal(size=(count, 3)))
     span, found = sand.Box.open().span, []
     for pair in (dipoles.uncut_pair, dipoles.uncut_pair_seeded):
         loads, far, own = (

@@ -14,13 +14,13 @@ def sampled(strata, chance, relative_error, seed):
     rounds = 0
     while tasks := strata.round(relative_error):
         rounds += 1
-        flights = []
+        trajectories = []
         for task in tasks:
             low, high = strata.edges(task.stratum)
             for number in range(task.first, task.last):
                 b = math.sqrt(rng.uniform(low**2, high**2))
-                flights.append((task.stratum, number, float(rng.random() < chance(b)), 1.0))
-        strata.add(*np.transpose(flights))
+                trajectories.append((task.stratum, number, float(rng.random() < chance(b)), 1.0))
+        strata.add(*np.transpose(trajectories))
     return rounds
 
 
@@ -100,9 +100,9 @@ def test_allocation_of_trajectories():
 def test_order_and_batches_change_no_bit():
     """The same trajectories in another order: the same sums."""
     rng = np.random.default_rng(2)
-    flights = [(int(k), n, float(rng.random() < 0.5), rng.random()) for k in range(24) for n in range(PILOT)]
+    trajectories = [(int(k), n, float(rng.random() < 0.5), rng.random()) for k in range(24) for n in range(PILOT)]
     ends = []
-    for order in (flights, flights[::-1]):
+    for order in (trajectories, trajectories[::-1]):
         strata = Strata(1.0)
         for part in (order[:100], order[100:]):
             strata.add(*np.transpose(part))

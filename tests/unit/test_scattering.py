@@ -57,9 +57,9 @@ class ReversingExecutor(Executor):
 
 def numbers(found):
     """Everything that does not depend on wall time."""
-    told = found.to_dict()
-    told.pop("seconds")
-    return json.dumps({k: np.asarray(v).tolist() for k, v in told.items()})
+    output = found.to_dict()
+    output.pop("seconds")
+    return json.dumps({k: np.asarray(v).tolist() for k, v in output.items()})
 
 
 @pytest.fixture
@@ -72,11 +72,11 @@ def here():
 @pytest.mark.compiled("scattering")
 def test_replay_of_one_trajectory(here):
     """A row of a batch of 200 and its replay: the same end, time and distance, to the bit."""
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
     width = float(here.profile[0, 1])
-    rows = fly(flying, [Task(5, 100, 300)], width, seed=9)
+    rows = fly(pair, [Task(5, 100, 300)], width, seed=9)
     for k in (0, 77, 199):
-        alone = replay(flying, 5, 100 + k, width, seed=9)
+        alone = replay(pair, 5, 100 + k, width, seed=9)
         row = dict(zip(COLUMNS, rows[k], strict=True))
         assert alone.time[-1] == row["time"]
         assert alone.time.size == row["steps"] + 1
@@ -87,13 +87,13 @@ def test_replay_of_one_trajectory(here):
 @pytest.mark.compiled("scattering")
 def test_any_split_gives_the_same_numbers(here, monkeypatch):
     """Batches of 64 in two processes, or in reverse order here: the bits of one process."""
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     monkeypatch.setattr(scattering, "MOST", 64)
-    again = scattering.measure(flying, relative_error=0.05, seed=3, executor=ReversingExecutor())
+    again = scattering.measure(pair, relative_error=0.05, seed=3, executor=ReversingExecutor())
     assert numbers(again) == numbers(here)
     with executor_for(2) as pool:
-        assert numbers(scattering.measure(flying, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
-    other = scattering.measure(flying, relative_error=0.05, seed=4)
+        assert numbers(scattering.measure(pair, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
+    other = scattering.measure(pair, relative_error=0.05, seed=4)
     assert numbers(other) != numbers(here)
 
 
@@ -102,7 +102,7 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
     """dask.distributed with two workers, one killed after the first batch: the same numbers."""
     distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
     monkeypatch.setattr(scattering, "MOST", 32)
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
     ) as cluster:
@@ -115,7 +115,7 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
                 os.kill(victim.pid, KILL)
 
         with executor_for(scheduler=cluster.scheduler_address) as executor:
-            found = scattering.measure(flying, relative_error=0.05, seed=3, executor=executor, keep=kill)
+            found = scattering.measure(pair, relative_error=0.05, seed=3, executor=executor, keep=kill)
         assert killed
     assert numbers(found) == numbers(here)
 
@@ -123,11 +123,11 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
 @pytest.mark.compiled("scattering")
 def test_resume_computes_missing_trajectories_only(here):
     """With the rows of half the trajectories the other half is computed; the same result."""
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     rows, later = [], []
-    whole = scattering.measure(flying, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
+    whole = scattering.measure(pair, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
     again = scattering.measure(
-        flying, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
+        pair, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
     )
     assert numbers(again) == numbers(whole) == numbers(here)
     assert len(later) == len(rows) - len(rows[::2])
@@ -136,8 +136,8 @@ def test_resume_computes_missing_trajectories_only(here):
 @pytest.mark.compiled("scattering")
 def test_hit_map():
     """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all trajectories are listed."""
-    flights = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
-    found = probability_map(flights, cells=6, per_cell=16)
+    trajectories = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
+    found = probability_map(trajectories, cells=6, per_cell=16)
     assert (found.flights == 16).all()
     assert (found.probability[:, 0] == 1.0).all()
     assert (found.probability[:, 5] == 0.0).all()
@@ -153,9 +153,9 @@ def test_the_command(tmp_path, capsys):
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE)
     assert main(["scatter", str(case), "--out", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [round(one["c"], 1) for one in told["cross_sections"]] == [1.0, 1.0]
-    assert told["versions"]["numba"] and told["seed"] == 3
+    output = json.loads(capsys.readouterr().out)
+    assert [round(one["c"], 1) for one in output["cross_sections"]] == [1.0, 1.0]
+    assert output["versions"]["numba"] and output["seed"] == 3
     assert {p.name for p in out.iterdir()} == {
         ".lock",
         "case.toml",
@@ -171,9 +171,9 @@ def test_the_command(tmp_path, capsys):
     assert "sigma = " in capsys.readouterr().out
     for name in ("flights.csv", "results.csv", "figure.png"):
         assert (out / name).read_bytes() == before[name]
-    for path, said in ((case, "scattering case"), (out, "results.csv"), (out / "scattering.json", "sigma = ")):
+    for path, expected in ((case, "scattering case"), (out, "results.csv"), (out / "scattering.json", "sigma = ")):
         assert main(["info", str(path)]) == 0
-        assert said in capsys.readouterr().out
+        assert expected in capsys.readouterr().out
     case.write_text(CASE.replace("seed = 3", "seed = 4"))
     assert main(["scatter", str(case), "--out", str(out), "--resume"]) == 2
     assert "another case" in capsys.readouterr().err
@@ -205,7 +205,7 @@ def test_killed_job_is_resumed(tmp_path):
 
 @pytest.mark.compiled("scattering")
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         ({"speed": 0}, "speed = 0"),
         ({"speed": "3 m"}, "speed = '3 m'"),
@@ -244,10 +244,10 @@ def test_killed_job_is_resumed(tmp_path):
         ({"relative_error": 0.9}, "relative_error"),
     ],
 )
-def test_wrong_arguments_are_refused(options, said):
+def test_wrong_arguments_are_refused(options, expected):
     """One line each, with the given value."""
     given = GRAINS | {"speed": 0.2} | options
-    with pytest.raises(sand.BadInput, match=said) as caught:
+    with pytest.raises(sand.BadInput, match=expected) as caught:
         scattering.cross_section(**given)
     assert len(caught.value.problems) == 1
 
@@ -261,19 +261,19 @@ def test_all_errors_are_reported_together():
 
 def test_impossible_impact_parameters():
     """Negative, in b_max without moments, outside the sphere of starts."""
-    flying = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
+    pair = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
     plain = scattering.flight(radius="10 nm", material="iron", speed=0.2)
-    for one, b, said in (
-        (flying, "-1 nm", "at least 0"),
+    for one, b, expected in (
+        (pair, "-1 nm", "at least 0"),
         (plain, "1 b_max", "without moments"),
-        (flying, "2 um", "below"),
+        (pair, "2 um", "below"),
     ):
-        with pytest.raises(sand.BadInput, match=said):
+        with pytest.raises(sand.BadInput, match=expected):
             scattering.trajectory(one, b)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "expected"),
     [
         (("speed = [1, 2]", "speed = 0"), "speed = 0"),
         (("speed = [1, 2]", "sped = 1"), "did you mean 'speed'"),
@@ -286,19 +286,21 @@ def test_impossible_impact_parameters():
         (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
     ],
 )
-def test_wrong_cases_write_nothing(tmp_path, capsys, change, said):
+def test_wrong_cases_write_nothing(tmp_path, capsys, change, expected):
     """Exit code 2, one line with the file's name, no folder."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace(*change))
     assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and said in lines[0] and "case.toml" in lines[0]
+    assert len(lines) == 1 and expected in lines[0] and "case.toml" in lines[0]
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("address", "said"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")])
-def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, said):
+@pytest.mark.parametrize(
+    ("address", "expected"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")]
+)
+def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, expected):
     """One line, exit code 2, nothing written."""
     from sand.experiments import executors
 
@@ -307,7 +309,7 @@ def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address
     case.write_text(CASE)
     assert main(["scatter", str(case), "--out", str(tmp_path / "out"), "--scheduler", address]) == 2
     lines = [line for line in capsys.readouterr().err.strip().splitlines() if line.startswith("sand:")]
-    assert len(lines) == 1 and said in lines[0]
+    assert len(lines) == 1 and expected in lines[0]
     assert not (tmp_path / "out").exists()
 
 
@@ -334,9 +336,9 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
         patch.setattr(process.ProcessPoolExecutor, "submit", lambda *a, **k: Done())
         patch.setattr(process.ProcessPoolExecutor, "map", dead)
         assert main(["scatter", str(case), "--out", str(out), "--workers", "2"]) == 2
-    told = capsys.readouterr().err
-    assert "a worker process died" in told
-    assert "sand resume" in told
+    output = capsys.readouterr().err
+    assert "a worker process died" in output
+    assert "sand resume" in output
     assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
 
 
@@ -352,10 +354,10 @@ def test_sigterm_tells_how_to_resume(tmp_path):
     while time.monotonic() < deadline and not (table.exists() and table.stat().st_size > 9000):
         time.sleep(0.02)
     job.terminate()
-    told = job.communicate(timeout=30)[1]
+    output = job.communicate(timeout=30)[1]
     assert job.returncode == 130
-    assert told.count("sand:") == 1
-    assert "sand resume" in told
+    assert output.count("sand:") == 1
+    assert "sand resume" in output
 
 
 def test_a_map_needs_speeds_that_differ(tmp_path, capsys):

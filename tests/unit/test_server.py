@@ -216,8 +216,8 @@ def test_slow_clients_do_not_block_others(server, capfd):
     for line in slow:
         line.close()
     assert ask(server, "frame/1")[0] == 200
-    told = capfd.readouterr()
-    assert told.out == told.err == ""
+    output = capfd.readouterr()
+    assert output.out == output.err == ""
 
 
 def test_the_number_of_connections_is_limited(server, monkeypatch):

@@ -68,9 +68,9 @@ def test_given_contacts_may_overlap_more():
     """
     limit = 2.0 * (2e-8 - rest_distance(sand.SILICA, 1e-8, 1e-8))
     size = np.repeat(np.where(np.arange(31) % 2, 1e-8, 4e-8), 2)
-    place = 1e-6 * np.repeat(np.arange(31), 2)
-    place[1::2] += 2.0 * size[1::2] - 1.3 * limit
-    grains = sand.Grains(np.stack([place, 0 * place, 0 * place], axis=1), size, sand.SILICA)
+    x_positions = 1e-6 * np.repeat(np.arange(31), 2)
+    x_positions[1::2] += 2.0 * size[1::2] - 1.3 * limit
+    grains = sand.Grains(np.stack([x_positions, 0 * x_positions, 0 * x_positions], axis=1), size, sand.SILICA)
     wrong = [2 * k for k in range(31) if k % 2]
     first = [2, 10, 58]
     pairs = np.array([[2, 3], [11, 10], [59, 58]])
@@ -78,9 +78,9 @@ def test_given_contacts_may_overlap_more():
     with pytest.raises(sand.BadInput) as caught:
         sand.Simulation(grains, [sand.Contact()], contacts=held)
     named = [f"grains {i} and {i + 1} overlap by {1.3 * limit:.3g} m at the start" for i in wrong if i not in first]
-    *told, rest = caught.value.problems
-    assert [line.split(";")[0] for line in told] == named[:10]
-    assert all(f"at most {limit:.3g} m is allowed: move them apart" in line for line in told)
+    *lines_of_pairs, rest = caught.value.problems
+    assert [line.split(";")[0] for line in lines_of_pairs] == named[:10]
+    assert all(f"at most {limit:.3g} m is allowed: move them apart" in line for line in lines_of_pairs)
     assert rest == f"… and {len(named) - 10} more overlapping pairs"
 
 
@@ -282,8 +282,8 @@ def test_steps_are_counted_through_growing_arrays():
 )
 def test_arrays_are_allocated_as_needed(far, there, not_there):
     """Long-range arrays have columns the kernel needs; contacts 10 % extra, in multiples of eight."""
-    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
-    grains = sand.Grains(place, 1e-8, sand.SILICA, moment="1 A m^2/kg")
+    x_positions = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(x_positions, 1e-8, sand.SILICA, moment="1 A m^2/kg")
     forces, search = [sand.Contact(), sand.Dipoles(cutoff="none")], sand.Neighbours(search="all pairs")
     sim = sand.Simulation(grains, forces, stepping=sand.Verlet(far=far), neighbours=search)
     arrays = sim.state.long_range._asdict()
@@ -295,8 +295,8 @@ def test_arrays_are_allocated_as_needed(far, there, not_there):
 @pytest.mark.compiled("contacts")
 def test_contacts_alone_have_no_room_for_other_forces():
     """No long-range loads and no list, one row for the cells; a damping column only with damping."""
-    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
-    grains = sand.Grains(place, 1e-8, sand.SILICA)
+    x_positions = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(x_positions, 1e-8, sand.SILICA)
     for damping in ("none", "viscoelastic"):
         forces, search = [sand.Contact(damping=damping)], sand.Neighbours(search="cells")
         sim = sand.Simulation(grains, forces, neighbours=search)

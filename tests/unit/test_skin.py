@@ -74,10 +74,10 @@ def test_displacements_stay_within_the_skin(monkeypatch, blocks):
     for steps in (1, 2, 3, 5, 8, 13, 21, 34, 55):
         sim._engine.advance(np.inf, steps)
         system, span = sim.state, sim._engine.parameters.span
-        for place, (group, name, limit) in limits.items():
+        for index, (group, name, limit) in limits.items():
             displacement = largest_displacement(system.grains.arrays, getattr(getattr(system, group), name), span)
-            assert system.pair_list.skin[place] <= limit - displacement + 1e-12 * limit
-            spared += system.pair_list.skin[place] > 0.0
+            assert system.pair_list.skin[index] <= limit - displacement + 1e-12 * limit
+            spared += system.pair_list.skin[index] > 0.0
         speeds = np.linalg.norm(sim.grains.velocity, axis=1).max(), np.linalg.norm(sim.grains.spin, axis=1).max()
         assert np.sqrt(system.pair_list.skin[[SQUARED_SPEED, SQUARED_SPIN]]) == pytest.approx(speeds, rel=1e-14)
         assert np.sqrt(largest_squared_speeds(system.grains.arrays)) == pytest.approx(speeds, rel=1e-14)
@@ -127,9 +127,9 @@ def test_a_pair_that_separates_and_meets_again_is_found():
     for speed in np.linspace(5.25, 8.25, 13):
         ends = []
         for calls in ("one", "many"):
-            place = np.array([[-9.9999e-9, 0.0, 0.0], [9.9999e-9, 0.0, 0.0]])
-            velocity = 0.5 * speed * np.sign(place)
-            grains = sand.Grains(place, 1e-8, sand.SILICA, velocity=velocity, charge=[6e-18, -6e-18])
+            index = np.array([[-9.9999e-9, 0.0, 0.0], [9.9999e-9, 0.0, 0.0]])
+            velocity = 0.5 * speed * np.sign(index)
+            grains = sand.Grains(index, 1e-8, sand.SILICA, velocity=velocity, charge=[6e-18, -6e-18])
             sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], stepping=every_step)
             sim.run(steps=1)
             while sim.state.steps < 400:
@@ -144,8 +144,8 @@ def test_a_pair_that_separates_and_meets_again_is_found():
 @pytest.mark.parametrize(("speed", "stop", "culprit"), [(1e6, Stop.TOO_FAST, 2), (0.0, Stop.SPINS_TOO_FAST, 0)])
 def test_an_outcome_names_the_limiting_grain(speed, stop, culprit):
     """Grain 0 spins too fast for the user's step; grain 2 flies too fast or rests."""
-    position, still = np.diag([0.0, 1e-7, 2e-7]), np.zeros((3, 3))
-    velocity, spin = still.copy(), still.copy()
+    position, at_rest = np.diag([0.0, 1e-7, 2e-7]), np.zeros((3, 3))
+    velocity, spin = at_rest.copy(), at_rest.copy()
     velocity[2, 0], spin[0, 0] = speed, 1e13
     grains = sand.Grains(position, 1e-8, sand.SILICA, velocity=velocity, spin=spin)
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="0.1 ps"))
@@ -171,15 +171,15 @@ def test_nan_counts_as_the_largest_value(sign):
 @pytest.mark.parametrize("radius", [[1e-8, 1e-8, 1e-8], [1e-8, 1e-8, 9e-9]], ids=["alike", "unlike"])
 def test_a_saved_state_with_too_few_columns_is_refused(name, radius):
     """Two contacts, one column of per-contact arrays missing: BadInput; equal grains share one column."""
-    place = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [1.998e-8 + 0.999 * (radius[1] + radius[2]), 0, 0]])
-    sim = sand.Simulation(sand.Grains(place, radius, sand.SILICA), [sand.Contact()])
+    index = np.array([[0.0, 0, 0], [1.998e-8, 0, 0], [1.998e-8 + 0.999 * (radius[1] + radius[2]), 0, 0]])
+    sim = sand.Simulation(sand.Grains(index, radius, sand.SILICA), [sand.Contact()])
     sim.run(steps=1)
-    world, saved = sim.state.copy(), sim.state.to_arrays()
-    assert world.uniform_contacts == (radius[2] == radius[0]) and len(sim.contacts["pair"]) == 2
-    world.from_arrays(saved)
+    system, saved = sim.state.copy(), sim.state.to_arrays()
+    assert system.uniform_contacts == (radius[2] == radius[0]) and len(sim.contacts["pair"]) == 2
+    system.from_arrays(saved)
     fewer = saved | {name: saved[name][..., :1]}
-    if world.uniform_contacts and name in ("contacts/constants", "pair_list/step"):
-        world.from_arrays(fewer)
+    if system.uniform_contacts and name in ("contacts/constants", "pair_list/step"):
+        system.from_arrays(fewer)
     else:
         with pytest.raises(sand.BadInput, match=name):
-            world.from_arrays(fewer)
+            system.from_arrays(fewer)

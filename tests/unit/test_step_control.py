@@ -74,9 +74,9 @@ def test_inner_list_holds_the_close_pairs():
         assert 0.49 * gap < near.skin[INNER_SKIN] < 0.5 * gap
         if inner_list_overflowed(near, w.count):
             return {tuple(sorted(pair)) for pair in near.pair[:, : w.count[PAIRS]].T.tolist()}
-        soon = near.inner[: int(near.skin[INNER_COUNT])].tolist()
-        assert len(set(soon)) == len(soon)
-        return {tuple(sorted(near.pair[:, p].tolist())) for p in soon}
+        inner = near.inner[: int(near.skin[INNER_COUNT])].tolist()
+        assert len(set(inner)) == len(inner)
+        return {tuple(sorted(near.pair[:, p].tolist())) for p in inner}
 
     position, radius = sim.grains.position, sim.grains.radius
     bound = {tuple(sorted(pair)) for pair in sim.contacts["pair"].tolist()}

@@ -89,7 +89,7 @@ def test_sizes_and_moments():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "expected"),
     [
         (lambda: theory.capture_radius(MOMENT, MASS, 0.0), "speed"),
         (lambda: theory.capture_radius(MOMENT, "3 m", 1.0), "mass"),
@@ -111,9 +111,9 @@ def test_sizes_and_moments():
         (lambda: theory.aggregate_moment(MOMENT, 0), "grains"),
     ],
 )
-def test_wrong_arguments_are_refused(call, said):
+def test_wrong_arguments_are_refused(call, expected):
     """One line with the name."""
-    with pytest.raises(sand.BadInput, match=said) as caught:
+    with pytest.raises(sand.BadInput, match=expected) as caught:
         call()
     assert len(caught.value.problems) == 1
 

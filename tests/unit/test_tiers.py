@@ -11,7 +11,7 @@ from ..validation import parse_part, part_of
 def test_at_most_eight_specifications():
     """Drivers and scattering; each name has one kernel specification, and none has two names."""
     assert len(specs.DRIVERS) + 1 <= 8
-    assert sorted(specs._plans().values()) == sorted(specs.DRIVERS)
+    assert sorted(specs._kernel_specs().values()) == sorted(specs.DRIVERS)
 
 
 def test_other_drivers_have_no_name():

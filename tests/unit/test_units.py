@@ -54,7 +54,7 @@ FORMS = ("{}", "{}/m^2", "J {}^-1*A", "A m²/{}", "kg·{}**3 / s", "rad/{}", "{}
 
 
 @pytest.fixture(scope="module")
-def common_units():
+def samples():
     """Three of each common unit, alone and as a factor, as quantities of pint from SAND's text."""
     registry = pint.UnitRegistry()
     texts = [form.format(name) for form in FORMS for name in USUAL]
@@ -66,19 +66,17 @@ def common_units():
 @pytest.mark.parametrize(
     "unit", ["m", "s", "kg", "K", "Pa", "T", "J/m^2", "A m^2/kg", "kg/m^3", "rad/s", "C", "A m^2", "1"]
 )
-def test_built_in_units_agree_with_pint(unit, common_units, monkeypatch):
+def test_built_in_units_agree_with_pint(unit, samples, monkeypatch):
     """Every prefix of every common unit, alone and as a factor: pint's value to rounding, or refused.
 
     pint cannot be imported while they are read, except for pure numbers, which need it.
     """
     wanted = unit.replace("^", "**")
-    expected = {
-        text: value.to(wanted).magnitude for text, value in common_units.items() if value.is_compatible_with(wanted)
-    }
+    expected = {text: value.to(wanted).magnitude for text, value in samples.items() if value.is_compatible_with(wanted)}
     assert len(expected) >= 2
     if unit != "1":
         monkeypatch.setitem(sys.modules, "pint", None)
-    found = {text: value for text in common_units if (value := in_unit(f"3 {text}", unit)) is not None}
+    found = {text: value for text in samples if (value := in_unit(f"3 {text}", unit)) is not None}
     assert found == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 

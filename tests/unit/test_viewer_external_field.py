@@ -12,10 +12,10 @@ from sand.viewer.external_field import describe_field, read_field
 def test_description_of_a_field(finished_run):
     """A rotating field has a direction per frame, a fixed one has one direction, no field is null."""
     folder, sim = finished_run
-    told = run_dataset(folder, read_field(folder)).manifest()["field"]
-    assert "rotating" in told["text"] and "1 mT" in told["text"]
+    description = run_dataset(folder, read_field(folder)).manifest()["field"]
+    assert "rotating" in description["text"] and "1 mT" in description["text"]
     expected = [np.array(sim.forces[2].flux_density_at(t)) * 1e3 for t in sim.ledger["time"]]
-    assert np.array(told["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
+    assert np.array(description["directions"]) == pytest.approx(np.array(expected), abs=1e-8)
     steady = run_dataset(folder, describe_field([sand.Field([0.0, 3e-3, 4e-3])])).manifest()["field"]
     assert steady["direction"] == [0.0, 0.6, 0.8] and "directions" not in steady
     assert describe_field([sand.Field(0.0)]) is None and run_dataset(folder).manifest()["field"] is None
@@ -26,7 +26,7 @@ def test_description_of_a_field(finished_run):
         ],
         "to 2 mT at 1 us": describe_field([sand.Field("1 mT", "ramp", final="2 mT", end="1 us")])[0],
     }
-    assert all(said in text for said, text in texts.items()), texts
+    assert all(phrase in text for phrase, text in texts.items()), texts
 
 
 class UserField:

@@ -101,6 +101,6 @@ def test_every_module_and_the_commands_work(tmp_path):
 @pytest.mark.validate
 def test_every_test_can_be_imported():
     """pytest can collect all tests; only modules that need other programs are skipped."""
-    told = run_as_windows(TESTS, TOP, compiled=True)
-    needless = [line for line in told.splitlines() if not line.startswith(("tests/peers", "tests/browser"))]
-    assert not needless, needless
+    output = run_as_windows(TESTS, TOP, compiled=True)
+    unexpected = [line for line in output.splitlines() if not line.startswith(("tests/peers", "tests/browser"))]
+    assert not unexpected, unexpected
