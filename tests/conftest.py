@@ -32,7 +32,7 @@ compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 from .specs import FIXTURES, SPECS, WORKERS, description_of, monitored_drivers  # noqa: E402
 from .validation import Recorder, parse_part, part_of  # noqa: E402
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 TESTS = Path(__file__).parent
@@ -162,7 +162,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 # ---- the last line -----------------------------------------------------------------------------------
 def pytest_sessionfinish(session: pytest.Session) -> None:
     output = getattr(session.config, "workeroutput", None)
-    if output is not None:  # a worker of pytest-xdist tells the process that reports
+    if output is not None:  # a worker of pytest-xdist sends it to the reporting process
         output["left_out"] = dict(left_out)
 
 

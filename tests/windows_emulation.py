@@ -24,7 +24,7 @@ except ImportError:
     fcntl = None
 
 OURS = ("sand", "tests", "benchmarks", "hatch_build", "__main__")
-"""Whose look-ups and imports are refused; other packages know the system, and have code of their own for Windows."""
+"""Packages whose look-ups and imports are refused; others detect the system and have code for Windows."""
 MODULES = ("fcntl", "grp", "posix", "pty", "pwd", "resource", "termios", "tty")
 NAMES = {
     os: (

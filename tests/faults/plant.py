@@ -33,11 +33,11 @@ from .faults import FAULTS, SOURCES, Fault
 
 HERE = Path(__file__).parents[2]
 BUILT = Path(SOURCES) / "viewer" / "page"
-"""Made by a build and not in git, but tests need it."""
+"""Files of a build that are not in git but that tests need."""
 MISSED, TIMEOUT, CRASH = "MISSED", "TIMEOUT", "CRASH"
 SUITE = "the whole suite"
 REST = ["--ignore=tests/faults"]
-"""All tests but those that look whether the lines of the faults are there: they would catch every fault."""
+"""All tests except those of the fault table itself, which would catch every fault."""
 PASSED, FAILED, INTERRUPTED = 0, 1, 2
 """Exit codes of pytest; a test file that cannot be imported counts as interrupted."""
 
@@ -115,7 +115,7 @@ _RUNNING: set[subprocess.Popen[str]] = set()
 
 def end(process: subprocess.Popen[str]) -> None:
     """Kill a process and what it has started."""
-    with contextlib.suppress(OSError, AttributeError):  # no such group any more, or a system without groups
+    with contextlib.suppress(OSError, AttributeError):  # the group has ended, or the system has no groups
         os.killpg(process.pid, signal.SIGKILL)
     process.kill()
     process.wait()
@@ -221,10 +221,10 @@ def examine_all(tree: Path, faults: Sequence[Fault], options: argparse.Namespace
 def state_of(tree: Path) -> str:
     """The commit of a tree, and whether tracked files differ from it."""
 
-    def said(*words: str) -> str:
+    def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=tree, capture_output=True, text=True).stdout.strip()
 
-    return said("rev-parse", "--short=10", "HEAD") + (" with changes" if said("status", "--porcelain", "-uno") else "")
+    return git("rev-parse", "--short=10", "HEAD") + (" with changes" if git("status", "--porcelain", "-uno") else "")
 
 
 def caught_by_text(found: Finding) -> str:

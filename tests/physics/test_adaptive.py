@@ -289,7 +289,7 @@ def test_pair_lists_miss_no_pair():
             sim.run(steps=1)
         ends.append(sim)
     a, b = ends
-    assert a.state.count[10] > b.state.count[10] > 1  # lists made
+    assert a.state.count[10] > b.state.count[10] > 1  # number of list builds
     assert a.state.contacts.pair[:, 0].tolist() == b.state.contacts.pair[:, 0].tolist()
     assert a.time == pytest.approx(b.time, rel=1e-8)
     apart = np.array([sand.Box.periodic(BOX).nearest(x) for x in a.grains.position - b.grains.position])

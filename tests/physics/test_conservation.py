@@ -65,7 +65,7 @@ def test_energy_of_a_magnetic_gas_before_its_first_contact():
     totals = np.array([row["total"] for row in before])
     magnetic = np.array([row["magnetic"] for row in before])
     assert len(before) > 20
-    assert np.ptp(magnetic) > 0.1 * u_min  # something did happen
+    assert np.ptp(magnetic) > 0.1 * u_min  # energy was exchanged
     assert np.abs(totals - totals[0]).max() < 1e-6 * u_min
 
 

@@ -13,7 +13,7 @@ from sand.setup.from_frame import SINGLE, restore_overlaps
 
 RADIUS = 1e-8
 STIFFNESS = 100.0
-"""More than k_n [N/m] of two grains of silica; at rest it is 2 E* a0 = 57 N/m."""
+"""Upper bound of k_n [N/m] of two silica grains; in equilibrium it is 2 E* a0 = 57 N/m."""
 
 
 @pytest.fixture(scope="module")

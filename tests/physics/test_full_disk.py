@@ -177,4 +177,4 @@ def test_a_disk_that_fills_up(undisturbed_run, tmp_path, kilobytes):
         subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True)
         assert_run_can_be_completed(undisturbed_run, disk / "run")
     finally:
-        subprocess.run(["umount", "-l", str(disk)], check=True)  # a simulation may hold its file
+        subprocess.run(["umount", "-l", str(disk)], check=True)  # an earlier simulation may keep its file open

@@ -119,7 +119,7 @@ def assert_same_as_undisturbed(undisturbed_run, folder):
 def test_killed_once(undisturbed_run, tmp_path):
     """Contacts, list, r-RESPA cycles and gas; killed once: same bits in checkpoint, ledger and frames."""
     arrays, _ = newest_checkpoint(undisturbed_run[1])
-    assert arrays["contacts/pair"].shape[1] > 5  # there is something to lose
+    assert arrays["contacts/pair"].shape[1] > 5  # the run has contacts that could be lost
     assert np.isfinite(arrays["long_range/anchor"]).all()
     assert_same_as_undisturbed(undisturbed_run, killed_and_resumed(undisturbed_run, tmp_path, random.Random(1), 1))
 

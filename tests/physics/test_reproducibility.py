@@ -149,7 +149,7 @@ def test_resume_is_bit_for_bit(tmp_path):
     second.run(until="60 ns")
     assert state(second) == state(whole)
     rows = [(tmp_path / name / "ledger.csv").read_text().splitlines() for name in ("whole", "parts")]
-    assert set(rows[0]) <= set(rows[1])  # the end of the first part is one more row
+    assert set(rows[0]) <= set(rows[1])  # the end of the first run adds one row
     assert len(rows[1]) - len(rows[0]) <= 1
 
 

@@ -78,7 +78,7 @@ def test_against_scipy():
     scale = np.repeat([1e-8, 1e-8, 1.0, 1.0, 1.0, 1.0, 1e7, 1e7], 3)
     found = solve_ivp(rates, (0.0, ours.time[-1]), start, method="DOP853", rtol=1e-12, atol=1e-12 * scale)
     end = found.y[:, -1].reshape(8, 3)
-    assert np.linalg.norm(ours.velocity_projectile[-1] - ours.velocity_projectile[0]) > 0.05  # something did happen
+    assert np.linalg.norm(ours.velocity_projectile[-1] - ours.velocity_projectile[0]) > 0.05  # deflection
     for mine, theirs, size in (
         (ours.projectile[-1], end[0], 1e-8),
         (ours.target[-1], end[1], 1e-8),
@@ -243,10 +243,10 @@ def test_cross_section_does_not_depend_on_the_tolerance():
 @pytest.mark.compiled("scattering")
 def test_only_the_relative_velocity_matters():
     """A moving target gives the trajectories of a target at rest at the sum of the speeds."""
-    still = scattering.flight(**IRON, speed=0.3, start="2 um")
+    at_rest = scattering.flight(**IRON, speed=0.3, start="2 um")
     coming = scattering.flight(**IRON, speed=0.1, start="2 um", target_velocity=[-0.2, 0, 0])
     tasks, width = [Task(0, 0, 50), Task(2, 0, 50)], 1e-7
-    rows = [fly(f, tasks, width) for f in (still, coming)]
+    rows = [fly(f, tasks, width) for f in (at_rest, coming)]
     assert (rows[0][:, END] == rows[1][:, END]).all()
     assert rows[1][:, COLUMNS.index("speed")] == pytest.approx(0.3, rel=1e-12, abs=0.0)
     assert rows[0][:, COLUMNS.index("time")] == pytest.approx(rows[1][:, COLUMNS.index("time")], rel=1e-6, abs=0.0)
@@ -259,9 +259,9 @@ def test_moving_target():
     In the laboratory frame the projectile has v∞ and the target its drawn velocity.
     """
     options = IRON | {"orientation": "aligned", "start": "4 um"}
-    still = scattering.cross_section(**options, speed=0.3, relative_error=0.02)
+    at_rest = scattering.cross_section(**options, speed=0.3, relative_error=0.02)
     coming = scattering.cross_section(**options, speed=0.1, target_velocity=[-0.2, 0, 0], relative_error=0.02)
-    assert coming.sigma == pytest.approx(still.sigma, rel=1e-6, abs=0.0)
+    assert coming.sigma == pytest.approx(at_rest.sigma, rel=1e-6, abs=0.0)
     assert coming.c == pytest.approx(1.0, abs=0.03)
     chance = scattering.cross_section(**options, speed=0.2, target_velocity="thermal", relative_error=0.02)
     assert chance.c == pytest.approx(1.0, abs=0.05)

@@ -11,7 +11,7 @@ import numpy as np
 from sand.viewer.packets import MAGIC, TYPES
 
 SCRIPT = "const a = '</script><!-- ${x}'; console.log(a)"
-"""What a script may hold that would end its element."""
+"""Text in a script that would end its element."""
 
 
 def decode(packet):

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("hatchling", reason="the build backend is not installed")
 TOP = Path(__file__).parents[2]
 MADE = ["grainview.css", "grainview.js", "licences.txt"]
-# stands for node: `node npm-cli.js ci …` and `node build.mjs OUT`
+# replacement of node: `node npm-cli.js ci …` and `node build.mjs OUT`
 NODE = """#!{python}
 import os, pathlib, sys
 what = sys.argv[1]

@@ -18,7 +18,7 @@ ARRAYS, META = read_checkpoint(next((REFERENCE / f"run-v{VERSION}").glob("*.npz"
 META = {name: value for name, value in META.items() if name not in ("format", "version", "sha256")}
 WITH_ORDER = {**ARRAYS, "order": np.arange(4, dtype=np.uint32)}
 FAR = 2**31 - 1
-"""An index that is none."""
+"""An index out of range."""
 
 
 def error_of(folder, arrays, meta=META):

@@ -19,7 +19,7 @@ def test_default_figures(run_in_field, tmp_path, capsys):
     assert main(["plot", str(run_in_field)]) == 2
     assert capsys.readouterr().err.count("exists; give another --out, or --overwrite") == 1
     assert main(["plot", str(run_in_field), "--overwrite", "--what", "size"]) == 0
-    assert main(["info", str(run_in_field)]) == 0  # a run's folder is one still
+    assert main(["info", str(run_in_field)]) == 0  # the folder is still recognised as a run
 
 
 @pytest.mark.compiled("fields")

@@ -111,7 +111,7 @@ def test_waiting_for_the_first_frame(finished_run, tmp_path, capsys):
 
     def begin():
         (run / "case.toml").write_bytes((finished_run[0] / "case.toml").read_bytes())
-        # both frames at once: a page may be made after the first as well
+        # both frames at once, because a page may be written after the first frame
         write_trajectory(tmp_path / "made.gsd", [[(0, 1)], []], 3).rename(run / "trajectory.gsd")
 
     later = threading.Timer(1.0, begin)

@@ -36,7 +36,7 @@ from sand.state.arrays import empty_contact_arrays, empty_pair_list
 from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, TWISTING
 
 PAIRS = 403
-"""Contacts of a test: whole blocks, and a rest that fills no vector."""
+"""Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""
 STEP = 1e-11
 STATE = ("pointer1", "pointer2", "twist", "force", "torque1", "torque2", "lost")
 contact_pass, update_flagged_contacts = contact_pass_loop(JKR), settle_loop(JKR)

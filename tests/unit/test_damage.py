@@ -104,7 +104,7 @@ def test_the_ledger_of_a_running_simulation_is_checked_by_rows(tmp_path):
     path.write_text(
         "\n".join([*lines[:-1], ",".join([*lines[-1].split(",")[:2], "nan", "1.0", "1.0", "nan", "0.0", "1"])]) + "\n"
     )
-    assert np.isnan(read_ledger(path)[-1]["total"])  # the last row of a run that the physics stopped
+    assert np.isnan(read_ledger(path)[-1]["total"])  # the last row of a run that ended with an error outcome
 
 
 def test_ledgers_shorter_or_longer_than_the_summary(tmp_path):

@@ -83,7 +83,7 @@ def test_times_since_a_frame(finished_run):
 def test_packets_of_frames(finished_run):
     """A packet holds the numbers of the file; cluster ids persist over frames."""
     folder, sim = finished_run
-    dataset = run_dataset(folder / "trajectory.gsd")  # the file means the run it lies in
+    dataset = run_dataset(folder / "trajectory.gsd")  # the file stands for the run in its folder
     assert dataset.manifest()["outcome"]
     head, arrays = decode(dataset.frame(5))
     assert head["time"] == sim.time and head["frame"] == 5
@@ -301,8 +301,8 @@ def test_ranges_of_quantities(finished_run, tmp_path):
         assert ranges[name] == [every.min(), every.max()]
     assert ranges["size"] == [1.0, 5.0] and ranges["moment"][1] > 0.0
     writer = TrajectoryWriter(tmp_path / "a.gsd")
-    still = sand.Grains([[0.0, 0.0, 0.0]], "10 nm", sand.SILICA)
-    writer.write(0, 0.0, still, sand.Box.open(), contacts_of([]))
+    unchanged = sand.Grains([[0.0, 0.0, 0.0]], "10 nm", sand.SILICA)
+    writer.write(0, 0.0, unchanged, sand.Box.open(), contacts_of([]))
     writer.close()
     ranges = run_dataset(tmp_path / "a.gsd").ranges()
     assert ranges["moment"] == ranges["load"] == ranges["speed"] == [0.0, 0.0] and ranges["size"] == [1.0, 1.0]

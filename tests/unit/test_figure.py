@@ -169,9 +169,9 @@ def test_spheres_stand_where_the_grains_are(run_with_clusters):
     """Positions are unwrapped, each cluster shifted by whole boxes; radii are unscaled."""
     pairs = run_with_clusters.contacts["pair"]
     scene = make_scene(run_with_clusters.grains, pairs, run_with_clusters.box)
-    moved = (scene.position - unwrapped(run_with_clusters.grains.position, pairs, run_with_clusters.box)) / 2e-7
-    np.testing.assert_allclose(moved, np.round(moved), atol=1e-9)
-    np.testing.assert_allclose(np.diff(moved[:3], axis=0), 0.0, atol=1e-9)
+    shifted = (scene.position - unwrapped(run_with_clusters.grains.position, pairs, run_with_clusters.box)) / 2e-7
+    np.testing.assert_allclose(shifted, np.round(shifted), atol=1e-9)
+    np.testing.assert_allclose(np.diff(shifted[:3], axis=0), 0.0, atol=1e-9)
     np.testing.assert_array_equal(scene.radius, run_with_clusters.grains.radius)
     np.testing.assert_allclose(np.diff(scene.position[:3, 0]), 1.9e-8)
 

@@ -10,7 +10,7 @@ from sand.io.trajectory import TrajectoryWriter, read_frames
 from .synthetic_trajectories import contacts_of
 
 SINGLE = 6e-8
-"""Half a unit of the last place of float32, in which the format holds most numbers."""
+"""Rounding error of float32, in which the format stores most numbers."""
 
 
 @pytest.mark.parametrize("box", [Box.open(), Box.periodic("1 um", None, "0.8 um")])

@@ -15,7 +15,7 @@ from sand.state.arrays import GATHER_CLASSES, GATHER_ORDER_FROM, empty_contact_a
 from sand.state.state import CONTACTS, COUNT, SQUARED_SPEED, SQUARED_SPIN
 
 GRAINS = GATHER_ORDER_FROM + 37
-"""Enough for an order of their own, and a last block that is not full."""
+"""Enough for the block-wise order, with an incomplete last block."""
 
 
 def _gather_all(grains, contacts):

@@ -68,8 +68,8 @@ def test_commands_refuse_a_locked_folder(locked_folder, tmp_path, capsys, words)
         )
     (folder / "checkpoint-000000000000001.npz").write_bytes(b"")
     assert main([*(str(case) if word == "CASE" else word for word in words), str(folder)]) == 2
-    said = capsys.readouterr().err.strip().splitlines()
-    assert len(said) == 1 and f"another process (pid {job.pid}) writes to {folder}" in said[0]
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and f"another process (pid {job.pid}) writes to {folder}" in lines[0]
     assert sorted(path.name for path in folder.iterdir()) == [LOCK, "case.toml", "checkpoint-000000000000001.npz"]
 
 
@@ -128,10 +128,10 @@ class CompetingWriter(Observer):
     """Tries to write to the folder of a run while it runs."""
 
     def __init__(self, folder):
-        self.folder, self.said = folder, []
+        self.folder, self.messages = folder, []
 
     def see(self, simulation, row):
-        if self.said:
+        if self.messages:
             return
         for attempt in (
             lambda: sand.resume(self.folder),
@@ -139,7 +139,7 @@ class CompetingWriter(Observer):
         ):
             with pytest.raises(sand.BadInput) as error:
                 attempt()
-            self.said.append(str(error.value))
+            self.messages.append(str(error.value))
 
 
 @pytest.mark.compiled("contacts")
@@ -152,7 +152,9 @@ def test_simulations_of_one_process(tmp_path):
     others = CompetingWriter(folder)
     first.observers.append(others)
     first.run(until="0.2 ns")
-    assert len(others.said) == 2 and all("another simulation of this process" in said for said in others.said)
+    assert len(others.messages) == 2 and all(
+        "another simulation of this process" in message for message in others.messages
+    )
     with pytest.raises(sand.BadInput, match=r"another run has written to .*give another folder"):
         late.run(until="0.1 ns")
     again, never = sand.resume(folder), sand.resume(folder)

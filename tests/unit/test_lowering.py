@@ -28,7 +28,7 @@ try:
 except IndexError as error:
     print("told", error)
 """
-"""A function of ours that calls a function of ours that reads beyond the end of an array."""
+"""A SAND kernel that calls a SAND function that reads beyond the end of an array."""
 
 
 @formula

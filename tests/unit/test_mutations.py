@@ -24,9 +24,9 @@ from sand.io.trajectory import read_frames
 from ..physics.test_full_disk import CASE
 
 LONGEST = 20
-"""Seconds that a file may take."""
+"""Time limit per file [s]."""
 MEMORY = 100 * 2**20
-"""Bytes that Python and NumPy may have taken at once for a file; the files are of some 10 kB."""
+"""Memory limit per file [bytes]; the files have about 10 kB."""
 
 
 @contextlib.contextmanager
@@ -247,7 +247,7 @@ def mutated_case(content, rng):
     return content
 
 
-def look(name, path):
+def read_and_build(name, path):
     """Read a case of a kind, and build the simulation if it is one."""
     found = KINDS[name][1](path)
     if name == "run" and found.grains.kind == "gas" and found.grains.number <= 200:
@@ -263,7 +263,7 @@ def test_mutated_cases_are_read_or_refused_in_lines(tmp_path, name, count):
     text = KINDS[name][0]
     path, rng, refused = tmp_path / "case.toml", random.Random(count), 0
     path.write_text(text)
-    look(name, path)  # the unchanged case is valid
+    read_and_build(name, path)  # the unchanged case is valid
     with within_bounds() as next_one:
         for number in range(count):
             if number % 2:
@@ -272,7 +272,7 @@ def test_mutated_cases_are_read_or_refused_in_lines(tmp_path, name, count):
                 path.write_bytes(tomli_w.dumps(mutated_case(tomllib.loads(text), rng)).encode("utf-8", "replace"))
             next_one()
             try:
-                look(name, path)
+                read_and_build(name, path)
             except sand.BadInput as error:
                 refused += 1
                 assert all(line and "\n" not in line for line in error.problems), (path.read_text(), error.problems)

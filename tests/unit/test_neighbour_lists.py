@@ -122,8 +122,8 @@ def test_grains_outside_a_periodic_box():
     """Grains shifted by whole box lengths: the same rows, as no pair is at the reach to rounding."""
     rng = np.random.default_rng(3)
     box, position = Box((1.0, None, 1.0)), rng.random((200, 3)) - 0.5
-    moved = position + rng.integers(-3, 4, (200, 3)) * [1.0, 0.0, 1.0]
-    assert (rows(moved, box, 0.21) == rows(position, box, 0.21)).all()
+    shifted = position + rng.integers(-3, 4, (200, 3)) * [1.0, 0.0, 1.0]
+    assert (rows(shifted, box, 0.21) == rows(position, box, 0.21)).all()
 
 
 @pytest.mark.compiled("small")
@@ -245,7 +245,7 @@ def test_near_pairs_are_those_with_a_small_gap(search, lengths):
     position = (rng.random((400, 3)) - 0.5) * [0.3e-6 if length is None else length for length in lengths]
     radius = rng.choice([5e-9, 3.5e-9, 1e-8], 400)
     chosen = [0]
-    for k in range(1, 400):  # none overlaps with one before it
+    for k in range(1, 400):  # no overlap with an earlier grain
         gap = np.linalg.norm(box.nearest(position[chosen] - position[k]), axis=1) - radius[chosen] - radius[k]
         chosen += [k] if gap.min() > 0.0 else []
     grains = sand.Grains(position[chosen], radius[chosen], sand.SILICA)
@@ -459,8 +459,8 @@ def test_states_of_earlier_versions_continue(earlier, far):
     options = {"box": box, "stepping": sand.Verlet(far=far)}
     begun = sand.Simulation(grains, forces, neighbours=earlier, **options)
     begun.run(until="0.3 ns")
-    moved = begun.box.nearest(begun.grains.position - grains.position)
-    assert np.sqrt((moved**2).sum(axis=1)).max() > 1e-8
+    shifted = begun.box.nearest(begun.grains.position - grains.position)
+    assert np.sqrt((shifted**2).sum(axis=1)).max() > 1e-8
     saved = begun.state.to_arrays(), {"temperature": 1e6, "wall_seconds": 0.0}
     goes_on = sand.Simulation(grains, forces, neighbours=Neighbours("cells", "2 nm"), restart=saved, **options)
     there, here = begun.loads(), goes_on.loads()

@@ -33,7 +33,7 @@ def test_histograms_count_every_grain(run_in_field):
     axes = grains_figure(frame, "coordination").axes[0]
     assert [(bar.get_x() + bar.get_width() / 2, bar.get_height()) for bar in axes.patches] == [(1.0, 8)]
     assert "speed (mm/s)" in grains_figure(frame, "speed").axes[0].get_xlabel()
-    frame.velocity = np.zeros((8, 3))  # all at rest: bars that can be seen
+    frame.velocity = np.zeros((8, 3))  # all grains at rest: the bars are still visible
     bars = grains_figure(frame, "speed").axes[0].patches
     assert sum(bar.get_height() for bar in bars) == 8 and min(bar.get_width() for bar in bars) > 0.0
     with pytest.raises(BadInput, match="field_alignment is not known"):

@@ -9,7 +9,7 @@ from sand.state.arrays import ContactArrays, empty_contact_arrays
 from sand.state.state import CONTACTS, COUNT
 
 BY_GRAIN = {"side", "start", "gather_order"}
-"""Arrays that are made anew from the pairs."""
+"""Arrays that are rebuilt from the pairs."""
 
 
 @pytest.mark.parametrize("broken", [[0], [1, 2, 5], [6], [], list(range(7))])

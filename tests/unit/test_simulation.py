@@ -265,7 +265,7 @@ def test_steps_are_counted_through_growing_arrays():
     """run(steps=N) takes N steps, also when the pair list outgrows its arrays."""
     sim = struck_chain(length=30)
     near = sim.state.pair_list
-    own = ("anchor", "inner", "skin")  # not by pair
+    own = ("anchor", "inner", "skin")  # without one column per pair
     columns = {name: array[..., :1].copy() for name, array in near._asdict().items() if name not in own}
     sim.state.pair_list = near._replace(**columns)
     sim.run(steps=32)

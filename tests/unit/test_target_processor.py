@@ -44,7 +44,7 @@ for name, function, types, wide in [
     found["instructions"][name] = [w for w in ("zmm", "vgatherq") if w in assembly]
 print(json.dumps(found))
 """
-"""Compiles three loops, as a user's process would; where two are the same, the second comes from the cache."""
+"""Compiles three loops, as a user's process would; of two equal ones the second comes from the cache."""
 
 NO_GATHER, WIDE = "+prefer-no-gather", '"prefer-vector-width"="512"'
 EXPECTED = {
@@ -52,13 +52,13 @@ EXPECTED = {
     "znver4": {"loop": [NO_GATHER], "gathering": [NO_GATHER]},
     "sapphirerapids": {"loop": [], "long loop": [WIDE], "gathering": []},
 }
-"""What LLVM must be told for each processor; without a long loop of its own, that is the other one."""
+"""Expected LLVM attributes per processor; without an entry for the long loop, those of the other one."""
 INSTRUCTIONS = {
     "haswell": {"loop": [], "gathering": []},
     "znver4": {"gathering": ["zmm"]},
     "sapphirerapids": {"loop": [], "long loop": ["zmm"], "gathering": ["vgatherq"]},
 }
-"""What LLVM must make of it: 512-bit registers, numbers gathered by an instruction (Zen has it, too)."""
+"""Expected machine code: 512-bit registers, gather instructions (Zen has them, too)."""
 
 
 def compiled_for(folder, name, features=""):

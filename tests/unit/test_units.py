@@ -47,7 +47,7 @@ USUAL = [
     "angstrom",
     "Å",
 ]
-"""Units that are understood without loading pint."""
+"""Units that are parsed without importing pint."""
 
 
 FORMS = ("{}", "{}/m^2", "J {}^-1*A", "A m²/{}", "kg·{}**3 / s", "rad/{}", "{}/m^3", "J/{}")
