@@ -83,12 +83,12 @@ def changed_entry(name, index, value):
 
 
 @pytest.mark.parametrize(
-    ("place", "value"),
+    ("index", "value"),
     [(CONTACTS, 2), (CONTACTS, 10**15), (CONTACTS, -1), (PAIRS, 4), (STAGE, 1), (STEPS, 61), (GRAIN1, FAR)],
 )
-def test_inconsistent_counters(tmp_path, place, value):
+def test_inconsistent_counters(tmp_path, index, value):
     """Numbers of contacts and pairs against the arrays, the step against meta.json, an invalid grain index."""
-    assert f"{COUNT[place]} = {value}" in error_of(tmp_path, changed_entry("count", place, value))
+    assert f"{COUNT[index]} = {value}" in error_of(tmp_path, changed_entry("count", index, value))
 
 
 def test_inconsistent_lists(tmp_path):

@@ -72,9 +72,9 @@ def test_a_checkpoint_of_another_format_is_refused(tmp_path, monkeypatch, versio
     path = write_state(tmp_path, 2)
     monkeypatch.undo()
     write_state(tmp_path, 1)
-    for read, place in ((read_checkpoint, path), (newest_checkpoint, tmp_path)):
+    for read, source in ((read_checkpoint, path), (newest_checkpoint, tmp_path)):
         with pytest.raises(sand.BadInput, match=rf"format {version}.*{advice}"):
-            read(place)
+            read(source)
     assert path.exists()
 
 

@@ -125,11 +125,11 @@ def test_resume_computes_missing_trajectories_only(here):
     """With the rows of half the trajectories the other half is computed; the same result."""
     pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     rows, later = [], []
-    whole = scattering.measure(pair, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
+    undisturbed = scattering.measure(pair, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
     again = scattering.measure(
         pair, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
     )
-    assert numbers(again) == numbers(whole) == numbers(here)
+    assert numbers(again) == numbers(undisturbed) == numbers(here)
     assert len(later) == len(rows) - len(rows[::2])
 
 
@@ -184,8 +184,8 @@ def test_killed_job_is_resumed(tmp_path):
     """Killed, with an incomplete last line: resumed, its files equal those of an undisturbed job."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace("[1, 2]", "[1, 1.5, 2]").replace("0.05", "0.01").replace('"4 b_max"', '"20 b_max"'))
-    whole, cut = tmp_path / "whole", tmp_path / "cut"
-    assert main(["scatter", str(case), "--out", str(whole), "--quiet"]) == 0
+    undisturbed, cut = tmp_path / "whole", tmp_path / "cut"
+    assert main(["scatter", str(case), "--out", str(undisturbed), "--quiet"]) == 0
     job = subprocess.Popen([sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(cut), "--quiet"])
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline and job.poll() is None:
@@ -194,13 +194,13 @@ def test_killed_job_is_resumed(tmp_path):
         time.sleep(0.005)
     job.kill()
     job.wait()
-    assert (cut / "flights.csv").stat().st_size < 0.9 * (whole / "flights.csv").stat().st_size
+    assert (cut / "flights.csv").stat().st_size < 0.9 * (undisturbed / "flights.csv").stat().st_size
     assert not (cut / "scattering.json").exists()
     with open(cut / "flights.csv", "a") as file:
         file.write("0,3,77,1,3.3e-")
     assert main(["resume", str(cut), "--quiet"]) == 0
     for name in ("flights.csv", "results.csv"):
-        assert (cut / name).read_bytes() == (whole / name).read_bytes()
+        assert (cut / name).read_bytes() == (undisturbed / name).read_bytes()
 
 
 @pytest.mark.compiled("scattering")

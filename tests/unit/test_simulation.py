@@ -74,9 +74,9 @@ def test_given_contacts_may_overlap_more():
     wrong = [2 * k for k in range(31) if k % 2]
     first = [2, 10, 58]
     pairs = np.array([[2, 3], [11, 10], [59, 58]])
-    held = sand.setup.StrainedContacts(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
+    kept = sand.setup.StrainedContacts(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
     with pytest.raises(sand.BadInput) as caught:
-        sand.Simulation(grains, [sand.Contact()], contacts=held)
+        sand.Simulation(grains, [sand.Contact()], contacts=kept)
     named = [f"grains {i} and {i + 1} overlap by {1.3 * limit:.3g} m at the start" for i in wrong if i not in first]
     *lines_of_pairs, rest = caught.value.problems
     assert [line.split(";")[0] for line in lines_of_pairs] == named[:10]
