@@ -282,9 +282,9 @@ def test_grains_kept_by_an_observer_are_in_the_users_order():
             self.kept = simulation.grains
 
         def tick(self, simulation):
-            self.looks += 1
+            self.calls += 1
             assert (self.kept.radius == simulation.start.radius).all()
-            if self.looks == 3:
+            if self.calls == 3:
                 raise RuntimeError("stumbled")
 
     keeper = Keeper()
