@@ -29,16 +29,16 @@ from numba.core.event import Event, Listener, register
 # run, workers and children, must load them in the same way, or they compile everything twice.
 compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 
-from .specs import FIXTURES, SPECS, WORKERS, parts_of, watched  # noqa: E402
+from .specs import FIXTURES, SPECS, WORKERS, description_of, monitored_drivers  # noqa: E402
 from .validation import Recorder, parse_part, part_of  # noqa: E402
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests press Ctrl-C
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 TESTS = Path(__file__).parent
 FOLDERS = ("browser", "peers")
 """Folders under tests/ that run only when their path is given."""
-HOW = {"browser": "the page in a browser: pytest tests/browser", "peers": "other programs: pytest tests/peers"}
+HOW_TO_RUN = {"browser": "the page in a browser: pytest tests/browser", "peers": "other programs: pytest tests/peers"}
 left_out: Counter[str] = Counter()
 
 
@@ -64,7 +64,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _tier(item: pytest.Item) -> str | None:
-    """The tier that a test belongs to beyond the default ones."""
+    """The tier of a test beyond the default ones, or None."""
     if "validate" in item.keywords:
         return "validate"
     folder = item.path.relative_to(TESTS).parts[0] if item.path.is_relative_to(TESTS) else ""
@@ -72,7 +72,7 @@ def _tier(item: pytest.Item) -> str | None:
 
 
 def _chosen(config: pytest.Config) -> set[str]:
-    """The tiers that this run was asked for."""
+    """The tiers that this run includes."""
     roots = [Path(str(word).split("::")[0]).resolve() for word in config.args]
     chosen = {name for name in FOLDERS if any(root.is_relative_to(TESTS / name) for root in roots)}
     if config.getoption("--validate") or config.getoption("--validate-part"):
@@ -107,7 +107,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _mark(item: pytest.Item, tier: str | None) -> None:
-    """Add `quick` or the group of the worker that compiles the test's kernels."""
+    """Add `quick` or the group of the pytest worker that compiles the test's kernels."""
     for name in FIXTURES.keys() & set(getattr(item, "fixturenames", ())):
         if item.get_closest_marker("compiled") is None:
             item.add_marker(pytest.mark.compiled(FIXTURES[name]))
@@ -134,12 +134,12 @@ class CompilationGuard(Listener):
             raise AssertionError(f"this test compiles {getattr(function, '__qualname__', function)}: {ADVICE}")
 
     def on_end(self, event: Event) -> None:
-        """Called by numba afterwards."""
+        """Called by numba after it compiled a function."""
 
-    def use(self, name: str | None, plan: Any) -> None:
-        """Called before a driver takes steps; `name` is its specification, None for one that is not canonical."""
+    def use(self, name: str | None, kernel_spec: Any) -> None:
+        """Called before a driver takes steps; `name` is its specification, None if it is not in tests/specs.py."""
         if self.allowed is not None and name not in self.allowed:
-            what = f"the driver {name!r}" if name else f"a driver that is none of tests/specs.py ({parts_of(plan)})"
+            what = f"the driver {name!r}" if name else f"a driver not in tests/specs.py ({description_of(kernel_spec)})"
             raise AssertionError(f"this test takes steps with {what}: {ADVICE}")
 
 
@@ -153,7 +153,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     mark = item.get_closest_marker("compiled")
     if _tier(item) is None and not DISABLE_JIT:
         guard.allowed = mark.args if mark else ()
-    with watched(guard.use):
+    with monitored_drivers(guard.use):
         result = yield
     guard.allowed = None
     return result
@@ -162,7 +162,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 # ---- the last line -----------------------------------------------------------------------------------
 def pytest_sessionfinish(session: pytest.Session) -> None:
     output = getattr(session.config, "workeroutput", None)
-    if output is not None:  # a worker of pytest-xdist tells the process that reports
+    if output is not None:  # a worker of pytest-xdist sends it to the reporting process
         output["left_out"] = dict(left_out)
 
 
@@ -174,10 +174,10 @@ def pytest_testnodedown(node: Any) -> None:
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     reporter = config.pluginmanager.getplugin("terminalreporter")
-    told = [f"{left_out['validate']} long statistical checks: pytest --validate"] if left_out["validate"] else []
-    told += [HOW[name] for name in HOW if name not in _chosen(config)]
+    lines = [f"{left_out['validate']} long statistical checks: pytest --validate"] if left_out["validate"] else []
+    lines += [HOW_TO_RUN[name] for name in HOW_TO_RUN if name not in _chosen(config)]
     if reporter is not None and not hasattr(config, "workerinput"):
-        reporter.write_line("not run: " + "; ".join(told))
+        reporter.write_line("not run: " + "; ".join(lines))
 
 
 @pytest.fixture(autouse=True)
@@ -195,7 +195,7 @@ def _empty_figures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPat
 
 @pytest.fixture(autouse=True)
 def _no_physics_warnings() -> Iterator[None]:
-    """Hot, overlapping and small iron grains give warnings; tests of these warnings look for them themselves."""
+    """Ignore warnings about hot, overlapping and small iron grains; tests of these warnings catch them."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="contacts of .* grains")
         warnings.filterwarnings("ignore", message=r"temperature = .* no material is solid")

@@ -1,11 +1,11 @@
-"""Numbers of short runs over everything SAND can do, to compare two revisions bit by bit on the same machine.
+"""Numbers of short runs over all features of SAND, to compare two revisions bit by bit on the same machine.
 
     git worktree add /tmp/before REVISION
     PYTHONPATH=/tmp/before/src python tests/golden.py record before.npz
     python tests/golden.py compare before.npz
 
-`compare` runs the same, prints every quantity whose bits differ with its largest relative difference, and exits with 1
-if there is one.  The numbers are not committed: bits differ between processors and versions of numba.
+`compare` repeats the runs, prints every quantity whose bits differ with its largest relative difference, and exits
+with 1 if there is one.  The numbers are not committed: bits differ between processors and versions of numba.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ def end_of(sim: sand.Simulation) -> dict[str, Any]:
 
 
 def gas(number: int = 20, box: str = "0.25 um", **options: Any) -> sand.Grains:
-    """Magnetic iron grains at random places."""
+    """Magnetic iron grains at random positions."""
     return sand.setup.gas(number, box, **(IRON | {"temperature": "300 K", "seed": 3} | options))
 
 
 def impact(**contact: Any) -> list[Any]:
-    """Two silica aggregates that are about to meet, and the contact model."""
+    """Two silica aggregates just before an impact, and the contact model."""
     first = sand.setup.bpca(12, radius="0.1 um", material="silica", seed=1)
     second = sand.setup.bpca(8, radius="0.1 um", material="silica", seed=2)
     met = sand.setup.encounter(first, second, speed="8 m/s", impact_parameter="0.3 b")
@@ -61,7 +61,7 @@ def impact(**contact: Any) -> list[Any]:
 
 @golden
 def contacts_open(folder: Path) -> dict[str, Any]:
-    """Contacts alone, slip beyond the limits, breaking."""
+    """Contacts alone: slip beyond the limits, breaking."""
     sim = sand.Simulation(*impact())
     sim.run(steps=6000)
     return end_of(sim)
@@ -69,7 +69,7 @@ def contacts_open(folder: Path) -> dict[str, Any]:
 
 @golden
 def contacts_options(folder: Path) -> dict[str, Any]:
-    """Reset on slip, springs that follow the contact radius, viscoelastic and constant damping, two materials."""
+    """slip="reset", variable stiffness, viscoelastic and constant damping, two materials."""
     contact = sand.Contact(slip="reset", stiffness="dt97", damping="viscoelastic", viscous_time="1e-11 s")
     sim = sand.Simulation(impact()[0], [contact], box="4 um")
     sim.run(steps=6000)
@@ -107,7 +107,7 @@ def dipoles_taylor(folder: Path) -> dict[str, Any]:
 
 @golden
 def listed(folder: Path) -> dict[str, Any]:
-    """Dipoles and charges from a Verlet list, both cuts, and a gas with Brownian motion."""
+    """Dipoles and charges from a Verlet list, smooth and sharp cut-offs, and a gas with Brownian motion."""
     grains = gas(100, "0.6 um")
     charged = sand.Grains(
         grains.position, grains.radius, sand.IRON, velocity=grains.velocity, spin=grains.spin, moment=grains.moment,
@@ -125,7 +125,7 @@ def listed(folder: Path) -> dict[str, Any]:
 
 @golden
 def external(folder: Path) -> dict[str, Any]:
-    """Gravity, an electric field, a rotating magnetic field and the attraction of masses, open."""
+    """Gravity, an electric field, a rotating magnetic field and Newtonian attraction, open space."""
     forces = [
         sand.Contact(), sand.Dipoles(cut="sharp"), sand.Attraction(), sand.Gravity("9.81 m/s^2"),
         sand.ElectricField("1 kV/m"), sand.Field(0, shape="rotating", amplitude=["10 mT", 0, 0], frequency="100 MHz",
@@ -138,7 +138,7 @@ def external(folder: Path) -> dict[str, Any]:
 
 @golden
 def adaptive(folder: Path) -> dict[str, Any]:
-    """Runge-Kutta steps while nothing touches, event location, then Verlet; with a ramp of the field."""
+    """Runge–Kutta steps without contacts, event location, then Verlet; with a field ramp."""
     forces = [sand.Contact(), sand.Dipoles(), sand.Field("1 mT", shape="ramp", final="5 mT", end="1 ns")]
     sim = sand.Simulation(gas(6, "0.15 um"), forces, stepping=sand.Adaptive())
     sim.run(steps=4000)
@@ -147,7 +147,7 @@ def adaptive(folder: Path) -> dict[str, Any]:
 
 @golden
 def many(folder: Path) -> dict[str, Any]:
-    """Above the sizes at which loops are cut into blocks and grains are sorted in space; one thread and two."""
+    """Above the sizes for parallel blocks and spatial sorting; one thread and two."""
     numbers = {}
     body = sand.setup.bpca(4200, radius="0.1 um", material="silica", seed=4)
     for threads in (1, 2):
@@ -273,7 +273,7 @@ def chain(folder: Path) -> dict[str, Any]:
 
 
 def vars_of(thing: Any) -> dict[str, Any]:
-    """Arrays of numbers among the attributes of an object."""
+    """Numerical arrays among the attributes of an object."""
     items = thing._asdict() if hasattr(thing, "_asdict") else vars(thing)
     return {name: value for name, value in items.items() if isinstance(value, (float, np.ndarray))}
 
@@ -291,7 +291,7 @@ def numbers_of(table: Path) -> dict[str, Any]:
 
 
 def numbers_within(content: Any, path: str = "") -> Iterator[tuple[str, float]]:
-    """Every number in what a JSON file holds, by its path, but for wall times."""
+    """Every number in the content of a JSON file, by its path, except wall times."""
     if isinstance(content, bool) or "wall" in path:
         return
     if isinstance(content, (int, float)):
@@ -332,7 +332,7 @@ def all_numbers(only: list[str]) -> dict[str, np.ndarray]:
 
 
 def compare(before: dict[str, np.ndarray], now: dict[str, np.ndarray]) -> list[str]:
-    """A line for each quantity that is not the same to the last bit."""
+    """A line for each quantity that differs in any bit."""
     lines = [f"{key}: only {'before' if key in before else 'now'}" for key in sorted(before.keys() ^ now.keys())]
     for key in sorted(before.keys() & now.keys()):
         a, b = before[key], now[key]

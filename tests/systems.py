@@ -1,4 +1,4 @@
-"""What differs between systems, for tests: names that are not everywhere, and what cannot be done everywhere."""
+"""Differences between operating systems: names that may be missing, and marks for tests that some cannot run."""
 
 import os
 import signal

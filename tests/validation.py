@@ -1,4 +1,4 @@
-"""The long checks behind ``--validate``: parts of them for a rotating run, and the record of their last whole run.
+"""Long checks behind ``--validate``: parts of them, and the record of the last complete run.
 
 ``pytest --validate --record`` writes ``tests/validated.md`` if every test passed; ``--validate-part 3/10`` runs the
 fourth tenth of the long checks alone.
@@ -29,7 +29,7 @@ def parse_part(text: str) -> tuple[int, int]:
 
 
 def part_of(nodeid: str, part: tuple[int, int]) -> bool:
-    """Whether a test belongs to part K of N; the same on every machine, whatever other tests exist."""
+    """Whether a test belongs to part K of N; independent of the machine and of other tests."""
     return zlib.crc32(nodeid.encode()) % part[1] == part[0]
 
 

@@ -1,4 +1,4 @@
-"""Which Chromium drives the tests of the page: the system's, or the one that Playwright installed before.
+"""The Chromium that runs the tests of the page: the system's, or one that Playwright installed.
 
 `python -m tests.browser.chromium` prints its path, or fails with one line.
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
-    # WebGL 2 by SwiftShader on the processor: the same picture on every machine, with or without a GPU
+    # WebGL 2 by SwiftShader on the CPU: the same picture on every machine, with or without a GPU
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",

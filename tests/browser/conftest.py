@@ -1,4 +1,4 @@
-"""A browser for the tests of the page, and a page that lets no error pass unseen.
+"""Fixtures for tests of the page: a browser, and tabs that fail a test for any unexpected error.
 
 Without Playwright, Chromium or the bundle the tests are skipped; SAND_NEED_BROWSER=1 makes that a failure.
 """
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 PATIENCE = 60_000  # ms, for whatever a test waits for: software draws slowly on a busy machine
 
 
-def lacking(reason: str) -> None:
-    """Skip the test, or fail it where the browser must be there."""
+def skip_or_fail(reason: str) -> None:
+    """Skip the test, or fail it if SAND_NEED_BROWSER is set."""
     if os.environ.get("SAND_NEED_BROWSER"):
         pytest.fail(reason, pytrace=False)
     pytest.skip(reason)
@@ -35,7 +35,7 @@ def lacking(reason: str) -> None:
 
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """Chromium without a window, one for each worker.
+    """Headless Chromium, one for each worker.
 
     Not for the whole session: while Playwright runs, asyncio has a running loop in this thread, and tests of other
     packages that start one would fail.
@@ -43,10 +43,10 @@ def browser() -> Iterator[Browser]:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        lacking("Playwright is not installed: pip install -e '.[interop]'")
+        skip_or_fail("Playwright is not installed: pip install -e '.[interop]'")
     path = find()
     if path is None:
-        lacking("no Chromium: apt install chromium, or playwright install chromium")
+        skip_or_fail("no Chromium: apt install chromium, or playwright install chromium")
     with sync_playwright() as playwright:
         # Playwright's default is no sandbox, which root and most containers need; only our own pages are opened
         started = playwright.chromium.launch(executable_path=path, headless=True, args=list(FLAGS))
@@ -60,12 +60,12 @@ def bundle() -> tuple[str, str]:
     try:
         return read_bundle()
     except BadInput as error:
-        lacking(str(error))
+        skip_or_fail(str(error))
 
 
 @pytest.fixture(scope="session")
 def shows(tmp_path_factory: pytest.TempPathFactory, bundle: tuple[str, str]) -> Iterator[Shows]:
-    """Runs to look at, by kind (see `runs.KINDS`): `shows("two")`."""
+    """Synthetic runs by kind (see `runs.KINDS`): `shows("two")`."""
     all_of_them = Shows(tmp_path_factory.mktemp("shows"))
     yield all_of_them
     all_of_them.close()
@@ -75,16 +75,16 @@ def shows(tmp_path_factory: pytest.TempPathFactory, bundle: tuple[str, str]) -> 
 def page(browser: Browser) -> Iterator[Page]:
     """An empty tab of 1280 × 800.
 
-    What goes wrong in it (errors on the console, exceptions, failed requests, requests to another machine) is listed in
-    `page.errors`. At the end of the test every entry must contain one of `page.expected_errors`, and each of these must
-    have come; the test sets that list where it provokes errors.
+    Errors in it (console, exceptions, failed requests, requests to another machine) are collected in `page.errors`.  At
+    the end of the test every entry must contain one of `page.expected_errors`, and each of these must have occurred;
+    tests that provoke errors set that list.
     """
     yield from page_of(browser)
 
 
 @pytest.fixture(scope="module")
 def tab(browser: Browser, bundle: tuple[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
-    """The page of a small run, one for all tests of a module."""
+    """The page of a small run, shared by all tests of a module."""
     folder = SmallRun(tmp_path_factory.mktemp("runs") / "small").folder
     with served(folder) as server:
         pages = page_of(browser)
@@ -97,13 +97,13 @@ def tab(browser: Browser, bundle: tuple[str, str], tmp_path_factory: pytest.Temp
 
 @pytest.fixture
 def view(tab: Driven) -> Driven:
-    """That page, as at first."""
+    """The shared page with its initial settings."""
     tab.fresh()
     return tab
 
 
 def page_of(browser: Browser) -> Iterator[Page]:
-    """What the fixture `page` does."""
+    """Implementation of the fixture `page`."""
     context = browser.new_context(viewport={"width": 1280, "height": 800})
     context.set_default_timeout(PATIENCE)
     tab = context.new_page()
@@ -111,10 +111,10 @@ def page_of(browser: Browser) -> Iterator[Page]:
     tab.errors, tab.expected_errors = errors, []  # type: ignore[attr-defined]
     tab.on("console", lambda message: errors.append(f"console: {message.text}") if message.type == "error" else None)
     tab.on("pageerror", lambda error: errors.append(f"exception: {error}"))
-    tab.on("requestfailed", lambda request: _note_failure(request, errors))
-    tab.on("request", lambda request: _note_stranger(request, errors))
+    tab.on("requestfailed", lambda request: _record_failure(request, errors))
+    tab.on("request", lambda request: _record_foreign_request(request, errors))
     yield tab
-    tab.evaluate("() => new Promise(requestAnimationFrame)")  # what the browser has told by now is heard
+    tab.evaluate("() => new Promise(requestAnimationFrame)")  # process the browser's pending events
     expected = tab.expected_errors  # type: ignore[attr-defined]
     seen = list(errors)
     context.close()
@@ -124,12 +124,12 @@ def page_of(browser: Browser) -> Iterator[Page]:
     assert not silent, f"expected, but not seen in the page: {silent}"
 
 
-def _note_failure(request: Request, errors: list[str]) -> None:
-    if request.failure != "net::ERR_ABORTED":  # the page itself gave it up, as it does with frames it skips
+def _record_failure(request: Request, errors: list[str]) -> None:
+    if request.failure != "net::ERR_ABORTED":  # aborted by the page itself, as for skipped frames
         errors.append(f"request: {request.url} {request.failure}")
 
 
-def _note_stranger(request: Request, errors: list[str]) -> None:
+def _record_foreign_request(request: Request, errors: list[str]) -> None:
     parts = urlsplit(request.url)
     if parts.scheme in ("http", "https", "ws", "wss") and parts.hostname != "127.0.0.1":
         errors.append(f"stranger: {request.url}")

@@ -1,4 +1,4 @@
-"""The page as a test drives it: opened, pressed, clicked, and looked at."""
+"""Operations on the page in a tab: open, press keys, click, read."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ CANVAS = """() => document.querySelector("canvas.gv-canvas").toDataURL("image/pn
 
 @contextmanager
 def served(folder: Path, field: Any = FIELD) -> Iterator[Server]:
-    """The server of a run."""
+    """A server of the run."""
     server = Server(run_dataset(folder, field))
     server.start()
     try:
@@ -51,7 +51,7 @@ def image(png: bytes) -> np.ndarray:
 
 
 def differ(a: np.ndarray, b: np.ndarray, by: int = 0) -> int:
-    """Pixels that are not the same, `by` more than so much of 255."""
+    """Number of pixels that differ by more than this of 255."""
     if a.shape != b.shape:
         return max(a.size, b.size)
     return int(np.any(np.abs(a.astype(int) - b) > by, axis=-1).sum())
@@ -61,8 +61,8 @@ class Driven:
     """A page of a run in a tab.
 
     Args:
-        tab: of the browser.
-        address: of the page; None: what the tab shows already.
+        tab: a tab of the browser.
+        address: of the page; None: the tab has it open already.
     """
 
     def __init__(self, tab: Page, address: str | None = None):
@@ -71,14 +71,14 @@ class Driven:
             self.open(address)
 
     def open(self, address: str, ready: str = "yes") -> None:
-        """Go there, and wait for the first picture (`ready`: "no" for the sentence instead)."""
+        """Open the address and wait for the first picture (`ready`: "no" for an error sentence instead)."""
         self.tab.goto("about:blank")
         self.tab.goto(address)
         self.tab.wait_for_selector(f"#grainview[data-ready={ready}]")
         self.settle()
 
     def settle(self) -> None:
-        """Until what was asked for is drawn."""
+        """Wait until everything requested is drawn."""
         self.tab.evaluate(SETTLED)
 
     def run(self, script: str, *told: Any) -> Any:
@@ -97,7 +97,7 @@ class Driven:
         self.settle()
 
     def fresh(self) -> None:
-        """All settings as at first, the camera too, no dialog, the focus nowhere."""
+        """Reset all settings and the camera, close dialogs, remove the focus."""
         self.run("app.player.stop()")
         self.tab.evaluate("() => { document.querySelector('dialog')?.close(); document.activeElement?.blur(); }")
         self.run("app.state.fromAddress('')")
@@ -106,7 +106,7 @@ class Driven:
         self.settle()
 
     def press(self, *keys: str) -> None:
-        """Keys, one after another."""
+        """Press keys, one after another."""
         for key in keys:
             self.tab.keyboard.press(key)
         self.settle()
@@ -116,20 +116,20 @@ class Driven:
         return self.tab.locator(f"#gv-{setting}")
 
     def look(self) -> dict[str, Any]:
-        """Where the camera is."""
+        """Position of the camera."""
         return self.run("app.stage.look")
 
     def picture(self) -> np.ndarray:
-        """(H, W, 4), what the canvas shows."""
+        """Pixels of the canvas, (H, W, 4)."""
         self.settle()
         return image(base64.b64decode(self.tab.evaluate(CANVAS).split(",")[1]))
 
     def text(self, selector: str) -> str:
-        """What is to be read there."""
+        """Visible text of an element."""
         return self.tab.locator(selector).inner_text()
 
-    def place_of(self, grain: int) -> tuple[float, float]:
-        """Where a grain is in the window [pixels]."""
+    def pixel_of(self, grain: int) -> tuple[float, float]:
+        """Pixel coordinates of a grain in the window."""
         x, y, _ = self.run("app.stage.screenOf(app.picture.positions.slice(3 * told[0], 3 * told[0] + 3))", grain)
         box = self.tab.locator("canvas.gv-canvas").bounding_box()
         return box["x"] + x, box["y"] + y

@@ -1,8 +1,8 @@
-"""Where things are in a picture, worked out from what the camera is said to be and nothing of the page's code.
+"""Projection of grains to pixels, computed from the camera's parameters only, without the page's code.
 
-A look is (target, from, up, height): the eye is in the direction `from` of the target; `height` is how much of the
-plane through the target the picture holds from top to bottom.  In perspective the eye is two heights away (tan of half
-the angle is 1/4), orthographic rays are all along −from.  Lengths are in the page's unit.
+A look is (target, from, up, height): the camera is in the direction `from` of the target; `height` is the height of
+the visible part of the plane through the target.  In perspective the camera is two heights away (tan of half the
+angle is 1/4); orthographic rays are along −from.  Lengths are in the page's unit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 @dataclass
 class Eye:
-    """A camera and the size of its picture in pixels; places in it count from the upper left corner."""
+    """A camera and the size of its picture in pixels; pixel coordinates start at the upper left corner."""
 
     look: tuple[float, ...]  # target, from, up, height: ten numbers
     wide: int
@@ -49,7 +49,7 @@ class Eye:
         return np.tile(eye, (len(at), 1)), (there - eye) / np.linalg.norm(there - eye, axis=1)[:, None]
 
     def spheres(self, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
-        """Which sphere (high, wide) is seen at the middle of each pixel, −1 where there is none."""
+        """Index of the sphere (high, wide) that is visible at the centre of each pixel, −1 for none."""
         seen, nearest = np.full((self.high, self.wide), -1), np.full((self.high, self.wide), np.inf)
         pixels, depth = self.pixels(places)
         reach = 1.5 * radii * self.scale * (1.0 if self.ortho else 2.0 * self.height / (depth - radii)) + 1.0
@@ -60,7 +60,7 @@ class Eye:
                 continue
             grid = np.stack(np.meshgrid(np.arange(left, right), np.arange(top, low)), axis=-1) + 0.5
             origin, way = self.rays(grid.reshape(-1, 2))
-            distance = _met(origin, way, places[i], radii[i]).reshape(grid.shape[:2])
+            distance = _distance_to_spheres(origin, way, places[i], radii[i]).reshape(grid.shape[:2])
             part = np.s_[top:low, left:right]
             closer = distance < nearest[part]
             nearest[part] = np.where(closer, distance, nearest[part])
@@ -68,8 +68,8 @@ class Eye:
         return seen
 
 
-def _met(origin: np.ndarray, way: np.ndarray, places: np.ndarray, radii: Any) -> np.ndarray:
-    """Distance along rays to spheres; infinite where they miss: |o + t w − c|² = r², the lesser root."""
+def _distance_to_spheres(origin: np.ndarray, way: np.ndarray, places: np.ndarray, radii: Any) -> np.ndarray:
+    """Distance along rays to spheres: smaller root of |o + t w − c|² = r²; infinite without a hit."""
     apart = places - origin
     along = (apart * way).sum(-1)
     room = np.square(radii) - (apart**2).sum(-1) + along**2
@@ -77,7 +77,7 @@ def _met(origin: np.ndarray, way: np.ndarray, places: np.ndarray, radii: Any) ->
 
 
 def inside(seen: np.ndarray, margin: int = 1) -> np.ndarray:
-    """Pixels (high, wide) whose neighbours up to so many pixels away see the same: there, edges are out of the way."""
+    """Mask (high, wide) of pixels whose neighbours within `margin` pixels show the same: no edges."""
     same = np.ones(seen.shape, bool)
     for dy in range(-margin, margin + 1):
         for dx in range(-margin, margin + 1):

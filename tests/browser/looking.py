@@ -1,4 +1,4 @@
-"""The page in a tab: what it shows, as pixels and as numbers."""
+"""The page in a tab, read as pixels and as numbers."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ ROWS = """() => [...document.querySelectorAll(".gv-inspector table")].map((t) =>
 
 @dataclass
 class Shown:
-    """A run that can be looked at: its frames as the file has them, the server's address and that of a single file."""
+    """A run open in the browser: frames as in the file, addresses of the server and of a single-file page."""
 
     frames: list[Any]
     url: dict[str, str]
 
     @property
     def unit(self) -> float:
-        """Metres of the page's unit of length."""
+        """The page's unit of length [m]."""
         return float(self.frames[0].radius.mean())
 
 
 class Shows:
-    """Runs by kind, each written and served when it is first asked for."""
+    """Runs by kind, each written and served on first use."""
 
     def __init__(self, place: Path):
         self.place, self._known, self._servers = place, dict[str, Shown](), list[Server]()
@@ -104,7 +104,7 @@ class View:
         )
 
     def go(self, k: int) -> Any:
-        """Show the k-th frame; gives it as the file has it."""
+        """Show frame k; returns the frame as in the file."""
         self.page.evaluate("(k) => sandView.navigation.go(k)", k)
         self.frame = self.shown.frames[k]
         return self.frame
@@ -126,17 +126,17 @@ class View:
         return Eye(tuple(map(float, text.split(","))), wide, high, self.ortho)
 
     @property
-    def places(self) -> np.ndarray:
-        """Of the grains (N, 3), in the page's unit."""
+    def positions(self) -> np.ndarray:
+        """Positions of the grains (N, 3), in the page's unit."""
         return self.frame.position / self.shown.unit
 
     @property
     def radii(self) -> np.ndarray:
-        """(N,) in the page's unit."""
+        """Radii (N,) in the page's unit."""
         return self.frame.radius / self.shown.unit
 
     def image(self) -> np.ndarray:
-        """What is on the canvas now, (high, wide, 3)."""
+        """Pixels of the canvas, (high, wide, 3)."""
         from PIL import Image
 
         self.page.evaluate("() => sandView.stage.draw()")
@@ -144,7 +144,7 @@ class View:
         return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
 
     def click(self, x: float, y: float) -> dict[str, dict[str, str]]:
-        """Click at a pixel of the canvas; the tables of numbers that come, by title."""
+        """Click at a pixel of the canvas; returns the tables shown, by title."""
         self.page.mouse.click(self.corner[0] + float(x), self.corner[1] + float(y))
         return self.rows()
 
@@ -153,7 +153,7 @@ class View:
         return {title: dict(rows) for title, rows in self.page.evaluate(ROWS)}
 
     def painted(self) -> np.ndarray:
-        """Colours (N, 3) that grains were given, before any light."""
+        """Colours (N, 3) of the grains before shading."""
         colours = self.page.evaluate("() => [...sandView.picture.painted.colour]")
         return np.array(colours).reshape(-1, 4)[:, :3]
 
@@ -171,7 +171,7 @@ def numbers(text: str) -> np.ndarray:
 
 
 def agree(text: str, values: Any, close: float = CLOSE) -> None:
-    """What a row says is the value, or the vector; of a vector, its largest component sets how close."""
+    """Whether the text shows this value or vector; for a vector the tolerance is relative to its largest component."""
     wanted = np.atleast_1d(np.asarray(values, float))
     off = np.abs(numbers(text) - wanted).max()
     assert off <= close * np.abs(wanted).max(), f"{text!r} is not {wanted}"

@@ -1,7 +1,7 @@
-"""Folders of runs to look at, written in a moment: no kernel is compiled, and the same bytes come each time.
+"""Synthetic run folders, written without compiled kernels; the same bytes each time.
 
-What is in them is made up, but has the form of a run: aggregates of ballistic particles, moments that turn, contacts
-wherever surfaces overlap, forces and shares by the contact's number.
+They have the format of a run: ballistic aggregates, rotating moments, contacts where surfaces overlap, forces and
+fractions of limits that depend on the index of the contact.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CASE = '[forces.field]\nflux_density = ["3 mT", "0 T", "4 mT"]\n'
 
 @dataclass
 class Body:
-    """Grains as a frame of a trajectory wants them, in SI."""
+    """Grains as `TrajectoryWriter` needs them, in SI."""
 
     position: np.ndarray
     radius: np.ndarray
@@ -47,7 +47,7 @@ class Body:
         self.charge = np.zeros(count)
         self.orientation = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
         way = rng.normal(size=(count, 3))
-        size = np.array([200.0, 0.0])[self.material] * self.mass  # what is no magnet has no arrow
+        size = np.array([200.0, 0.0])[self.material] * self.mass  # non-magnetic grains have no arrow
         self.moment = way / np.linalg.norm(way, axis=1)[:, None] * size[:, None]
         self.velocity, self.spin = 3.0 * rng.normal(size=(count, 3)), 1e8 * rng.normal(size=(count, 3))
 
@@ -56,7 +56,7 @@ class Body:
 
 
 def ballistic(count: int, radius: np.ndarray | float, seed: int) -> np.ndarray:
-    """Centres (N, 3) of an aggregate: one grain after another flies in from anywhere and sticks where it hits."""
+    """Centres (N, 3) of an aggregate: grains arrive one by one from random directions and stick on contact."""
     rng, r = np.random.default_rng(seed), np.broadcast_to(np.asarray(radius, float), count)
     place, known, reach = np.zeros((count, 3)), 1, 2.0 * r.max()
     while known < count:
@@ -77,16 +77,16 @@ def ballistic(count: int, radius: np.ndarray | float, seed: int) -> np.ndarray:
     return place
 
 
-def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
-    """Vectors (N, 3) turned about z."""
+def rotated(vectors: np.ndarray, angle: float) -> np.ndarray:
+    """Vectors (N, 3) rotated about z."""
     c, s = np.cos(angle), np.sin(angle)
     return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def contacts_of(body: Body, box: Box) -> dict[str, np.ndarray]:
-    """All pairs of grains that overlap, with forces and shares that belong to the pair.
+    """All pairs of overlapping grains, with forces and fractions of limits that depend on the pair.
 
-    Of every six contacts, four have one mode each at its limit; the shares of one are not known.
+    Of every six contacts, four have one mode each at its limit; the fractions of one are NaN.
     """
     pair = box.close_pairs(body.position, 2.0 * body.radius.max()).astype(np.uint32)
     apart = box.nearest(body.position[pair[:, 0]] - body.position[pair[:, 1]])
@@ -117,7 +117,7 @@ def contacts_of(body: Body, box: Box) -> dict[str, np.ndarray]:
 
 
 def write(folder: Path, moments: list[Body], box: Box) -> Path:
-    """A folder with a frame for each state, a ledger and an end."""
+    """A folder with a frame per state, a ledger and a summary."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / files.CASE).write_text(CASE)
     writer, rows, before = TrajectoryWriter(folder / files.TRAJECTORY), [], set()
@@ -146,11 +146,11 @@ def _sizes(count: int, pairs: np.ndarray) -> dict[str, float]:
 
 
 def two(folder: Path) -> Path:
-    """Two touching grains that turn around each other, in the open; three frames."""
+    """Two grains in contact that rotate about each other, in open space; three frames."""
     moments = []
     for k in range(3):
-        body = Body(turned(np.array([[-SUNK, 0.0, 0.0], [SUNK, 0.0, 0.0]]) * RADIUS, 0.4 * k), np.full(2, RADIUS))
-        body.moment = turned(body.moment, 0.7 * k)
+        body = Body(rotated(np.array([[-SUNK, 0.0, 0.0], [SUNK, 0.0, 0.0]]) * RADIUS, 0.4 * k), np.full(2, RADIUS))
+        body.moment = rotated(body.moment, 0.7 * k)
         moments.append(body)
     return write(folder, moments, Box.open())
 
@@ -165,9 +165,9 @@ FRAMES = 6
 
 
 def hundred(folder: Path) -> Path:
-    """100 grains of two sizes and two materials in a periodic box: clusters drift across faces, two meet.
+    """100 grains of two sizes and materials in a periodic box: clusters cross faces, two merge.
 
-    Clusters take the first numbers, in the order of SIZES; the last nine grains are single.
+    Clusters have the first indices, in the order of SIZES; the last nine grains are single.
     """
     rng, box = np.random.default_rng(5), Box.periodic(SIDE)
     radius = RADIUS * np.where(rng.random(sum(SIZES) + SINGLES) < 0.3, 1.4, 1.0)
@@ -186,7 +186,7 @@ def hundred(folder: Path) -> Path:
         return box.wrap(start + k * drift + max(MEETING - k, 0) * late)
 
     drift[first:] = 0.6 * RADIUS * np.array([1.0, 0.0, 0.3])
-    for i in range(first, len(radius)):  # wherever there is room for one in all frames
+    for i in range(first, len(radius)):  # where a grain fits in all frames
         while True:
             start[i] = (rng.random(3) - 0.5) * SIDE
             if all(_free(at(k), radius, i, box) for k in range(FRAMES)):
@@ -194,13 +194,13 @@ def hundred(folder: Path) -> Path:
     moments = []
     for k in range(FRAMES):
         body = Body(at(k), radius)
-        body.moment, body.velocity = turned(body.moment, 0.35 * k), body.velocity * (1.0 + 0.2 * k)
+        body.moment, body.velocity = rotated(body.moment, 0.35 * k), body.velocity * (1.0 + 0.2 * k)
         moments.append(body)
     return write(folder, moments, box)
 
 
 def _joined(radius: np.ndarray) -> np.ndarray:
-    """Two aggregates side by side along x that touch at one place."""
+    """Two aggregates side by side along x in contact at one point."""
     one, other = (ballistic(len(r), r, seed) for r, seed in ((radius[:FIRST_PART], 11), (radius[FIRST_PART:], 12)))
     across = other[:, None] - one[None]
     room = (SUNK * (radius[FIRST_PART:, None] + radius[None, :FIRST_PART])) ** 2 - (across[..., 1:] ** 2).sum(-1)
@@ -214,7 +214,7 @@ def _free(place: np.ndarray, radius: np.ndarray, i: int, box: Box) -> bool:
 
 
 def many(folder: Path, bodies: int = 5, each: int = 2000, frames: int = 3) -> Path:
-    """Large aggregates side by side in the open, each turning; 5 of 2000 grains by default."""
+    """Large rotating aggregates side by side in open space; 5 of 2000 grains by default."""
     place = ballistic(each, RADIUS, seed=3)
     apart = 2.1 * np.linalg.norm(place, axis=1).max()
     side = int(np.ceil(bodies ** (1 / 3) - 1e-9))
@@ -222,9 +222,9 @@ def many(folder: Path, bodies: int = 5, each: int = 2000, frames: int = 3) -> Pa
     grid = (grid - grid.mean(0)) * apart
     moments = []
     for k in range(frames):
-        parts = [turned(place, 0.02 * k * (1 + b % 3) + 1.3 * b) + grid[b] for b in range(bodies)]
+        parts = [rotated(place, 0.02 * k * (1 + b % 3) + 1.3 * b) + grid[b] for b in range(bodies)]
         body = Body(np.vstack(parts), np.full(bodies * each, RADIUS))
-        body.moment = turned(body.moment, 0.02 * k)
+        body.moment = rotated(body.moment, 0.02 * k)
         moments.append(body)
     return write(folder, moments, Box.open())
 

@@ -1,7 +1,7 @@
-"""Folders of small runs, written as a run writes them but not simulated: nothing is compiled.
+"""Folders of small synthetic runs in the format of real ones; nothing is compiled.
 
-Twelve grains in a periodic box: a chain of four that lies across a face, a chain of four that comes and touches it in
-frame 4, a pair that parts in frame 6, and two single grains that move all the time.
+Twelve grains in a periodic box: a chain of four across a face, a chain of four that makes contact with it in frame
+4, a pair that separates in frame 6, and two single moving grains.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ COLUMNS = (
 
 
 class Grains(SimpleNamespace):
-    """What `TrajectoryWriter` takes for grains."""
+    """Grains as `TrajectoryWriter` needs them."""
 
     def __len__(self) -> int:
         return len(self.radius)
 
 
-def places(k: int) -> np.ndarray:
-    """(12, 3), in radii, inside the box."""
+def positions(k: int) -> np.ndarray:
+    """Positions (12, 3) in radii, inside the box."""
     drift = 0.4 * max(k - MERGED, 0)
     first = [(9.0 + 1.99 * i, -6.0, drift) for i in range(4)]
     second = [(16.96 + 1.99 * i, 6.0 - 3.0 * min(k, MERGED), drift) for i in range(4)]
@@ -58,13 +58,13 @@ def places(k: int) -> np.ndarray:
 
 
 def pairs(k: int) -> np.ndarray:
-    """(C, 2), grains that touch."""
+    """Pairs of grains in contact, (C, 2)."""
     chains = [(i, i + 1) for start in (0, 4) for i in range(start, start + 3)]
     return np.array(chains + [(3, 4)] * (k >= MERGED) + [(8, 9)] * (k < PARTED))
 
 
 def grains(at: np.ndarray, k: int = 0, *, moments: bool = True) -> Grains:
-    """Grains at places [radii]; numbers differ from grain to grain and from frame to frame."""
+    """Grains at these positions [radii]; values differ between grains and frames."""
     n = len(at)
     one = np.arange(n)
     radius = np.where(one == GRAINS - 1, 1.5, 1.0) * R
@@ -104,7 +104,7 @@ def contacts(pair: np.ndarray, k: int = 0) -> dict[str, np.ndarray]:
 
 
 def row(at: float) -> dict[str, float]:
-    """Of the ledger, at a time counted in frames; a change has happened by the half before the frame that shows it."""
+    """A row of the ledger at a time in frames; an event has happened half a frame before the frame that shows it."""
     merged, parted = at >= MERGED - 0.5, at >= PARTED - 0.5
     told = dict.fromkeys(COLUMNS, 0.0)
     told |= {name: 1e-18 * (k + 1) * (1 + 0.1 * at) for k, name in enumerate(ENERGIES)}
@@ -117,11 +117,11 @@ def row(at: float) -> dict[str, float]:
 
 
 class SmallRun:
-    """The run in a folder, written as far as is wanted.
+    """A run folder with any number of frames.
 
     Args:
-        folder: of the run; made.
-        frames: of the eight that are there at first.
+        folder: of the run; created.
+        frames: number of frames, of eight, written at first.
         ended: whether the summary is there.
         box: periodic by default.
     """
@@ -132,27 +132,27 @@ class SmallRun:
         folder.mkdir(parents=True, exist_ok=True)
         self.ledger = LedgerFile(folder / LEDGER, COLUMNS)
         self.writer = TrajectoryWriter(folder / TRAJECTORY)
-        self.go_on(frames)
+        self.append(frames)
         if ended:
             self.end()
 
-    def go_on(self, frames: int) -> None:
-        """Write so many more frames, and the ledger twice as often."""
+    def append(self, frames: int) -> None:
+        """Write this many more frames, and two ledger rows per frame."""
         for k in range(self.count, self.count + frames):
             for at in (k - 0.5, k) if k else (0,):
                 self.ledger.append(row(at))
-            self.writer.write(100 * k, k * STEP, grains(places(k), k), self.box, contacts(pairs(k), k))
+            self.writer.write(100 * k, k * STEP, grains(positions(k), k), self.box, contacts(pairs(k), k))
         self.count += frames
         self.writer.flush()
 
     def end(self) -> None:
-        """The run has ended."""
+        """Write the summary."""
         self.writer.close()
         write_json(self.folder / SUMMARY, {"outcome_text": "ended as wished", "steps": 100 * (self.count - 1)})
 
 
 def written(folder: Path, frames: list[tuple[Any, np.ndarray]], box: Box | None = None) -> Path:
-    """A trajectory of these grains and pairs, one of each for every frame, without a ledger."""
+    """A trajectory with one set of grains and pairs per frame, without a ledger."""
     folder.mkdir(parents=True, exist_ok=True)
     writer = TrajectoryWriter(folder / TRAJECTORY)
     for k, (some, pair) in enumerate(frames):

@@ -1,4 +1,4 @@
-"""Every action by its keys, and by its button where it has one: what it does, not only that nothing breaks."""
+"""Every action by its keys and by its button: the effect is checked."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .small_runs import FRAMES, GRAINS, MERGED, PARTED
 Check = Callable[[Driven], None]
 
 
-def lands(frame: int) -> Check:
-    """A frame is shown: by the state, in the words beside the time line, by the grains on the canvas."""
+def shows_frame(frame: int) -> Check:
+    """A frame is shown: by the state, by the text beside the time line, by the grains on the canvas."""
 
     def check(view: Driven) -> None:
         assert view.get("frame") == frame == view.run("app.picture.frame.frame")
@@ -43,15 +43,15 @@ def captions(*words: str) -> Check:
     return check
 
 
-def along(axis: list[float]) -> Check:
+def looks_along(axis: list[float]) -> Check:
     def check(view: Driven) -> None:
         assert np.allclose(view.look()["from"], axis, atol=1e-4)
 
     return check
 
 
-def moved(part: str, test: Callable[[np.ndarray, np.ndarray, dict], bool]) -> Check:
-    """A part of the camera's place has changed from the first view as `test` says, and nothing else has."""
+def camera_changed(part: str, test: Callable[[np.ndarray, np.ndarray, dict], bool]) -> Check:
+    """Only this part of the camera has changed from the first view, as `test` says."""
 
     def check(view: Driven) -> None:
         now = view.look()
@@ -64,8 +64,8 @@ def moved(part: str, test: Callable[[np.ndarray, np.ndarray, dict], bool]) -> Ch
     return check
 
 
-def across(right: float, upwards: float) -> Check:
-    """The target has moved so far, in heights of the picture."""
+def target_shifted(right: float, upwards: float) -> Check:
+    """The target has moved by this much, in heights of the picture."""
 
     def test(now: np.ndarray, first: np.ndarray, look: dict) -> bool:
         side = np.cross(look["up"], look["from"])
@@ -73,22 +73,22 @@ def across(right: float, upwards: float) -> Check:
         up = np.cross(look["from"], side)
         return np.allclose((now - first) / look["height"] @ np.array([side, up]).T, [right, upwards], atol=1e-3)
 
-    return moved("target", test)
+    return camera_changed("target", test)
 
 
-def turned(sideways: int, upwards: int) -> Check:
-    """The eye has gone around the target by a 24th of π."""
+def camera_rotated(sideways: int, upwards: int) -> Check:
+    """The camera has rotated about the target by π/24."""
 
     def test(now: np.ndarray, first: np.ndarray, look: dict) -> bool:
         angle = np.arctan2(now[1], now[0]) - np.arctan2(first[1], first[0])
         rise = np.arcsin(now[2]) - np.arcsin(first[2])
         return np.allclose([angle, rise], [sideways * np.pi / 24, upwards * np.pi / 24], atol=2e-3)
 
-    return moved("from", test)
+    return camera_changed("from", test)
 
 
 def dialog(title: str) -> Check:
-    """A window of this name is open, and Esc closes it and does nothing else."""
+    """A dialog of this name is open, and Esc closes it and does nothing else."""
 
     def check(view: Driven) -> None:
         assert view.tab.get_by_role("dialog", name=title).is_visible()
@@ -121,7 +121,7 @@ def centred(view: Driven) -> None:
     assert np.allclose(view.look()["target"], view.run("app.selection.centre()"), atol=1e-4)
 
 
-def as_at_first(view: Driven) -> None:
+def is_reset(view: Driven) -> None:
     assert np.allclose(view.look()["from"], np.array([0.52, -0.74, 0.43]) / np.linalg.norm([0.52, -0.74, 0.43]))
     assert view.look()["height"] == pytest.approx(view.run("app.camera.overview().height"))
 
@@ -133,24 +133,24 @@ def copied(view: Driven) -> None:
     assert "clipboard" in view.text(".gv-note")
 
 
-def panel_away(view: Driven) -> None:
+def panel_hidden(view: Driven) -> None:
     assert not view.tab.locator(".gv-panel").is_visible()
     view.press("`")
     assert view.tab.locator(".gv-panel").is_visible()
 
 
-# settings before; what must be so after each of its keys
+# settings before; the check after each of its keys
 ACTIONS: dict[str, tuple[dict, Check]] = {
     "help": ({"grain": 3}, dialog("Keys and help")),
     "play": ({"speed": 30, "loop": True}, playing),
-    "next-frame": ({"frame": 2}, lands(3)),
-    "previous-frame": ({"frame": 2}, lands(1)),
-    "forward-10": ({"frame": 2}, lands(FRAMES - 1)),
-    "back-10": ({"frame": 5}, lands(0)),
-    "first-frame": ({"frame": 5}, lands(0)),
-    "last-frame": ({"frame": 2}, lands(FRAMES - 1)),
-    "next-event": ({"frame": MERGED}, lands(PARTED)),
-    "previous-event": ({"frame": PARTED}, lands(MERGED)),
+    "next-frame": ({"frame": 2}, shows_frame(3)),
+    "previous-frame": ({"frame": 2}, shows_frame(1)),
+    "forward-10": ({"frame": 2}, shows_frame(FRAMES - 1)),
+    "back-10": ({"frame": 5}, shows_frame(0)),
+    "first-frame": ({"frame": 5}, shows_frame(0)),
+    "last-frame": ({"frame": 2}, shows_frame(FRAMES - 1)),
+    "next-event": ({"frame": MERGED}, shows_frame(PARTED)),
+    "previous-event": ({"frame": PARTED}, shows_frame(MERGED)),
     "next-grain": ({"grain": GRAINS - 1}, captions("grain 0", "cluster")),
     "previous-grain": ({"grain": 0}, captions(f"grain {GRAINS - 1}")),
     "next-contact": ({"contact": "0-1"}, captions("contact 1–2")),
@@ -159,24 +159,24 @@ ACTIONS: dict[str, tuple[dict, Check]] = {
     "measure-from": ({"grain": 10, "ends": "3"}, captions("grain 10", "distance")),
     "clear": ({"grain": 3, "isolate": True, "follow": True, "ends": "1-2"}, captions()),
     "centre": ({"grain": 5}, centred),
-    "reset": ({"look": "1,2,3,1,0,0,0,0,1,5"}, as_at_first),
-    "along-x": ({}, along([1, 0, 0])),
-    "along-y": ({}, along([0, -1, 0])),
-    "along-z": ({}, along([0, 0, 1])),
-    "turn-left": ({}, turned(-1, 0)),
-    "turn-right": ({}, turned(1, 0)),
-    "turn-up": ({}, turned(0, 1)),
-    "turn-down": ({}, turned(0, -1)),
-    "pan-left": ({}, across(-0.08, 0.0)),
-    "pan-right": ({}, across(0.08, 0.0)),
-    "pan-up": ({}, across(0.0, 0.08)),
-    "pan-down": ({}, across(0.0, -0.08)),
-    "zoom-in": ({}, moved("height", lambda now, first, _: bool(np.isclose(1.2 * now, first)))),
-    "zoom-out": ({}, moved("height", lambda now, first, _: bool(np.isclose(now, 1.2 * first)))),
+    "reset": ({"look": "1,2,3,1,0,0,0,0,1,5"}, is_reset),
+    "along-x": ({}, looks_along([1, 0, 0])),
+    "along-y": ({}, looks_along([0, -1, 0])),
+    "along-z": ({}, looks_along([0, 0, 1])),
+    "turn-left": ({}, camera_rotated(-1, 0)),
+    "turn-right": ({}, camera_rotated(1, 0)),
+    "turn-up": ({}, camera_rotated(0, 1)),
+    "turn-down": ({}, camera_rotated(0, -1)),
+    "pan-left": ({}, target_shifted(-0.08, 0.0)),
+    "pan-right": ({}, target_shifted(0.08, 0.0)),
+    "pan-up": ({}, target_shifted(0.0, 0.08)),
+    "pan-down": ({}, target_shifted(0.0, -0.08)),
+    "zoom-in": ({}, camera_changed("height", lambda now, first, _: bool(np.isclose(1.2 * now, first)))),
+    "zoom-out": ({}, camera_changed("height", lambda now, first, _: bool(np.isclose(now, 1.2 * first)))),
     "picture": ({}, kind_asked("png")),
     "movie": ({}, kind_asked("webm")),
     "link": ({"frame": 2}, copied),
-    "panel": ({}, panel_away),
+    "panel": ({}, panel_hidden),
 }
 ELSEWHERE = {"save-now"}  # test_driven_captures
 BUTTONS = {
@@ -196,14 +196,14 @@ BUTTONS = {
 }
 
 
-def test_no_action_is_left_out(view):
-    """A new one without a test fails here."""
+def test_every_action_is_tested(view):
+    """A new action without a test fails here."""
     assert set(view.run("app.actions.map((a) => a.id)")) == set(ACTIONS) | ELSEWHERE
 
 
 @pytest.mark.parametrize("action", ACTIONS)
 def test_an_action_by_each_of_its_keys(view, action):
-    """With nothing in focus, as when the page has just been opened."""
+    """With the focus on no element, as after opening."""
     setup, check = ACTIONS[action]
     for key in view.run(f"app.actions.find((a) => a.id === {action!r}).keys"):
         view.fresh()
@@ -223,7 +223,7 @@ def test_an_action_by_its_button(view, action):
 
 
 def test_help_lists_all_keys(view):
-    """Every action and every setting with a key, and the keys."""
+    """Every action and every setting with a key."""
     view.press("?")
     words = view.text("dialog .gv-keys")
     for label in view.run("[...app.actions, ...app.state.settings.filter((s) => s.key)].map((one) => one.label)"):

@@ -1,4 +1,4 @@
-"""What is looked at is in the address of the page: it can be shared, edited, and be nonsense."""
+"""The page's address contains the view: it can be shared, edited, and malformed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def address(bundle, tmp_path_factory) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def tabs(browser) -> Iterator[list[Driven]]:
-    """Two windows, as of two people."""
+    """Two windows, as of two users."""
     pages = [page_of(browser) for _ in range(2)]
     tabs = [Driven(next(page)) for page in pages]
     for one in tabs:
@@ -48,7 +48,7 @@ def everything(view: Driven) -> dict:
 
 @pytest.mark.parametrize("settings", SHARED, ids=lambda s: next(iter(s)))
 def test_a_shared_address_shows_the_same(tabs, address, settings):
-    """Settings, camera, every pixel of the picture, and what is told beside it."""
+    """Settings, camera, every pixel of the picture, and the numbers beside it."""
     mine, theirs = tabs
     mine.open(address)
     mine.put(**settings)
@@ -68,14 +68,14 @@ def test_a_shared_address_shows_the_same(tabs, address, settings):
 
 
 def test_all_settings_are_shared():
-    """A new setting that no shared address has fails here, as those of the mouse do."""
+    """A new setting without a test fails here; so do the settings of the mouse."""
     from .test_driven_settings import EFFECTS, HIDDEN
 
     assert {name for one in SHARED for name in one} | {"look"} == set(EFFECTS) | HIDDEN
 
 
 def test_an_address_is_edited_in_place(tabs, address):
-    """Its settings are taken over without loading the page anew; those it does not name are as at first."""
+    """Its settings apply without reloading; those it does not name are reset."""
     view, other = tabs
     view.open(address)
     view.run("window.stillHere = true")
@@ -97,7 +97,7 @@ def test_an_address_is_edited_in_place(tabs, address):
 
 
 def test_a_followed_cluster_stays_where_the_address_has_it(tabs, address):
-    """Also where it is not in the middle of the picture."""
+    """Also if it is not in the centre of the picture."""
     view, other = tabs
     view.open(address)
     view.put(grain=5, follow=True)
@@ -128,8 +128,8 @@ NONSENSE = [
 
 
 @pytest.mark.parametrize("text", NONSENSE, ids=range(len(NONSENSE)))
-def test_nonsense_is_ignored(tabs, address, text):
-    """The page is there, with a picture that is not blank, and can be used; nothing of it is run."""
+def test_malformed_addresses_are_ignored(tabs, address, text):
+    """The page has a picture that is not blank, and works; nothing of the address is run as code."""
     view = tabs[0]
     view.tab.on("dialog", lambda dialog: pytest.fail("a script was run"))
     view.open(f"{address}#{text}")

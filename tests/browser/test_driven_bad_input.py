@@ -1,4 +1,4 @@
-"""What is broken, strange or missing becomes a sentence on the page; what is merely unusual is shown."""
+"""Damaged or missing input gives a sentence on the page; unusual input is shown."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sand.viewer.html import write_page
 from sand.viewer.server import Server
 
 from .driving import Driven, differ, served
-from .small_runs import FIELD, FRAMES, SIDE, R, SmallRun, contacts, grains, pairs, places, written
+from .small_runs import FIELD, FRAMES, SIDE, R, SmallRun, contacts, grains, pairs, positions, written
 
 NO_WEBGL = """() => {
   const real = HTMLCanvasElement.prototype.getContext;
@@ -32,7 +32,7 @@ NO_WEBGL = """() => {
 
 @pytest.fixture(scope="module")
 def file(bundle, tmp_path_factory) -> str:
-    """A page in one file, whole."""
+    """A complete page in one file."""
     folder = tmp_path_factory.mktemp("files")
     write_page(run_dataset(SmallRun(folder / "small").folder, FIELD), folder / "small.html")
     return (folder / "small.html").read_text("utf-8")
@@ -56,7 +56,7 @@ def is_shown(view: Driven) -> None:
 
 
 def is_refused(view: Driven, *words: str) -> None:
-    """One sentence that is read aloud, and seen; no error that nobody understands."""
+    """One sentence, visible and announced to screen readers; no internal error."""
     told = view.tab.get_by_role("alert")
     assert told.is_visible()
     for word in words:
@@ -76,7 +76,7 @@ def with_block(text: str, name: str, content: str) -> str:
     return text[:start] + content + text[end:]
 
 
-def test_a_whole_file(view, file, tmp_path):
+def test_a_complete_file(view, file, tmp_path):
     opened(view, file, tmp_path)
     is_shown(view)
     view.press("End")
@@ -87,7 +87,7 @@ def test_a_whole_file(view, file, tmp_path):
 
 @pytest.mark.parametrize("where", ["frame", "manifest", "script"])
 def test_a_file_that_was_cut_off(page, file, tmp_path, where):
-    """Its script, which comes last, cannot tell; the page does so without."""
+    """The script comes last and is missing; the page reports the damage without it."""
     ends = {
         "frame": block(file, "frame-3")[0] + 100,
         "manifest": block(file, "manifest")[0] + 200,
@@ -145,7 +145,7 @@ def test_other_manifests(view, file, tmp_path, keys, words):
 
 @pytest.mark.parametrize("content", ["H4sI", "", base64.b64encode(b"x" * 50).decode()])
 def test_one_unreadable_frame(view, file, tmp_path, content):
-    """A sentence when it comes; the frames around it are there, trails too; playing stops at it."""
+    """A sentence at that frame; neighbouring frames and trails are shown; playing stops there."""
     opened(view, with_block(file, "frame-3", content), tmp_path)
     view.put(frame=2)
     before = view.picture()
@@ -177,8 +177,8 @@ def test_no_webgl(view, file, tmp_path):
     is_refused(view, "WebGL 2", "sand plot")
 
 
-def test_webgl_taken_away_and_given_back(view, file, tmp_path):
-    """A sentence while it is away; the same picture afterwards."""
+def test_webgl_context_is_lost_and_restored(view, file, tmp_path):
+    """A sentence while it is lost; the same picture afterwards."""
     opened(view, file, tmp_path)
     before = view.picture()
     view.run("window.lose = app.stage.renderer.getContext().getExtension('WEBGL_lose_context'), lose.loseContext()")
@@ -190,8 +190,8 @@ def test_webgl_taken_away_and_given_back(view, file, tmp_path):
     assert differ(view.picture(), before, by=2) == 0
 
 
-class Mortal(Server):
-    """Ends as a process does: connections that are open go, too."""
+class StoppableServer(Server):
+    """A server whose open connections end with it, as for a process."""
 
     def process_request(self, request: socket.socket, client_address: object) -> None:
         self.__dict__.setdefault("open", []).append(request)
@@ -205,9 +205,9 @@ class Mortal(Server):
 
 
 def test_the_server_is_gone(view, tmp_path, bundle):
-    """While it plays: it stops and says so; frames that are here already can be looked at."""
+    """During playing: it stops and says so; loaded frames can still be shown."""
     folder = SmallRun(tmp_path / "small").folder
-    server = Mortal(run_dataset(folder, FIELD))
+    server = StoppableServer(run_dataset(folder, FIELD))
     server.start()
     view.open(server.url)
     view.press("ArrowRight")
@@ -222,7 +222,7 @@ def test_the_server_is_gone(view, tmp_path, bundle):
 
 
 def test_an_empty_run(tmp_path):
-    """The server's side says that there is nothing to look at yet."""
+    """The server reports that there is nothing to show yet."""
     SmallRun(tmp_path / "small", 0, ended=False)
     with pytest.raises(BadInput, match="no frame yet"):
         run_dataset(tmp_path / "small")
@@ -231,17 +231,17 @@ def test_an_empty_run(tmp_path):
 ONE = np.zeros((1, 3))
 UNUSUAL = {
     "one-grain": ([(grains(ONE), [])], None),
-    "no-contacts": ([(grains(places(k), k), []) for k in range(2)], Box.periodic(SIDE * R)),
-    "open-box": ([(grains(places(k), k), pairs(k)) for k in range(2)], None),
-    "half-open-box": ([(grains(places(k), k), pairs(k)) for k in range(2)], Box.periodic(SIDE * R, None, SIDE * R)),
-    "no-moments": ([(grains(places(k), k, moments=False), pairs(k)) for k in range(2)], None),
-    "far-away": ([(grains(places(k) + 1e5, k), pairs(k)) for k in range(2)], None),
-    "wide": ([(grains(places(k) * 1e6, k), pairs(k)) for k in range(2)], None),
+    "no-contacts": ([(grains(positions(k), k), []) for k in range(2)], Box.periodic(SIDE * R)),
+    "open-box": ([(grains(positions(k), k), pairs(k)) for k in range(2)], None),
+    "half-open-box": ([(grains(positions(k), k), pairs(k)) for k in range(2)], Box.periodic(SIDE * R, None, SIDE * R)),
+    "no-moments": ([(grains(positions(k), k, moments=False), pairs(k)) for k in range(2)], None),
+    "far-away": ([(grains(positions(k) + 1e5, k), pairs(k)) for k in range(2)], None),
+    "wide": ([(grains(positions(k) * 1e6, k), pairs(k)) for k in range(2)], None),
 }
 
 
 def use_everything(view: Driven) -> None:
-    """All colours, kinds of contacts and plots, and what keys do with grains and clusters."""
+    """Use all colours, kinds of contacts and plots, and the keys for grains and clusters."""
     for setting in ("colour", "bonds", "plot"):
         for value, _ in view.run(f"app.state.setting({setting!r}).options"):
             view.run("app.state.set(told[0], told[1])", setting, value)
@@ -251,7 +251,7 @@ def use_everything(view: Driven) -> None:
 
 @pytest.mark.parametrize("name", UNUSUAL)
 def test_unusual_runs_are_shown(view, tmp_path, bundle, name):
-    """The picture holds grains; every control works; none of it is an error."""
+    """The picture has grains; every control works without an error."""
     frames, box = UNUSUAL[name]
     with served(written(tmp_path / name, frames, box)) as server:
         view.open(server.url)
@@ -262,9 +262,9 @@ def test_unusual_runs_are_shown(view, tmp_path, bundle, name):
         assert not re.search("NaN|Infinity|undefined", view.text("body"))
 
 
-def test_places_that_are_not_numbers(view, tmp_path, bundle):
-    """Of one grain, as a run that failed leaves them: the others are seen."""
-    frames = [(grains(places(k), k), pairs(k)) for k in range(3)]
+def test_nan_positions(view, tmp_path, bundle):
+    """Of one grain, as after numerical failure: the others are visible."""
+    frames = [(grains(positions(k), k), pairs(k)) for k in range(3)]
     for some, _ in frames[1:]:
         some.position[5] = some.velocity[5] = np.nan
     with served(written(tmp_path / "nan", frames, Box.periodic(SIDE * R))) as server:
@@ -277,6 +277,6 @@ def test_places_that_are_not_numbers(view, tmp_path, bundle):
         is_shown(view)
 
 
-def test_columns_of_contacts_suit_the_writer():
-    """The fixture's table has what a frame stores of contacts."""
+def test_synthetic_contacts_have_the_columns_of_a_frame():
+    """The fixture's table has the stored columns of contacts."""
     assert {"pair", "overlap", "formed", "force", "slide_vector", "roll_vector", "twist"} <= set(contacts(pairs(0)))

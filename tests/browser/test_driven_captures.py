@@ -1,4 +1,4 @@
-"""Pictures and movies that the page hands over: of the size asked for, not blank, and nothing is left behind."""
+"""Pictures and movies saved by the page: requested size, not blank, and the page is unchanged afterwards."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def saved(
 
 
 @pytest.fixture
-def untouched(view) -> Iterator[Driven]:
-    """The page, which must be as before afterwards: frame, camera, size, and every pixel."""
+def restored_view(view) -> Iterator[Driven]:
+    """The page, which must be unchanged after the test: frame, camera, size, and every pixel."""
     view.put(frame=3, grain=2)
     before, look = view.picture(), view.look()
     yield view
@@ -43,9 +43,9 @@ def untouched(view) -> Iterator[Driven]:
 
 
 @pytest.mark.parametrize("size", [(320, 240), (301, 777), (2500, 1200)])
-def test_a_picture_has_its_size(untouched, size):
-    """And shows the grains: not blank, the background of the theme in its corners."""
-    name, content = saved(untouched, width=size[0], height=size[1])
+def test_a_picture_has_its_size(restored_view, size):
+    """It shows the grains: not blank, the theme's background in its corners."""
+    name, content = saved(restored_view, width=size[0], height=size[1])
     assert name == "small-000003.png" and content[:8] == b"\x89PNG\r\n\x1a\n"
     picture = image(content)
     assert picture.shape == (size[1], size[0], 4)
@@ -55,11 +55,11 @@ def test_a_picture_has_its_size(untouched, size):
     assert len({tuple(v) for v in picture[::3, ::3].reshape(-1, 4)}) > 30
 
 
-def test_a_picture_shows_what_the_page_shows(untouched):
+def test_a_picture_shows_what_the_page_shows(restored_view):
     """Drawn as large as the page has it, it differs at edges only: these are smoother."""
-    shape = untouched.picture().shape
-    picture = image(saved(untouched, words=False, width=shape[1], height=shape[0])[1]).astype(int)
-    page = untouched.picture().astype(int)
+    shape = restored_view.picture().shape
+    picture = image(saved(restored_view, words=False, width=shape[1], height=shape[0])[1]).astype(int)
+    page = restored_view.picture().astype(int)
     far = np.abs(picture - page).max(axis=-1) > 40
     assert far.mean() < 0.03
     assert np.abs(picture - page).mean() < 2.0
@@ -67,7 +67,7 @@ def test_a_picture_shows_what_the_page_shows(untouched):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_a_transparent_picture(view, theme):
-    """Nothing where no grain is; the grains are opaque; edges carry no colour of the background."""
+    """Background pixels are empty, grains opaque; edges have no background colour."""
     view.put(theme=theme, box=False, shade=0)
     picture = image(saved(view, clear=True, width=400, height=300)[1])
     assert (picture[[0, 0, -1, -1], [0, -1, 0, -1], 3] == 0).all()
@@ -103,10 +103,10 @@ def test_the_legend_on_a_picture(view, width, height):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("height", [500, 900])
-def test_the_bar_of_length_on_a_picture(view, theme, height):
-    """As long as a round number of metres is at the centre: height of the picture over that of the look, in pixels.
+def test_scale_bar_of_a_picture(view, theme, height):
+    """Its length is a round number of metres at the target: picture height over height of the look, in pixels.
 
-    Its line is 1.6 pixels thick, so that it has four fifths of its colour in each of two rows; ends are off by a pixel.
+    Its line is 1.6 pixels thick, so it has four fifths of its colour in each of two rows; ends are off by a pixel.
     """
     view.put(theme=theme, ortho=True)
     both, words = written(view, width=800, height=height)
@@ -135,24 +135,24 @@ def test_the_time_on_a_picture(view):
     assert (clear[10:30, 14:100, 3] == 255).sum() > 20 and (clear[:8, :, 3] == 0).all()
 
 
-def test_the_page_is_not_transparent_afterwards(untouched):
+def test_the_page_is_not_transparent_afterwards(restored_view):
     """Only the picture was."""
-    assert image(saved(untouched, clear=True, width=64, height=64)[1])[0, 0, 3] == 0
-    untouched.tab.wait_for_timeout(50)
-    assert untouched.picture()[0, -1].tolist() == [251, 250, 247, 255]
+    assert image(saved(restored_view, clear=True, width=64, height=64)[1])[0, 0, 3] == 0
+    restored_view.tab.wait_for_timeout(50)
+    assert restored_view.picture()[0, -1].tolist() == [251, 250, 247, 255]
 
 
-def test_a_picture_at_once(untouched):
+def test_a_picture_at_once(restored_view):
     """By one key: twice as large as on the page."""
-    with untouched.tab.expect_download() as coming:
-        untouched.tab.keyboard.press("S")
-    shape = untouched.picture().shape
+    with restored_view.tab.expect_download() as coming:
+        restored_view.tab.keyboard.press("S")
+    shape = restored_view.picture().shape
     assert image(Path(coming.value.path()).read_bytes()).shape == (2 * shape[0], 2 * shape[1], 4)
 
 
-def test_a_sequence_of_pictures(untouched):
+def test_a_sequence_of_pictures(restored_view):
     """A zip of the frames asked for, in order; each shows its own frame."""
-    name, content = saved(untouched, "sequence", **{"from": 2, "to": 6}, width=200, height=150)
+    name, content = saved(restored_view, "sequence", **{"from": 2, "to": 6}, width=200, height=150)
     assert name == "small-frames.zip"
     with zipfile.ZipFile(io.BytesIO(content)) as files:
         assert files.testzip() is None
@@ -161,42 +161,42 @@ def test_a_sequence_of_pictures(untouched):
     assert all(one.shape == (150, 200, 4) for one in pictures)
     assert all(differ(a, b) > 20 for k, a in enumerate(pictures) for b in pictures[:k])
     for k in (2, 5):
-        untouched.put(frame=k)
-        _, alone = saved(untouched, width=200, height=150)
+        restored_view.put(frame=k)
+        _, alone = saved(restored_view, width=200, height=150)
         assert differ(image(alone), pictures[k - 2]) == 0
-    untouched.put(frame=3)
+    restored_view.put(frame=3)
 
 
-def test_saving_is_stopped(untouched):
+def test_saving_is_stopped(restored_view):
     """Esc ends a long sequence: nothing is saved, and the page says so."""
     downloads = []
-    untouched.tab.on("download", lambda one: downloads.append(one))
-    untouched.run("void app.exporter.save({ kind: 'sequence', width: 900, height: 600, from: 0, to: 7 })")
-    untouched.press("Escape")
-    note = untouched.tab.locator(".gv-note", has_text="Stopped")
+    restored_view.tab.on("download", lambda one: downloads.append(one))
+    restored_view.run("void app.exporter.save({ kind: 'sequence', width: 900, height: 600, from: 0, to: 7 })")
+    restored_view.press("Escape")
+    note = restored_view.tab.locator(".gv-note", has_text="Stopped")
     note.wait_for()
-    untouched.settle()
-    assert not downloads and not untouched.run("app.exporter.busy")
-    untouched.put(grain=2)
-    untouched.run("app.notify('')")
+    restored_view.settle()
+    assert not downloads and not restored_view.run("app.exporter.busy")
+    restored_view.put(grain=2)
+    restored_view.run("app.notify('')")
 
 
-def test_frames_given_the_wrong_way_round(untouched):
+def test_frames_given_the_wrong_way_round(restored_view):
     """They are taken from the smaller to the larger."""
-    _, content = saved(untouched, "sequence", **{"from": 4, "to": 3}, width=64, height=64)
+    _, content = saved(restored_view, "sequence", **{"from": 4, "to": 3}, width=64, height=64)
     assert zipfile.ZipFile(io.BytesIO(content)).namelist() == ["frame-000003.png", "frame-000004.png"]
 
 
 @pytest.mark.parametrize(("first", "last", "words"), [(1, 4, True), (5, 5, False)])
-def test_a_movie(untouched, first, last, words):
+def test_a_movie(restored_view, first, last, words):
     """A WebM that the browser plays, as large as the picture on the page; dark letters at its upper left, or none."""
-    if not untouched.tab.evaluate("() => typeof MediaRecorder !== 'undefined'"):
+    if not restored_view.tab.evaluate("() => typeof MediaRecorder !== 'undefined'"):
         pytest.skip("this browser writes no movies")
-    untouched.put(speed=10)
-    name, content = saved(untouched, "webm", words=words, **{"from": first, "to": last})
+    restored_view.put(speed=10)
+    name, content = saved(restored_view, "webm", words=words, **{"from": first, "to": last})
     assert name == "small.webm" and content[:4] == b"\x1aE\xdf\xa3"
-    shape = untouched.picture().shape
-    told = untouched.tab.context.new_page()
+    shape = restored_view.picture().shape
+    told = restored_view.tab.context.new_page()
     played = told.evaluate(
         """async (bytes) => {
           const film = document.createElement("video");
@@ -222,8 +222,8 @@ def test_a_movie(untouched, first, last, words):
     assert played[2] > 30 and (played[3] > 20) == words
 
 
-def test_what_cannot_be_is_not_asked_for(view):
-    """Fields that mean nothing are grey; a size beyond the largest is refused by the form."""
+def test_meaningless_fields_are_disabled(view):
+    """Fields without effect are grey; a size above the limit is refused by the form."""
     view.press("s")
     tab = view.tab
     assert tab.locator("#gv-cap-from").is_disabled() and tab.locator("#gv-cap-width").is_enabled()
@@ -239,8 +239,8 @@ def test_what_cannot_be_is_not_asked_for(view):
     assert tab.locator("dialog").count() == 0
 
 
-def test_the_last_wish_is_remembered(view):
-    """Sizes given once are there again."""
+def test_the_last_size_is_remembered(view):
+    """The form shows the sizes that were entered last."""
     saved(view, width=123, height=45)
     view.press("s")
     assert view.tab.locator("#gv-cap-width").input_value() == "123"

@@ -1,4 +1,4 @@
-"""A run that is still going: the page goes along with it."""
+"""The page of a running simulation is updated."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def until(view: Driven, words: str) -> None:
     view.settle()
 
 
-def test_the_page_goes_along(view, run):
-    """From the last frame to the new last; from another it stays; ticks and plot grow; the end is told."""
+def test_new_frames_are_shown(view, run):
+    """At the last frame it follows; at another it stays; ticks and plot grow; the end is reported."""
     assert "3 frames · still running" in " ".join(view.text(".gv-status").split())
     view.press("End")
-    run.go_on(2)
+    run.append(2)
     until(view, "5 frames")
     assert view.get("frame") == 4 == view.run("app.picture.frame.frame")
     assert view.run("app.plot.chart.data[0].at(-1)") == pytest.approx(4.0)
@@ -41,7 +41,7 @@ def test_the_page_goes_along(view, run):
     line, over = (view.tab.locator(f".gv-plot {part}").bounding_box() for part in (".gv-cursor", ".u-over"))
     assert line["x"] == pytest.approx(over["x"] + view.run("app.plot.chart.valToPos(4, 'x')"), abs=1.5)
     view.press("ArrowLeft")
-    run.go_on(2)
+    run.append(2)
     until(view, "7 frames")
     assert view.get("frame") == 3 == view.run("app.picture.frame.frame")
     assert "frame 3 of 6" in view.text(".gv-time")
@@ -49,7 +49,7 @@ def test_the_page_goes_along(view, run):
     view.press("n", "n")
     assert view.get("frame") == PARTED
     view.control("live").click()
-    run.go_on(1)
+    run.append(1)
     run.end()
     until(view, "ended as wished")
     assert view.get("frame") == PARTED
@@ -61,10 +61,10 @@ def test_the_page_goes_along(view, run):
 
 
 def test_playing_goes_on_into_new_frames(view, run):
-    """What comes while it plays is played, too."""
+    """Frames that arrive during playing are played, too."""
     view.put(speed=2)
     view.press("Space")
-    run.go_on(5)
+    run.append(5)
     until(view, "8 frames")
     view.put(speed=60)
     view.tab.wait_for_selector("button[aria-label=Play]")
@@ -80,14 +80,14 @@ def test_a_run_that_is_followed_from_an_address(view, run):
 
 
 def test_scales_and_plots_grow_with_the_run(tmp_path, page, bundle):
-    """A run that is looked at from its first frame: what there is to lose, and how large clusters are, comes later."""
+    """Opened at the first frame: ranges of losses and cluster sizes are updated later."""
     page.set_viewport_size({"width": 800, "height": 560})
     run = SmallRun(tmp_path / "young", 1, ended=False)
     with served(run.folder) as server:
         view = Driven(page, server.url)
         view.put(colour="size")
         assert "losses" not in dict(view.run("app.state.setting('plot').options"))
-        run.go_on(MERGED)
+        run.append(MERGED)
         until(view, "5 frames")
         assert view.run("app.picture.painted.scale.high") == 8
         assert view.control("plot").locator("option[value=losses]").count() == 1
@@ -95,8 +95,8 @@ def test_scales_and_plots_grow_with_the_run(tmp_path, page, bundle):
         assert view.get("plot") == "losses"
 
 
-def test_a_run_begun_anew(view, run):
-    """The page says so, and asks no more: what it has is of the run before."""
+def test_a_restarted_run(view, run):
+    """The page says so and stops requesting frames: it shows the earlier run."""
     (run.folder / "trajectory.gsd").unlink()
     SmallRun(run.folder, 2, ended=False)
     view.tab.locator(".gv-note", has_text="restarted").wait_for()

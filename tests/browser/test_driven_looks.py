@@ -19,7 +19,7 @@ def test_one_cluster_alone(view):
     corner = view.tab.locator("canvas.gv-canvas").bounding_box()
     alone = view.picture()
     for grain, drawn in ((10, False), (8, False), (1, True)):
-        column, line = (round(v) for v in np.subtract(view.place_of(grain), (corner["x"], corner["y"])))
+        column, line = (round(v) for v in np.subtract(view.pixel_of(grain), (corner["x"], corner["y"])))
         assert (alone[line, column].tolist() != alone[0, -1].tolist()) == drawn, grain
     x = np.array(view.run("[0, 1, 2, 3].map((i) => app.picture.positions[3 * i])"))
     unit = view.run("app.manifest.unit") / 10e-9
@@ -36,7 +36,7 @@ def room(view: Driven, *grains: int) -> float:
     """How much of the canvas these grains take, wide or high, whichever is more; above 1 if one is not all within."""
     canvas = view.tab.locator("canvas.gv-canvas").bounding_box()
     size = np.array([canvas["width"], canvas["height"]])
-    at = np.array([view.place_of(grain) for grain in grains]) - [canvas["x"], canvas["y"]] - size / 2
+    at = np.array([view.pixel_of(grain) for grain in grains]) - [canvas["x"], canvas["y"]] - size / 2
     radius = view.run("app.dataset.grains.radius[told[0]] * app.stage.pixelsPerLength", grains[0])
     return float((2 * (np.abs(at) + radius) / size).max())
 
@@ -189,7 +189,7 @@ def test_parallel_rays_see_what_is_near(view):
     """Near by, what lies in front of the camera is not cut away: the same view, set anew, is the same picture."""
     view.put(ortho=True, shade=0)
     view.run("app.camera.zoom(1 / 1.2)")
-    view.tab.mouse.move(*view.place_of(9))
+    view.tab.mouse.move(*view.pixel_of(9))
     for _ in range(6):
         view.tab.mouse.wheel(0, -400)
     before = view.picture()
@@ -210,7 +210,7 @@ def test_the_middle_of_a_contact(view):
     """Centre puts it into the middle of the picture."""
     view.put(contact="8-9")
     view.press("z")
-    at = np.array([view.place_of(8), view.place_of(9)])
+    at = np.array([view.pixel_of(8), view.pixel_of(9)])
     box = view.tab.locator("canvas.gv-canvas").bounding_box()
     middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
     assert at.mean(axis=0) == pytest.approx(middle, abs=1.5)

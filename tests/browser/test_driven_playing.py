@@ -1,9 +1,9 @@
-"""Playing, measuring, choosing: what takes more than one key."""
+"""Playing, measuring, choosing: operations with several keys."""
 
 from __future__ import annotations
 
 from .small_runs import FRAMES, MERGED
-from .test_driven_actions import lands
+from .test_driven_actions import shows_frame
 
 
 def test_playing_stops_at_the_last_frame_and_begins_again(view):
@@ -14,7 +14,7 @@ def test_playing_stops_at_the_last_frame_and_begins_again(view):
     view.tab.wait_for_selector("button[aria-label=Play]")
     view.settle()
     assert view.tab.evaluate("() => seenFrames") == list(range(1, FRAMES))
-    lands(FRAMES - 1)(view)
+    shows_frame(FRAMES - 1)(view)
     view.tab.evaluate("() => void (seenFrames.length = 0)")
     view.press("Space")
     view.tab.wait_for_selector("button[aria-label=Play]")
@@ -22,7 +22,7 @@ def test_playing_stops_at_the_last_frame_and_begins_again(view):
 
 
 def test_playing_twice_is_not_twice_as_fast(view):
-    """Pausing and going on within a frame leaves no second player behind."""
+    """Pausing and continuing within a frame leaves no second timer."""
     view.put(speed=5, loop=True)
     view.press("Space", "Space", "Space", "Space", "Space")
     before = view.get("frame")
@@ -57,7 +57,7 @@ def test_measuring(view):
     view.press("u")
     assert "select two grains" in view.text(".gv-inspector")
     for grain in (10, 11):
-        view.tab.mouse.click(*view.place_of(grain))
+        view.tab.mouse.click(*view.pixel_of(grain))
     view.settle()
     assert view.get("ends") == "10-11" and view.get("grain") == -1
 
@@ -76,7 +76,7 @@ def test_numbers_of_a_cluster_go_with_the_frame(view):
     view.put(grain=2)
     assert "grains N\t4" in view.text(".gv-inspector")
     view.press("n")
-    lands(MERGED)(view)
+    shows_frame(MERGED)(view)
     assert "grains N\t8" in view.text(".gv-inspector")
 
 

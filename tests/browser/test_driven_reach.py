@@ -86,7 +86,7 @@ def test_fingers(browser, address):
     """A tap chooses, one finger turns, and the page does not scroll away under it."""
     context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True)
     view = Driven(context.new_page(), address)
-    view.tab.touchscreen.tap(*view.place_of(11))
+    view.tab.touchscreen.tap(*view.pixel_of(11))
     view.settle()
     assert view.get("grain") == 11
     assert view.tab.locator("canvas.gv-canvas").evaluate("(e) => getComputedStyle(e).touchAction") == "none"

@@ -69,7 +69,7 @@ def followed(view: Driven) -> object:
 
 def measuring(view: Driven) -> object:
     """What a click on a grain does."""
-    view.tab.mouse.click(*view.place_of(10))
+    view.tab.mouse.click(*view.pixel_of(10))
     view.settle()
     return view.get("ends"), view.get("grain")
 

@@ -108,7 +108,7 @@ def test_the_plots_have_what_the_ledger_has(view):
 def test_dragging_turns(view):
     """The eye goes around the target at the same distance; nothing is chosen by it."""
     before = view.look()
-    drag(view, view.place_of(11), (80, 30))
+    drag(view, view.pixel_of(11), (80, 30))
     after = view.look()
     assert np.linalg.norm(np.subtract(after["from"], before["from"])) > 0.1
     assert np.allclose(after["target"], before["target"]) and after["height"] == pytest.approx(before["height"])
@@ -117,12 +117,12 @@ def test_dragging_turns(view):
 
 def test_dragging_with_the_right_button_moves(view):
     """The picture goes along with the mouse."""
-    before, (x, y) = view.look(), view.place_of(0)
+    before, (x, y) = view.look(), view.pixel_of(0)
     drag(view, empty_place(view), (-40, -25), "right")
     after = view.look()
     assert np.allclose(after["from"], before["from"], atol=1e-4)
     assert np.linalg.norm(np.subtract(after["target"], before["target"])) > 0.01 * before["height"]
-    assert np.allclose(np.subtract(view.place_of(0), (x, y)), (-40, -25), atol=8)
+    assert np.allclose(np.subtract(view.pixel_of(0), (x, y)), (-40, -25), atol=8)
 
 
 def test_the_wheel_goes_nearer(view):
@@ -130,14 +130,14 @@ def test_the_wheel_goes_nearer(view):
     for ortho in (False, True):
         view.fresh()
         view.put(ortho=ortho)
-        before, place = view.look(), view.place_of(5)
+        before, place = view.look(), view.pixel_of(5)
         view.tab.mouse.move(*place)
         view.tab.mouse.wheel(0, -300)
         view.tab.wait_for_timeout(50)
         view.settle()
         assert view.look()["height"] < 0.9 * before["height"]
         assert np.allclose(view.look()["from"], before["from"], atol=1e-3)
-        assert np.linalg.norm(np.subtract(view.place_of(5), place)) < 12
+        assert np.linalg.norm(np.subtract(view.pixel_of(5), place)) < 12
         view.tab.mouse.wheel(0, 300)
         view.tab.wait_for_timeout(50)
         view.settle()
@@ -149,12 +149,12 @@ def test_a_click_chooses_what_is_under_it(view):
     view.press("3")
     view.put(arrows=False, bonds="off")
     for grain in range(GRAINS):
-        view.tab.mouse.click(*view.place_of(grain))
+        view.tab.mouse.click(*view.pixel_of(grain))
         view.settle()
         assert view.get("grain") == grain
         assert f"grain {grain}" in view.text(".gv-inspector")
         view.press("Escape")
-    view.tab.mouse.click(*view.place_of(4))
+    view.tab.mouse.click(*view.pixel_of(4))
     view.tab.mouse.click(*empty_place(view))
     view.settle()
     assert view.get("grain") == -1 and not view.tab.locator(".gv-inspector").is_visible()
@@ -164,7 +164,7 @@ def test_a_click_chooses_a_contact(view):
     """Between two small grains, where its bar is."""
     view.press("3")
     view.put(size=0.3, bar=0.5, arrows=False)
-    (x, y), (u, v) = view.place_of(5), view.place_of(6)
+    (x, y), (u, v) = view.pixel_of(5), view.pixel_of(6)
     view.tab.mouse.click((x + u) / 2, (y + v) / 2)
     view.settle()
     assert view.get("contact") == "5-6" and view.get("grain") == -1
@@ -181,7 +181,7 @@ def test_a_chosen_grain_is_marked(view):
     view.put(grain=11)
     after = view.picture()
     box = view.tab.locator("canvas.gv-canvas").bounding_box()
-    x, y = np.subtract(view.place_of(11), (box["x"], box["y"]))
+    x, y = np.subtract(view.pixel_of(11), (box["x"], box["y"]))
     rows, columns = np.nonzero(np.any(before != after, axis=-1))
     assert len(rows) > 10
     assert np.hypot(columns - x, rows - y).max() < 30
@@ -195,7 +195,7 @@ def test_the_canvas_suits_the_window(view):
         view.settle()
         box = view.tab.locator("canvas.gv-canvas").bounding_box()
         assert view.picture().shape[:2] == (round(box["height"]), round(box["width"]))
-        view.tab.mouse.click(*view.place_of(11))
+        view.tab.mouse.click(*view.pixel_of(11))
         view.settle()
         assert view.get("grain") == 11
         view.press("Escape")

@@ -49,13 +49,13 @@ class Kernel:
         story: of the run; None once it is gone.
     """
 
-    def __init__(self, story: RunDataset):
-        self.story, self.asked = story, list[dict]()
+    def __init__(self, dataset: RunDataset):
+        self.story, self.asked = dataset, list[dict]()
 
     def __call__(self, content: dict) -> tuple[dict, list[str]]:
         self.asked.append(content)
-        told, buffers = answer_message(self.story, content)
-        return told, [base64.b64encode(one).decode() for one in buffers]
+        message, buffers = answer_message(self.story, content)
+        return message, [base64.b64encode(one).decode() for one in buffers]
 
 
 @pytest.fixture

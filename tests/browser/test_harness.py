@@ -1,4 +1,4 @@
-"""The browser can do what the page needs, and errors in it are noticed."""
+"""The browser supports what the page needs, and errors in it are detected."""
 
 import threading
 from functools import partial
@@ -61,8 +61,8 @@ def test_scripts_run_in_files(page, tmp_path):
         ("fetch('nothing-here')", ["console: Failed to load resource: the server responded with a status of 404"]),
     ],
 )
-def test_errors_are_noticed(page, address, script, told):
-    """All that is expected must come, or the fixture complains."""
+def test_errors_are_detected(page, address, script, told):
+    """All expected errors must occur, or the fixture fails the test."""
     page.goto(address)
     page.evaluate(f"() => {{ {script} }}")
     page.expected_errors = told
@@ -73,8 +73,8 @@ def test_errors_are_noticed(page, address, script, told):
 
 
 @pytest.mark.parametrize(("expected", "wrong"), [([], "not well"), (["not well", "more"], "more")])
-def test_the_fixture_complains(browser, expected, wrong):
-    """Of an error nobody expected, and of one that did not come."""
+def test_the_fixture_fails_the_test(browser, expected, wrong):
+    """For an unexpected error, and for an expected one that did not occur."""
     tabs = page_of(browser)
     tab = next(tabs)
     tab.evaluate("() => console.error('not well')")

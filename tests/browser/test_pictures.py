@@ -39,7 +39,7 @@ def differs(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 @pytest.mark.parametrize("kind", ["two", "hundred", "ten-thousand"])
-def test_the_picture_is_as_it_was(page, shows, kind):
+def test_the_picture_equals_the_stored_one(page, shows, kind):
     from PIL import Image
 
     view = View(page, shows(kind), frame=1, theme="light")
@@ -53,8 +53,8 @@ def test_the_picture_is_as_it_was(page, shows, kind):
     assert not differs(np.asarray(now), np.asarray(Image.open(kept).convert("RGB")))
 
 
-def test_a_missing_grain_is_noticed(page, shows):
-    """The comparison is fine enough: of one hundred grains, one that is moved by its diameter is another picture."""
+def test_a_displaced_grain_is_detected(page, shows):
+    """Of one hundred grains, one is displaced by its diameter: the pictures differ."""
     from PIL import Image
 
     view = View(page, shows("hundred"), frame=1, theme="light")

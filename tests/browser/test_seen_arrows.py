@@ -42,7 +42,7 @@ def test_an_arrow_points_along_the_moment(page, shows, grain, source):
         moment = np.asarray(frame.moment[grain], float)
         way = moment / np.linalg.norm(moment)
         across = np.cross(way, [0.3, -0.8, 0.5])
-        place, length = view.places[grain], LENGTH * view.radii[grain]
+        place, length = view.positions[grain], LENGTH * view.radii[grain]
         eye = view.look(*place, *(across + 0.4 * way * np.linalg.norm(across)), *(0.2, 0.1, 0.97), 1.5 * length)
         rows, columns = np.nonzero(np.abs(view.image() - BACKGROUND).max(-1) > 30)
         points = np.stack([columns, rows], axis=1) + 0.5
@@ -76,8 +76,8 @@ def test_all_arrows_have_their_heads_in_front(page, shows, ortho, source):
         size = np.linalg.norm(moment, axis=1)
         way = moment / np.where(size > 0.0, size, 1.0)[:, None]
         half = 0.5 * LENGTH * view.radii[:, None] * way
-        tip, tail, middle = (eye.pixels(view.places + s * half)[0] for s in (1.0, -1.0, 0.0))
-        long, depth = np.linalg.norm(tip - tail, axis=1), eye.pixels(view.places)[1]
+        tip, tail, middle = (eye.pixels(view.positions + s * half)[0] for s in (1.0, -1.0, 0.0))
+        long, depth = np.linalg.norm(tip - tail, axis=1), eye.pixels(view.positions)[1]
         full = LENGTH * view.radii * eye.scale * (1.0 if ortho else 2.0 * eye.height / depth)
         for i in np.flatnonzero((middle > 60).all(1) & (middle < [eye.wide - 60, eye.high - 60]).all(1)):
             along = (tip[i] - tail[i]) / long[i] if size[i] > 0.0 else np.array([1.0, 0.0])

@@ -44,7 +44,7 @@ def clear(eye: Eye, spot: np.ndarray, own: int, pieces: tuple, view: View) -> bo
     way = b - a
     share = np.clip(((at - a) * way).sum(1) / np.maximum((way**2).sum(1), 1e-9), 0.0, 1.0)
     off = np.linalg.norm(at - a - share[:, None] * way, axis=1) - thickness(view) * eye.scale
-    grains = np.linalg.norm(eye.pixels(view.places)[0] - at, axis=1) - 0.3 * view.radii * eye.scale
+    grains = np.linalg.norm(eye.pixels(view.positions)[0] - at, axis=1) - 0.3 * view.radii * eye.scale
     return bool((off[contact != own] > 2.0).all() and (grains > 2.0).all())
 
 
@@ -133,7 +133,7 @@ def test_bars_are_where_contacts_are_and_nowhere_else(page, shows, source):
         share = ((points[:, None] - a) * way).sum(-1) / (way**2).sum(-1)
         off = np.linalg.norm(points[:, None] - a - np.clip(share, 0.0, 1.0)[..., None] * way, axis=-1)
         near = (off < thickness(view) * eye.scale + 1.5).any(1)
-        centres = eye.pixels(view.places)[0]
+        centres = eye.pixels(view.positions)[0]
         apart = np.linalg.norm(points[:, None] - centres, axis=-1)
         near |= (apart < 0.3 * view.radii * eye.scale + 1.5).any(1)
         assert near.all(), f"frame {k}: {np.sum(~near)} pixels are drawn where there is neither bar nor grain"

@@ -73,7 +73,7 @@ def test_pixels_show_the_grain_that_a_ray_meets(page, shows, kind, ortho, source
     view = View(page, shows(kind), source, look=LOOKS[kind], ortho=ortho, **BARE)
     for k in FRAMES[kind]:
         view.go(k)
-        seen = view.eye().spheres(view.places, view.radii)
+        seen = view.eye().spheres(view.positions, view.radii)
         sure = inside(seen)
         empty, full = sure & (seen < 0), sure & (seen >= 0)
         assert full.sum() > 0.03 * seen.size and len(np.unique(seen[full])) > 0.8 * len(view.radii)
@@ -99,7 +99,7 @@ def test_the_rim_of_a_grain(page, shows, kind, ortho, source):
     for k in FRAMES[kind]:
         view.go(k)
         eye, image = view.eye(), view.image()
-        pixels, depth = eye.pixels(view.places)
+        pixels, depth = eye.pixels(view.positions)
         reach = view.radii * eye.scale * (1.0 if ortho else 2.0 * eye.height / depth)
         for i in range(len(view.radii)):
             apart = np.linalg.norm(pixels - pixels[i], axis=1) - 1.1 * reach - 1.25 * reach[i]
@@ -130,8 +130,8 @@ def test_a_click_chooses_the_grain_that_is_there(page, shows, kind, ortho, sourc
     for k in FRAMES[kind]:
         view.go(k)
         eye, image, painted = view.eye(), view.image(), view.painted()
-        pixels, _ = eye.pixels(view.places)
-        free = alone(eye, view.places, view.radii)
+        pixels, _ = eye.pixels(view.positions)
+        free = alone(eye, view.positions, view.radii)
         assert len(free) >= min(len(view.radii), 20 if kind != "two" else 1)
         for i in rng.choice(free, min(len(free), 17 if kind == "ten-thousand" else 12), replace=False):
             x, y = pixels[i].astype(int)
@@ -146,7 +146,7 @@ def test_ten_thousand_grains_cover_what_they_must(page, shows, source):
     view = View(page, shows("ten-thousand"), source, look=(0.0, 0.0, 0.0, *OBLIQUE, 160.0), **BARE)
     for k in FRAMES["ten-thousand"]:
         view.go(k)
-        seen, drawn = view.eye().spheres(view.places, view.radii), (view.image() != BACKGROUND).any(-1)
+        seen, drawn = view.eye().spheres(view.positions, view.radii), (view.image() != BACKGROUND).any(-1)
         covered = seen >= 0
         assert covered.mean() > 0.05
         assert not drawn[~covered & inside(covered)].any()
@@ -176,8 +176,8 @@ def test_clusters_have_their_own_colours_and_keep_them(page, shows, source):
         for member in (0, 40, 56, 68, 76, 82):  # the first grains of clusters that live through all frames
             assert kept.setdefault(member, tuple(painted[member])) == tuple(painted[member]), (k, member)
         assert (tuple(painted[26]) == kept[0]) == (k >= 3)
-        pixels, _ = eye.pixels(view.places)
-        for i in alone(eye, view.places, view.radii):
+        pixels, _ = eye.pixels(view.positions)
+        for i in alone(eye, view.positions, view.radii):
             x, y = pixels[i].astype(int)
             assert np.abs(image[y, x] - painted[i]).max() <= NEAR, (k, i)
 
@@ -202,8 +202,8 @@ def test_colours_of_a_quantity(page, shows, palette, source):
         allowed = [table[np.clip(np.floor((share + d) * 64), 0, 63).astype(int)] for d in (-1e-3, 0.0, 1e-3)]
         eye, image, painted = view.eye(), view.image(), view.painted()
         assert (np.min([np.abs(painted - a).max(1) for a in allowed], axis=0) == 0).all()
-        pixels, _ = eye.pixels(view.places)
-        free = alone(eye, view.places, view.radii)
+        pixels, _ = eye.pixels(view.positions)
+        free = alone(eye, view.positions, view.radii)
         assert len(free) > 20
         for i in free:
             x, y = pixels[i].astype(int)

@@ -1,4 +1,4 @@
-"""Every example runs."""
+"""Every example runs, and its documented results are reproduced."""
 
 import copy
 import csv
@@ -23,8 +23,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda p: p.name)
-def test_case_files_are_without_mistakes(path):
-    """Each is read by the command that its first comment names."""
+def test_case_files_are_valid(path):
+    """Each is read by the command named in its first comment."""
     reads = {"run": read_case, "grow": read_case, "collide": read_collision, "scatter": read_scattering}
     comment = path.read_text().split("[", 1)[0]
     command = next(word for word in reads if f"sand {word} examples/{path.name}" in comment)
@@ -36,9 +36,9 @@ def test_figure_4(tmp_path, monkeypatch, capsys):
     """The script draws its figure and finds a T where hit-and-stick has none."""
     monkeypatch.setattr(sys, "argv", ["figure4.py", str(tmp_path / "figure4.png")])
     runpy.run_path(str(EXAMPLES / "figure4.py"), run_name="__main__")
-    told = capsys.readouterr().out
-    assert ": T, crossbar" in told
-    assert "hit-and-stick gives: straight" in told
+    message = capsys.readouterr().out
+    assert ": T, crossbar" in message
+    assert "hit-and-stick gives: straight" in message
     assert 10_000 < (tmp_path / "figure4.png").stat().st_size < 300_000
 
 
@@ -58,12 +58,12 @@ MEAN = "pinned by a field in any direction, 80 K"
 
 @pytest.mark.validate
 def test_cross_sections(monkeypatch, capsys):
-    """The script has the rows of docs/physics/cross-sections.csv, and six of them, flown again, have its numbers.
+    """The script's rows equal docs/physics/cross-sections.csv; six of them, recomputed, have these numbers.
 
-    They are asked for to 5 %; both numbers have errors of their own, and four standard errors of the difference are
-    about 20 %: a factor 2, the row of another start (0.72, 0.48, 0.98 of Eq. 14) or a spin that is left out (a factor
-    3) is seen.  Moments along the line of centres make the central potential of Eq. 14, σ/π(2R)² = 406.  The mean over
-    directions is Σ weight × row, to the four digits that are printed.
+    The requested error is 5 %; four standard errors of the difference are about 20 %.  This detects a factor 2, the row
+    of another start (0.72, 0.48, 0.98 of Eq. 14) and a missing spin (a factor 3).  Moments along the line of centres
+    give the central potential of Eq. 14, σ/π(2R)² = 406.  The mean over directions is Σ weight × row, to the four
+    printed digits.
     """
     example = loaded("cross_sections")
     kept = {row[0]: row[1:] for row in csv.reader((EXAMPLES.parent / "docs/physics/cross-sections.csv").open())}
@@ -88,11 +88,11 @@ def test_cross_sections(monkeypatch, capsys):
 
 @pytest.mark.validate
 def test_growth_variants(tmp_path, monkeypatch, capsys):
-    """Thirty grains for 20 ns in two boxes, at 10 K and at 1000 K: S is what the contacts of the last frames make it.
+    """Thirty grains for 20 ns in two boxes, at 10 K and 1000 K: S follows from contacts of the last frames.
 
-    S = Σ s²/N of clusters found by SciPy's graphs, the mean of both boxes, in the two digits that are printed; grains
-    do meet.  The same seed at a hundred times the heat has ten times the speeds, to float32.  The other variants are
-    cases without mistakes that differ from growth.toml in the tables they name.
+    S = Σ s²/N of clusters found by SciPy's graphs, the mean of both boxes, in the two printed digits; some grains
+    collide.  The same seed at a hundred times the temperature has ten times the speeds, to float32.  The other variants
+    are valid cases that differ from growth.toml in the tables they name.
     """
     example = loaded("growth_variants")
     for name, changes in example.VARIANTS.items():

@@ -1,8 +1,7 @@
-"""Single-line faults, and the tests that should catch each of them; `tests.faults.plant` plants them.
+"""Single-line faults, and the test that should catch each of them; `tests.faults.plant` plants them.
 
-They are slips that people make: a sign, a factor 2, an image or a unit that is forgotten, one too many or too few, a
-row that is lost, an error that is swallowed.  They lie in formulas, loops, settings, files, commands, set-up and
-analysis.
+They are typical programming errors: a sign, a factor 2, a forgotten image or unit, an index off by one, a lost row, a
+swallowed error; in formulas, loops, settings, files, commands, set-up and analysis.
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ SOURCES, TESTS = "src/sand/", "tests/"
 
 @dataclass(frozen=True)
 class Fault:
-    """One line that is wrong.
+    """A fault in one line.
 
     Attributes:
         name: for the table.
         kind: of KINDS.
         area: of AREAS.
-        file: below SOURCES.
-        old, new: part of a line that occurs once in the file, and what stands there instead.
-        test: below TESTS, the test that should fail, of the checkout that this file belongs to.
+        file: path below SOURCES.
+        old, new: part of a line that occurs once in the file, and its replacement.
+        test: path below TESTS and name of the test that should fail.
     """
 
     name: str
@@ -37,12 +36,12 @@ class Fault:
 
     @property
     def named(self) -> str:
-        """The test to run first, from the top of the checkout."""
+        """The test to run first, relative to the root of the checkout."""
         return TESTS + self.test
 
     @property
     def searched(self) -> str:
-        """What words of the command line are looked for in."""
+        """The text in which words of the command line are searched."""
         return f"{self.name} | {self.kind} | {self.area} | {self.file}"
 
 
@@ -51,25 +50,25 @@ FAULTS = (
     # formulas
     Fault("half the JKR force", "factor 2", "formula", "contact/jkr.py",
           "return 4.0 * pull_off_force * (cube * cube - cube)", "return 2.0 * pull_off_force * (cube * cube - cube)",
-          "unit/test_adhesion.py::test_special_points_are_exact"),
+          "unit/test_jkr.py::test_special_points_are_exact"),
     Fault("the cut-off pushes where it should pull", "sign", "formula", "forces/pair/dipole_formulas.py",
           "(both - 5.0 * product) + slope * energy", "(both - 5.0 * product) - slope * energy",
-          "unit/test_dipole.py::test_force_is_the_slope_of_the_energy"),
+          "unit/test_dipole.py::test_force_is_minus_the_gradient_of_the_energy"),
     Fault("the rate of 1/r^5 as if it were 1/r^4", "off by one", "formula", "forces/pair/dipole_rates.py",
           "-3.0 * inverse3 * radial, -5.0 * three * radial", "-3.0 * inverse3 * radial, -4.0 * three * radial",
-          "unit/test_far.py::test_taylor_rates_are_finite_differences"),
+          "unit/test_pair_forces.py::test_taylor_rates_against_finite_differences"),
     Fault("friction of a spin with r^3 for r^4", "forgotten unit", "formula", "forces/gas/drag.py",
           "accommodation * density * speed * radius**4", "accommodation * density * speed * radius**3",
-          "unit/test_gas_drag.py::test_the_shortest_time"),
+          "unit/test_gas_drag.py::test_shortest_relaxation_time"),
     Fault("a quaternion product with one wrong sign", "sign", "formula", "numerics/quaternion.py",
           "cosine * q[1] + y * q[3] + z * q[0] - x * q[2]", "cosine * q[1] + y * q[3] - z * q[0] - x * q[2]",
-          "unit/test_rotation.py::test_turn_is_a_rotation_in_the_laboratory_frame"),
+          "unit/test_quaternion.py::test_turn_is_a_rotation_in_the_laboratory_frame"),
     Fault("the rate of a cut central force", "sign", "formula", "forces/pair/inverse_square_formulas.py",
           "grow += slope_rate - slope * radial * inverse2", "grow += slope_rate + slope * radial * inverse2",
-          "unit/test_far.py::test_central_force_is_minus_the_gradient"),
+          "unit/test_pair_forces.py::test_central_force_is_minus_the_gradient"),
     Fault("Box and Muller without the 2", "factor 2", "formula", "numerics/random.py",
           "math.sqrt(-2.0 * math.log(uniform(word1)))", "math.sqrt(-1.0 * math.log(uniform(word1)))",
-          "unit/test_noise.py::test_moments_of_the_normals"),
+          "unit/test_random.py::test_moments_of_the_normals"),
     Fault("pairs of equal sizes counted twice", "factor 2", "formula", "theory/smoluchowski.py",
           "np.where(i == j, 0.5, 1.0)", "np.where(i == j, 1.0, 1.0)",
           "unit/test_kinetics.py::test_constant_kernel_against_the_exact_solution"),
@@ -79,44 +78,44 @@ FAULTS = (
     Fault("sliding forgets where it ends", "factor 2", "formula", "contact/mechanics.py",
           "slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))",
           "slide = dot(start.slide, sub(end.slide, left.slide))",
-          "generic/test_contact_laws.py::test_what_yielding_dissipates"),
+          "generic/test_contact_laws.py::test_dissipation_of_slip"),
     # loops
     Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "neighbours/cell_list.py",
           "(0, high - nx + 1)", "(0, high - nx)",
-          "unit/test_cells.py::test_many_grains_in_thin_cells"),
+          "unit/test_neighbour_lists.py::test_many_grains_in_thin_cells"),
     Fault("both grains are pushed the same way", "sign", "loop", "contact/gather.py",
           "force = sub(force, load(contacts.force, c))", "force = add(force, load(contacts.force, c))",
-          "unit/test_gathering.py::test_sums_are_those_of_brute_force"),
+          "unit/test_gather.py::test_sums_are_those_of_brute_force"),
     Fault("no reaction of a dipole's force", "sign", "loop", "forces/pair/dipole_loops.py",
           "accrue(force, j, (-f[0], -f[1], -f[2]))", "accrue(force, j, f)",
-          "physics/test_magnetics.py::test_loads_against_brute_force_with_images"),
-    Fault("a touch is given a whole kick", "factor 2", "loop", "contact/events.py",
+          "physics/test_magnetic_dynamics.py::test_loads_against_brute_force_with_images"),
+    Fault("a forming contact is given a whole kick", "factor 2", "loop", "contact/events.py",
           "impulse - 0.5 * dt * dot(load(contacts.force, c), n)", "impulse - dt * dot(load(contacts.force, c), n)",
-          "physics/test_conservation.py::test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls"),
-    Fault("half the speed at the start of a curve", "factor 2", "loop", "integrate/event_location.py",
+          "physics/test_conservation.py::test_contact_formation_conserves_the_modified_energy_of_verlet"),
+    Fault("half the velocity at the start of the interpolation", "factor 2", "loop", "integrate/event_location.py",
           "v0 = scale(dt / 5.0, ", "v0 = scale(dt / 10.0, ",
-          "unit/test_touch_curve.py::test_the_curve_is_the_motion_of_degree_five"),
+          "unit/test_event_location.py::test_interpolation_of_quintic_motion_is_exact"),
     Fault("the second half of a kick is a whole one", "factor 2", "loop", "integrate/driver.py",
           "return kick(grains, 0.5 * clock[STEP])", "return kick(grains, clock[STEP])",
-          "physics/test_magnetics.py::test_two_far_grains_swing_in_each_others_field"),
+          "physics/test_magnetic_dynamics.py::test_oscillation_of_two_distant_dipoles"),
     Fault("after a break the others keep the wrong twist", "lost row", "loop", "contact/events.py",
           "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
-          "unit/test_drop_broken.py::test_each_column_moves_with_its_contact"),
+          "unit/test_remove_broken.py::test_each_column_moves_with_its_contact"),
     # settings and units
-    Fault("a tesla without a second", "forgotten unit", "settings", "units.py",
+    Fault("tesla with 1/s instead of 1/s²", "forgotten unit", "settings", "units.py",
           '"T": (0, 0, 1, -2, -1, 0)', '"T": (0, 0, 1, -1, -1, 0)',
-          "unit/test_units.py::test_units_that_need_no_pint_are_those_of_pint"),
+          "unit/test_units.py::test_built_in_units_agree_with_pint"),
     Fault("a run of no steps", "off by one", "settings", "config/sections.py",
           "Steps = Annotated[int, Field(ge=1, le=MOST_STEPS", "Steps = Annotated[int, Field(ge=0, le=MOST_STEPS",
-          "unit/test_case.py::test_one_mistake_is_one_line"),
-    Fault("a material with a number that cannot be", "swallowed error", "settings", "material.py",
+          "unit/test_case.py::test_a_wrong_entry_gives_one_line"),
+    Fault("a material with an impossible value", "swallowed error", "settings", "material.py",
           "problems += error.problems", "problems += []",
-          "unit/test_grains.py::test_materials_check_themselves"),
+          "unit/test_grains.py::test_materials_are_checked"),
     Fault("a moment per mass taken for a moment", "forgotten unit", "settings", "grains.py",
           "per_mass * mass", "per_mass",
-          "unit/test_grains.py::test_what_follows_from_radius_and_material"),
+          "unit/test_grains.py::test_derived_quantities"),
     # files
-    Fault("orientations are read one place off", "off by one", "files", "io/frame.py",
+    Fault("quaternion components are read one position off", "off by one", "files", "io/frame.py",
           "np.roll(np.asarray(p.orientation), -1, axis=1)", "np.roll(np.asarray(p.orientation), 1, axis=1)",
           "unit/test_frame_quantities.py::test_a_frame_holds_grains_and_contacts"),
     Fault("a check sum without the numbers", "swallowed error", "files", "io/checkpoint.py",
@@ -128,20 +127,20 @@ FAULTS = (
     Fault("radii in metres among angstroms", "forgotten unit", "files", "io/extended_xyz.py",
           "[grains.position / ANGSTROM, grains.radius / ANGSTROM, grains.moment,",
           "[grains.position / ANGSTROM, grains.radius, grains.moment,",
-          "unit/test_builders.py::test_bodies_come_back_from_files"),
-    Fault("a full disk is not told", "swallowed error", "files", "io/run_folder.py",
+          "unit/test_builders.py::test_bodies_round_trip_through_files"),
+    Fault("a full disk is not reported", "swallowed error", "files", "io/run_folder.py",
           'raise FilesFailed(f"cannot write {path}: {error.strerror}; {left}") from error', "return",
           "unit/test_files.py::test_a_failed_write_leaves_the_old_file"),
     # commands
     Fault("the last frame of a slice", "off by one", "command", "cli/export.py",
           "first + 1 if first != -1 else None", "first + 1",
-          "unit/test_opened.py::test_the_export_command"),
-    Fault("a mistake ends with exit code 0", "swallowed error", "command", "cli/program.py",
+          "unit/test_results.py::test_the_export_command"),
+    Fault("wrong input ends with exit code 0", "swallowed error", "command", "cli/program.py",
           "return str(error).splitlines(), BAD_INPUT", "return str(error).splitlines(), DONE",
-          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2"),
+          "unit/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
     Fault("an end before the start", "swallowed error", "command", "simulation/stop.py",
           'seconds = si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
-          "unit/test_cli.py::test_mistakes_are_lines_and_exit_code_2"),
+          "unit/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
     # analysis
     Fault("a cluster is made whole without images", "forgotten image", "analysis", "analysis/clusters.py",
           "whole[i] + box.nearest(whole[j] - whole[i])", "whole[i] + (whole[j] - whole[i])",
@@ -149,6 +148,6 @@ FAULTS = (
     # set-up
     Fault("a gas overlaps across the faces of its box", "forgotten image", "set-up", "setup/gas.py",
           "dx - lx * round(dx * ix), dy - ly", "dx, dy - ly",
-          "unit/test_gas.py::test_no_two_grains_are_closer_than_the_clearance"),
+          "unit/test_setup_gas.py::test_no_two_grains_are_closer_than_the_clearance"),
 )
 # fmt: on

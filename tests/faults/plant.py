@@ -33,18 +33,18 @@ from .faults import FAULTS, SOURCES, Fault
 
 HERE = Path(__file__).parents[2]
 BUILT = Path(SOURCES) / "viewer" / "page"
-"""Made by a build and not in git, but tests need it."""
+"""Files of a build that are not in git but that tests need."""
 MISSED, TIMEOUT, CRASH = "MISSED", "TIMEOUT", "CRASH"
 SUITE = "the whole suite"
 REST = ["--ignore=tests/faults"]
-"""All tests but those that look whether the lines of the faults are there: they would catch every fault."""
+"""All tests except those of the fault table itself, which would catch every fault."""
 PASSED, FAILED, INTERRUPTED = 0, 1, 2
 """Exit codes of pytest; a test file that cannot be imported counts as interrupted."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of one fault."""
+    """The outcome of one fault."""
 
     fault: Fault
     caught_by: str  # test id, CRASH, TIMEOUT or MISSED
@@ -57,7 +57,7 @@ class Finding:
 
 
 def copy_of(tree: Path, place: Path) -> Path:
-    """Copy what git tracks or would track, and the built page, with the times of the files; the folder of the copy."""
+    """Copy the files that git tracks or would track, and the built page, with their times; returns the folder."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         cwd=tree,
@@ -74,10 +74,10 @@ def copy_of(tree: Path, place: Path) -> Path:
 
 
 def environment(copy: Path) -> dict[str, str]:
-    """The variables of a test run on a copy: its own source first, its own compiler cache, no chance.
+    """Environment variables of a test run on a copy: its own source first, its own compiler cache, fixed hash seed.
 
-    The cache lies beside the copy.  Its key is a digest of the sources that reach compiled code, so that a fault in
-    these is compiled and all others share what is there.
+    The cache is beside the copy.  Its key is a digest of the compiled sources: a fault in these is compiled, and all
+    others share the compiled code.
     """
     kept = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST", "SAND_", "NUMBA_"))}
     cache = copy.parent / f"cache-{copy.name}"
@@ -115,14 +115,14 @@ _RUNNING: set[subprocess.Popen[str]] = set()
 
 def end(process: subprocess.Popen[str]) -> None:
     """Kill a process and what it has started."""
-    with contextlib.suppress(OSError, AttributeError):  # no such group any more, or a system without groups
+    with contextlib.suppress(OSError, AttributeError):  # the group has ended, or the system has no groups
         os.killpg(process.pid, signal.SIGKILL)
     process.kill()
     process.wait()
 
 
 def pytest_words(tests: Sequence[str], workers: int = 0) -> list[str]:
-    """Words for Python that run these tests, or all default ones, up to the first failure."""
+    """Command-line words that run these tests, or all default ones, up to the first failure."""
     fixed = ["-p", "no:cacheprovider", "--hypothesis-seed=0", "--tb=line", "-rfE", "-n", str(workers)]
     return ["-m", "pytest", "-x", "-q", *fixed, *tests]
 
@@ -188,7 +188,7 @@ def prepare(tree: Path, place: Path, faults: Sequence[Fault], options: argparse.
 
 
 def report(line: str) -> None:
-    """A line on standard error, at once."""
+    """Print a line on standard error and flush."""
     print(line, file=sys.stderr, flush=True)
 
 
@@ -221,23 +221,23 @@ def examine_all(tree: Path, faults: Sequence[Fault], options: argparse.Namespace
 def state_of(tree: Path) -> str:
     """The commit of a tree, and whether tracked files differ from it."""
 
-    def said(*words: str) -> str:
+    def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=tree, capture_output=True, text=True).stdout.strip()
 
-    return said("rev-parse", "--short=10", "HEAD") + (" with changes" if said("status", "--porcelain", "-uno") else "")
+    return git("rev-parse", "--short=10", "HEAD") + (" with changes" if git("status", "--porcelain", "-uno") else "")
 
 
-def told(found: Finding) -> str:
-    """The test, or what happened instead and what was run."""
+def caught_by_text(found: Finding) -> str:
+    """The failed test, or the outcome and what was run."""
     return f"`{found.caught_by}`" if found.caught else f"{found.caught_by} by {found.ran}"
 
 
 def as_markdown(findings: Sequence[Finding], state: str, total: float) -> str:
-    """The table for people."""
+    """The table as Markdown."""
     caught = sum(found.caught for found in findings)
     rows = [
         f"| {found.fault.name} | {found.fault.kind} | {found.fault.area} | `{SOURCES}{found.fault.file}` "
-        f"| {told(found)} | {found.seconds:.0f} |"
+        f"| {caught_by_text(found)} | {found.seconds:.0f} |"
         for found in findings
     ]
     head = (
@@ -249,7 +249,7 @@ def as_markdown(findings: Sequence[Finding], state: str, total: float) -> str:
 
 
 def as_json(findings: Sequence[Finding], state: str, total: float) -> str:
-    """The table for programs."""
+    """The table as JSON."""
     rows = [asdict(found) | {"caught": found.caught} for found in findings]
     content = {"commit": state, "date": str(datetime.date.today()), "seconds": round(total), "faults": rows}
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"

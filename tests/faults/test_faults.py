@@ -1,4 +1,4 @@
-"""The table of planted faults fits the sources and tests of today, and planting leaves everything as it was."""
+"""The table of planted faults matches the sources and tests, and planting restores every file."""
 
 import ast
 import shutil
@@ -16,7 +16,7 @@ from .plant import BUILT, CRASH, HERE, MISSED, TIMEOUT, Finding, as_markdown, ch
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_fits_its_file_and_names_a_test_that_exists(fault):
-    """Its text occurs once, what stands there instead is another, still Python, and the named test is a function."""
+    """Its text occurs once, the replacement differs and is valid Python, and the named test exists."""
     text = (HERE / SOURCES / fault.file).read_text(encoding="utf-8")
     assert text.count(fault.old) == 1
     assert fault.old != fault.new and "\n" not in fault.old.rstrip("\n")
@@ -29,7 +29,7 @@ def test_a_fault_fits_its_file_and_names_a_test_that_exists(fault):
 
 
 def test_faults_are_of_all_kinds_everywhere():
-    """Thirty or more with names of their own; every kind, and every part of the program."""
+    """At least thirty with unique names; every kind, and every part of the program."""
     assert len(FAULTS) == len({fault.name for fault in FAULTS}) >= 30
     assert {fault.kind for fault in FAULTS} == set(KINDS)
     assert {fault.area for fault in FAULTS} == set(AREAS)
@@ -48,21 +48,21 @@ def test_faults_are_of_all_kinds_everywhere():
         (-11, "", CRASH),
     ],
 )
-def test_what_pytest_says_is_understood(code, output, expected):
-    """Exit code and summary become the name of the test, or what happened instead."""
+def test_verdict_from_the_output_of_pytest(code, output, expected):
+    """Exit code and summary give the name of the failed test, or CRASH or TIMEOUT."""
     assert verdict(code, output) == expected
 
 
 @pytest.mark.parametrize("code", [1, 3, 4, 5])
 def test_a_run_without_a_failed_test_is_no_catch(code):
-    """A wrong name or an error of pytest itself ends the script; it is not taken for a test that failed."""
+    """A wrong name or an internal error of pytest ends the script and does not count as a failed test."""
     with pytest.raises(SystemExit, match=f"exit code {code}"):
         verdict(code, "no tests ran")
 
 
 @pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
-def test_planting_changes_a_copy_for_a_while(tmp_path):
-    """The copy has the fault inside the block and the old file, with its times, after it; the tree is never touched."""
+def test_planting_changes_a_copy_temporarily(tmp_path):
+    """The copy has the fault inside the block and the old file with its times after it; the tree never changes."""
     tree = tmp_path / "tree"
     (tree / BUILT).mkdir(parents=True)
     (tree / SOURCES / "one.py").write_text("x = 1\n", encoding="utf-8")
@@ -81,8 +81,8 @@ def test_planting_changes_a_copy_for_a_while(tmp_path):
         raise AssertionError
 
 
-def test_the_table_counts_what_was_caught():
-    """A test or a crash is a catch, a miss and a test that never ends are none."""
+def test_the_table_counts_caught_faults():
+    """A failed test and a crash catch a fault; a pass and a timeout do not."""
     found = [Finding(FAULTS[0], by, "the named test", 1.0) for by in ("tests/a.py::test_b", CRASH, MISSED, TIMEOUT)]
     assert [one.caught for one in found] == [True, True, False, False]
     table = as_markdown(found, "abc", 60.0)
@@ -97,5 +97,5 @@ def test_the_script_lists_its_faults():
 
 
 def test_the_built_page_is_where_the_program_reads_it():
-    """The copy in which faults are planted needs the page, which is not in git."""
+    """The copy in which faults are planted needs the page bundle, which is not in git."""
     assert HERE / BUILT == page_bundle.PAGE

@@ -39,7 +39,7 @@ def contact_of(ratio, materials=(SILICA, ICE), law="jkr"):
 
 
 class Pair:
-    """Two grains near their equilibrium distance; their positions and orientations can be changed by hand.
+    """Two grains near their equilibrium distance, whose positions and orientations a test can change.
 
     The contact pointers are fixed to the grains.
     """
@@ -104,8 +104,8 @@ def slope(pair, change, h):
 def test_the_force_is_minus_the_gradient(law, ratio, push, turn1, turn2):
     """F1 = −∂U/∂x1 of normal, sliding and rolling energy together.
 
-    Twist is held (its energy depends on the spins' history, not on places).  Central differences with a
-    step of 1e-3 δc and one Richardson step: truncation 1e-12, rounding 1e-16·U/h·… below 1e-8 of k_s ζ_c.
+    Twist is held constant (its energy depends on the history of the spins, not on positions).  Central differences with
+    a step of 1e-3 δc and one Richardson step: truncation 1e-12, rounding 1e-16·U/h, below 1e-8 of k_s ζ_c.
     """
     pair = Pair(ratio, push, turn1, turn2, law=law)
     h = 1e-3 * pair.mode.rest_overlap
@@ -141,8 +141,8 @@ def test_the_torque_is_minus_the_gradient(law, ratio, push, turn1, turn2, which)
 
 @settings(max_examples=60, deadline=None)
 @given(ALL_LAWS, RATIOS, TRIPLE, TRIPLE, TRIPLE)
-def test_each_mode_alone(law, ratio, push, turn1, turn2):
-    """−dU_mode equals the mode's own work for a random small motion: every spring alone, not only their sum."""
+def test_energy_of_each_mode(law, ratio, push, turn1, turn2):
+    """−dU_mode equals the work of the mode for a random small motion: each spring separately, not only the sum."""
     pair = Pair(ratio, push, turn1, turn2, law=law)
     b, pose = pair.constants, pair.pose()
     zeta, along = tangential.sliding(pose.n1, pose.n2, pose.n, pair.r1, pair.r2)
@@ -175,8 +175,8 @@ def test_each_mode_alone(law, ratio, push, turn1, turn2):
 
 
 @given(ALL_LAWS, RATIOS, TRIPLE, TRIPLE, TRIPLE)
-def test_no_contact_spins_itself_up(law, ratio, push, turn1, turn2):
-    """M1 + M2 + (x1−x2)×F1 = 0 to rounding, for unequal radii too: angular momentum."""
+def test_angular_momentum_is_conserved(law, ratio, push, turn1, turn2):
+    """M1 + M2 + (x1−x2)×F1 = 0 to rounding, for unequal radii too."""
     pair = Pair(ratio, push, turn1, turn2, law=law)
     force, torque1, torque2 = pair.load()
     total = np.array(add(add(torque1, torque2), cross(sub(pair.x1, pair.x2), force)))
@@ -187,7 +187,7 @@ def test_no_contact_spins_itself_up(law, ratio, push, turn1, turn2):
 
 @given(ALL_LAWS, RATIOS, TRIPLE, TRIPLE, TRIPLE)
 def test_swapping_the_grains_swaps_the_loads(law, ratio, push, turn1, turn2):
-    """Which grain is called 1 is nobody's business: F → −F, M1 ↔ M2; φ is the same number."""
+    """The order of the grains does not matter: F → −F, M1 ↔ M2; φ is the same number."""
     pair = Pair(ratio, push, turn1, turn2, law=law)
     force, torque1, torque2 = pair.load()
     p = pair.pose()
@@ -199,8 +199,8 @@ def test_swapping_the_grains_swaps_the_loads(law, ratio, push, turn1, turn2):
 
 
 @given(RATIOS, TRIPLE, TRIPLE)
-def test_pointers_land_on_their_target(ratio, slide, roll):
-    """n1, n2 made for (ζ', ξ') have just these displacements, to 1e-12 of them, radii 1:1 to 1:20."""
+def test_pointers_for_given_displacements(ratio, slide, roll):
+    """n1, n2 made for (ζ', ξ') have these displacements, to 1e-12 of them, radii 1:1 to 1:20."""
     r1, r2, constants = contact_of(ratio)
     n = unit((0.2, 0.5, -0.8))
     size = constants.slide_limit
@@ -220,7 +220,7 @@ def test_pointers_land_on_their_target(ratio, slide, roll):
 @pytest.mark.parametrize("reset", [False, True])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_limits_hold_on_both_sides(reset, sign):
-    """Clamp leaves a displacement at its limit, reset at 0; both signs of the twist."""
+    """slip="clamp" leaves a displacement at its limit, "reset" at 0; both signs of the twist."""
     _, _, constants = contact_of(1.0)
     over = mechanics.Displacements(
         0.0,
@@ -249,8 +249,8 @@ def test_limits_hold_on_both_sides(reset, sign):
     assert mechanics.after_slip(within, UP, constants, reset) == within
 
 
-def test_what_yielding_dissipates():
-    """½k(q_before + q_left)·(q_reached − q_left): clamped on the limit k q_c (|q| − q_c); reset ½k q_before·q."""
+def test_dissipation_of_slip():
+    """½k(q_before + q_left)·(q_reached − q_left): clamp at the limit k q_c (|q| − q_c), reset ½k q_before·q."""
     _, _, b = contact_of(1.0)
     c = b.slide_limit
     zero = (0.0, 0.0, 0.0)
@@ -315,11 +315,11 @@ def test_the_normal_force_and_stiffness_are_derivatives_of_the_energy(law, share
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_law_is_consistent_at_rest_touch_and_break(law):
-    """At δ₀ the force is 0 and the contact radius a₀ (y = 1); at touch and break U and F are those of the formulas.
+def test_a_law_is_consistent_at_equilibrium_formation_and_breaking(law):
+    """At δ₀ the force is 0 and the contact radius a₀ (y = 1); at formation and breaking U and F are those of the law.
 
-    The fast root equals the exact one where it is valid.  Tolerance: 1e-9 in units of k δ₀ and k δ₀²; just before the
-    break y has an infinite slope, so that an overlap 1e-12 away changes it by 1e-6.
+    The fast root equals the exact one where it is valid.  Tolerance: 1e-9 in units of k δ₀ and k δ₀²; just before
+    breaking y has an infinite slope, so that an overlap 1e-12 away changes it by 1e-6.
     """
     _, _, c = contact_of(0.5, law=law)
     own, pairing = LAWS[law], Contact().pairing(SILICA, ICE)
@@ -392,8 +392,8 @@ def test_a_law_with_a_taken_name_or_without_a_member_is_refused():
 @pytest.mark.parametrize(
     "law", [pytest.param(law, marks=() if law == "jkr" else pytest.mark.validate) for law in sorted(LAWS)]
 )
-def test_a_head_on_impact_closes_the_ledger(law):
-    """Two grains meet with three times the JKR sticking speed and rebound; total energy is conserved to 1e-3.
+def test_energy_balance_of_a_head_on_impact(law):
+    """Two grains collide at three times the JKR sticking speed and rebound; total energy is conserved to 1e-3.
 
     DMT contacts dissipate nothing (they form and break at δ = 0, where U = 0); JKR contacts dissipate 0.9355 F_c δ_c.
     The error is that of velocity Verlet with 100 steps per period, (ω dt)²/24 = 1.6e-4 of the elastic energy.

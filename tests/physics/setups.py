@@ -1,4 +1,4 @@
-"""Small worlds that several tests share."""
+"""Initial conditions and helpers that several physics tests share."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sand.contact.model import Contact
 
 
 def rest_distance(a: sand.Material, r1: float, r2: float, b: sand.Material | None = None) -> float:
-    """Distance of two centres in equilibrium [m]."""
+    """Equilibrium distance of two centres in contact [m]."""
     p = Contact().pairing(a, b or a)
     reduced = r1 * r2 / (r1 + r2)
     return r1 + r2 - rest_overlap(rest_radius(p.surface_energy, reduced, p.modulus), reduced)
@@ -27,7 +27,7 @@ def struck_chain(
     steps_per_period: float = 25.0,
     **options,
 ) -> sand.Simulation:
-    """A straight chain at rest along x, hit from above at its end grain; `offset` in radii along x."""
+    """A straight chain at rest along x whose end grain is hit by a grain from above; `offset` along x in radii."""
     pitch = rest_distance(material, radius, radius)
     position = np.zeros((length + 1, 3))
     position[:length, 0] = pitch * np.arange(length)
@@ -41,7 +41,7 @@ def struck_chain(
 def random_aggregate(
     count: int, seed: int, *, radii: tuple[float, float] = (1e-8, 1e-8), material=sand.SILICA, **options
 ) -> sand.Grains:
-    """Grains added one by one, each touching a random earlier one at rest, none overlapping."""
+    """Aggregate of grains added one by one, each in equilibrium contact with a random earlier grain; no overlaps."""
     rng = np.random.default_rng(seed)
     radius = rng.uniform(*radii, size=count)
     position = np.zeros((count, 3))
@@ -58,15 +58,15 @@ def random_aggregate(
     return sand.Grains(position, radius, material, **(given | options))
 
 
-class Imposed:
-    """A simulation whose motion is imposed from outside: grains are moved, contacts answer, loads are ignored."""
+class PrescribedMotion:
+    """A simulation with prescribed motion: grains are moved, contacts are updated, forces are ignored."""
 
     def __init__(self, grains, contact=None):
         self.sim = sand.Simulation(grains, [contact or sand.Contact()], stepping=sand.Verlet(step=1.0))
         self.sim.loads()
 
     def step(self, velocity, spin):
-        """One step of 1 s at these velocities (N, 3) [m/s] and spins [rad/s]; what Verlet adds is taken back."""
+        """One step of 1 s at these velocities (N, 3) [m/s] and spins [rad/s]; the kick of Verlet is undone."""
         g = self.sim.state.grains.arrays
         g.force[...] = 0.0
         g.torque[...] = 0.0

@@ -1,4 +1,4 @@
-"""What must never change: momenta, and the ledger's total."""
+"""Conservation laws: momentum, angular momentum, and the total energy including recorded losses."""
 
 import itertools
 import math
@@ -11,7 +11,7 @@ from sand.constants import MAGNETIC
 from sand.contact import jkr
 from sand.state.state import CONTACT_STEP
 
-from .setups import Imposed, random_aggregate, rest_distance, struck_chain
+from .setups import PrescribedMotion, random_aggregate, rest_distance, struck_chain
 
 
 @pytest.mark.compiled("dipoles")
@@ -19,13 +19,12 @@ from .setups import Imposed, random_aggregate, rest_distance, struck_chain
     ("far", "bound"), [pytest.param("every step", 1e-12, marks=pytest.mark.validate), ("impulse", 1e-11)]
 )
 @pytest.mark.parametrize(("seed", "radii"), [(1, (1e-8, 1e-8)), (2, (4e-9, 1.2e-8)), (3, (2e-9, 2e-8))])
-def test_momenta_are_kept(seed, radii, far, bound):
-    """P and L = Σ x×mv + Iω of a random aggregate with dipoles, open box, 1e5 steps: to rounding.
+def test_momentum_and_angular_momentum_are_conserved(seed, radii, far, bound):
+    """P and L = Σ x×mv + Iω of a random aggregate with dipoles in open space, 1e5 steps, change by rounding only.
 
-    Verlet keeps both exactly, with the far loads summed in every step or in cycles; what is left is rounding:
-    ε √steps ~ 1e-13 of Σ|mv| and Σ|x×mv| + |Iω|.  The held part of far loads is added with the same bits again and
-    again, so that its rounding errors add up, ε steps ~ 2e-11 at worst.  Without `correct_angular_momentum` L is lost
-    at 1e-6.
+    Verlet conserves both exactly, with long-range forces summed in every step or in r-RESPA cycles.  Rounding gives
+    ε √steps ~ 1e-13 of Σ|mv| and Σ|x×mv| + |Iω|.  The same long-range impulse is added several times in a cycle, so its
+    rounding errors add up: ε steps ~ 2e-11 at most.  Without `correct_angular_momentum` L changes by 1e-6.
     """
     fast = 8.0 * np.random.default_rng(seed + 100).normal(size=(16, 3))
     grains = random_aggregate(16, seed, radii=radii, moment="300 A m^2/kg", velocity=fast)
@@ -48,10 +47,10 @@ def test_momenta_are_kept(seed, radii, far, bound):
 
 
 @pytest.mark.compiled("dipoles")
-def test_magnetic_gas_before_its_first_touch():
-    """The ledger of the magnetics alone: ≤ 1e-6 of |U_min| = 2kμ²/d³ until the first contact of a periodic gas.
+def test_energy_of_a_magnetic_gas_before_its_first_contact():
+    """Total energy of a periodic gas until the first contact: error ≤ 1e-6 of |U_min| = 2kμ²/d³.
 
-    No contact can hide an error here; the cut-off is crossed by many pairs, so it is in the books too.
+    Without contacts only errors of the magnetic forces remain; many pairs cross the cut-off.
     """
     box = sand.Box.periodic("0.5 um")
     grains = sand.setup.gas(
@@ -66,12 +65,12 @@ def test_magnetic_gas_before_its_first_touch():
     totals = np.array([row["total"] for row in before])
     magnetic = np.array([row["magnetic"] for row in before])
     assert len(before) > 20
-    assert np.ptp(magnetic) > 0.1 * u_min  # something did happen
+    assert np.ptp(magnetic) > 0.1 * u_min  # energy was exchanged
     assert np.abs(totals - totals[0]).max() < 1e-6 * u_min
 
 
 def chain_errors(steps_per_period):
-    """|change of the total| over the impact energy for nine points of impact."""
+    """|change of the total energy| over the impact energy, for nine points of impact."""
     errors = []
     for offset in np.linspace(-0.5, 0.5, 9):
         sim = struck_chain(offset=offset, steps_per_period=steps_per_period)
@@ -84,11 +83,11 @@ def chain_errors(steps_per_period):
 
 
 @pytest.mark.compiled("contacts")
-def test_a_struck_chain_closes_its_books():
-    """Chain of 7 iron grains (20 nm) hit at 100 m/s: rms over nine hits ≤ 3e-3 of the impact energy at T/20.
+def test_energy_balance_of_a_struck_chain():
+    """Chain of 7 iron grains (20 nm) hit at 100 m/s: rms error of nine hits ≤ 3e-3 of the impact energy at T/20.
 
-    Contacts form, break, slide and roll in it.  Verlet is of order two and the events are exact, so the
-    error falls by about 4 per halving, at least 3, down to 1e-5.
+    Contacts form, break, slide and roll.  Verlet is of order two and transitions are exact, so the error falls by about
+    4, at least 3, per halving of the step, down to 1e-5.
     """
     errors = [chain_errors(20.0 * 2**k) for k in range(5)]
     assert errors[0] < 3e-3
@@ -99,8 +98,8 @@ def test_a_struck_chain_closes_its_books():
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("slip", ["clamp", "reset"])
-def test_unequal_grains_of_two_materials_close_their_books(slip):
-    """Two aggregates of unequal silica and ice grains collide at 20 m/s; error ≤ 1e-3 of the impact energy."""
+def test_energy_balance_of_two_materials_and_unequal_radii(slip):
+    """Two aggregates of unequal silica and ice grains collide at 20 m/s; energy error ≤ 1e-3 of the impact energy."""
     left = random_aggregate(12, 5, radii=(2e-8, 8e-8))
     right = random_aggregate(12, 6, radii=(2e-8, 8e-8))
     shift = np.array([np.ptp(left.position[:, 0]) + np.ptp(right.position[:, 0]) + 2e-7, 0, 0])
@@ -120,11 +119,12 @@ def test_unequal_grains_of_two_materials_close_their_books(slip):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("offset", [0.0, 0.3, 0.7])
-def test_small_grains_touch_at_their_own_step_beside_large_ones(offset):
+def test_the_step_resolves_a_contact_of_small_grains_beside_large_ones(offset):
     """Two 10 nm iron grains meet at 10 m/s while two 1 µm grains rest in contact elsewhere.
 
-    The step at touch must be the small pair's own; at the large pair's (19 times longer) the books would be off
-    by up to half of the forming energy. 1e-2 is twice what the small pair has alone (ringing, (ω dt)²/8).
+    The step must be that of the small pair when its contact forms.  At the step of the large pair (19 times longer) the
+    energy error is up to half of the formation energy.  1e-2 is twice the error of the small pair alone (ringing,
+    (ω dt)²/8).
     """
     big, d = 1e-6, rest_distance(sand.IRON, 1e-6, 1e-6)
     small = 1e-8
@@ -140,10 +140,11 @@ def test_small_grains_touch_at_their_own_step_beside_large_ones(offset):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("r2", [1e-8, 5e-9])
-def test_rolling_far_against_the_grain_size_closes_its_books(r2):
-    """ξ_c = 1 nm on grains of 5 nm: the normal part of n1 + n2 takes part; the error falls with the step.
+def test_energy_balance_of_rolling_over_a_large_angle(r2):
+    """ξ_c = 1 nm on grains of 5 nm: the rolling displacement includes the normal part of n1 + n2.
 
-    A grain is spun up and rolls; the loss is first order here for finite turns, ×4 in steps at least ÷2.5.
+    A grain is spun up and rolls.  The loss is of first order in the step for finite turns: the error falls by at least
+    2.5 for a step 4 times shorter.
     """
     d = rest_distance(sand.IRON, 1e-8, r2)
     errors = []
@@ -161,8 +162,8 @@ def test_rolling_far_against_the_grain_size_closes_its_books(r2):
 
 
 @pytest.mark.compiled("contacts")
-def test_nothing_is_booked_for_grains_that_touch_at_the_start():
-    """A relaxed pair: no losses, no motion but rounding, and the energy of its contact is in the books."""
+def test_initial_contacts_at_rest_dissipate_nothing():
+    """A relaxed pair: no losses, motion by rounding only, and the ledger contains the energy of its contact."""
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)
     grains = sand.Grains([[0, 0, 0], [d, 0, 0]], 1e-7, sand.SILICA)
     sim = sand.Simulation(grains, [sand.Contact()])
@@ -171,18 +172,18 @@ def test_nothing_is_booked_for_grains_that_touch_at_the_start():
     assert last["contacts"] == 1
     assert last["made"] == 0
     assert sim.ledger.dissipated == 0.0
-    assert np.abs(sim.grains.velocity).max() < 1e-6  # the sound of rounding, 1e-16 of the elastic speeds
+    assert np.abs(sim.grains.velocity).max() < 1e-6  # rounding excites vibrations of 1e-16 of the elastic speeds
     assert last["normal"] < 0.0
 
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("speed", [0.5, 20.0])
 @pytest.mark.parametrize("side", [0.0, 0.7])
-def test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls(speed, side):
-    """E + dt² (k w²/12 − F²/(24 m̄)) after the step of a touch is the energy before it, to rounding.
+def test_contact_formation_conserves_the_modified_energy_of_verlet(speed, side):
+    """E + dt² (k w²/12 − F²/(24 m̄)) after the step in which a contact forms equals the energy before, to rounding.
 
-    Two 10 nm iron grains, head on and from the side, at eleven phases of the step.  Rounding of −U(0) and of
-    ½ m̄ w² is some 1e-16 of either; 1e-12 leaves room.  An impulse of F (τ − dt/2) alone is off by 1e-3.
+    Two 10 nm iron grains, head-on and oblique, at eleven phases of the step.  Rounding of −U(0) and of ½ m̄ w² is about
+    1e-16 of either; the tolerance is 1e-12.  An impulse of F (τ − dt/2) alone gives an error of 1e-3.
     """
     r, dt = 1e-8, 5e-13
     for phase in np.linspace(0.0, 1.0, 11):
@@ -192,12 +193,12 @@ def test_a_touch_keeps_what_verlet_keeps_wherever_in_a_step_it_falls(speed, side
         while sim.ledger.rows[-1]["contacts"] == 0 if len(sim.ledger) else True:
             sim.run(steps=1)
         first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
-        kept = last["total"] - first["total"] + dt * dt * beyond_energy(sim)
+        kept = last["total"] - first["total"] + dt * dt * modified_energy_term(sim)
         assert last["lost_forming"] > 0
         assert abs(kept) < 1e-12 * last["lost_forming"]
 
 
-def beyond_energy(sim):
+def modified_energy_term(sim):
     """k w²/12 − F²/(24 m̄) [J/s²] of a single pair, k from differences of F."""
     constants = sand.contact.law.contact_constants(jkr.LAW)(
         sand.Contact().pairing(sand.IRON, sand.IRON), *sim.grains.radius, *sim.grains.mass
@@ -215,12 +216,12 @@ def beyond_energy(sim):
 
 
 @pytest.mark.compiled("contacts")
-def test_the_ringing_after_a_touch_has_the_energy_of_before():
-    """Mean of the total over twelve periods: at most (ω_n dt)²/12 of the ringing under the energy before the touch.
+def test_mean_energy_of_the_ringing_after_a_contact_forms():
+    """The mean total energy over twelve periods is below the energy before contact by at most (ω_n dt)²/12 E.
 
-    A harmonic oscillator in Verlet keeps H + dt² (k w²/12 − F²/(24 m̄)), whose mean is (ω dt)²/24 E above that of H;
-    JKR's wide ringing makes twice that, 9.7e-4 at 25 steps per fastest period.  A touch that keeps the energy itself
-    makes 1.2e-3, one of first order (ω dt)²/3 on the other side.
+    A harmonic oscillator in Verlet conserves H + dt² (k w²/12 − F²/(24 m̄)), whose mean exceeds that of H by
+    (ω dt)²/24 E.  The wide anharmonic ringing of JKR doubles that: 9.7e-4 at 25 steps per fastest period.  Conserving E
+    instead gives 1.2e-3; a first-order formation gives (ω dt)²/3 of the other sign.
     """
     r, speed = 1e-8, 0.5
     period = sand.theory.contact(sand.IRON, r).normal_period
@@ -240,10 +241,10 @@ def test_the_ringing_after_a_touch_has_the_energy_of_before():
 
 
 @pytest.mark.compiled("contacts")
-def test_two_grains_that_bounce():
-    """Head-on above the sticking speed: rebound √(v² − v_s²), loss E_cycle = 0.935503 Fcδc exactly booked.
+def test_rebound_of_two_grains():
+    """Head-on above the sticking speed: rebound √(v² − v_s²), and the recorded loss is E_cycle = 0.935503 F_c δ_c.
 
-    v_s = 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2); 1 % for the step, 1e-6 for the books' two entries.
+    v_s = 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).  Tolerance 1 % for the speed (step), 1e-6 for the two recorded losses.
     """
     r, m = 1e-7, sand.SILICA
     modulus = m.young_modulus / (2 * (1 - m.poisson_ratio**2))
@@ -268,20 +269,20 @@ def test_two_grains_that_bounce():
 
 @pytest.mark.compiled("contacts")
 def test_twist_is_integrated_to_second_order():
-    """dφ/dt = (ω1 − ω2)·n with n turning in the plane: φ = Δω sin(Ωt)/Ω; halving the step quarters the error.
+    """dφ/dt = (ω1 − ω2)·n with n rotating: φ = Δω sin(Ωt)/Ω; halving the step quarters the error.
 
-    The motion is imposed; n must be taken in the middle of the step, else the order is one.
+    The motion is prescribed; n must be evaluated in the middle of the step, otherwise the order is one.
     """
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)
     whole, turning = 1.0, 0.015
     errors = []
     for steps in (50, 100):
-        mover = Imposed(sand.Grains([[0, 0, 0], [-d, 0, 0]], 1e-7, sand.SILICA))
+        moving_pair = PrescribedMotion(sand.Grains([[0, 0, 0], [-d, 0, 0]], 1e-7, sand.SILICA))
         angle = whole / steps
         for k in range(steps):
             here, there = (d * np.array([-math.cos(a), -math.sin(a), 0]) for a in (k * angle, (k + 1) * angle))
-            mover.step([np.zeros(3), there - here], [[turning / steps, 0, 0], [0, 0, 0]])
-        errors.append(abs(mover.sim.state.contacts.twist[0] - turning * math.sin(whole) / whole))
+            moving_pair.step([np.zeros(3), there - here], [[turning / steps, 0, 0], [0, 0, 0]])
+        errors.append(abs(moving_pair.sim.state.contacts.twist[0] - turning * math.sin(whole) / whole))
     assert errors[0] < 1e-5
     assert 3.5 < errors[0] / errors[1] < 4.5
 
@@ -295,10 +296,10 @@ def test_twist_is_integrated_to_second_order():
         *(pytest.param(k, v, marks=pytest.mark.validate) for k in ("lattice", "pca") for v in (1.0, 5.0)),
     ],
 )
-def test_aggregate_collisions_close_their_books(kind, speed):
-    """Two 5×5×5 lattices and two 64-grain PCA clusters, silica 0.6 µm, at the default step: ≤ 1e-3 of the impact.
+def test_energy_balance_of_aggregate_collisions(kind, speed):
+    """Two 5×5×5 lattices and two 64-grain PCA clusters, silica 0.6 µm: error ≤ 1e-3 of the impact energy.
 
-    Verlet's error per step is that of the ringing, (ω dt)²/8 of it; impacts are resolved to δ_c a step.
+    At the default step Verlet's error is (ω dt)²/8 of the ringing energy; impacts are resolved to δ_c per step.
     """
     from sand.experiments.collision import collide
     from sand.setup import lattice, pca

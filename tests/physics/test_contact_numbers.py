@@ -1,4 +1,4 @@
-"""Numbers that are known in closed form: sticking speeds, periods, friction."""
+"""Contacts against closed forms: sticking speeds, periods, friction."""
 
 import math
 
@@ -11,15 +11,15 @@ from sand.contact.jkr import LAW as JKR
 from sand.contact.jkr import normal_stiffness, rest_overlap, rest_radius
 from sand.contact.law import contact_constants
 
-from .setups import Imposed, random_aggregate, rest_distance
-from .test_magnetics import swing
+from .setups import PrescribedMotion, random_aggregate, rest_distance
+from .test_magnetic_dynamics import measured_period
 
 LAW = sand.Contact()
 MATERIALS = {m.name: m for m in (sand.ICE, sand.SILICA, sand.IRON)}
 
 
 def head_on(material, r1, r2, speed, steps_per_period=100):
-    """Two grains at rest but for their closing speed; returns the relative speed after, 0 if they stick."""
+    """Relative speed after a head-on collision of two grains, 0 if they stick."""
     gap = 0.02 * min(r1, r2)
     masses = [material.density * r**3 for r in (r1, r2)]
     share = masses[1] / sum(masses)
@@ -41,7 +41,7 @@ def head_on(material, r1, r2, speed, steps_per_period=100):
 
 
 def sticking_speed(material, r1, r2):
-    """m̄v²/2 = E_cycle = 0.935503 F_cδ_c; for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2)."""
+    """v_s of m̄v²/2 = E_cycle = 0.935503 F_cδ_c; for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2)."""
     masses = [material.density * 4 / 3 * math.pi * r**3 for r in (r1, r2)]
     constants = contact_constants(JKR)(LAW.pairing(material, material), r1, r2, *masses)
     reduced_mass = masses[0] * masses[1] / sum(masses)
@@ -51,8 +51,8 @@ def sticking_speed(material, r1, r2):
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("r", [1e-8, 1e-7, 1e-6])
 @pytest.mark.parametrize("name", list(MATERIALS))
-def test_the_sticking_speed_of_equal_grains(name, r):
-    """The program sticks at 0.995 v_s and bounces at 1.005 v_s: the prefactor is 1.639 to 0.5 %."""
+def test_sticking_speed_of_equal_grains(name, r):
+    """Grains stick at 0.995 v_s and bounce at 1.005 v_s: the prefactor 1.639 is confirmed to 0.5 %."""
     m = MATERIALS[name]
     modulus = m.young_modulus / (2 * (1 - m.poisson_ratio**2))
     speed = 1.6394 * (m.surface_energy / (r / 2)) ** (5 / 6) * modulus ** (-1 / 3) * m.density**-0.5
@@ -65,8 +65,8 @@ def test_the_sticking_speed_of_equal_grains(name, r):
 @pytest.mark.parametrize("factor", [1.05, 1.5, 4.0, 20.0])
 @pytest.mark.parametrize("name", list(MATERIALS))
 @pytest.mark.parametrize(("r1", "r2"), [(1e-8, 1e-8), (1e-6, 1e-6), (1e-7, 4e-7)])
-def test_the_rebound(name, factor, r1, r2):
-    """√(v² − v_s²) to 1 %, unequal radii by the same energy balance."""
+def test_rebound_speed(name, factor, r1, r2):
+    """Rebound √(v² − v_s²) to 1 %, with v_s of unequal radii from the same energy balance."""
     m = MATERIALS[name]
     stick = sticking_speed(m, r1, r2)
     speed = factor * stick
@@ -85,7 +85,7 @@ INERTIA = 0.4 * MASS * R**2
 KN = normal_stiffness(CONSTANTS.rest_radius, LAW.pairing(sand.SILICA, sand.SILICA).modulus)
 D = rest_distance(sand.SILICA, R, R)
 SIDE = 2 * INERTIA * 1e1 / (MASS * D)
-# each mode of the free pair: ω², how to excite it (1e-3 of a limit), what to watch
+# each mode of the free pair: ω², how to excite it (1e-3 of a limit), the coordinate to record
 MODES = {
     "normal": (
         2 * KN / MASS,
@@ -94,7 +94,7 @@ MODES = {
     ),
     "sliding": (
         CONSTANTS.slide_stiffness * (2 / MASS + (D / 2) ** 2 * 2 / INERTIA),
-        # no angular momentum in all: the axis stays
+        # total angular momentum zero: the axis stays
         {"spin": [[0, 0, 1e1], [0, 0, 1e1]], "velocity": [[0, SIDE, 0], [0, -SIDE, 0]]},
         lambda s: s.grains.spin[0, 2] + s.grains.spin[1, 2],
     ),
@@ -113,21 +113,21 @@ MODES = {
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("mode", list(MODES))
-def test_periods_of_the_four_modes(mode):
-    """ω² = 2k_n/m, 7k_s/m, 2R²k_r/I, 2k_t/I to 1e-3 at T/100 of the fastest (Verlet: 1.6e-4).
+def test_periods_of_the_four_contact_modes(mode):
+    """ω² = 2k_n/m, 7k_s/m, 2R²k_r/I, 2k_t/I to 1e-3 at T/100 of the fastest (Verlet's error: 1.6e-4).
 
-    Sliding: with D = 2r − δ0 instead of 2r the exact value is k_s (2/m + D²/(2I)); 7k_s/m to (δ0/r).
+    Sliding: with the distance D = 2r − δ0 the exact value is k_s (2/m + D²/(2I)), which is 7k_s/m up to O(δ0/r).
     """
-    square, start, watch = MODES[mode]
+    square, start, coordinate = MODES[mode]
     expected = 2 * math.pi / math.sqrt(square)
-    found, _ = swing(
-        pair_at_rest(**start), [LAW], watch, expected, periods=8.2, stepping=sand.Verlet(steps_per_period=100)
+    found, _ = measured_period(
+        pair_at_rest(**start), [LAW], coordinate, expected, periods=8.2, stepping=sand.Verlet(steps_per_period=100)
     )
     assert found == pytest.approx(expected, rel=1e-3, abs=0.0)
 
 
-def test_limits_of_force_and_torque():
-    """Critical sliding force G a0²/(4π), rolling moment 4 F_c ξ_c, twisting moment G a0³/(6π) for equal grains."""
+def test_critical_force_and_torques():
+    """Critical sliding force G a0²/(4π), rolling torque 4 F_c ξ_c, twisting torque G a0³/(6π) of equal grains."""
     g = sand.SILICA.shear_modulus
     assert CONSTANTS.slide_stiffness * CONSTANTS.slide_limit == pytest.approx(
         g * CONSTANTS.rest_radius**2 / (4 * math.pi), rel=1e-6, abs=0.0
@@ -141,13 +141,14 @@ def test_limits_of_force_and_torque():
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize(("slip", "share"), [("clamp", 1.0), ("reset", 0.5)])
-def test_a_grain_rolled_round_another_by_90_degrees(slip, share):
-    """Dissipates k_r ξ_c (πr/2 − ξ_c) clamped (→ 12π²γRξ_c for ξ_c ≪ r), half of it reset; 1 % at r = 0.1 µm.
+def test_dissipation_of_rolling_by_90_degrees(slip, share):
+    """Rolling dissipates k_r ξ_c (πr/2 − ξ_c) with slip="clamp" (→ 12π²γRξ_c for ξ_c ≪ r), half of it with "reset".
 
-    Grain 2 orbits at rest grain 1 and turns twice as fast as the axis, so that it rolls without sliding.
+    Grain 2 orbits grain 1, which is at rest, and spins twice as fast as the axis, so that it rolls without sliding.
+    Tolerance 1 % at r = 0.1 µm.
     """
     r = 1e-7
-    roller = Imposed(pair_at_rest(r), sand.Contact(slip=slip))
+    roller = PrescribedMotion(pair_at_rest(r), sand.Contact(slip=slip))
     d = rest_distance(sand.SILICA, r, r)
     steps = 40_000
     angle = math.pi / 2 / steps
@@ -163,10 +164,10 @@ def test_a_grain_rolled_round_another_by_90_degrees(slip, share):
 
 
 @pytest.mark.compiled("contacts")
-def test_a_grain_twisted_by_a_full_turn():
-    """Dissipates k_t φ_c (2π − φ_c) clamped, k_t φ_c 2π for small φ_c; both directions."""
+def test_dissipation_of_twisting_by_a_full_turn():
+    """Twisting dissipates k_t φ_c (2π − φ_c) with slip="clamp", 2π k_t φ_c for small φ_c; in both directions."""
     for sign in (1.0, -1.0):
-        twister = Imposed(pair_at_rest())
+        twister = PrescribedMotion(pair_at_rest())
         steps = 20_000
         for _ in range(steps):
             twister.step(np.zeros((2, 3)), [[sign * 2 * math.pi / steps, 0, 0], [0, 0, 0]])
@@ -179,11 +180,13 @@ def test_a_grain_twisted_by_a_full_turn():
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("steps", [5_000])
-def test_rigid_motion_strains_nothing(steps):
-    """An aggregate of unequal grains turned ten times about an odd axis while it flies: every displacement stays
-    below 1e-9 of its limit. Rounding: 1e-16 r a step, random, is 1e-14 r after 5e3."""
+def test_rigid_motion_causes_no_displacement(steps):
+    """A flying aggregate of unequal grains turns ten times about an oblique axis: displacements < 1e-9 of limits.
+
+    Rounding of 1e-16 r per step, a random walk, gives 1e-14 r after 5e3 steps.
+    """
     grains = random_aggregate(12, 21, radii=(5e-8, 1e-7), velocity=None, spin=None)
-    mover = Imposed(grains)
+    rigid_body = PrescribedMotion(grains)
     axis = np.array([0.48, -0.6, 0.64])
     angle = 10 * 2 * math.pi / steps
     drift = np.array([1e-12, 2e-12, -1e-12])
@@ -191,26 +194,26 @@ def test_rigid_motion_strains_nothing(steps):
 
     turn = Rotation.from_rotvec(angle * axis)
     start = grains.position.copy()
-    before = mover.sim.state.contacts
-    used = mover.sim.state.count[2]
+    before = rigid_body.sim.state.contacts
+    used = rigid_body.sim.state.count[2]
     assert used == 11
     for k in range(steps):
         whole = Rotation.from_rotvec(k * angle * axis)
         here, there = whole.apply(start), (turn * whole).apply(start)
-        mover.step(there - here + drift, np.tile(angle * axis, (12, 1)))
+        rigid_body.step(there - here + drift, np.tile(angle * axis, (12, 1)))
     from sand.contact import mechanics
     from sand.contact.columns import column_loops
     from sand.contact.update import pose_at
 
-    g = mover.sim.state.grains.arrays
+    g = rigid_body.sim.state.grains.arrays
     for c in range(used):
         i, j = (int(k) for k in before.pair[:, c])
         constants = column_loops(JKR).at(before, c)
-        pose = pose_at(g, before, mover.sim.box.span, c, before.twist[c])
+        pose = pose_at(g, before, rigid_body.sim.box.span, c, before.twist[c])
         strain = mechanics.displacements_of(pose, 0.0, g.radius[i], g.radius[j], constants)
         assert np.linalg.norm(strain.slide) < 1e-9 * constants.slide_limit
         across_n = np.array(strain.roll) - np.dot(strain.roll, pose.n) * np.array(pose.n)
         assert np.linalg.norm(across_n) < 1e-9 * constants.roll_limit
         assert abs(strain.twist) < 1e-9 * constants.twist_limit
-    assert mover.sim.state.lost.sum() == 0.0
+    assert rigid_body.sim.state.lost.sum() == 0.0
     assert rest_overlap(rest_radius(0.025, 5e-8, 2.8e10), 5e-8) > 0

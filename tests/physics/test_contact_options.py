@@ -1,4 +1,4 @@
-"""The options of the contact law: damping, stiffnesses that follow, multipliers, mixing, no adhesion."""
+"""Options of the contact law: damping, variable stiffness, multipliers, mixing rules, no adhesion."""
 
 import math
 
@@ -27,7 +27,7 @@ def pair_constants(contact, material=sand.SILICA, r=R):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("kind", ["constant", "viscoelastic"])
-def test_ringing_decays_as_the_oscillator_does(kind):
+def test_damped_ringing_decays_exponentially(kind):
     """m̄ x¨ = −k_n x − c ẋ: energy falls as exp(−c t/m̄), c constant or (2 T_vis E*/ν²) a0; small amplitude, 2 %."""
     contact = sand.Contact(damping=kind, damping_constant="2e-9 kg/s", viscous_time="2e-14 s")
     constants, mass = pair_constants(contact)
@@ -44,8 +44,8 @@ def test_ringing_decays_as_the_oscillator_does(kind):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("kind", ["constant", pytest.param("viscoelastic", marks=pytest.mark.validate)])
-def test_the_books_of_damped_impacts_close_with_the_square_of_the_step(kind):
-    """Aggregates of unequal grains collide with damping: the error falls ≥ 3× per halving (rms of twelve)."""
+def test_energy_error_of_damped_impacts_falls_with_the_step(kind):
+    """Aggregates of unequal grains collide with damping: rms error of twelve impacts falls ≥ 3× per halving."""
 
     def error(steps_per_period):
         errors = []
@@ -73,8 +73,8 @@ def test_the_books_of_damped_impacts_close_with_the_square_of_the_step(kind):
 
 
 @pytest.mark.compiled("contacts")
-def test_stiffnesses_that_follow_are_booked():
-    """ "dt97" does not conserve: its springs make or destroy `lost_stiffness`, and with it the ledger closes."""
+def test_energy_of_variable_stiffness_is_recorded():
+    """Stiffnesses "dt97" do not conserve energy: with their work `lost_stiffness` the energy balance closes."""
     rng = np.random.default_rng(3)
     grains = random_aggregate(12, 4, radii=(5e-8, 1e-7), velocity=1.5 * rng.normal(size=(12, 3)))
     totals = []
@@ -89,8 +89,8 @@ def test_stiffnesses_that_follow_are_booked():
 
 
 @pytest.mark.compiled("contacts")
-def test_each_contact_keeps_its_own_books():
-    """The sum over contacts that never broke equals the ledger's channels, to rounding."""
+def test_losses_per_contact_add_up_to_the_ledger():
+    """The sum over contacts that never broke equals the ledger's columns, to rounding."""
     rng = np.random.default_rng(8)
     grains = random_aggregate(10, 4, radii=(5e-8, 1e-7), velocity=0.1 * rng.normal(size=(10, 3)))
     sim = sand.Simulation(grains, [sand.Contact(damping="constant", damping_constant="1e-10 kg/s")])
@@ -104,8 +104,8 @@ def test_each_contact_keeps_its_own_books():
 
 
 @pytest.mark.parametrize(("factor", "power"), [("slide_factor", 1.0), ("roll_factor", 1.0), ("twist_factor", 1.0)])
-def test_multipliers_scale_their_own_stiffness(factor, power):
-    """k_s, k_r, k_t alone are multiplied; limits stay."""
+def test_a_multiplier_scales_one_stiffness(factor, power):
+    """A multiplier scales k_s, k_r or k_t alone; the limits do not change."""
     plain, _ = pair_constants(sand.Contact())
     scaled, _ = pair_constants(sand.Contact(**{factor: 2.5}))
     name = factor.replace("factor", "stiffness")
@@ -117,7 +117,7 @@ def test_multipliers_scale_their_own_stiffness(factor, power):
 
 @pytest.mark.parametrize("rule", list(MIXING))
 def test_mixing_rules(rule):
-    """Equal grains give γ, a partner without any gives 0, order does not matter, and it lies between the two."""
+    """Equal grains give γ, a partner with γ = 0 gives 0, the rule is symmetric, and γ_eff lies between the two."""
     mix = MIXING[rule]
     assert mix(0.1, 0.1) == pytest.approx(0.1, rel=1e-6, abs=0.0)
     assert mix(0.1, 0.0) == 0.0
@@ -127,23 +127,27 @@ def test_mixing_rules(rule):
 
 
 @pytest.mark.compiled("contacts")
-def test_without_adhesion_grains_bounce_like_hertz():
-    """γ = 0: no sticking, no loss; contact time 2.868 (m̄²/(R E*² v))^(1/5), seen to within the two steps around it."""
+def test_contact_time_without_adhesion_is_that_of_hertz():
+    """γ = 0: no sticking, no loss; contact time 2.868 (m̄²/(R E*² v))^(1/5), resolved to two steps."""
     bare = sand.SILICA.but(name="bare", surface_energy=0.0)
     speed = 3.0
     grains = sand.Grains(
         [[0, 0, 0], [2.001 * R, 0, 0]], R, [bare, sand.SILICA], velocity=[[speed / 2, 0, 0], [-speed / 2, 0, 0]]
     )
-    touching, steps = [], []
+    contact_frames, steps = [], []
 
-    class Watch(sand.Observer):
+    class ContactRecorder(sand.Observer):
         def see(self, simulation, row):
             if row["contacts"]:
-                touching.append(row["time"])
+                contact_frames.append(row["time"])
                 steps.append(simulation.state.clock[1])
 
     sim = sand.Simulation(
-        grains, [sand.Contact()], stepping=sand.Verlet(steps_per_period=100), observers=[Watch()], frame_every="1 ps"
+        grains,
+        [sand.Contact()],
+        stepping=sand.Verlet(steps_per_period=100),
+        observers=[ContactRecorder()],
+        frame_every="1 ps",
     )
     sim.run(until="3 ns")
     last = sim.ledger.rows[-1]
@@ -152,7 +156,7 @@ def test_without_adhesion_grains_bounce_like_hertz():
     assert sim.ledger.dissipated == pytest.approx(0.0, abs=1e-6 * last["translation"])
     modulus = sand.SILICA.young_modulus / (2 * (1 - sand.SILICA.poisson_ratio**2))
     expected = 2.868 * ((grains.mass[0] / 2) ** 2 / (R / 2 * modulus**2 * speed)) ** 0.2
-    assert touching[-1] - touching[0] == pytest.approx(expected, abs=2.5 * max(steps[1:]))
+    assert contact_frames[-1] - contact_frames[0] == pytest.approx(expected, abs=2.5 * max(steps[1:]))
 
 
 @pytest.mark.parametrize(
@@ -168,7 +172,7 @@ def test_without_adhesion_grains_bounce_like_hertz():
     ],
 )
 def test_bad_settings(settings, message):
-    """One line each; several at once are all told."""
+    """One line per error, all errors at once."""
     with pytest.raises(sand.BadInput, match=message):
         sand.Contact(**settings)
     with pytest.raises(sand.BadInput) as caught:

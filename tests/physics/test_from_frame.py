@@ -1,4 +1,4 @@
-"""A frame of a trajectory as a new start: single precision corrected, no contact made or broken."""
+"""Starting from a frame of a trajectory: single precision is corrected, no contact is made or broken."""
 
 import copy
 import math
@@ -13,29 +13,29 @@ from sand.setup.from_frame import SINGLE, restore_overlaps
 
 RADIUS = 1e-8
 STIFFNESS = 100.0
-"""More than k_n [N/m] of two grains of silica; at rest it is 2 E* a0 = 57 N/m."""
+"""Upper bound of k_n [N/m] of two silica grains; in equilibrium it is 2 E* a0 = 57 N/m."""
 
 
 @pytest.fixture(scope="module")
-def crash(tmp_path_factory):
-    """A run in which a fast grain hits a compact cluster in a corner of a periodic box; its folder and frames."""
+def collision_run(tmp_path_factory):
+    """A fast grain hits a compact cluster in a corner of a periodic box; folder and frames of the run."""
     folder = tmp_path_factory.mktemp("frames") / "crash"
     cluster = sand.setup.pca(40, radius=RADIUS, material="silica", seed=1)
     corner = np.array([1.4e-7, 0.9e-7, 1.4e-7])
-    place = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
-    place = sand.Box.periodic("0.3 um").wrap(place + corner)
+    positions = np.vstack([cluster.position, cluster.position[0] + [0, 0, 1.5e-7]])
+    positions = sand.Box.periodic("0.3 um").wrap(positions + corner)
     speed = np.zeros((41, 3))
     speed[40] = [0.3, 0.4, -30.0]
-    grains = sand.Grains(place, RADIUS, "silica", velocity=speed, moment="2 A m^2/kg")
+    grains = sand.Grains(positions, RADIUS, "silica", velocity=speed, moment="2 A m^2/kg")
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box="0.3 um", out=folder, frame_every="0.25 ns")
     sim.run(until="10 ns")
     return folder, read_frames(folder / "trajectory.gsd"), sim
 
 
 @pytest.mark.compiled("dipoles", "small")
-def test_the_run_is_worth_it(crash):
-    """There are stretched contacts, strained ones, some at a limit, and contacts across the faces."""
-    _, frames, _ = crash
+def test_the_run_covers_the_hard_cases(collision_run):
+    """The run has stretched and displaced contacts, some at a limit, and contacts across the box faces."""
+    _, frames, _ = collision_run
     shares = np.vstack([frame.share for frame in frames])
     assert (shares[:, 0] > 0.05).any()
     assert (shares[:, 2] > 0.2).any()
@@ -45,12 +45,12 @@ def test_the_run_is_worth_it(crash):
 
 
 @pytest.mark.compiled("dipoles")
-def test_every_frame_starts_a_run_with_its_contacts(crash):
-    """Pairs are the same, overlaps to rounding (64 ε of the coordinates in radii), strains to single precision.
+def test_every_frame_starts_a_run_with_its_contacts(collision_run):
+    """Pairs are equal, overlaps to rounding (64 ε of the coordinates in radii), displacements to single precision.
 
-    The force of each contact is that of the frame, to k_n times the rounding of overlaps and the frame's own rounding.
+    Contact forces agree to k_n times the rounding of overlaps plus the rounding of the frame.
     """
-    _, frames, _ = crash
+    _, frames, _ = collision_run
     for number, frame in enumerate(frames):
         start = sand.setup.from_frame(frame, {"silica": sand.SILICA})
         sim = sand.Simulation(start.grains, [sand.Contact(), sand.Dipoles()], box=start.box, contacts=start.contacts)
@@ -70,9 +70,9 @@ def test_every_frame_starts_a_run_with_its_contacts(crash):
 
 
 @pytest.mark.compiled("dipoles")
-def test_the_books_begin_where_they_were(crash):
-    """All energies of the new run's first row are those of the old ledger's row, to single precision."""
-    _, frames, old = crash
+def test_first_ledger_row_equals_that_of_the_frame(collision_run):
+    """All energies of the new run's first row equal those of the earlier ledger to single precision."""
+    _, frames, old = collision_run
     k = len(frames) // 2
     start = sand.setup.from_frame(frames[k], {"silica": sand.SILICA})
     sim = sand.Simulation(start.grains, [sand.Contact(), sand.Dipoles()], box=start.box, contacts=start.contacts)
@@ -83,9 +83,9 @@ def test_the_books_begin_where_they_were(crash):
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_frame_as_a_simulation(crash):
-    """`sand.open(DIR).at(k)`: energies at grains sum to those of the old ledger's row, to single precision."""
-    folder, frames, old = crash
+def test_a_frame_as_a_simulation(collision_run):
+    """`sand.open(DIR).at(k)`: energies at grains add up to the ledger's row, to single precision."""
+    folder, frames, old = collision_run
     k = len(frames) // 2
     at = sand.open(folder).at(k).at_grains()
     elastic = sum(old.ledger[name][k] for name in ("normal", "sliding", "rolling", "twisting"))
@@ -95,13 +95,13 @@ def test_a_frame_as_a_simulation(crash):
 
 
 @pytest.mark.compiled("dipoles")
-def test_it_goes_on_as_the_old_run_did(crash):
-    """After the time between two frames positions agree with the old run's next frame.
+def test_continuation_follows_the_original_run(collision_run):
+    """After one frame interval positions agree with the next frame of the original run.
 
-    The two start 1e-7 apart (single precision of velocities, of strains) and steps are not the same; Verlet's own
-    error at these steps is far above that, so the bound is a thousandth of what moved.
+    The start differs by 1e-7 (single precision of velocities and displacements) and steps differ; the integration error
+    is far above that, so the bound is a thousandth of the displacement in the interval.
     """
-    _, frames, _ = crash
+    _, frames, _ = collision_run
     k = len(frames) // 2
     start = sand.setup.from_frame(frames[k], {"silica": sand.SILICA})
     sim = sand.Simulation(start.grains, [sand.Contact(), sand.Dipoles()], box=start.box, contacts=start.contacts)
@@ -112,11 +112,10 @@ def test_it_goes_on_as_the_old_run_did(crash):
     assert len(sim.contacts["pair"]) == len(frames[k + 1].pair)
 
 
-def test_healing_against_chance():
-    """Positions rounded to 24 bits: dense lattices with more contacts than freedoms, gaps of a hair, a periodic box.
+def test_position_correction_of_random_packings():
+    """Positions rounded to 24 bits: dense lattices with redundant contacts, small gaps, a periodic box.
 
-    Overlaps come back to 64 ε of the coordinates, no coordinate moves by more than a few roundings, and pairs that
-    did not touch do not touch.
+    Overlaps are restored to 64 ε of the coordinates, coordinates change by a few roundings, and no new pair overlaps.
     """
     rng = np.random.default_rng(3)
     for box in (sand.Box.open(), sand.Box.periodic(12 * RADIUS * 0.99)):
@@ -126,22 +125,22 @@ def test_healing_against_chance():
         pairs = box.close_pairs(true, 2.2 * RADIUS)
         apart = np.linalg.norm(box.nearest(true[pairs[:, 0]] - true[pairs[:, 1]]), axis=1)
         overlap = radius[pairs].sum(axis=1) - apart
-        held = overlap > -0.01 * RADIUS  # some of them stretched
-        touching = pairs[held]
+        kept = overlap > -0.01 * RADIUS  # some of them stretched
+        in_contact = pairs[kept]
         rounded = np.float64(np.float32(true / RADIUS)) * RADIUS
-        found = restore_overlaps(rounded, radius, box, touching, overlap[held])
-        apart = np.linalg.norm(box.nearest(found[touching[:, 0]] - found[touching[:, 1]]), axis=1)
-        assert radius[touching].sum(axis=1) - apart == pytest.approx(
-            overlap[held], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
+        found = restore_overlaps(rounded, radius, box, in_contact, overlap[kept])
+        apart = np.linalg.norm(box.nearest(found[in_contact[:, 0]] - found[in_contact[:, 1]]), axis=1)
+        assert radius[in_contact].sum(axis=1) - apart == pytest.approx(
+            overlap[kept], rel=0, abs=64 * 2.3e-16 * 12 * RADIUS
         )
         assert np.abs(box.nearest(found - rounded)).max() < 12 * SINGLE * RADIUS * 10
-        assert held.sum() > 400
+        assert kept.sum() > 400
 
 
-def test_a_rigid_packing_that_hardly_touches():
-    """32 grains of an fcc block exactly 2r apart: rounding decides which pairs touch; none does afterwards.
+def test_position_correction_of_a_rigid_packing():
+    """32 grains of an fcc block exactly 2r apart: rounding decides which overlap; after correction none does.
 
-    Far away, single precision knows places to 6e-8 of the distance only, and that is no damage.
+    Far from the origin single precision resolves 6e-8 of the distance only, which is not reported as damage.
     """
     cell = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])
     grid = np.array([[x, y, z] for x in range(2) for y in range(2) for z in range(2)], float)
@@ -156,9 +155,9 @@ def test_a_rigid_packing_that_hardly_touches():
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_frame_without_numbers(crash):
-    """The last frame of a run that ended in numbers that are not finite is refused with its step."""
-    _, frames, _ = crash
+def test_a_frame_with_nan_is_refused(collision_run):
+    """The last frame of a run that ended with non-finite numbers is refused with its step."""
+    _, frames, _ = collision_run
     frame = copy.copy(frames[4])
     frame.velocity = frame.velocity.copy()
     frame.velocity[3] = np.nan
@@ -166,29 +165,29 @@ def test_a_frame_without_numbers(crash):
         sand.setup.from_frame(frame, {"silica": sand.SILICA})
 
 
-def test_what_rounding_brought_together_is_parted():
-    """Two grains a hair apart that overlap once rounded: no contact is made."""
-    place = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
+def test_overlap_by_rounding_makes_no_contact():
+    """Two grains with a tiny gap that overlap once rounded are separated again."""
+    positions = np.array([[0.0, 0, 0], [2.0 * RADIUS * (1 - 3e-8), 0, 0], [0, 5 * RADIUS, 0]])
     none = np.zeros((0, 2), int)
-    found = restore_overlaps(place, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
+    found = restore_overlaps(positions, np.full(3, RADIUS), sand.Box.open(), none, np.zeros(0))
     gap = np.linalg.norm(found[0] - found[1]) / (2 * RADIUS) - 1
     assert 0 < gap < 2e-9
-    assert (found[2] == place[2]).all()
+    assert (found[2] == positions[2]).all()
 
 
-def said(capsys):
+def captured(capsys):
     return capsys.readouterr()
 
 
 @pytest.mark.compiled("dipoles")
-def test_the_command(crash, tmp_path, monkeypatch, capsys):
-    """`sand run --from`: the earlier run's case, a frame of it, said so; a case file can ask for it; resume goes on."""
-    folder, frames, _ = crash
+def test_the_command(collision_run, tmp_path, monkeypatch, capsys):
+    """`sand run --from` starts from a frame of an earlier run and reports it; case files and `resume` work, too."""
+    folder, frames, _ = collision_run
     monkeypatch.chdir(tmp_path)
     assert main(["run", "--from", str(folder), "--frame", "20", "--until", "0.1 ns"]) == 0
-    told = " ".join(said(capsys).out.split())
-    assert f"trajectory.gsd, step {frames[20].step}" in told
-    assert f"{len(frames[20].pair)} contacts kept" in told
+    message = " ".join(captured(capsys).out.split())
+    assert f"trajectory.gsd, step {frames[20].step}" in message
+    assert f"{len(frames[20].pair)} contacts kept" in message
     new = sand.open("crash-from-20")
     assert new.frames[0].time == 0.0
     assert (new.frames[0].pair == frames[20].pair).all()
@@ -230,9 +229,9 @@ def test_the_command(crash, tmp_path, monkeypatch, capsys):
         (["foreign.toml"], ["foreign.gsd", "not a trajectory"]),
     ],
 )
-def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
+def test_wrong_requests_are_refused(collision_run, tmp_path, monkeypatch, capsys, words, parts):
     """One line each, nothing written."""
-    folder, frames, _ = crash
+    folder, frames, _ = collision_run
     stretched = int(np.argmax([frame.share[:, 0].max() for frame in frames]))
     monkeypatch.chdir(tmp_path)
     run, forces = '[run]\nuntil = "1 ns"\n', "[forces.contact]\n"
@@ -252,16 +251,16 @@ def test_mistakes(crash, tmp_path, monkeypatch, capsys, words, parts):
     before = sorted(tmp_path.iterdir())
     meant = {"RUN": str(folder), "STRETCHED": str(stretched)}
     assert main(["run", *(meant.get(word, word) for word in words)]) == 2
-    told = "\n".join(line for line in said(capsys).err.splitlines() if "compiling" not in line)
-    assert told.count("\n") == 0, told
-    assert all(part in told for part in parts), told
+    message = "\n".join(line for line in captured(capsys).err.splitlines() if "compiling" not in line)
+    assert message.count("\n") == 0, message
+    assert all(part in message for part in parts), message
     assert sorted(tmp_path.iterdir()) == before
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_frame_that_does_not_fit_itself(crash):
-    """An overlap that the positions cannot have is refused, not forced."""
-    _, frames, _ = crash
+def test_an_inconsistent_frame_is_refused(collision_run):
+    """An overlap that the positions cannot have is refused, not enforced."""
+    _, frames, _ = collision_run
     frame = frames[3]
     overlap = frame.overlap.copy()
     overlap[5] += 0.3 * RADIUS

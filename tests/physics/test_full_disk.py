@@ -1,4 +1,4 @@
-"""A file system that fills up at any write of a run, and folders that vanish: nothing is lost, one clear message."""
+"""A disk that fills up at any write of a run, and folders that disappear: no data are lost, one clear message."""
 
 import contextlib
 import shutil
@@ -40,23 +40,23 @@ temperature = "300 K"
 
 
 def content(folder):
-    """What must be the same as if the disk had been large enough."""
+    """Ledger and frames, which must equal those of a run on a large enough disk."""
     frames = read_frames(folder / "trajectory.gsd")
     return read_ledger(folder / "ledger.csv"), [(f.step, f.position.tobytes(), f.pair.tobytes()) for f in frames]
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """Case and folder of a run with room enough."""
-    place = tmp_path_factory.mktemp("room")
-    (place / "case.toml").write_text(CASE)
-    assert main(["run", str(place / "case.toml"), "--out", str(place / "run"), "--quiet"]) == 0
-    return place / "case.toml", place / "run"
+def undisturbed_run(tmp_path_factory):
+    """Case and folder of a run on a large enough disk."""
+    parent = tmp_path_factory.mktemp("room")
+    (parent / "case.toml").write_text(CASE)
+    assert main(["run", str(parent / "case.toml"), "--out", str(parent / "run"), "--quiet"]) == 0
+    return parent / "case.toml", parent / "run"
 
 
 @contextlib.contextmanager
-def no_file_longer_than(limit):
-    """A write that would make a file longer fails, in compiled code, too, as it does on a full disk."""
+def file_size_limit(limit):
+    """Writes beyond this file size fail, also in compiled code, as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
     try:
@@ -65,15 +65,15 @@ def no_file_longer_than(limit):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def gone_on(whole, folder):
-    """After the disk has room again: what was flushed is there; the run goes on, or starts again, to the same end."""
+def assert_run_can_be_completed(undisturbed_run, folder):
+    """With space again, flushed frames are intact and resuming, or running again, gives the undisturbed result."""
     if list(folder.glob("checkpoint-*.npz")):
-        frames, rows = content(folder)[1], content(whole[1])[1]
+        frames, rows = content(folder)[1], content(undisturbed_run[1])[1]
         assert frames == rows[: len(frames)]
         assert main(["resume", str(folder), "--quiet"]) == 0
     else:
-        assert main(["run", str(whole[0]), "--out", str(folder), "--overwrite", "--quiet"]) == 0
-    assert content(folder) == content(whole[1])
+        assert main(["run", str(undisturbed_run[0]), "--out", str(folder), "--overwrite", "--quiet"]) == 0
+    assert content(folder) == content(undisturbed_run[1])
 
 
 @pytest.mark.compiled("contacts")
@@ -81,30 +81,30 @@ def gone_on(whole, folder):
 @pytest.mark.parametrize(
     "limit", [0, 700, 3000, 20_000, 50_000, *(pytest.param(n, marks=pytest.mark.draws) for n in (90_000, 120_000))]
 )
-def test_files_that_cannot_grow(whole, tmp_path, capsys, limit):
-    """Limits hit the case, the ledger, the trajectory, checkpoints and the figure: one line, nothing half written."""
+def test_writes_beyond_a_file_size_limit(undisturbed_run, tmp_path, capsys, limit):
+    """The limit hits the case, ledger, trajectory, checkpoint or figure: one line, no partial file."""
     folder = tmp_path / "run"
-    with no_file_longer_than(limit):
-        assert main(["run", str(whole[0]), "--out", str(folder), "--quiet"]) == 2
-    said = [line for line in capsys.readouterr().err.splitlines() if "note:" not in line]
-    assert len(said) == 1
-    assert "cannot write" in said[0] and "File too large" in said[0]
-    assert ("sand resume" if list(folder.glob("checkpoint-*.npz")) else "--overwrite") in said[0]
+    with file_size_limit(limit):
+        assert main(["run", str(undisturbed_run[0]), "--out", str(folder), "--quiet"]) == 2
+    errors = [line for line in capsys.readouterr().err.splitlines() if "note:" not in line]
+    assert len(errors) == 1
+    assert "cannot write" in errors[0] and "File too large" in errors[0]
+    assert ("sand resume" if list(folder.glob("checkpoint-*.npz")) else "--overwrite") in errors[0]
     assert {path.name for path in folder.glob(".*")} <= {LOCK}
-    gone_on(whole, folder)
+    assert_run_can_be_completed(undisturbed_run, folder)
 
 
-def flying(out):
-    """Two grains that fly past each other, with a frame in every step."""
+def passing_grains(out):
+    """Two grains that pass each other, with a frame in every step."""
     grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", velocity=[[1.0, 0, 0], [0, 0, 2.0]])
     return sand.Simulation(grains, [sand.Contact()], out=out, stepping=sand.Verlet(step=1e-11), frame_every=1e-11)
 
 
 @pytest.fixture(scope="module")
 def many_frames(tmp_path_factory):
-    """The folder of a run of 200 frames with room enough."""
+    """The folder of a run of 200 frames on a large enough disk."""
     folder = tmp_path_factory.mktemp("frames") / "whole"
-    flying(folder).run(steps=200)
+    passing_grains(folder).run(steps=200)
     return folder
 
 
@@ -113,25 +113,25 @@ def many_frames(tmp_path_factory):
 @pytest.mark.parametrize(
     "limit", [120_000, 165_000, *(pytest.param(n, marks=pytest.mark.validate) for n in (150_000, 180_000))]
 )
-def test_many_small_frames(many_frames, tmp_path, limit):
-    """Two grains, 200 frames before the first flush: the index must be lengthened several times over.
+def test_trajectory_index_that_cannot_grow(many_frames, tmp_path, limit):
+    """Two grains, 200 frames before the first flush: the index of the GSD file must grow several times.
 
-    GSD goes on where it cannot lengthen its index, and writes entries over the first frames; it is not let.
+    GSD itself would continue after a failed growth and write index entries over the first frames; SAND stops it.
     """
-    whole, sim = many_frames, flying(tmp_path / "run")
-    with no_file_longer_than(limit), pytest.raises(sand.FilesFailed, match="File too large"):
+    undisturbed_run, sim = many_frames, passing_grains(tmp_path / "run")
+    with file_size_limit(limit), pytest.raises(sand.FilesFailed, match="File too large"):
         sim.run(steps=200)
     with pytest.raises(sand.BadInput, match=r"cannot continue.*sand\.resume"):
         sim.run(steps=1)
     before = len(read_frames(tmp_path / "run" / "trajectory.gsd"))
     assert before >= 1
     sand.resume(tmp_path / "run").run()
-    assert content(tmp_path / "run") == content(whole)
+    assert content(tmp_path / "run") == content(undisturbed_run)
 
 
 @pytest.mark.compiled("contacts")
-def test_a_folder_that_vanishes(whole, tmp_path):
-    """Removed while the run goes on: told, with the folder's name, exit code 2; no traceback."""
+def test_a_folder_removed_during_a_run(undisturbed_run, tmp_path):
+    """One line with the folder's name, exit code 2, no traceback."""
     script = (
         "import shutil, sys, sand; from sand.cli.main import main; from sand.simulation.ledger import Ledger\n"
         "plain, seen = Ledger.add, []\n"
@@ -143,7 +143,7 @@ def test_a_folder_that_vanishes(whole, tmp_path):
         "sys.exit(main(['run', sys.argv[1], '--out', sys.argv[2], '--quiet']))\n"
     )
     job = subprocess.run(
-        [sys.executable, "-c", script, str(whole[0]), str(tmp_path / "run")], capture_output=True, text=True
+        [sys.executable, "-c", script, str(undisturbed_run[0]), str(tmp_path / "run")], capture_output=True, text=True
     )
     assert job.returncode == 2, job.stderr
     assert f"cannot write {tmp_path / 'run'}" in job.stderr
@@ -151,30 +151,30 @@ def test_a_folder_that_vanishes(whole, tmp_path):
     assert "Traceback" not in job.stderr
 
 
-def small_disk(place, kilobytes):
-    """A file system of its own, of so many kB; skips the test where that is not allowed."""
-    place.mkdir(exist_ok=True)
-    words = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(place)]
+def small_disk(parent, kilobytes):
+    """A file system of this many kB; skips the test where mounting is not allowed."""
+    parent.mkdir(exist_ok=True)
+    words = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(parent)]
     if shutil.which("mount") is None or not IS_ROOT or subprocess.run(words, capture_output=True).returncode:
         pytest.skip("no leave to mount a small file system")
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("kilobytes", range(4, 420, 4))
-def test_a_disk_that_fills_up(whole, tmp_path, kilobytes):
-    """A disk of 4, 8, 12 … kB, so that each write of the run is the one that fails; then the disk grows."""
+def test_a_disk_that_fills_up(undisturbed_run, tmp_path, kilobytes):
+    """Disks of 4, 8, 12 … kB, so that each write of the run fails once; then the disk grows."""
     disk = tmp_path / "disk"
     small_disk(disk, kilobytes)
     try:
-        words = [sys.executable, "-m", "sand", "run", str(whole[0]), "--out", str(disk / "run"), "--quiet"]
+        words = [sys.executable, "-m", "sand", "run", str(undisturbed_run[0]), "--out", str(disk / "run"), "--quiet"]
         job = subprocess.run(words, capture_output=True, text=True)
-        said = [line for line in job.stderr.splitlines() if "note:" not in line]
+        errors = [line for line in job.stderr.splitlines() if "note:" not in line]
         if job.returncode:
             assert job.returncode == 2, job.stderr
-            assert len(said) == 1, job.stderr
-            assert "No space left on device" in said[0]
+            assert len(errors) == 1, job.stderr
+            assert "No space left on device" in errors[0]
             assert not [p for p in (disk / "run").glob(".*") if p.name not in (".probe", LOCK)]
         subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True)
-        gone_on(whole, disk / "run")
+        assert_run_can_be_completed(undisturbed_run, disk / "run")
     finally:
-        subprocess.run(["umount", "-l", str(disk)], check=True)  # a simulation may hold its file
+        subprocess.run(["umount", "-l", str(disk)], check=True)  # an earlier simulation may keep its file open

@@ -1,4 +1,4 @@
-"""A run that is killed at any moment goes on as if nothing had been: SIGKILL, in writes too, and SIGTERM."""
+"""Runs killed at random times, by SIGKILL (also during writes) or SIGTERM, and resumed end in the same bits."""
 
 import random
 import shutil
@@ -49,7 +49,7 @@ pressure = "1 mbar"
 
 
 def sand_command(*words):
-    """A `sand` process that writes checkpoints all the time."""
+    """A `sand` process that writes a checkpoint every 0.05 s."""
     script = (
         "import sys; import sand.simulation.run_writer as r; "
         "r.CHECKPOINT_EVERY = 0.05; r.RunWriter.draw = lambda *_: None; "
@@ -59,7 +59,7 @@ def sand_command(*words):
 
 
 def content(folder):
-    """Everything that must not depend on interruptions."""
+    """Checkpoint arrays, ledger and frames."""
     arrays, _ = newest_checkpoint(folder)
     frames = read_frames(folder / "trajectory.gsd")
     return (
@@ -70,21 +70,21 @@ def content(folder):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """The folder of a run that nobody disturbed, and the seconds it took."""
-    place = tmp_path_factory.mktemp("whole")
-    (place / "case.toml").write_text(CASE)
-    folder = place / "run"
+def undisturbed_run(tmp_path_factory):
+    """Folder of a run without interruptions, and its wall time [s]."""
+    parent = tmp_path_factory.mktemp("whole")
+    (parent / "case.toml").write_text(CASE)
+    folder = parent / "run"
     begun = time.monotonic()
-    assert sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet").wait() == 0
-    return place, folder, time.monotonic() - begun
+    assert sand_command("run", str(parent / "case.toml"), "--out", str(folder), "--quiet").wait() == 0
+    return parent, folder, time.monotonic() - begun
 
 
-def killed_and_resumed(whole, tmp_path, rng, kills, kind=KILL):
-    """Stop a run and each of its resumes by a signal after a random time, then let it end."""
-    place, _, seconds = whole
+def killed_and_resumed(undisturbed_run, tmp_path, rng, kills, kind=KILL):
+    """Stop a run and each of its resumes by a signal after a random time, then let the last one finish."""
+    parent, _, seconds = undisturbed_run
     folder = tmp_path / "run"
-    job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
+    job = sand_command("run", str(parent / "case.toml"), "--out", str(folder), "--quiet")
     flushed = 0
     for _ in range(kills):
         try:
@@ -95,19 +95,19 @@ def killed_and_resumed(whole, tmp_path, rng, kills, kind=KILL):
             assert job.wait() in (ended, INTERRUPTED, DONE), job.stderr.read()
         if not list(folder.glob("checkpoint-*.npz")):
             shutil.rmtree(folder, ignore_errors=True)
-            job = sand_command("run", str(place / "case.toml"), "--out", str(folder), "--quiet")
+            job = sand_command("run", str(parent / "case.toml"), "--out", str(folder), "--quiet")
             continue
         frames = read_frames(folder / "trajectory.gsd")
         assert len(frames) >= flushed
         flushed = len(frames)
         job = sand_command("resume", str(folder), "--quiet")
-    told = job.communicate()[1].decode()
-    assert job.returncode == 0, told
+    errors = job.communicate()[1].decode()
+    assert job.returncode == 0, errors
     return folder
 
 
-def same_as_whole(whole, folder):
-    ours, theirs = content(folder), content(whole[1])
+def assert_same_as_undisturbed(undisturbed_run, folder):
+    ours, theirs = content(folder), content(undisturbed_run[1])
     assert ours[1] == theirs[1]
     assert ours[2] == theirs[2]
     assert ours[0].keys() == theirs[0].keys()
@@ -116,24 +116,28 @@ def same_as_whole(whole, folder):
 
 
 @pytest.mark.compiled("listed")
-def test_killed_once(whole, tmp_path):
-    """Contacts, a list, cycles and a gas; killed while it runs: the same bits in checkpoint, ledger and frames."""
-    arrays, _ = newest_checkpoint(whole[1])
-    assert arrays["contacts/pair"].shape[1] > 5  # there is something to lose
+def test_killed_once(undisturbed_run, tmp_path):
+    """Contacts, list, r-RESPA cycles and gas; killed once: same bits in checkpoint, ledger and frames."""
+    arrays, _ = newest_checkpoint(undisturbed_run[1])
+    assert arrays["contacts/pair"].shape[1] > 5  # the run has contacts that could be lost
     assert np.isfinite(arrays["long_range/anchor"]).all()
-    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(1), 1))
+    assert_same_as_undisturbed(undisturbed_run, killed_and_resumed(undisturbed_run, tmp_path, random.Random(1), 1))
 
 
 @stops_others
 @pytest.mark.validate
-def test_asked_to_stop_twice(whole, tmp_path):
-    """The same for SIGTERM, which ends a run at the next step with a checkpoint."""
-    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(2), 2, signal.SIGTERM))
+def test_terminated_twice(undisturbed_run, tmp_path):
+    """SIGTERM ends a run after the current step with a checkpoint; same bits after two of them."""
+    assert_same_as_undisturbed(
+        undisturbed_run, killed_and_resumed(undisturbed_run, tmp_path, random.Random(2), 2, signal.SIGTERM)
+    )
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("seed", range(25))
 @pytest.mark.parametrize("kind", [KILL, pytest.param(signal.SIGTERM, marks=stops_others)])
-def test_stopped_a_hundred_times(whole, tmp_path, seed, kind):
-    """The same, four times in each of twenty-five runs, for both signals."""
-    same_as_whole(whole, killed_and_resumed(whole, tmp_path, random.Random(100 + seed), 4, kind))
+def test_stopped_four_times(undisturbed_run, tmp_path, seed, kind):
+    """Four stops in each of twenty-five runs, by either signal: same bits."""
+    assert_same_as_undisturbed(
+        undisturbed_run, killed_and_resumed(undisturbed_run, tmp_path, random.Random(100 + seed), 4, kind)
+    )

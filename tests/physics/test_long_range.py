@@ -1,4 +1,4 @@
-"""Long-range forces in a run: cut-offs, and what outside forces and the gas do to the books."""
+"""Long-range forces in a run: cut-offs, and the energy exchanged with external forces and the gas."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from sand.forces.gas.drag import rotation_friction, translation_friction
 from sand.state.state import KICKED, STEP
 
 
-def passing(cut, step):
-    """Two free dipoles that cross the cut-off on their way out of a close pass."""
+def pair_crossing_the_cutoff(cut, step):
+    """Two free dipoles that cross the cut-off on their way out of a close encounter."""
     moment = 6.6e-18 * np.array([[0.3, 0.9, 0.1], [-0.5, 0.7, 0.4]])
     grains = sand.Grains(
         [[0, 0, 0], [1.2e-7, 3e-8, 0]], 1e-8, sand.IRON, moment=moment, velocity=[[0, 0, 0], [-40.0, 0, 0]]
@@ -24,15 +24,15 @@ def passing(cut, step):
 
 
 @pytest.mark.compiled("dipoles")
-def test_the_smooth_cut_keeps_the_energy_and_the_sharp_one_jumps():
-    """Smooth: the drift falls as dt² and is the integrator's.  Sharp: E jumps by U(r_c) at each crossing, at any dt.
+def test_energy_of_smooth_and_sharp_cutoffs():
+    """Smooth: the drift falls as dt².  Sharp: E jumps by U(r_c) at each crossing, for any dt.
 
-    U(r_c) = k [μ1·μ2 − 3 (μ1·n)(μ2·n)]/r_c³ at the moment of the crossing; the jumps in and out are those of the
-    energy column, to the 5 % that a frame's way changes it.
+    U(r_c) = k [μ1·μ2 − 3 (μ1·n)(μ2·n)]/r_c³ when the pair crosses; the jumps agree with those of the energy column to
+    5 %, the change of U along the path between two frames.
     """
     changes = {}
     for cut, step in (("smooth", 4e-12), ("smooth", 2e-12), ("sharp", 4e-12), ("sharp", 2e-12)):
-        sim = passing(cut, step)
+        sim = pair_crossing_the_cutoff(cut, step)
         sim.run(until="6 ns")
         total = sim.ledger["total"]
         changes[cut, step] = np.abs(total - total[0]).max()
@@ -45,8 +45,8 @@ def test_the_smooth_cut_keeps_the_energy_and_the_sharp_one_jumps():
     assert changes["sharp", 2e-12] == pytest.approx(jumps.max(), rel=0.1, abs=0.0)
 
 
-def swinging(field, step, **options):
-    """Three free magnetic grains in a field that changes."""
+def grains_in_changing_field(field, step, **options):
+    """Three free magnetic grains in a field that changes with time."""
     rng = np.random.default_rng(4)
     grains = sand.Grains(
         2e-7 * rng.normal(size=(3, 3)), 1e-8, sand.IRON, moment=6.6e-18 * rng.normal(size=(3, 3)), **options
@@ -66,14 +66,14 @@ def swinging(field, step, **options):
     ],
     ids=["oscillating", "rotating", "ramp"],
 )
-def test_work_of_a_changing_field_is_booked(field):
-    """d(−μ·B)/dt at rest is −μ·Ḃ: with it in `lost_outside` the total keeps still, with an error that falls as dt².
+def test_work_of_a_changing_field(field):
+    """d(−μ·B)/dt at rest is −μ·Ḃ: with this work in `lost_outside` the total is constant; the error falls as dt².
 
-    The work is a hundred times what is left.
+    The work is a hundred times the remaining error.
     """
     left = []
     for step in (4e-11, 2e-11):
-        sim = swinging(field, step)
+        sim = grains_in_changing_field(field, step)
         sim.run(until="60 ns")
         total = sim.ledger["total"]
         left.append(np.abs(total - total[0]).max())
@@ -83,8 +83,8 @@ def test_work_of_a_changing_field_is_booked(field):
 
 
 @pytest.mark.validate
-def test_falling_and_drifting_through_periodic_walls():
-    """Gravity and an electric field in a periodic box: each crossing is booked, E + lost stays to rounding.
+def test_energy_of_grains_falling_through_periodic_walls():
+    """Gravity and an electric field in a periodic box: each crossing is recorded, E + lost is constant to rounding.
 
     Verlet is exact for a constant force; the grains cross the box of 1 µm many times.
     """
@@ -102,14 +102,14 @@ def test_falling_and_drifting_through_periodic_walls():
 
 
 @pytest.mark.validate
-def test_charges_meet_as_kepler_says():
-    """Two opposite charges on a circle about their middle, m v²/(r/2) = k q²/r²: ten turns, radius to 1e-4, E to 1e-6.
+def test_kepler_orbit_of_two_charges():
+    """Two opposite charges on a circular orbit, m v²/(r/2) = k q²/r²: ten turns, radius to 1e-4, E to 1e-6.
 
-    Verlet at 2000 steps a turn errs by (2π/2000)²/24 ~ 4e-7 in the force's share of a turn.
+    Verlet at 2000 steps per turn has a phase error of (2π/2000)²/24 ~ 4e-7.
     """
     q, r = 1e-17, 2e-7
     mass = sand.Grains([[0, 0, 0]], 1e-8, sand.SILICA).mass[0]
-    speed = np.sqrt(COULOMB * q**2 / (2.0 * mass * r))  # each about the middle, r/2 away
+    speed = np.sqrt(COULOMB * q**2 / (2.0 * mass * r))  # distance of each from the centre: r/2
     grains = sand.Grains(
         [[r / 2, 0, 0], [-r / 2, 0, 0]], 1e-8, sand.SILICA, charge=[q, -q], velocity=[[0, speed, 0], [0, -speed, 0]]
     )
@@ -122,7 +122,7 @@ def test_charges_meet_as_kepler_says():
     assert np.abs(total - total[0]).max() < 1e-6 * abs(total[0])
 
 
-def brownian(count, temperature="300 K", seed=1, **options):
+def brownian_grains(count, temperature="300 K", seed=1, **options):
     """Free silica grains at rest in a gas, in open space."""
     gas = sand.Gas(temperature, pressure="10 kPa", **options)
     grains = sand.Grains(np.zeros((count, 3)), 1e-7, sand.SILICA)
@@ -131,14 +131,14 @@ def brownian(count, temperature="300 K", seed=1, **options):
 
 
 @pytest.mark.validate
-def test_brownian_grains():
-    """⟨x²⟩ = 2 (kT/m) τ² (t/τ − 1 + e^(−t/τ)) per axis, ⟨v(0)v(t)⟩ = (kT/m) e^(−t/τ), ½mv² and ½Iω² each (3/2)kT.
+def test_brownian_motion():
+    """⟨x²⟩ = 2 (kT/m) τ² (t/τ − 1 + e^(−t/τ)) per axis, ⟨v(0)v(t)⟩ = (kT/m) e^(−t/τ), energies (3/2)kT each.
 
-    All to 3σ; 4000 grains × 3 axes: σ of a variance √(2/12000) = 1.3 %, of the autocorrelation √(1/12000).  Kicks each
-    τ/20 make the diffusion (h/τ)²/12 = 2e-4 to 4e-4 too fast, below that.
+    Tolerance 3σ for 4000 grains × 3 axes: σ of a variance is √(2/12000) = 1.3 %, of the autocorrelation √(1/12000).
+    Kicks every τ/20 increase the diffusion by (h/τ)²/12 = 2e-4 to 4e-4, which is less.
     """
     count = 4000
-    sim, gas, _ = brownian(count)
+    sim, gas, _ = brownian_grains(count)
     grains = sim.grains
     rules = gas.numbers()
     numbers = (rules.density, rules.mean_speed, rules.accommodation)
@@ -162,12 +162,12 @@ def test_brownian_grains():
 
 
 @pytest.mark.validate
-def test_kicks_come_in_time():
-    """Kicks of the gas are 2/3 to 4/3 of the period apart, on average less than half a step from it.
+def test_intervals_between_gas_kicks():
+    """Kicks of the gas are 2/3 to 4/3 of the period apart, the mean within half a step of the period.
 
-    The step is a power of two of a second, at most the period; the end of the step nearest to the period is taken.
+    The step is a power of two of a second, at most the period; kicks are applied at the step end nearest to the period.
     """
-    sim, _, tau = brownian(3)
+    sim, _, tau = brownian_grains(3)
     period = sim._engine.parameters.gas.period
     assert period == pytest.approx(tau / 20, rel=1e-12, abs=0.0)
     times = [0.0]
@@ -182,11 +182,11 @@ def test_kicks_come_in_time():
 
 
 @pytest.mark.validate
-def test_heat_of_the_gas_is_booked():
-    """Kinetic energy + lost_gas is constant to rounding: the gas heats grains at rest, and brakes fast ones."""
-    cold, _, tau = brownian(50)
+def test_heat_exchanged_with_the_gas():
+    """Kinetic energy + lost_gas is constant to rounding: the gas heats grains at rest and cools fast ones."""
+    cold, _, tau = brownian_grains(50)
     cold.run(until=float(3 * tau))
-    hot, _, _ = brownian(50, brownian=False)
+    hot, _, _ = brownian_grains(50, brownian_grains=False)
     hot.grains.arrays.velocity[...] = 3.0
     hot.run(until=float(3 * tau))
     for sim, sign in ((cold, -1), (hot, 1)):
@@ -196,11 +196,11 @@ def test_heat_of_the_gas_is_booked():
 
 
 @pytest.mark.validate
-def test_gas_runs_are_the_same_bits():
-    """Same seed: the same bits, in one run or in pieces; another seed: others."""
+def test_gas_noise_is_reproducible():
+    """The same seed gives the same bits, in one run or several; another seed gives other numbers."""
     ends = []
     for seed, pieces in ((1, 1), (1, 7), (2, 1)):
-        sim, _, tau = brownian(20, seed=seed)
+        sim, _, tau = brownian_grains(20, seed=seed)
         for k in range(pieces):
             sim.run(until=float(5 * tau * (k + 1) / pieces))
         ends.append(sim.grains.position.copy())
@@ -209,8 +209,8 @@ def test_gas_runs_are_the_same_bits():
 
 
 @pytest.mark.validate
-def test_momentum_and_books_with_charged_clusters():
-    """Dipoles and charges of 16 grains that stick: P kept to rounding × steps, total to 1e-3 of what is lost."""
+def test_momentum_and_energy_of_charged_clusters():
+    """16 sticking grains with dipoles and charges: P to rounding × steps, total to 1e-3 of the dissipated energy."""
     rng = np.random.default_rng(2)
     box = sand.Box.periodic("0.25 um")
     grains = sand.setup.gas(16, box, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg", temperature="100 K")

@@ -1,4 +1,4 @@
-"""Threads: the same bits for any number of them, and the same numbers as without blocks but for rounding."""
+"""Threads: the same bits for any number of threads; parallel and serial loops agree to rounding."""
 
 import copy
 import time
@@ -18,14 +18,14 @@ pytestmark = pytest.mark.filterwarnings("ignore:contacts of iron")
 
 
 @pytest.fixture(autouse=True)
-def as_before():
-    """Leave the number of threads as it was."""
+def default_threads():
+    """Restore the default number of threads."""
     yield
     sand.set_threads(None)
 
 
-def shaken_lattice(cutoff, size=(11, 10, 10)):
-    """Iron grains in touch, shaken so that contacts move, enough for a crew; magnetic, or with contacts alone."""
+def vibrating_lattice(cutoff, size=(11, 10, 10)):
+    """Vibrating iron grains in contact, enough for worker threads; with dipoles unless `cutoff` is "bare"."""
     grid = np.stack(np.meshgrid(*map(np.arange, size), indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(4)
     moment = rng.normal(size=grid.shape)
@@ -36,7 +36,7 @@ def shaken_lattice(cutoff, size=(11, 10, 10)):
 
 
 def state(sim):
-    """All numbers of the world, as bytes."""
+    """All arrays of the state, as bytes."""
     return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
@@ -49,15 +49,15 @@ def state(sim):
         pytest.param("bare", (17, 16, 16), marks=pytest.mark.validate),
     ],
 )
-def test_threads_change_no_bit(cutoff, size):
-    """60 steps, run in two pieces, with 1, 2 and 3 threads; contacts move and break.
+def test_the_number_of_threads_changes_no_bit(cutoff, size):
+    """60 steps, in two runs, with 1, 2 and 3 threads; contacts slip and break.
 
-    All pairs and listed ones; contacts alone, whose loads kick at once, in several blocks of grains that take turns.
+    Dipoles over all pairs and over a list; contacts alone, where the gather also kicks, in several blocks of grains.
     """
     ends = []
     for number in (1, 2, 3):
         sand.set_threads(number)
-        sim = shaken_lattice(cutoff, size)
+        sim = vibrating_lattice(cutoff, size)
         assert sim._engine._kernel_spec.queue and sim._engine._kernel_spec.contacts_only is (cutoff == "bare")
         sim.run(steps=25)
         sim.run(steps=35)
@@ -68,15 +68,15 @@ def test_threads_change_no_bit(cutoff, size):
 
 
 @pytest.mark.validate
-def test_blocks_change_only_rounding(monkeypatch):
-    """One step in blocks and one without part by less than 1e-12 of what they changed.
+def test_parallel_and_serial_loops_agree_to_rounding(monkeypatch):
+    """One step with parallel loops and one with serial loops agree to 1e-12 of the largest value.
 
-    Sums over 1100 grains in another order differ by √1100 ε = 7e-15 of their size.
+    Sums over 1100 grains in another order differ by √1100 ε = 7e-15.
     """
     sim = {}
     for large in (True, False):
         monkeypatch.setattr(translate, "uses_task_queue", lambda grains, large=large: large)
-        sim[large] = shaken_lattice(None)
+        sim[large] = vibrating_lattice(None)
         assert sim[large]._engine._kernel_spec.queue is large
         sim[large].run(steps=1)
     for name in ("force", "torque", "velocity", "spin", "position"):
@@ -85,11 +85,10 @@ def test_blocks_change_only_rounding(monkeypatch):
 
 
 @pytest.mark.validate
-def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
-    """Gravity in a periodic box, whose jumps of energy are booked by one thread after the drift that all share.
+def test_work_at_periodic_walls_in_parallel_and_serial_loops(monkeypatch):
+    """Gravity in a periodic box: drift is shared by threads, the energy jumps at the walls are recorded by one thread.
 
-    Places, velocities and what the walls took, after 60 steps in blocks and 60 without: one sum over 1100 grains is
-    in another order, 1e-12.
+    Positions, velocities and `lost` after 60 steps agree to 1e-12: a sum over 1100 grains in another order.
     """
     found = []
     for large in (True, False):
@@ -105,92 +104,94 @@ def test_walls_are_crossed_alike_in_blocks_and_without(monkeypatch):
 
 
 @pytest.mark.compiled("threads")
-def test_a_helper_that_comes_too_late_touches_nothing():
-    """It finds QUIT on its board and goes, with nobody counted inside."""
-    sim = shaken_lattice(None)
+def test_a_late_worker_changes_nothing():
+    """A worker that finds QUIT in the task queue returns; no worker is counted as active and the state is unchanged."""
+    sim = vibrating_lattice(None)
     sim.run(steps=1)
-    before, world = state(sim), sim.state
-    crew = new_task_queue(len(world.grains), world.contacts.flag.size)
-    crew.words[WORD] = QUIT << TASK
-    rules = sim._engine.parameters._replace(queue=crew)
-    worker_loops(sim._engine._kernel_spec)[1](world.grains.arrays, world.contacts, world.long_range, world.count, rules)
-    assert crew.words[ACTIVE] == 0
+    before, system = state(sim), sim.state
+    task_queue = new_task_queue(len(system.grains), system.contacts.flag.size)
+    task_queue.words[WORD] = QUIT << TASK
+    rules = sim._engine.parameters._replace(queue=task_queue)
+    worker_loops(sim._engine._kernel_spec)[1](
+        system.grains.arrays, system.contacts, system.long_range, system.count, rules
+    )
+    assert task_queue.words[ACTIVE] == 0
     assert state(sim) == before
 
 
 @pytest.mark.compiled("threads")
-def test_helpers_leave_a_driver_that_fails(monkeypatch):
-    """Ctrl-C while it compiles, or an error in a formula: nobody is left at work; copies have their own."""
-    boards = []
+def test_workers_stop_when_a_driver_raises(monkeypatch):
+    """An exception in the driver makes all workers quit; a copy of a simulation has its own workers."""
+    queues = []
 
-    def watched(grains, contacts):
-        boards.append(new_task_queue(grains, contacts))
-        return boards[-1]
+    def recording_queue(grains, contacts):
+        queues.append(new_task_queue(grains, contacts))
+        return queues[-1]
 
     def fails(*arguments):
         raise RuntimeError("broken")
 
     sand.set_threads(2)
-    sim = shaken_lattice(None)
+    sim = vibrating_lattice(None)
     sim.run(steps=1)
-    monkeypatch.setattr(engine, "new_task_queue", watched)
+    monkeypatch.setattr(engine, "new_task_queue", recording_queue)
     works = sim._engine._advance
     sim._engine._advance = fails
     with pytest.raises(RuntimeError, match="broken"):
         sim._engine.advance(1.0, 1)
-    assert boards[-1].words[WORD] == QUIT << TASK
-    assert boards[-1].words[ACTIVE] == 0
+    assert queues[-1].words[WORD] == QUIT << TASK
+    assert queues[-1].words[ACTIVE] == 0
     sim._engine._advance = works
     sim.run(steps=1)
     assert copy.deepcopy(sim._engine._workers) is not sim._engine._workers
 
 
 @pytest.mark.compiled("threads")
-def test_helpers_go_home_with_their_simulation():
-    """No thread of a crew outlives its simulation by more than a moment."""
+def test_worker_threads_end_with_their_simulation():
+    """Within 10 s after a simulation is deleted its worker threads have ended."""
     import threading
 
     others = set(threading.enumerate())
 
-    def crew():
+    def worker_threads():
         return [t for t in threading.enumerate() if t.name == "sand-worker" and t not in others]
 
     sand.set_threads(2)
-    sim = shaken_lattice(None)
+    sim = vibrating_lattice(None)
     sim.run(steps=1)
-    assert len(crew()) == 1
+    assert len(worker_threads()) == 1
     del sim
     deadline = time.monotonic() + 10.0
-    while crew() and time.monotonic() < deadline:
+    while worker_threads() and time.monotonic() < deadline:
         time.sleep(0.01)
-    assert not crew()
+    assert not worker_threads()
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize(
-    ("number", "forces", "helpers"),
+    ("number", "forces", "workers"),
     [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 0), (1000, [sand.Dipoles("0.1 um")], 1)],
 )
-def test_helpers_come_where_they_save_time(number, forces, helpers):
-    """1000 contacts are done before a helper has begun, 4200 are not; sums of dipoles are shared, of charges not."""
+def test_workers_are_used_where_they_save_time(number, forces, workers):
+    """1000 contacts take less time than waking a worker, 4200 take more; sums of dipoles are shared, of charges not."""
     sand.set_threads(2)
-    place = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
-    chain = sand.Grains(place, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
+    positions = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
+    chain = sand.Grains(positions, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")
     sim = sand.Simulation(chain, [sand.Contact(), *forces])
     sim.run(steps=1)
     assert sim._engine._kernel_spec.queue
     assert sim.state.count[CONTACTS] == number - 1
-    assert len(sim._engine._workers._inboxes) == helpers
+    assert len(sim._engine._workers._inboxes) == workers
 
 
-def test_small_simulations_have_no_crew():
+def test_small_simulations_have_no_task_queue():
     """Below a thousand grains."""
     assert uses_task_queue(1000)
     assert not uses_task_queue(999)
 
 
-def test_how_many(monkeypatch):
-    """What is set goes before the environment, and that before the number of cores."""
+def test_the_number_of_threads_to_use(monkeypatch):
+    """`set_threads` overrides SAND_THREADS, which overrides the number of cores; other values are refused."""
     monkeypatch.setenv("SAND_THREADS", "3")
     assert threads.threads() == 3
     sand.set_threads(5)

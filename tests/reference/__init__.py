@@ -1,1 +1,1 @@
-"""Numbers tests compare with, and the scripts that made them."""
+"""Reference numbers of tests, and the scripts that computed them."""

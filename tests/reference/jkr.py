@@ -1,8 +1,8 @@
 """Points of the JKR curve, and the fit behind `sand.contact.jkr.POLYNOMIAL`.
 
-The table was worked out by hand from F/Fc = 4(x³ − x^1.5), δ/δc = 6^(1/3)(2x² − (4/3)√x) and
+The table was computed from F/Fc = 4(x³ − x^1.5), δ/δc = 6^(1/3)(2x² − (4/3)√x) and
 U/(Fcδc) = 4·6^(1/3)[(4/5)x⁵ − (4/3)x^3.5 + (1/3)x²], x = a/a0, by two independent programs.
-Run this file to print the coefficients anew:  python -m tests.reference.jkr
+Print the coefficients again:  python -m tests.reference.jkr
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 TABLE = (
     (6.0 ** (-2 / 3), -5 / 9, -1.0, 4 / 45),  # break
     (2.0 ** (-2 / 3), -1.0, -0.480750, -0.384600),  # force minimum
-    ((2 / 3) ** (2 / 3), -8 / 9, 0.0, -0.846614),  # first touch
+    ((2 / 3) ** (2 / 3), -8 / 9, 0.0, -0.846614),  # first contact
     (1.0, 0.0, 1.211414, -1.453696),  # equilibrium
     (1.47867319, 5.74001609, 5.0, None),
     (3.88221404, 203.44746371, 50.0, None),
@@ -20,7 +20,7 @@ E_BREAK, E_CYCLE = 1.542585, 0.935503  # in Fc δc
 
 
 def root_by_bisection(overlap: np.ndarray) -> np.ndarray:
-    """y = √(a/a0) at overlaps δ/δc ≥ −1, by bisection in extended precision: slow and sure."""
+    """y = √(a/a0) at overlaps δ/δc ≥ −1, by bisection in extended precision."""
     d = np.asarray(overlap, np.longdouble)
     third = np.longdouble(1) / 3
     low = np.full(d.shape, np.longdouble(6) ** -third)

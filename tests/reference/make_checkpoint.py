@@ -23,8 +23,8 @@ def main() -> None:
     if goal.exists():
         raise SystemExit(f"{goal} is there already; an old folder is never made anew")
     grains = sand.setup.aggregates.chain(4, radius="10 nm", material=sand.IRON, moment="200 A m^2/kg")
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place) / "run"
+    with tempfile.TemporaryDirectory() as parent:
+        folder = Path(parent) / "run"
         forces = [sand.Contact(), sand.Dipoles(), sand.Gas("100 K", pressure="1 mbar")]
         sim = sand.Simulation(grains, forces, out=folder, seed=4, frame_every="10 ps")
         sim.run(until="30 ps")

@@ -78,8 +78,8 @@ def test_no_circular_imports():
     assert len(order) == len(MODULES)
 
 
-def test_every_package_has_a_layer_and_stands_in_the_documentation():
-    """A new package or top-level module needs a row of `layers.LAYERS`; ARCHITECTURE.md holds the table as it is."""
+def test_every_package_has_a_documented_layer():
+    """A new package or top-level module needs a row of `layers.LAYERS`; ARCHITECTURE.md has the same table."""
     names = {package_of(path) for path in SOURCES} - {"__init__", "__main__"}
     assert names == {name for row in LAYERS for name in row}
     assert PLAN.read_text("utf-8") == written(), "run: python -m tests.structure.layers"
@@ -104,7 +104,7 @@ def test_public_names_have_docstrings():
     assert not silent, silent
 
 
-def test_the_compiler_is_one_that_was_tried():
+def test_the_installed_numba_is_a_tested_version():
     """An untested numba is slow and single-threaded: test `compiler/` with it, then raise jit.TESTED_NUMBA."""
     import numba
 
@@ -116,7 +116,7 @@ def test_the_compiler_is_one_that_was_tried():
 
 @pytest.mark.slow
 def test_numba_is_imported_in_one_package():
-    """numba and llvmlite are imported in `compiler/` alone."""
+    """numba and llvmlite are imported in `compiler/` only."""
     wrong = [
         f"{path.relative_to(SOURCE)} imports {name}"
         for path in SOURCES
@@ -146,7 +146,7 @@ def test_only_io_opens_files_and_only_cli_prints():
 
 
 def loads_of_numpy(tree: ast.AST) -> list[ast.Call]:
-    """Calls of `numpy.load`, by whatever name the module imports it."""
+    """Calls of `numpy.load`, under any name that the module imports."""
     modules, functions = set(), set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -163,12 +163,12 @@ def loads_of_numpy(tree: ast.AST) -> list[ast.Call]:
 
 
 def refuses_pickles(call: ast.Call) -> bool:
-    """Whether a call says allow_pickle=False itself."""
+    """Whether a call passes allow_pickle=False."""
     return any(word.arg == "allow_pickle" and getattr(word.value, "value", None) is False for word in call.keywords)
 
 
 def test_calls_that_load_arrays_are_found():
-    """The next test would be blind if a call by another name, or one that allows pickles, were passed over."""
+    """Checks the helper of the next test: calls under other names, and calls that allow pickles."""
     text = (
         "import numpy\nimport numpy as np\nfrom numpy import load as get\nnp.load(a)\nnumpy.load(b, allow_pickle=x)\n"
     )
@@ -179,7 +179,7 @@ def test_calls_that_load_arrays_are_found():
 
 @pytest.mark.slow
 def test_no_pickle_no_network():
-    """Neither pickle nor sockets anywhere but in the server of `sand view`; NumPy files with allow_pickle=False."""
+    """No pickle, and no sockets except in the server of `sand view`; NumPy files with allow_pickle=False."""
     server = SOURCE / "viewer" / "server.py"
     network = {"socket", "socketserver", "urllib", "requests", "http", "asyncio", "aiohttp", "ssl"}
     loads = []
@@ -192,8 +192,8 @@ def test_no_pickle_no_network():
     assert not [f"{path.relative_to(TOP)}:{call.lineno}" for path, call in loads if not refuses_pickles(call)]
 
 
-def test_help_is_light():
-    """`import sand` and the command line's parser load neither numba nor NumPy nor anything as heavy."""
+def test_help_imports_no_heavy_package():
+    """`import sand` and the command line's parser import neither numba nor NumPy nor similar packages."""
     program = (
         "import sys, sand, sand.cli.main\n"
         "heavy = {'numba', 'numpy', 'scipy', 'pydantic', 'matplotlib', 'gsd', 'pint'} & set(sys.modules)\n"
@@ -204,8 +204,8 @@ def test_help_is_light():
 
 
 @pytest.mark.slow
-def test_a_gas_is_built_light():
-    """Nothing is loaded that takes long and is not needed before the first step."""
+def test_building_a_gas_imports_no_unneeded_package():
+    """Packages that are slow to import are imported only when they are needed."""
     program = (
         "import sys, sand\n"
         "gas = sand.setup.gas(8, '0.5 um', radius='10 nm', material='iron', moment='200 A m^2/kg')\n"
@@ -222,13 +222,13 @@ def without_comments(text: str) -> str:
     return re.sub(r"/\*.*?\*/|(?<!:)//[^\n]*", "", text, flags=re.DOTALL)
 
 
-def test_comments_are_told_from_addresses():
-    """The next test would be blind if an address were taken for a comment."""
+def test_comments_are_distinguished_from_addresses():
+    """Checks the helper of the next test: `//` of an address is no comment."""
     assert without_comments("a /* http://b\n */ c // https://d\ne") == "a  c \ne"
     assert "http://b" in without_comments('fetch("http://b"); // of https://c')
 
 
-def test_the_page_is_written_like_the_rest():
+def test_size_limits_of_the_page_sources():
     """TypeScript: files under 300 lines, lines of at most 120 characters."""
     scripts = [path for path in PAGE if path.suffix == ".ts"]
     assert scripts
@@ -240,7 +240,7 @@ def test_the_page_is_written_like_the_rest():
 
 
 def test_the_page_needs_no_network():
-    """No address of another machine, but for names of XML such as http://www.w3.org/2000/svg, which nobody fetches."""
+    """No address of another machine except XML namespaces such as http://www.w3.org/2000/svg."""
     for path in PAGE:
         strangers = re.findall(
             r"(?:https?|wss?)://(?!www\.w3\.org/)[^\s\"'`)]*", without_comments(path.read_text("utf-8"))
@@ -249,7 +249,7 @@ def test_the_page_needs_no_network():
 
 
 def tracked_files() -> list[str]:
-    """What git holds; skips the test where this is no checkout, as in an unpacked source archive."""
+    """Files in git; skips the test where there is no checkout, as in an unpacked source archive."""
     if not (TOP / ".git").exists() or shutil.which("git") is None:
         pytest.skip("not a git checkout")
     words = ["git", "ls-files"]
@@ -257,20 +257,20 @@ def tracked_files() -> list[str]:
 
 
 def test_nothing_built_is_in_git():
-    """Neither the bundle of the page nor what npm installs."""
+    """Neither the page bundle nor npm packages."""
     built = [n for n in tracked_files() if n.startswith("src/sand/viewer/page/") or "node_modules/" in n]
     assert not built, built
 
 
 def test_no_large_files():
-    """Nothing above 300 kB in git."""
+    """No file above 300 kB in git."""
     large = [n for n in tracked_files() if (TOP / n).is_file() and (TOP / n).stat().st_size > 300_000]
     assert not large, large
 
 
 @pytest.mark.slow
 def test_the_source_archive_is_complete():
-    """What git holds is in the sdist, so that its tests can be run and its docs be built."""
+    """All files in git are in the sdist, so that its tests run and its docs build."""
     sdist = pytest.importorskip("hatchling.builders.sdist", reason="the build backend is not installed")
     names = {file.distribution_path for file in sdist.SdistBuilder(str(TOP)).recurse_included_files()}
     missing = {name for name in tracked_files() if (TOP / name).is_file()} - {name.replace("\\", "/") for name in names}

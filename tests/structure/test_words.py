@@ -1,4 +1,4 @@
-"""Names in the sources are terms of the field: words of a private vocabulary that were replaced do not come back."""
+"""Identifiers in the sources are terms of the field: replaced words of a private vocabulary do not return."""
 
 import ast
 import re
@@ -36,7 +36,7 @@ REPLACED = {
     "told": "description, message",
     "watch": "skin",
 }
-"""Words that stood for something else, and the words of the field in their place."""
+"""Replaced words, and the terms of the field in their place."""
 
 
 def names_in(path: Path) -> set[str]:

@@ -1,4 +1,4 @@
-"""What unit tests share."""
+"""Fixtures of unit tests: two finished runs and a small page bundle."""
 
 import warnings
 
@@ -12,8 +12,8 @@ from .pages import SCRIPT
 
 
 @pytest.fixture(scope="session")
-def looked_at(tmp_path_factory):
-    """A finished run of six grains, five of them in a row, in a field that turns; its folder and simulation."""
+def finished_run(tmp_path_factory):
+    """Folder and simulation of a finished run of six grains, five of them in a row, in a rotating field."""
     folder = tmp_path_factory.mktemp("looked-at") / "run"
     position = [[(2e-8 - 1e-10) * k, 0, 0] for k in range(5)] + [[0, 2e-7, 0]]
     grains = sand.Grains(position, 1e-8, sand.IRON, moment="200 A m^2/kg", velocity=np.eye(6, 3) * 0.1)
@@ -33,9 +33,9 @@ def _run(grains, field, folder):
 
 
 @pytest.fixture(scope="session")
-def in_a_field(tmp_path_factory):
-    """A short run of eight magnetic grains, two of which touch, in a field."""
-    place = tmp_path_factory.mktemp("plot") / "run"
+def run_in_field(tmp_path_factory):
+    """A short run of eight magnetic grains, two of them in contact, in a field."""
+    run_folder = tmp_path_factory.mktemp("plot") / "run"
     grains = sand.Grains(
         [[2e-8 * 0.998 * (k % 2), 5e-8 * (k // 2), 0.0] for k in range(8)],
         "10 nm",
@@ -47,16 +47,16 @@ def in_a_field(tmp_path_factory):
         grains,
         [sand.Contact(), sand.Dipoles(), sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")],
         box="400 nm",
-        out=str(place),
+        out=str(run_folder),
         frame_every="1 ns",
     )
     sim.run(until="3 ns")
-    return place
+    return run_folder
 
 
 @pytest.fixture
 def bundle(tmp_path, monkeypatch):
-    """A small page in place of the real one, whose script holds what would end its element."""
+    """A small page bundle in place of the real one; its script contains text that would end its element."""
     home = tmp_path / "bundle"
     home.mkdir()
     (home / "grainview.js").write_text(SCRIPT)

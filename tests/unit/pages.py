@@ -1,4 +1,4 @@
-"""Pages of a run taken apart."""
+"""Decoding of packets and HTML pages of a run."""
 
 import base64
 import gzip
@@ -11,7 +11,7 @@ import numpy as np
 from sand.viewer.packets import MAGIC, TYPES
 
 SCRIPT = "const a = '</script><!-- ${x}'; console.log(a)"
-"""What a script may hold that would end its element."""
+"""Text in a script that would end its element."""
 
 
 def decode(packet):
@@ -27,7 +27,7 @@ def decode(packet):
 
 
 def elements(path):
-    """Type and content of each script element, by id, as a browser splits them; "" for the page's own."""
+    """Type and content of each script element, by id, as a browser splits them; id "" for the page's own script."""
     text = Path(path).read_text(encoding="utf-8")
     found = re.findall(r'<script type="([^"]*)"(?: id="([^"]*)")?>(.*?)</script', text, re.DOTALL | re.IGNORECASE)
     assert len({key for _, key, _ in found}) == len(found)
@@ -37,10 +37,10 @@ def elements(path):
 def blocks(path):
     """Manifest, series and packets of a page."""
     found = elements(path)
-    told = {key: json.loads(found[f"sand-{key}"][1]) for key in ("manifest", "series")}
+    header_bytes = {key: json.loads(found[f"sand-{key}"][1]) for key in ("manifest", "series")}
     packets = [
         decode(gzip.decompress(base64.b64decode(content)))
         for key, (kind, content) in found.items()
         if kind == "application/octet-stream" and key.startswith("sand-frame-")
     ]
-    return told["manifest"], told["series"], packets
+    return header_bytes["manifest"], header_bytes["series"], packets

@@ -1,4 +1,4 @@
-"""Aggregates and encounters: contacts at rest, no overlaps, aimed where they should be."""
+"""Aggregates and encounters: contacts in equilibrium, no overlaps, the requested offset."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_a_chain():
 
 
 def test_a_lattice():
-    """3·5·5·4 = 300 contacts of a 5³ cube, nothing closer."""
+    """3·5·5·4 = 300 contacts of a 5³ cube, no smaller distance."""
     d = distances(lattice(5, radius=R, material=M))
     assert np.isclose(d, rest_distance(M, R), rtol=1e-9, atol=0.0).sum() == 300
     assert d.min() == pytest.approx(rest_distance(M, R), rel=1e-6, abs=0.0)
@@ -34,7 +34,7 @@ def test_a_lattice():
 
 @pytest.mark.compiled("small")
 def test_ballistic_particle_cluster_aggregates():
-    """N − 1 contacts at rest distance (each newcomer touches one), no overlap, one cluster, seeded, compact-ish."""
+    """N − 1 contacts in equilibrium (each new grain has one), no overlap, one cluster, seeded, moderately compact."""
     body = pca(200, radius=R, material=M, seed=4)
     d = distances(body)
     rest = rest_distance(M, R)
@@ -47,8 +47,8 @@ def test_ballistic_particle_cluster_aggregates():
 
 
 @pytest.mark.compiled("contacts", "small")
-def test_they_rest():
-    """A simulation of a lattice and an aggregate stays at rest: contacts as many as counted, no force but rounding."""
+def test_built_aggregates_are_at_rest():
+    """A lattice and an aggregate in a simulation: the expected contacts, forces by rounding only."""
     for body, contacts in ((lattice(3, radius=R, material=M), 54), (pca(50, radius=R, material=M, seed=1), 49)):
         sim = sand.Simulation(body, [sand.Contact()])
         assert len(sim.contacts["pair"]) == contacts
@@ -58,10 +58,10 @@ def test_they_rest():
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("b", ["0 b", "0.5 b", "0.9 b"])
 def test_an_encounter(b):
-    """Centre of mass at rest, relative speed as asked, offset as asked, no contact at the start, then it meets."""
+    """Centre of mass at rest, requested relative speed and offset, no contact at the start; then they collide."""
     target, projectile = pca(20, radius=R, material=M, seed=1), pca(10, radius=R, material=M, seed=2)
-    met = encounter(target, projectile, speed="5 m/s", impact_parameter=b)
-    g, n = met.grains, met.target
+    collided = encounter(target, projectile, speed="5 m/s", impact_parameter=b)
+    g, n = collided.grains, collided.target
     assert n == 20
     momentum = (g.mass[:, None] * g.velocity).sum(axis=0)
     assert np.abs(momentum).max() < 1e-12 * g.mass.sum() * 5
@@ -74,8 +74,8 @@ def test_an_encounter(b):
     assert offset[2] == pytest.approx(0.0, abs=1e-15)
 
 
-def test_turning_keeps_the_body():
-    """Distances, sizes of moments and the centre stay; the same seed turns the same way."""
+def test_rotation_preserves_the_body():
+    """Distances, magnitudes of moments and the centre are preserved; the seed determines the rotation."""
     body = chain(4, radius=R, material=M, moment="1 A m^2/kg")
     one, two = (turned_at_random(body, np.random.default_rng(3)) for _ in range(2))
     assert distances(one) == pytest.approx(distances(body), rel=1e-6, abs=0.0)

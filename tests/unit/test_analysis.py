@@ -1,4 +1,4 @@
-"""Shapes, networks, dimensions and fits against exact shapes and brute force."""
+"""Shapes, contact networks, fractal dimensions and fits against exact shapes and brute force."""
 
 import itertools
 import math
@@ -30,31 +30,31 @@ RNG = np.random.default_rng(5)
 
 
 def test_gyration_of_exact_shapes():
-    """Rod of n spheres 2a apart: r_g² = a²(n² − 1)/3, and ⅗a² more with extent; any masses by brute force over pairs.
+    """Rod of n spheres 2a apart: r_g² = a²(n² − 1)/3, plus ⅗a² with extent; arbitrary masses by brute force.
 
     r_g² = Σ m_i m_j |x_i − x_j|²/2M²; both to rounding.
     """
     assert gyration_radius(ROD) == pytest.approx(math.sqrt((81 - 1) / 3), rel=1e-14, abs=0)
     assert gyration_radius(ROD, radius=1.0) ** 2 == pytest.approx(80 / 3 + 0.6, rel=1e-14, abs=0)
-    place, mass = RNG.normal(size=(20, 3)), RNG.uniform(1, 3, 20)
-    brute = sum(mass[i] * mass[j] * ((place[i] - place[j]) ** 2).sum() for i in range(20) for j in range(20))
-    assert gyration_radius(place, mass) == pytest.approx(math.sqrt(brute / 2) / mass.sum(), rel=1e-13, abs=0)
+    points, mass = RNG.normal(size=(20, 3)), RNG.uniform(1, 3, 20)
+    brute = sum(mass[i] * mass[j] * ((points[i] - points[j]) ** 2).sum() for i in range(20) for j in range(20))
+    assert gyration_radius(points, mass) == pytest.approx(math.sqrt(brute / 2) / mass.sum(), rel=1e-13, abs=0)
 
 
 def test_inertia_against_the_definition():
-    """I = Σ m (x² 1 − x xᵀ) about the centre of mass + ⅖mr² each; one sphere alone has its own."""
-    place, mass, radius = RNG.normal(size=(7, 3)), RNG.uniform(1, 3, 7), RNG.uniform(0.1, 0.4, 7)
-    x = place - np.average(place, axis=0, weights=mass)
+    """I = Σ m (x² 1 − x xᵀ) about the centre of mass + ⅖mr² each, also for one sphere."""
+    points, mass, radius = RNG.normal(size=(7, 3)), RNG.uniform(1, 3, 7), RNG.uniform(0.1, 0.4, 7)
+    x = points - np.average(points, axis=0, weights=mass)
     one = np.eye(3)
     each = zip(x, mass, radius, strict=True)
     brute = sum(m * (p @ p * one - np.outer(p, p)) + 0.4 * m * r * r * one for p, m, r in each)
-    # the tensor of extent takes the mean of r² over the masses, which is the same sum
-    assert inertia_tensor(place, mass, radius) == pytest.approx(brute, rel=1e-12, abs=1e-12)
-    assert inertia_tensor(place[:1], mass[:1], radius[:1]) == pytest.approx(0.4 * mass[0] * radius[0] ** 2 * np.eye(3))
+    # with extent the tensor uses the mass average of r², which is the same sum
+    assert inertia_tensor(points, mass, radius) == pytest.approx(brute, rel=1e-12, abs=1e-12)
+    assert inertia_tensor(points[:1], mass[:1], radius[:1]) == pytest.approx(0.4 * mass[0] * radius[0] ** 2 * np.eye(3))
 
 
 def test_lengths_and_elongation():
-    """A turned rod: one length, √((80/3 + 1/5)/(1/5)) long over short; a sphere has 1; a disc has two equal lengths."""
+    """A rotated rod: ratio of the axes √((80/3 + 1/5)/(1/5)); a sphere has 1; a disc has two equal lengths."""
     turn = np.linalg.qr(RNG.normal(size=(3, 3)))[0]
     assert principal_lengths(ROD @ turn) == pytest.approx([math.sqrt(80 / 3), 0, 0], abs=1e-7)
     assert elongation(ROD @ turn, None, 1.0) == pytest.approx(math.sqrt((80 / 3 + 0.2) / 0.2), rel=1e-12, abs=0)
@@ -72,7 +72,7 @@ def test_filling_factor():
 
 @pytest.mark.compiled("small")
 def test_projected_area_of_exact_shapes():
-    """πa² of a sphere; two discs a distance d apart cover 2πa² − lens; far ones add; a hidden one adds nothing."""
+    """πa² of a sphere; two discs at distance d cover 2πa² − lens; distant ones add; a hidden one adds nothing."""
     assert projected_area(np.zeros((1, 3)), 1.0)[0] == pytest.approx(math.pi, rel=1e-14, abs=0)
     axis = np.array([[0.0, 0.0, 1.0]])
     for d in (0.3, 1.0, 1.9, 2.0, 5.0):
@@ -84,24 +84,24 @@ def test_projected_area_of_exact_shapes():
 
 
 @pytest.mark.compiled("small")
-def test_projected_area_against_darts():
-    """300 discs of several sizes: 4e5 darts agree within four of their standard deviations, √(p(1−p)/n)."""
-    place, radius = RNG.uniform(-5, 5, (300, 3)), RNG.uniform(0.1, 0.8, 300)
-    area, _ = projected_area(place, radius, np.array([[0.0, 0.0, 1.0]]))
-    darts = RNG.uniform(-6, 6, (400_000, 2))
-    hit = np.zeros(len(darts), bool)
-    for (x, y, _), r in zip(place, radius, strict=True):
-        hit |= (darts[:, 0] - x) ** 2 + (darts[:, 1] - y) ** 2 < r * r
+def test_projected_area_against_monte_carlo():
+    """300 discs of several sizes: 4e5 random points agree within four standard deviations, √(p(1−p)/n)."""
+    points, radius = RNG.uniform(-5, 5, (300, 3)), RNG.uniform(0.1, 0.8, 300)
+    area, _ = projected_area(points, radius, np.array([[0.0, 0.0, 1.0]]))
+    random_points = RNG.uniform(-6, 6, (400_000, 2))
+    hit = np.zeros(len(random_points), bool)
+    for (x, y, _), r in zip(points, radius, strict=True):
+        hit |= (random_points[:, 0] - x) ** 2 + (random_points[:, 1] - y) ** 2 < r * r
     share = hit.mean()
-    assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(darts))
+    assert abs(area / 144 - share) < 4 * math.sqrt(share * (1 - share) / len(random_points))
 
 
 @pytest.mark.validate
 def test_projected_area_of_a_long_rod():
-    """Mean shadow of a convex body is a quarter of its surface (Cauchy); spheres 0.02 apart are nearly a capsule.
+    """Mean projection of a convex body is a quarter of its surface (Cauchy); spheres 0.02 apart are nearly a capsule.
 
-    Capsule of length L, radius 1: (2πL + 4π)/4.  The waist between spheres is at most 0.02²/8 deep: 5e-5 of the area;
-    1024 even directions leave 3e-4 (1.8e-3 with 64, 1.5e-5 with 4096).
+    Capsule of length L, radius 1: (2πL + 4π)/4.  The gap between spheres is at most 0.02²/8 deep: 5e-5 of the area.
+    1024 regular directions have an error of 3e-4 (1.8e-3 with 64, 1.5e-5 with 4096).
     """
     rod = np.column_stack([np.arange(0, 4.001, 0.02), np.zeros(201), np.zeros(201)])
     area, error = projected_area(rod, 1.0, 1024)
@@ -111,7 +111,7 @@ def test_projected_area_of_a_long_rod():
 
 
 def test_networks():
-    """A chain, a ring, a cross, a ladder: by hand."""
+    """A chain, a ring, a cross and a ladder, by hand."""
     chain = network(6, np.array([[k, k + 1] for k in range(5)]))
     assert (chain.ends, chain.junctions, chain.rings, chain.longest) == (2, 0, 0, 6)
     assert chain.chains.tolist() == [6]
@@ -128,8 +128,8 @@ def test_networks():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_longest_way_in_trees(seed):
-    """Against all shortest ways (Floyd and Warshall) in random trees of 30 grains."""
+def test_longest_shortest_path_of_trees(seed):
+    """Against all shortest paths (Floyd and Warshall) in random trees of 30 grains."""
     rng = np.random.default_rng(seed)
     pairs = np.array([[rng.integers(k), k] for k in range(1, 30)])
     way = np.full((30, 30), 99)
@@ -144,18 +144,18 @@ def test_the_longest_way_in_trees(seed):
 def sierpinski(depth):
     """Corners of a tetrahedral gasket: D = ln 4/ln 2 = 2."""
     corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], float)
-    place = np.zeros((1, 3))
+    points = np.zeros((1, 3))
     for level in range(depth):
-        place = np.concatenate([place + 2.0**level * corner for corner in corners])
-    return place
+        points = np.concatenate([points + 2.0**level * corner for corner in corners])
+    return points
 
 
 def dust(depth):
     """A Cantor dust of eight corners, thirds: D = ln 8/ln 3 = 1.893."""
-    place = np.zeros((1, 3))
+    points = np.zeros((1, 3))
     for level in range(depth):
-        place = np.concatenate([place + 2.0 * 3.0**level * np.array(c) for c in itertools.product((0, 1), repeat=3)])
-    return place
+        points = np.concatenate([points + 2.0 * 3.0**level * np.array(c) for c in itertools.product((0, 1), repeat=3)])
+    return points
 
 
 EXACT = {
@@ -182,36 +182,36 @@ EXACT = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(EXACT))
 def test_dimensions_of_exact_shapes(name):
-    """Correlation integral within 0.06 (0.3 for a ball 24 grains across), box counting 0.5 below to 0.05 above.
+    """Correlation integral within 0.06 (0.3 for a ball 24 grains across), box counting −0.5 … +0.05.
 
-    Boxes at the rim are part empty, which for n boxes on a side is a factor (1 + 1/n)^D; within r of a grain there is
-    also the rim, for r up to 0.7 r_g where the body is that small.
+    Boxes at the surface are partly empty: a factor (1 + 1/n)^D for n boxes per side.  Within r of a grain the surface
+    matters, too, for r up to 0.7 r_g in bodies this small.
     """
-    place, exact = EXACT[name]
-    by_pairs, by_boxes = correlation_dimension(place), box_dimension(place)
+    points, exact = EXACT[name]
+    by_pairs, by_boxes = correlation_dimension(points), box_dimension(points)
     assert by_pairs.value == pytest.approx(exact, abs=0.3 if name == "ball" else 0.06)
     assert exact - 0.5 < by_boxes.value < exact + 0.05
     assert 0.0 <= by_pairs.error < 0.5 and 0.0 < by_boxes.error < 0.5
 
 
 @pytest.mark.validate
-def test_larger_bodies_are_nearer_their_dimension():
+def test_dimensions_converge_with_size():
     """A gasket of 16384 corners against one of 1024, both methods."""
     for method in (correlation_dimension, box_dimension):
         near, far = (abs(method(sierpinski(depth)).value - 2.0) for depth in (7, 5))
         assert near < far + 0.02, method.__name__
 
 
-def test_grains_are_counted():
-    """The tree counts the same grains as brute force."""
-    place, radii = RNG.normal(size=(300, 3)), np.array([0.3, 1.0])
-    apart = np.linalg.norm(place[:50, None] - place[None], axis=2)
+def test_pair_counts_against_brute_force():
+    """The tree counts the same pairs as brute force."""
+    points, radii = RNG.normal(size=(300, 3)), np.array([0.3, 1.0])
+    apart = np.linalg.norm(points[:50, None] - points[None], axis=2)
     brute = [(apart <= r).sum() / 50 for r in radii]
-    assert grains_within(place[:50], place, radii) == pytest.approx(brute, rel=1e-12)
+    assert grains_within(points[:50], points, radii) == pytest.approx(brute, rel=1e-12)
 
 
 def test_ensemble_dimension():
-    """N = k (r_g/a)^D given exactly comes back to rounding, small ones are left out; with noise errors cover it."""
+    """Exact N = k (r_g/a)^D is recovered to rounding, small clusters are excluded; errors cover noise."""
     sizes = np.array([2, 5, 10, 20, 50, 100.0])
     exact = ensemble_dimension(sizes, 3.0 * (sizes / 1.4) ** (1 / 1.8), 3.0)
     assert (exact.value, exact.prefactor) == (pytest.approx(1.8, rel=1e-12), pytest.approx(1.4, rel=1e-12))
@@ -222,7 +222,10 @@ def test_ensemble_dimension():
 
 
 def test_power_laws():
-    """Exact data to rounding; the error of noisy data is that of least squares, σ/√Σ(u−ū)², within a fifth."""
+    """Exact data are recovered to rounding; for noisy data the error is that of least squares, σ/√Σ(u−ū)².
+
+    The latter within 20 %.
+    """
     x = np.geomspace(1, 100, 400)
     exact = power_law(x, 3.0 * x**0.63)
     assert (exact.exponent, exact.prefactor) == (pytest.approx(0.63, rel=1e-12), pytest.approx(3.0, rel=1e-12))
@@ -234,10 +237,10 @@ def test_power_laws():
     assert abs(fit.exponent - 0.63) < 4 * expected
 
 
-def test_errors_count_boxes_not_points():
-    """The same eight boxes looked at a hundred times more often are no better known: the error stays, to a tenth.
+def test_errors_depend_on_boxes_not_on_points():
+    """Eight boxes sampled a hundred times more often have the same error to a tenth.
 
-    It is that of the mean of eight slopes, s/√8, and the interval is Student's.
+    It is that of the mean of eight slopes, s/√8, with Student's interval.
     """
     slopes = 0.6 + 0.1 * RNG.normal(size=8)
     errors = []
@@ -253,9 +256,9 @@ def test_errors_count_boxes_not_points():
 
 
 def test_laws_of_growth():
-    """S = (1 + t/zτ)^z put in exactly comes out to 1e-6 (the optimiser's), z = 1, 2, 3.2 and an exponential.
+    """S = (1 + t/zτ)^z is recovered to 1e-6 (tolerance of the optimiser), z = 1, 2, 3.2, and an exponential.
 
-    With a factor e^±0.1 of its own for each box's τ the mean over boxes bends by less than its square, 1 %.
+    With a factor e^±0.1 in τ per box the mean over boxes differs by less than its square, 1 %.
     """
     time = np.linspace(0.01, 10, 200)
     for z in (1.0, 2.0, 3.2):
@@ -294,8 +297,8 @@ def test_moments():
     assert aggregate_moments(0 * moment, np.zeros(4, int))[1].tolist() == [0.0]
 
 
-def test_a_census_across_the_faces():
-    """A straight chain of four across a face, a pair and a single grain: whole, the largest first."""
+def test_cluster_table_across_periodic_faces():
+    """A straight chain of four across a face, a pair and a single grain: unwrapped, the largest first."""
     frame = SimpleNamespace(
         position=np.array(
             [[4.0, 0, 0], [-4.0, 0, 0], [-2.0, 0, 0], [2.0, 0, 0], [0, 3, 3], [0, 3, 5 - 1e-9], [0, -4, 0]]
@@ -331,7 +334,7 @@ def test_a_census_across_the_faces():
         (lambda: power_law([2, 2], [1, 2]), "two different x"),
     ],
 )
-def test_mistakes(call, part):
+def test_wrong_arguments_are_refused(call, part):
     """One line each."""
     with pytest.raises(BadInput, match=part):
         call()

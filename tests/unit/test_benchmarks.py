@@ -1,4 +1,4 @@
-"""The table of `python -m benchmarks`: its rows are complete and judged rightly. No time is bounded here."""
+"""The table of `python -m benchmarks`: complete rows and correct verdicts. No time is limited here."""
 
 import itertools
 import json
@@ -14,8 +14,8 @@ from benchmarks import decks, main_job, pieces, scaling, steps, timing, worlds  
 from benchmarks.compare import median_interval  # noqa: E402
 
 
-def test_a_row_is_met_if_all_that_it_is_asked_is():
-    """Target, ratio and share are judged together; a ratio without a peer is not judged."""
+def test_a_row_passes_if_all_its_limits_are_met():
+    """Target, ratio and fraction are judged together; a ratio without a peer is not judged."""
     pair = timing.Pair(2e-9, 10e-9, 5.0)
     good = table.row("x", pair, "ns", 2.5, scale=1e9, of="peer", ratio_asked=4.0, share=0.7, share_asked=0.65)
     assert tuple(good) == table.KEYS
@@ -31,21 +31,21 @@ def test_a_row_is_met_if_all_that_it_is_asked_is():
 
 
 def test_in_turns_takes_the_median_of_paired_ratios():
-    """Rounds (1, 4), (2, 4), (4, 4): least 1 and 4, ratios 4, 2, 1 with the median 2."""
+    """Rounds (1, 4), (2, 4), (4, 4): minima 1 and 4, ratios 4, 2, 1 with the median 2."""
     mine, other = itertools.cycle([1.0, 2.0, 4.0]), itertools.repeat(4.0)
     assert timing.in_turns(lambda: next(mine), lambda: next(other), 3) == (1.0, 4.0, 2.0)
 
 
 @pytest.mark.compiled("contacts", "small")
 @pytest.mark.parametrize(("kind", "contacts"), [("loose", 12), ("fcc", 36), ("gas", 0)])
-def test_worlds_have_the_contacts_that_are_counted(kind, contacts):
-    """BPCA: N − 1. A grain with its 12 neighbours, which touch along the 24 edges of a cuboctahedron. A gas: none."""
-    place = worlds.PLACES[kind](13)
-    apart = np.linalg.norm(place[:, None] - place[None], axis=2)[np.triu_indices(13, 1)]
-    touching = int((apart < 2 * worlds.RADIUS).sum())
-    assert touching == contacts
-    sim = sand.Simulation(worlds.shaken(place), [sand.Contact()])
-    assert len(sim.contacts["pair"]) == touching
+def test_benchmark_systems_have_the_expected_contacts(kind, contacts):
+    """BPCA: N − 1. A grain and its 12 neighbours: 24 more (edges of a cuboctahedron). A gas: none."""
+    positions = worlds.PLACES[kind](13)
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)[np.triu_indices(13, 1)]
+    in_contact = int((apart < 2 * worlds.RADIUS).sum())
+    assert in_contact == contacts
+    sim = sand.Simulation(worlds.shaken(positions), [sand.Contact()])
+    assert len(sim.contacts["pair"]) == in_contact
 
 
 @pytest.mark.compiled("contacts", "small")
@@ -55,7 +55,7 @@ def test_clusters_side_by_side_do_not_touch():
     assert len(sim.contacts["pair"]) == 22
 
 
-def test_what_lammps_is_told_of_a_grain():
+def test_lammps_input_of_a_grain():
     """Micro units: µm, pg/µm³ (the density of 2000 kg/m³ is 2), m/s."""
     grains = worlds.shaken(np.array([[0.0, 0, 0], [2e-6, 0, 0]]))
     lines = decks.data(grains).splitlines()
@@ -65,17 +65,17 @@ def test_what_lammps_is_told_of_a_grain():
     assert [float(word) for word in speed] == pytest.approx(grains.velocity[0].tolist())
 
 
-def test_bytes_of_counts_every_array_of_a_world():
-    """Grains' arrays, contacts, pairs and lists, whatever nests them."""
-    world = worlds.lattice(3).state
-    parts = (world.grains.arrays, world.contacts, world.pair_list, world.long_range, world.stages)
-    alone = (world.clock, world.count, world.lost)
-    assert pieces.bytes_of(world) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
+def test_bytes_of_counts_every_array():
+    """Arrays of grains, contacts, pairs and lists, at any nesting."""
+    system = worlds.lattice(3).state
+    parts = (system.grains.arrays, system.contacts, system.pair_list, system.long_range, system.stages)
+    alone = (system.clock, system.count, system.lost)
+    assert pieces.bytes_of(system) == sum(a.nbytes for part in parts for a in part) + sum(a.nbytes for a in alone)
 
 
 @pytest.mark.compiled("contacts")
 def test_a_replay_takes_the_same_steps():
-    """Each call ends in the same state, to the bit, after a tenth to warm up and the steps asked for."""
+    """Each call ends in the same state, to the bit; a tenth of the steps is for warm-up."""
     sim = worlds.lattice(3)
     sim.run(steps=5)
     again = timing.replayed(sim, 10)
@@ -88,8 +88,8 @@ def test_a_replay_takes_the_same_steps():
 
 
 @pytest.mark.compiled("contacts", "small")
-def test_scaling_leaves_out_what_does_not_fit(monkeypatch):
-    """A row says so, in place of numbers."""
+def test_scaling_skips_systems_that_do_not_fit_in_memory(monkeypatch):
+    """The row says so in place of numbers."""
     monkeypatch.setattr(scaling, "available", lambda: 0.0)
     rows = list(scaling.rows(True))
     assert len(rows) == 9
@@ -97,18 +97,18 @@ def test_scaling_leaves_out_what_does_not_fit(monkeypatch):
 
 
 def test_readme_quotes_the_measured_main_job():
-    """The one time of the main job that pages give is that of docs/main-job.json, in the words made from it."""
+    """The only time of the main job on all pages is that of docs/main-job.json, in generated wording."""
     top = Path(__file__).parents[2]
     measured = json.loads((top / "docs" / "main-job.json").read_text("utf-8"))
     assert measured["sentence"] == main_job.sentence(measured)
     assert measured["sentence"] in " ".join((top / "README.md").read_text("utf-8").split())
 
 
-def test_the_interval_of_a_median_covers_it():
+def test_coverage_of_the_interval_of_a_median():
     """The extremes of 7 rounds cover the median with 1 - 2/2^7 = 98.4 %, the 6th and 15th of 20 with 95.9 %.
 
-    No interval of 5 rounds is wide enough.  Coverage is counted in 4000 sets of skewed numbers whose median is 1: its
-    standard error is at most 0.35 %, the bound is four times that.
+    No interval of 5 rounds is wide enough.  Coverage is counted in 4000 sets of skewed numbers with median 1: standard
+    error at most 0.35 %, tolerance four times that.
     """
     rng = np.random.default_rng(3)
     for rounds, expected in ((7, 0.984), (20, 0.959)):
@@ -119,8 +119,8 @@ def test_the_interval_of_a_median_covers_it():
 
 
 @pytest.mark.compiled("contacts")
-def test_bytes_that_a_step_touches_count_arrays_with_columns():
-    """Per contact: pair 8, pointers 48, twist 8, loads 72, flag 1, side 4 bytes; constants only if they differ.
+def test_bytes_per_step_of_a_contact():
+    """Per contact: pair 8, pointers 48, twist 8, loads 72, flag 1, side 4 bytes; constants only if not uniform.
 
     A lattice of 3 x 3 x 3 grains has 54 contacts.
     """

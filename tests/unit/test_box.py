@@ -14,7 +14,7 @@ triple = st.tuples(coordinate, coordinate, coordinate)
 
 @given(triple)
 def test_nearest_image_is_the_shortest(v):
-    """Brute force over the 27 neighbours of neighbours; the open axis is left alone."""
+    """Brute force over the images in 27 neighbouring cells; the open axis is unchanged."""
     box = Box.periodic(7.0, None, 5.0)
     found = box.nearest(np.array(v))
     assert found[1] == v[1]
@@ -26,14 +26,14 @@ def test_nearest_image_is_the_shortest(v):
 
 
 def test_an_open_box_changes_nothing():
-    """Not even a bit."""
+    """To the bit."""
     v = np.array([1e300, -3.3, 1e-300])
     assert (Box.open().nearest(v) == v).all()
 
 
 @pytest.mark.parametrize("box", [Box.open(), Box.periodic(1.0, None, 1.0), Box.periodic(1.0)])
-def test_close_pairs_of_few_points_and_of_many(box, monkeypatch):
-    """Looking at all pairs and the tree of SciPy find the same, in the same order."""
+def test_close_pairs_by_both_searches(box, monkeypatch):
+    """The search over all pairs and SciPy's tree find the same pairs in the same order."""
     points = np.random.default_rng(4).uniform(-0.7, 0.7, (150, 3))
     few = box.close_pairs(points, 0.2)
     monkeypatch.setattr("sand.box.ALL_PAIRS_UP_TO", 0)
@@ -43,8 +43,8 @@ def test_close_pairs_of_few_points_and_of_many(box, monkeypatch):
     assert few.dtype == many.dtype
 
 
-def test_ways_to_say_it():
-    """A length is a cube; None or no length is an open axis."""
+def test_box_arguments():
+    """One length is a cube; None or no length is an open axis."""
     assert as_box("1 um") == Box.periodic(1e-6) == Box((1e-6, 1e-6, 1e-6))
     assert as_box(None).is_open
     assert Box.periodic("1 um", None, "2 um").lengths == (1e-6, None, 2e-6)

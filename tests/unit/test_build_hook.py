@@ -1,4 +1,4 @@
-"""The build of the page: a bundle or one sentence, nothing between, and never an error of the installation."""
+"""The build of the page: a complete bundle or one sentence, and never an installation error."""
 
 import importlib.util
 import json
@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("hatchling", reason="the build backend is not installed")
 TOP = Path(__file__).parents[2]
 MADE = ["grainview.css", "grainview.js", "licences.txt"]
-# stands for node: `node npm-cli.js ci …` and `node build.mjs OUT`
+# replacement of node: `node npm-cli.js ci …` and `node build.mjs OUT`
 NODE = """#!{python}
 import os, pathlib, sys
 what = sys.argv[1]
@@ -61,8 +61,8 @@ def names(folder):
 
 @pytest.mark.skipif(os.name == "nt", reason="the stand-in for node is a script")
 class TestWithNode:
-    def test_success_leaves_the_bundle_alone(self, hook, sources, fake_node, tmp_path):
-        """The sentence of an earlier failure goes; the sources stay as they were."""
+    def test_success_leaves_only_the_bundle(self, hook, sources, fake_node, tmp_path):
+        """The sentence of an earlier failure is removed; the sources are unchanged."""
         out = tmp_path / "page"
         out.mkdir()
         (out / "missing.txt").write_text("an old reason.\n")
@@ -72,7 +72,7 @@ class TestWithNode:
 
     @pytest.mark.parametrize("wrong", [{"npm": 1}, {"esbuild": 1}])
     def test_failure_leaves_one_sentence(self, hook, sources, fake_node, tmp_path, wrong):
-        """The bundle of an earlier success goes: it may not fit the package any more."""
+        """The bundle of an earlier success is removed: it may not fit the package."""
         out = tmp_path / "page"
         fake_node()
         hook.make_page(sources, out)
@@ -82,13 +82,13 @@ class TestWithNode:
         assert (out / "missing.txt").read_text() == why + "\n"
         assert why.startswith(f"{next(iter(wrong))} failed: ") and why.endswith("reason: no network.")
 
-    def test_half_a_bundle_is_none(self, hook, sources, fake_node, tmp_path):
+    def test_an_incomplete_bundle_is_a_failure(self, hook, sources, fake_node, tmp_path):
         fake_node(makes=["grainview.js"])
         assert hook.make_page(sources, tmp_path / "page") == "esbuild made no grainview.css."
         assert names(tmp_path / "page") == ["missing.txt"]
 
     def test_modules_of_a_developer_are_used_if_they_fit(self, hook, sources, fake_node, tmp_path):
-        """npm, which would fail here, is asked only where the versions differ."""
+        """npm, which would fail here, runs only if versions differ."""
         fake_node(npm=1)
         (sources / "node_modules").mkdir()
         lock = sources / "node_modules" / ".package-lock.json"
@@ -103,16 +103,16 @@ class TestWithNode:
         assert hook.make_page(sources, tmp_path / "page") == "npm did not end within 0 s."
 
 
-def test_skipped_when_told(hook, sources, tmp_path, monkeypatch):
-    """Then node is not asked for either."""
+def test_skipped_by_environment_variable(hook, sources, tmp_path, monkeypatch):
+    """Node is not called."""
     monkeypatch.setenv("SAND_NO_PAGE", "1")
     assert "SAND_NO_PAGE" in hook.make_page(sources, tmp_path / "page")
     assert names(tmp_path / "page") == ["missing.txt"]
     assert hook.PageHook.dependencies(None) == []
 
 
-def test_node_is_asked_for_only_where_there_is_a_wheel(hook, monkeypatch):
-    """pip would try to build the source archive elsewhere, and the installation would fail."""
+def test_node_is_required_only_where_a_wheel_exists(hook, monkeypatch):
+    """Elsewhere pip would build node's source archive, and the installation would fail."""
     from packaging import tags
 
     monkeypatch.setattr(tags, "platform_tags", lambda: iter(["manylinux_2_35_x86_64", "manylinux_2_28_x86_64"]))
@@ -128,17 +128,17 @@ def test_without_node_or_sources(hook, sources, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("version", ["standard", "editable"])
-def test_hook_tells_and_includes(hook, tmp_path, monkeypatch, version):
-    """A wheel gets the file without touching the source tree; an editable install has it in the source tree."""
-    told, data = [], {"force_include": {}}
+def test_hook_reports_and_includes_the_bundle(hook, tmp_path, monkeypatch, version):
+    """A wheel gets the file without a change of the source tree; an editable install has it there."""
+    messages, data = [], {"force_include": {}}
     monkeypatch.setenv("SAND_NO_PAGE", "1")
 
     class App:
-        display_warning = staticmethod(told.append)
+        display_warning = staticmethod(messages.append)
 
     made = hook.PageHook(str(tmp_path), {}, None, None, str(tmp_path / "dist"), "wheel", App)
     made.initialize(version, data)
-    assert len(told) == 1 and "SAND_NO_PAGE" in told[0]
+    assert len(messages) == 1 and "SAND_NO_PAGE" in messages[0]
     if version == "editable":
         assert names(tmp_path / hook.PAGE) == ["missing.txt"] and not data["force_include"]
     else:
@@ -148,17 +148,17 @@ def test_hook_tells_and_includes(hook, tmp_path, monkeypatch, version):
     assert not any(Path(source).exists() for source in data["force_include"])
 
 
-def test_folder_that_cannot_be_written_spoils_nothing(hook, tmp_path, monkeypatch):
-    """An editable install of a read-only tree succeeds; here a file stands where the folder should."""
-    told = []
+def test_unwritable_folder_does_not_fail_the_installation(hook, tmp_path, monkeypatch):
+    """An editable install of a read-only tree succeeds; here a file is in place of the folder."""
+    messages = []
     monkeypatch.setenv("SAND_NO_PAGE", "1")
     (tmp_path / "src").write_text("")
-    app = type("App", (), {"display_warning": staticmethod(told.append)})
+    app = type("App", (), {"display_warning": staticmethod(messages.append)})
     hook.PageHook(str(tmp_path), {}, None, None, "", "wheel", app).initialize("editable", {})
-    assert len(told) == 1 and "could not be written" in told[0]
+    assert len(messages) == 1 and "could not be written" in messages[0]
 
 
-def test_unforeseen_errors_become_a_sentence(hook, sources, tmp_path, monkeypatch):
+def test_unexpected_errors_become_a_sentence(hook, sources, tmp_path, monkeypatch):
     def broken(*_):
         raise KeyError("packages")
 

@@ -1,4 +1,4 @@
-"""Aggregates by chance: contacts at rest, nothing else touching, seeded; their laws; from and to files."""
+"""Random aggregates: equilibrium contacts, no overlaps, reproducible; size laws; files."""
 
 import json
 
@@ -26,8 +26,8 @@ GROWN = {"bpca": bpca, "bcca": bcca, "dla": dla, "dlca": dlca, "fractal": fracta
 MIXED = {"radius": "lognormal(0.1 um, 0.4)", "material": {"silica": 0.6, "ice": 0.4}}
 
 
-def touching(body):
-    """Brute force over all pairs: those that touch (C, 2), their distances, and the distances at rest."""
+def pairs_in_contact(body):
+    """Brute force over all pairs: those in contact (C, 2), their distances, and equilibrium distances."""
     i, j = np.triu_indices(len(body), 1)
     d = np.linalg.norm(body.position[i] - body.position[j], axis=1)
     near = d <= body.radius[i] + body.radius[j]
@@ -41,7 +41,7 @@ def touching(body):
     return np.column_stack([i, j]), d, np.array(rest)
 
 
-def pieces(body, pairs):
+def number_of_clusters(body, pairs):
     graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(body), len(body)))
     return connected_components(graph, directed=False)[0]
 
@@ -53,13 +53,15 @@ def size_of(body):
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("what", [{"radius": R, "material": M}, {"radius": "12 nm", "material": "iron"}, MIXED])
 @pytest.mark.parametrize("kind", list(GROWN))
-def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
-    """Every pair that touches is at r1 + r2 − δ0, to the rounding of coordinates of ten diameters and ten turns,
-    1e-13; one cluster; trees but for rbd; the centre of mass at the origin; the same seed gives the same bits."""
+def test_contacts_are_in_equilibrium_without_overlaps(kind, what):
+    """Every pair in contact is at r1 + r2 − δ0, to 1e-13: the rounding of coordinates of ten diameters.
+
+    One cluster; trees except for rbd; centre of mass at the origin; the same seed gives the same bits.
+    """
     body = GROWN[kind](150, seed=7, **what)
-    pairs, distance, rest = touching(body)
+    pairs, distance, rest = pairs_in_contact(body)
     assert np.abs(distance / rest - 1.0).max() < 1e-13
-    assert pieces(body, pairs) == 1
+    assert number_of_clusters(body, pairs) == 1
     assert len(pairs) == 149 if kind != "rbd" else len(pairs) > 200
     assert np.abs(np.average(body.position, axis=0, weights=body.mass)).max() < 1e-12 * size_of(body)
     again, other = (GROWN[kind](150, seed=s, **what) for s in (7, 8))
@@ -69,7 +71,7 @@ def test_contacts_are_at_rest_and_nothing_else_touches(kind, what):
 
 @pytest.mark.compiled("contacts", "small")
 def test_a_simulation_finds_the_contacts_that_were_made():
-    """N − 1 contacts, forces below 1e-9 of what a contact bears, in a simulation of its own."""
+    """N − 1 contacts in a simulation, forces below 1e-9 of the pull-off force."""
     sim = sand.Simulation(bcca(80, radius=R, material=M, seed=2), [sand.Contact()])
     assert len(sim.contacts["pair"]) == 79
     assert np.abs(sim.loads()["force"]).max() < 1e-9 * 3 * np.pi * M.surface_energy * R / 2
@@ -77,14 +79,16 @@ def test_a_simulation_finds_the_contacts_that_were_made():
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("make", [bpca, rbd])
-def test_spheres_are_cut_in_one_piece(make):
-    """From a heap of 400 grains any number: so many, one cluster, and compact: r_g at most twice that of a ball which
-    fills 0.1 of space; of trees (bpca) and of a net (rbd)."""
+def test_spheres_cut_from_a_heap_are_one_cluster(make):
+    """Any number of grains from a heap of 400: one cluster, r_g at most twice that of a ball of filling factor 0.1.
+
+    From trees (bpca) and networks (rbd).
+    """
     heap = make(400, radius=R, material=M, seed=3)
     for count in range(20, 400, 13):
         kept = cut_sphere(heap.position, heap.radius, count)
         body = sand.Grains(heap.position[kept] - heap.position[kept].mean(axis=0), R, M)
-        assert len(body) == count and pieces(body, touching(body)[0]) == 1
+        assert len(body) == count and number_of_clusters(body, pairs_in_contact(body)[0]) == 1
         assert size_of(body) < 2.0 * np.sqrt(0.6) * R * (count / 0.1) ** (1 / 3)
 
 
@@ -92,28 +96,28 @@ def test_spheres_are_cut_in_one_piece(make):
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 @pytest.mark.parametrize("kind", list(GROWN))
 def test_few_grains(kind, count):
-    """One, two, three grains make an aggregate, too."""
+    """One, two and three grains make an aggregate, too."""
     body = GROWN[kind](count, radius=R, material=M)
-    pairs, _, _ = touching(body)
-    assert len(body) == count and pieces(body, pairs) == 1
+    pairs, _, _ = pairs_in_contact(body)
+    assert len(body) == count and number_of_clusters(body, pairs) == 1
 
 
 def test_hexagonal_packing():
-    """Inside each grain has twelve contacts, all at rest; 5³ grains have 3·125 − … of them: counted by brute force."""
+    """Each inner grain has twelve contacts, all in equilibrium; the number for 5³ grains by brute force."""
     body = hexagonal(5, radius=R, material=M)
-    pairs, distance, rest = touching(body)
+    pairs, distance, rest = pairs_in_contact(body)
     contacts = np.bincount(pairs.ravel())
     inside = (np.abs(body.position) < 1.4 * R).all(axis=1)
     assert inside.any() and (contacts[inside] == 12).all() and contacts.max() == 12
     assert distance == pytest.approx(rest, rel=1e-12, abs=0.0)
     layer = hexagonal(5, 5, 1, radius=R, material=M)
-    assert np.bincount(touching(layer)[0].ravel()).max() == 6
+    assert np.bincount(pairs_in_contact(layer)[0].ravel()).max() == 6
 
 
 def test_a_chain_of_unequal_grains():
-    """N − 1 contacts at rest, straight."""
+    """N − 1 contacts in equilibrium, straight."""
     body = chain(40, seed=3, **MIXED)
-    pairs, distance, rest = touching(body)
+    pairs, distance, rest = pairs_in_contact(body)
     assert (np.diff(pairs, axis=1) == 1).all() and len(pairs) == 39
     assert distance == pytest.approx(rest, rel=1e-12, abs=0.0)
 
@@ -131,8 +135,10 @@ def dimension(make, few, many, count):
     ("make", "count", "expected", "bound"), [(bpca, 60, 2.95, 0.2), (bcca, 150, 1.9, 0.15), (dla, 20, 2.5, 0.2)]
 )
 def test_fractal_dimensions(make, count, expected, bound):
-    """N ∝ r_g^D from 64 to 512 grains.  The known dimensions, 3 (2.9 at finite size), 1.9 and 2.5; the bound adds
-    what small aggregates are off, about 0.1, to three standard errors of this many seeds."""
+    """N ∝ r_g^D from 64 to 512 grains.  Known dimensions: 3 (2.9 at finite size), 1.9 and 2.5.
+
+    The tolerance is the finite-size error, about 0.1, plus three standard errors of this many seeds.
+    """
     found, wrong = dimension(make, 64, 512, count)
     assert 3.0 * wrong < bound
     assert found == pytest.approx(expected, abs=bound)
@@ -140,9 +146,11 @@ def test_fractal_dimensions(make, count, expected, bound):
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("asked", [1.6, 2.0, 2.4])
-def test_a_chosen_dimension(asked):
-    """N = k_f (r_g/a)^D_f by definition: r_g within 5 % at the end as promised, D_f between 100 and 800 grains within
-    D² · 0.02/ln 8 · √2 < 0.05 for the 2 % that it usually is at most; the internal structure has it within 0.3."""
+def test_requested_fractal_dimension(asked):
+    """N = k_f (r_g/a)^D_f: r_g within 5 % at the end as documented, D_f between 100 and 800 grains.
+
+    Tolerance D² · 0.02/ln 8 · √2 < 0.05 for the usual 2 % in r_g; the internal structure has D_f within 0.3.
+    """
     sizes = []
     for n in (100, 800):
         some = [size_of(fractal(n, dimension=asked, radius=R, material=M, seed=s)) for s in range(6)]
@@ -151,9 +159,11 @@ def test_a_chosen_dimension(asked):
     assert np.log(8.0) / np.log(sizes[1] / sizes[0]) == pytest.approx(asked, abs=0.05)
 
 
-def test_walkers_come_back_as_brownian_motion_does():
-    """From 2R outside a sphere it is hit with probability R/|x| = ½, and cos of the angle to where the walker was has
-    the mean R/|x|: both harmonic functions.  Four standard errors of 4000 walkers."""
+def test_return_of_random_walkers():
+    """From 2R a walker hits the sphere with probability R/|x| = ½; the mean cosine to its old direction is R/|x|.
+
+    Both are harmonic functions.  Four standard errors of 4000 walkers.
+    """
     x, count, cosines = (0.0, 0.0, 2.0), 4000, []
     for number in range(count):
         there, back = return_to_sphere(np.uint64(5), number, 1, x, 1.0)
@@ -165,8 +175,8 @@ def test_walkers_come_back_as_brownian_motion_does():
 
 
 @pytest.mark.compiled("small")
-def test_gaps_are_never_overrated():
-    """Against all grains: `gap_to_nearest` is at most the gap of surfaces, and just that where it names a grain."""
+def test_gap_to_nearest_is_a_lower_bound():
+    """Against all grains: `gap_to_nearest` is at most the gap of surfaces, and equal to it where it names a grain."""
     body, rng, named = dla(60, seed=1, **MIXED), np.random.default_rng(2), 0
     grain_set = grain_set_of(body.radius, [body.materials[k] for k in body.material])
     grid = empty_hash_grid(grain_set)
@@ -174,7 +184,7 @@ def test_gaps_are_never_overrated():
         insert_grain(grid, i, tuple(body.position[i]))
     for number in range(900):
         x = rng.normal(size=3) * size_of(body) * rng.choice([0.3, 5.0, 50.0])
-        if number % 3:  # where a look at cells says just so much
+        if number % 3:  # where the search over cells gives the bound only
             x = body.position[number % 60] + rng.normal(size=3) * rng.choice([2.0, 5.0]) * grain_set.largest
         gap, neighbour = gap_to_nearest(grid, body.arrays.position, grain_set, 0, tuple(x))
         true = np.linalg.norm(body.position - x, axis=1) - body.radius - body.radius[0]
@@ -187,9 +197,11 @@ def test_gaps_are_never_overrated():
     assert 90 < named < 810
 
 
-def test_radii_follow_their_laws():
-    """Moments of 20 000 radii to five standard errors: ⟨ln r⟩ and its spread, cut at 3 σ (which takes 0.9865 of it);
-    ⟨r⟩ of r^−3.5 between 1 and 10 is (2.5/1.5)(1 − 10^−1.5)/(1 − 10^−2.5)."""
+def test_size_distributions():
+    """Moments of 20 000 radii to five standard errors: ⟨ln r⟩ and its spread, cut at 3 σ (a factor 0.9865).
+
+    ⟨r⟩ of r^−3.5 between 1 and 10 is (2.5/1.5)(1 − 10^−1.5)/(1 − 10^−2.5).
+    """
     rng, count = np.random.default_rng(1), 20_000
     logs = np.log(Lognormal(1e-7, 0.3).draw(count, rng) / 1e-7)
     assert logs.mean() == pytest.approx(0.0, abs=5 * 0.3 / np.sqrt(count))
@@ -205,7 +217,7 @@ def test_radii_follow_their_laws():
 
 @pytest.mark.compiled("small")
 def test_populations():
-    """Parts of materials and of magnetic grains to within one grain; sizes of moments by the material."""
+    """Fractions of materials and of magnetic grains to within one grain; moments by the material."""
     body = bpca(200, radius=R, material={"silica": 0.7, "iron": 0.3}, moment="material", seed=1)
     names = np.array([m.name for m in body.materials])[body.material]
     assert (names == "iron").sum() == 60 and 10 < (names[:100] == "iron").sum() < 50
@@ -225,9 +237,11 @@ def flux_densities(body):
 
 @pytest.mark.compiled("small")
 def test_relaxed_moments():
-    """U is below that of random and of aligned moments, it falls with every sweep, and no torque is left: |μ × B| is
-    below 1e-5 of |μ||B|, ten times the angle at which sweeps end.  k is 1e-7 to nine digits here.
-    Two moments lie head to tail, U = −2kμ²/d³."""
+    """U is below that of random and aligned moments and falls with every sweep; |μ × B| < 1e-5 |μ||B|.
+
+    The bound is ten times the angle at which sweeps end.  k is 1e-7 to nine digits here.
+    Two moments lie head to tail, U = −2kμ²/d³.
+    """
     body, flat = (
         bpca(60, radius=R, material="iron", moment="1e-16 A m^2", moments=how, seed=4) for how in ("random", "aligned")
     )
@@ -247,8 +261,8 @@ def test_relaxed_moments():
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("ending", ["xyz", "extxyz", "gsd"])
-def test_bodies_come_back_from_files(tmp_path, ending):
-    """Places, radii, moments and materials to rounding (twelve ulps through ångström); contacts are still at rest."""
+def test_bodies_round_trip_through_files(tmp_path, ending):
+    """Positions, radii, moments and materials to rounding (twelve ulps through ångström); contacts in equilibrium."""
     body = bcca(60, radius="power law(-2, 0.1 um, 0.3 um)", material={"silica": 0.5, "iron": 0.5}, moment="material")
     path = write_body(tmp_path / f"body.{ending}", body)
     again = body_from_file(path)
@@ -256,7 +270,7 @@ def test_bodies_come_back_from_files(tmp_path, ending):
     assert again.radius == pytest.approx(body.radius, rel=1e-15, abs=0.0)
     assert again.moment == pytest.approx(body.moment, rel=1e-15, abs=0.0)
     assert [again.materials[k] for k in again.material] == [body.materials[k] for k in body.material]
-    _, distance, rest = touching(again)
+    _, distance, rest = pairs_in_contact(again)
     assert len(rest) == 59 and np.abs(distance / rest - 1.0).max() < 1e-13
     with pytest.raises(sand.BadInput, match="exists; give another name"):
         write_body(path, body)
@@ -266,7 +280,7 @@ def test_bodies_come_back_from_files(tmp_path, ending):
 
 @pytest.mark.compiled("small")
 def test_other_programs_read_bodies(tmp_path):
-    """ASE and gsd itself: as many grains, radii, places."""
+    """ASE and gsd read the same number of grains, radii and positions."""
     body = bpca(20, radius=R, material=M)
     ase_io = pytest.importorskip("ase.io")
     atoms = ase_io.read(write_body(tmp_path / "a.xyz", body))
@@ -277,8 +291,8 @@ def test_other_programs_read_bodies(tmp_path):
     assert body_from_file(again, M).position == pytest.approx(body.position, abs=1e-17)
 
 
-def test_foreign_gsd(tmp_path):
-    """A frame of another program: positions and diameters in a unit that is given, materials by the key."""
+def test_gsd_files_of_other_programs(tmp_path):
+    """Positions and diameters in a given unit, materials by the key."""
     import gsd.hoomd
 
     frame = gsd.hoomd.Frame()
@@ -310,7 +324,7 @@ PLACES = ["0 0 0", "1.9995 0 0", "3.999 0 0"]
     ],
 )
 def test_bad_bodies(tmp_path, lines, message):
-    """One line each with file and grain or line; ten of them at most, then how many there are more."""
+    """One line each with file and grain or line; at most ten, then the number of others."""
     path = tmp_path / "bad.xyz"
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(sand.BadInput, match=message) as caught:
@@ -319,7 +333,7 @@ def test_bad_bodies(tmp_path, lines, message):
 
 
 def test_only_ten_grains_are_named(tmp_path):
-    """Thirty grains apart: twenty-nine gaps, ten lines and one that counts the rest."""
+    """Thirty separate grains: twenty-nine gaps, ten lines and the number of the others."""
     path = tmp_path / "loose.txt"
     path.write_text("".join(f"{3 * k} 0 0 1\n" for k in range(30)))
     with pytest.raises(sand.BadInput, match="and 19 more") as caught:
@@ -358,7 +372,7 @@ def test_only_ten_grains_are_named(tmp_path):
     ],
 )
 def test_impossible_requests(make, message):
-    """One line each, at once, with the reason."""
+    """One line each with the reason, without a search."""
     with pytest.raises(sand.BadInput, match=message):
         make()
 
@@ -366,16 +380,16 @@ def test_impossible_requests(make, message):
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - {"grain"}))
 def test_the_command(tmp_path, capsys, monkeypatch, kind):
-    """`sand build KIND` writes a body and says what it is; the dimension of a chain is 1."""
+    """`sand build KIND` writes a body and reports its properties; the dimension of a chain is 1."""
     monkeypatch.chdir(tmp_path)
     assert main(["build", kind, "--grains", "64", "--out", "a.xyz", "--seed", "2", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["grains"] == 64 and told["file"] == "a.xyz"
+    output = json.loads(capsys.readouterr().out)
+    assert output["grains"] == 64 and output["file"] == "a.xyz"
     body = body_from_file("a.xyz")
-    assert told["radius_of_gyration"] == pytest.approx(size_of(body))
-    assert told["contacts"] == len(touching(body)[0])
+    assert output["radius_of_gyration"] == pytest.approx(size_of(body))
+    assert output["contacts"] == len(pairs_in_contact(body)[0])
     if kind == "chain":
-        assert told["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)
+        assert output["fractal_dimension"] == pytest.approx(1.0, abs=1e-6)
     assert main(["build", kind, "--grains", "64", "--out", "a.xyz"]) == 2
     assert "exists" in capsys.readouterr().err
 
@@ -403,8 +417,8 @@ def test_mistakes_on_the_command_line(tmp_path, capsys, monkeypatch, words, mess
 
 
 @pytest.mark.compiled("contacts", "small")
-def test_what_is_built_collides_and_runs(tmp_path, capsys, monkeypatch):
-    """A body from a file, one by its kind and one with laws and moments, in `sand collide` and `sand run`."""
+def test_built_bodies_in_collide_and_run(tmp_path, capsys, monkeypatch):
+    """A body from a file, one by kind and one with size laws and moments."""
     monkeypatch.chdir(tmp_path)
     laws = ["--radius", "lognormal(0.1 um, 0.2)", "--material", "silica:0.5,ice:0.5"]
     assert main(["build", "bcca", "--grains", "12", *laws, "--out", "a.xyz"]) == 0
@@ -425,8 +439,8 @@ def test_what_is_built_collides_and_runs(tmp_path, capsys, monkeypatch):
         text = f'[run]\nsteps = 3\n[grains]\nkind = "file"\nfile = "{file}"\n[forces.contact]\n'
         (tmp_path / f"{name}.toml").write_text(text)
         assert main(["run", f"{name}.toml", "--json"]) == 0
-        told = json.loads(capsys.readouterr().out)
-        assert told["grains"] == 12
+        output = json.loads(capsys.readouterr().out)
+        assert output["grains"] == 12
 
 
 @pytest.mark.validate
@@ -435,6 +449,6 @@ def test_what_is_built_collides_and_runs(tmp_path, capsys, monkeypatch):
     [(bpca, 1000, 10_000, 6, 2.9, 0.15), (bcca, 100, 1000, 100, 1.9, 0.1), (dlca, 100, 1000, 40, 1.8, 0.1)],
 )
 def test_dimensions_of_large_aggregates(make, few, many, count, expected, bound):
-    """N ∝ r_g^D over a decade, within what is known of these aggregates at finite size."""
+    """N ∝ r_g^D over a decade, within the known finite-size ranges."""
     found, _ = dimension(make, few, many, count)
     assert found == pytest.approx(expected, abs=bound)

@@ -1,4 +1,4 @@
-"""The folder for compiled code, into which nobody else may write: whoever can runs code as its reader."""
+"""The folder for compiled code must be writable by its user only: whoever can write it can run code."""
 
 import os
 import stat
@@ -17,7 +17,7 @@ needs_modes = pytest.mark.skipif(not hasattr(os, "getuid"), reason="no owners an
 
 @pytest.fixture
 def home(tmp_path, monkeypatch):
-    """A home and a temporary folder of their own, and a usual umask."""
+    """A home and a temporary folder, and a usual umask."""
     monkeypatch.delenv("SAND_CACHE", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
@@ -28,13 +28,13 @@ def home(tmp_path, monkeypatch):
     os.umask(before)
 
 
-def chosen(*said):
-    """The folder, which must be there and safe, and have been chosen with one warning that holds all these words."""
+def chosen(*expected):
+    """The folder, which must exist and be safe, chosen with one warning that contains all these words."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         folder = cache.private_folder("digest")
-    assert len(caught) == (1 if said else 0), [str(w.message) for w in caught]
-    for words in said:
+    assert len(caught) == (1 if expected else 0), [str(w.message) for w in caught]
+    for words in expected:
         assert words in str(caught[0].message) and "\n" not in str(caught[0].message)
     assert folder.name == "digest" and cache.unsafe(folder) is None
     return folder
@@ -46,7 +46,7 @@ def mode(folder):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the places of Linux")
 def test_the_usual_folder(home, monkeypatch):
-    """~/.cache/sand, $XDG_CACHE_HOME/sand, $SAND_CACHE: new ones are for their user alone."""
+    """~/.cache/sand, $XDG_CACHE_HOME/sand, $SAND_CACHE: new folders are private."""
     usual = home / "home" / ".cache" / "sand"
     assert chosen() == usual / "digest"
     assert mode(usual) == mode(usual / "digest") == 0o700
@@ -59,7 +59,7 @@ def test_the_usual_folder(home, monkeypatch):
 
 @needs_modes
 def test_a_folder_that_only_its_user_can_write_is_kept(home, monkeypatch):
-    """Earlier versions made it with the usual umask: others may look, not write."""
+    """Earlier versions used the usual umask: others may read, not write."""
     monkeypatch.setenv("SAND_CACHE", str(home / "mine"))
     (home / "mine").mkdir(mode=0o755)
     assert chosen() == home / "mine" / "digest"
@@ -68,7 +68,7 @@ def test_a_folder_that_only_its_user_can_write_is_kept(home, monkeypatch):
 
 @needs_modes
 def test_a_folder_that_others_can_write_is_refused(home, monkeypatch):
-    """By group or others, itself or the one for this version inside; the one in use is private, and kept."""
+    """Writable by group or others, itself or this version's subfolder; a private one is used instead."""
     monkeypatch.setenv("SAND_CACHE", str(home / "mine"))
     private = home / "tmp" / f"sand-cache-{os.getuid()}"
     for bits in (0o775, 0o757, 0o1777):
@@ -85,15 +85,15 @@ def test_a_folder_that_others_can_write_is_refused(home, monkeypatch):
 
 @needs_modes
 def test_a_folder_of_another_user_is_refused(home, monkeypatch):
-    """Also one of root: whoever shares a cache can run code as its readers."""
+    """Also one of root."""
     monkeypatch.setenv("SAND_CACHE", str(home / "theirs"))
     (home / "theirs").mkdir(mode=0o700)
     owner, me = os.getuid(), os.getuid() + 1
-    monkeypatch.setattr(os, "getuid", lambda: me)  # so that the folder is another's
+    monkeypatch.setattr(os, "getuid", lambda: me)  # the folder belongs to another user
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         assert cache.unsafe(home / "theirs") == f"belongs to another user (uid {owner}), who could run code as you"
-        with pytest.raises(cache._UnsafeFolder):  # here all folders are another's, the new one, too
+        with pytest.raises(cache._UnsafeFolder):  # here all folders belong to another user, the new one, too
             cache.private_folder("digest")
     assert "belongs to another user" in str(caught[0].message)
     assert not (home / "theirs" / "digest").exists()
@@ -101,7 +101,7 @@ def test_a_folder_of_another_user_is_refused(home, monkeypatch):
 
 @needs_modes
 def test_a_link_is_refused(home, monkeypatch):
-    """Where it leads to can be changed by who owns it; a link to nowhere is no folder to be made either."""
+    """Its owner can change the target; a link to nothing is refused, too."""
     (home / "real").mkdir()
     for aim in ("real", "nowhere"):
         link = home / f"to-{aim}"
@@ -112,8 +112,8 @@ def test_a_link_is_refused(home, monkeypatch):
 
 
 @needs_modes
-def test_the_fallback_of_another_is_not_taken(home, monkeypatch):
-    """Anybody can make TMPDIR/sand-cache-UID before its user does: then a new one is taken, deleted at the end."""
+def test_a_fallback_folder_of_another_user_is_not_used(home, monkeypatch):
+    """Anybody can create TMPDIR/sand-cache-UID first: then a new temporary one is used and deleted at exit."""
     (home / "home").write_text("no folder can be made in a file")
     planted = home / "tmp" / f"sand-cache-{os.getuid()}"
     planted.mkdir()
@@ -124,15 +124,15 @@ def test_the_fallback_of_another_is_not_taken(home, monkeypatch):
     assert folder.parent.parent == home / "tmp" and folder.parent != planted
     assert mode(folder.parent) == mode(folder) == 0o700
     ((delete, *given),) = registered
-    delete(given[0], -1)  # as in a fork, which is not to delete it
+    delete(given[0], -1)  # as in a forked process, which must not delete it
     assert folder.exists()
     delete(*given)
     assert not folder.parent.exists()
     planted.chmod(0o755)
-    assert chosen() == planted / "digest"  # a home without room for files is nothing to be said
+    assert chosen() == planted / "digest"  # a home folder without space causes no message
 
 
-def test_what_cannot_be_made_is_said(home, monkeypatch):
+def test_a_folder_that_cannot_be_created_is_reported(home, monkeypatch):
     """$SAND_CACHE below a file, or a file itself."""
     (home / "file").write_text("")
     for wished in (home / "file" / "cache", home / "file"):
@@ -141,9 +141,7 @@ def test_what_cannot_be_made_is_said(home, monkeypatch):
 
 
 def test_systems_without_owners(home, monkeypatch):
-    """Without `os.getuid`, as on Windows, the folder is as private as the place where it lies, and there is no
-    fallback that others could make.
-    """
+    """Without `os.getuid`, as on Windows, no owner is checked and there is no shared fallback folder."""
     monkeypatch.delattr(os, "getuid", raising=False)
     monkeypatch.setenv("SAND_CACHE", str(home / "mine"))
     assert chosen() == home / "mine" / "digest"
@@ -155,13 +153,13 @@ def test_systems_without_owners(home, monkeypatch):
 IMPORT = "import sys, sand; assert 'platformdirs' not in sys.modules and 'numba' not in sys.modules"
 
 
-def test_the_package_is_as_light_as_before():
-    """`import sand` loads no library for folders."""
+def test_importing_sand_imports_no_folder_library():
+    """`import sand` imports no library for standard folders."""
     subprocess.run([sys.executable, "-c", IMPORT], check=True)
 
 
 def test_a_process_has_one_folder(monkeypatch, tmp_path):
-    """Who asks again gets the same, named by the digest: summaries give it as `source_digest`."""
+    """Repeated requests give the same folder, named by the digest; summaries give it as `source_digest`."""
     from sand.compiler import jit
 
     assert jit.cache_folder() is jit.cache_folder()

@@ -1,4 +1,4 @@
-"""Case files: every mistake found and named, and a case read back is the same case."""
+"""Case files: every error is found and named; reading and writing a case gives the same case."""
 
 import copy
 import tomllib
@@ -33,10 +33,10 @@ temperature = "300 K"
 
 
 def changed(**changes):
-    """The good case with some places changed: `grains__radius="1 K"`; None removes."""
+    """The valid case with changes: `grains__radius="1 K"`; None removes."""
     content = copy.deepcopy(GOOD)
-    for place, value in changes.items():
-        *sections, key = place.split("__")
+    for key_path, value in changes.items():
+        *sections, key = key_path.split("__")
         section = content
         for name in sections:
             section = section.setdefault(name, {})
@@ -48,7 +48,7 @@ def changed(**changes):
 
 
 def problems_of(content):
-    """What is said of a case, when read or when its simulation is put together."""
+    """Error lines of a case, from reading it or from building its simulation."""
     with pytest.raises(BadInput) as caught:
         simulation_of(check_case(content, "some.toml"), None)
     return caught.value.problems
@@ -96,13 +96,13 @@ def problems_of(content):
         ({"forces__field__flux_density": [1, 2]}, ["forces.field", "three components, in T"]),
         ({"run": "5 ns"}, ["run", "'5 ns'"]),
         ({"forces__contact": True}, ["forces.contact", "True"]),
-        # things that are missing
+        # missing entries
         ({"run__until": None}, ["run", "until is missing"]),
         ({"grains__number": None}, ["grains", "number is missing", "number = 125"]),
         ({"grains__radius": None}, ["grains", "radius is missing"]),
         ({"run": None}, ["run is missing"]),
         ({"materials__mine__density": "3 g/cm^3"}, ["mine lacks young_modulus, poisson_ratio"]),
-        # what shows when grains, forces and box come together
+        # errors that only the combination of grains, forces and box shows
         ({"box__periodic": "30 nm"}, ["box", "too small", "3 diameters"]),
         ({"box__periodic": "62 nm", "grains__number": 30}, ["too full", "use a larger box or fewer grains"]),
         ({"box__periodic": None}, ["a gas needs a box"]),
@@ -112,8 +112,8 @@ def problems_of(content):
         ({"grains__kind": "given"}, ["came from a script", "sand resume"]),
     ],
 )
-def test_one_mistake_is_one_line(changes, parts):
-    """The line says where, what was given, and what is allowed or meant."""
+def test_a_wrong_entry_gives_one_line(changes, parts):
+    """The line says where, what was given, and what is allowed or probably meant."""
     problems = problems_of(changed(**changes))
     assert len(problems) == 1, problems
     assert "\n" not in problems[0]
@@ -122,7 +122,7 @@ def test_one_mistake_is_one_line(changes, parts):
 
 
 def test_several_mistakes_are_reported_together(tmp_path):
-    """Every mistake of a file at once: one line each, each with the name of the file and the place."""
+    """Every error of a file: one line each with file and key."""
     path = tmp_path / "many.toml"
     content = changed(
         run__until="5 m",
@@ -140,9 +140,9 @@ def test_several_mistakes_are_reported_together(tmp_path):
     problems = caught.value.problems
     assert len(problems) == 8
     assert all(line.startswith(f"{path}: ") and "\n" not in line for line in problems)
-    places = ["run.until", "box.periodic", "grains.radius", "grains.temprature", "grains.material", "dipoles.cutof"]
-    for place in [*places, "step = '3 m'", "accuracy = -1"]:
-        assert sum(place in line for line in problems) == 1, place
+    key_paths = ["run.until", "box.periodic", "grains.radius", "grains.temprature", "grains.material", "dipoles.cutof"]
+    for key_path in [*key_paths, "step = '3 m'", "accuracy = -1"]:
+        assert sum(key_path in line for line in problems) == 1, key_path
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_several_mistakes_are_reported_together(tmp_path):
     ],
 )
 def test_files_that_are_no_cases(tmp_path, content, part):
-    """Broken grammar with its line, other files, missing files: one line with the file's name."""
+    """Invalid TOML with its line, other files, missing files: one line with the file's name."""
     path = tmp_path / "some.toml"
     if content is not None:
         path.write_bytes(content)
@@ -168,12 +168,12 @@ def test_files_that_are_no_cases(tmp_path, content, part):
 
 
 def test_an_empty_file_lacks_its_sections():
-    """Both sections that must be there are named."""
+    """Both required sections are named."""
     assert len(problems_of({})) == 2
 
 
 def test_magnetite_with_a_surface_energy_runs():
-    """What the message about magnetite asks for is enough."""
+    """The change that the message about magnetite suggests is sufficient."""
     content = changed(grains__material="mine", materials__mine__like="magnetite")
     content["materials"]["mine"]["surface_energy"] = "0.1 J/m^2"
     material = simulation_of(check_case(content, "some.toml"), None).grains.materials[0]
@@ -202,7 +202,7 @@ def test_numbers_are_si_and_text_has_units():
 )
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_the_case_a_run_writes_is_the_case_it_ran(tmp_path, changes):
-    """case.toml read back builds the same grains and forces, moves them to the same bits, and is written the same."""
+    """case.toml builds the same grains and forces, the same bits after steps, and the same case.toml."""
     case = check_case(changed(**changes), "some.toml")
     first = simulation_of(case, tmp_path / "one")
     first.run(until=case.run.until, steps=case.run.steps)
@@ -216,7 +216,7 @@ def test_the_case_a_run_writes_is_the_case_it_ran(tmp_path, changes):
 
 
 def same_bits(one, other):
-    """True if every array of two worlds agrees to the last bit."""
+    """True if all arrays of two states are equal bit by bit."""
     a, b = one.state.to_arrays(), other.state.to_arrays()
     return a.keys() == b.keys() and all(a[name].tobytes() == b[name].tobytes() for name in a)
 
@@ -224,7 +224,7 @@ def same_bits(one, other):
 @pytest.mark.compiled("dipoles")
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_case_and_script_are_the_same_physics():
-    """The same numbers given to the constructors in a script move the grains to the same bits."""
+    """The same parameters in a case and in a script give the same bits."""
     from_case = simulation_of(check_case(GOOD, "some.toml"), None)
     box = sand.Box.periodic("400 nm")
     grains = sand.setup.gas(
@@ -238,7 +238,7 @@ def test_case_and_script_are_the_same_physics():
 
 
 def test_an_empty_name_of_a_material_is_refused():
-    """An empty string is not the same as no key: it is an unknown material."""
+    """An empty string is an unknown material, not a missing key."""
     with pytest.raises(sand.BadInput, match=r"grains.material: unknown material ''"):
         check_case(
             {
@@ -251,7 +251,7 @@ def test_an_empty_name_of_a_material_is_refused():
 
 
 def test_an_index_of_a_list_is_named():
-    """Entry 0 of a list is named like the others."""
-    for seeds, place in (([-1, 2], "grow.seeds.0"), ([2, -1], "grow.seeds.1")):
-        with pytest.raises(sand.BadInput, match=place):
+    """Errors in entry 0 of a list are named like those of other entries."""
+    for seeds, key_path in (([-1, 2], "grow.seeds.0"), ([2, -1], "grow.seeds.1")):
+        with pytest.raises(sand.BadInput, match=key_path):
             validate(GrowSection, {"seeds": seeds}, "c", table="grow")

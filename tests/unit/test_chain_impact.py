@@ -1,4 +1,4 @@
-"""Figure 4: shapes are told apart, and a T arises where hit-and-stick has none."""
+"""Figure 4: classification of shapes, and the T that hit-and-stick does not produce."""
 
 import numpy as np
 import pytest
@@ -30,13 +30,13 @@ CHAIN = [[0, 1], [1, 2], [2, 3]]
     ],
 )
 def test_shapes(end, projectile, more, name):
-    """Drawn by hand: a chain of four, its end grain moved, the projectile put down."""
+    """By hand: a chain of four, its end grain moved, and the projectile at several positions."""
     position = np.vstack([LINE[:3], [end], [projectile]])
     assert chain_impact.shape(position, links(*CHAIN, *more), 4).name == name
 
 
 def test_a_broken_chain():
-    """A link is gone."""
+    """A missing contact."""
     position = np.vstack([LINE, [[9, 9, 9]]])
     assert chain_impact.shape(position, links([0, 1], [1, 2], [3, 4]), 4).name == "broken"
 
@@ -44,9 +44,9 @@ def test_a_broken_chain():
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("place", [-0.65, -0.6, -0.55])
 def test_the_papers_figure_4(place):
-    """20 nm iron, released rolling as in SAND, 240 m/s: a T, crossbar within 30° of perpendicular, end grain rolled.
+    """20 nm iron, slip="reset", 240 m/s: a T, crossbar within 30° of perpendicular, end grain rolled.
 
-    Hit-and-stick gives a chain with one more grain; clamped rolling (twice the friction) gives no T there.
+    Hit-and-stick gives a chain with one more grain; slip="clamp" (twice the friction) gives no T there.
     """
     hit = chain_impact.strike(sand.IRON, "10 nm", speed=240.0, place=place, contact=sand.Contact(slip="reset"))
     shape = chain_impact.shape_of(hit)
@@ -60,13 +60,13 @@ def test_the_papers_figure_4(place):
 
 @pytest.mark.compiled("contacts")
 def test_a_slow_grain_leaves_the_chain_straight():
-    """20 m/s on the end grain: it sticks, nothing rolls far."""
+    """20 m/s on the end grain: it sticks without much rolling."""
     hit = chain_impact.strike(sand.IRON, "10 nm", speed=20.0, place=0.3)
     assert chain_impact.shape_of(hit).name == "straight"
 
 
 def test_the_figure():
-    """Colours of the map are those of the names; pictures show every grain."""
+    """The map has the colours of the shapes; pictures show every grain."""
     names = np.array([["T", "bent"], ["broken", "straight"]])
     picture = Picture("before", np.vstack([LINE, [[9, 9, 0]]]) * 1e-8, 1e-8)
     figure = chain_figure([picture], [Map("iron", [1, 2], [0.0, 1.0], names)])

@@ -1,4 +1,4 @@
-"""Checkpoints whose archive is whole but whose numbers are not those that were written, and ones that hold code."""
+"""Complete checkpoint archives with changed numbers or with embedded code are refused."""
 
 import zipfile
 from pathlib import Path
@@ -14,7 +14,7 @@ REFERENCE = Path(__file__).parents[1] / "reference" / f"run-v{VERSION}"
 
 
 def written(folder, steps):
-    """Write the reference state as that of a step; the path."""
+    """Write the reference state as that of this step; returns the path."""
     arrays, meta = read_checkpoint(next(REFERENCE.glob("*.npz")))
     meta = {name: value for name, value in meta.items() if name not in ("format", "version", "sha256")}
     arrays["count"][STEPS] = steps
@@ -22,7 +22,7 @@ def written(folder, steps):
 
 
 def rewritten(path, change):
-    """The archive packed anew with `change` applied to its arrays by name: its own check sums are right again."""
+    """The archive repacked with `change` applied to its arrays, with valid zip checksums."""
     with np.load(path, allow_pickle=False) as saved:
         arrays = {name: saved[name] for name in saved.files}
     change(arrays)
@@ -50,7 +50,7 @@ def retype(arrays):
 
 @pytest.mark.parametrize("change", [set_number, swap, drop, retype])
 def test_numbers_that_were_changed_are_refused(tmp_path, change):
-    """One last bit, rows in another order, an array that is gone or of another type: the check sum of SAND is wrong."""
+    """A flipped bit, reordered rows, a missing array or another type: SAND's checksum is wrong."""
     written(tmp_path, 1)
     path = written(tmp_path, 2)
     rewritten(path, lambda arrays: None)
@@ -63,7 +63,7 @@ def test_numbers_that_were_changed_are_refused(tmp_path, change):
 
 
 class Code:
-    """What a pickle would run when it is read."""
+    """An object whose unpickling would run code."""
 
     def __init__(self, path):
         self.path = path
@@ -73,7 +73,7 @@ class Code:
 
 
 def test_code_in_a_checkpoint_is_not_run(tmp_path):
-    """An array of objects is a pickle: refused in one line, and what it would do is not done."""
+    """An array of objects is a pickle: refused in one line and not executed."""
     path = written(tmp_path, 1)
     trace = tmp_path / "run"
 

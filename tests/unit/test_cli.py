@@ -1,4 +1,4 @@
-"""The `sand` command: exit codes, what is printed where, interruption and going on."""
+"""The `sand` command: exit codes, output streams, interruption and resuming."""
 
 import contextlib
 import io
@@ -40,23 +40,23 @@ SAND = [sys.executable, "-m", "sand.cli.main"]
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
-    """An empty folder to work in, with a case file."""
+def workdir(tmp_path, monkeypatch):
+    """An empty working folder with a case file."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "small.toml").write_text(CASE)
     return tmp_path
 
 
 @pytest.fixture
-def done(place, capsys):
-    """The same after `sand run small.toml`."""
+def done(workdir, capsys):
+    """The folder after `sand run small.toml`."""
     assert main(["run", "small.toml", "--quiet"]) == 0
     capsys.readouterr()
-    return place / "small"
+    return workdir / "small"
 
 
 def heavy_modules(*words):
-    """The heavy packages that `sand WORDS` has imported by its end, in a fresh interpreter."""
+    """The heavy packages that `sand WORDS` imports, in a fresh interpreter."""
     code = (
         "import sys\nfrom sand.cli.main import main\ncode = main(sys.argv[1:])\n"
         "heavy = {'numpy', 'numba', 'pydantic', 'gsd', 'matplotlib', 'pint', 'scipy', 'tqdm'}\n"
@@ -69,19 +69,19 @@ def heavy_modules(*words):
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["cite"], ["--version"], []])
 def test_light_commands_import_nothing_heavy(words):
-    """Help and citations answer at once: no numerical package is loaded for them."""
+    """Help and citation import no numerical package."""
     assert heavy_modules(*words) == "[]"
 
 
 @pytest.mark.compiled("dipoles")
 def test_info_of_a_run_needs_no_compiler(done):
-    """What a folder holds is read from its small files; neither numba nor the case reader is loaded."""
+    """Small files of the folder suffice; neither numba nor the case reader is imported."""
     assert heavy_modules("info", str(done)) == "['numpy']"
 
 
 @pytest.mark.compiled("dipoles")
-def test_run_tells_what_it_does_and_what_came_of_it(place, capsys):
-    """Grains, box, cut-off with its reason at the start; outcome and the files, the figure too, at the end."""
+def test_output_of_run(workdir, capsys):
+    """Grains, box and cut-off with its reason at the start; outcome and files, the figure included, at the end."""
     assert main(["run", "small.toml"]) == 0
     out, err = capsys.readouterr()
     for part in ("8 of iron, radius 10 nm", "periodic 400 nm", "cut-off", "half the box", "contact, dipoles"):
@@ -90,28 +90,28 @@ def test_run_tells_what_it_does_and_what_came_of_it(place, capsys):
         assert part in out
     assert "sand: note: contacts of iron" in err
     assert "%|" not in err  # no progress bar where there is no terminal
-    assert {p.name for p in (place / "small").iterdir()} >= {"case.toml", "summary.json", "figure.png"}
+    assert {p.name for p in (workdir / "small").iterdir()} >= {"case.toml", "summary.json", "figure.png"}
 
 
-def test_settings_that_differ_are_told(place, capsys):
-    """Of each force its name and what the user has set."""
-    (place / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nslip = "reset"'))
-    (place / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
+def test_run_prints_settings_that_differ_from_defaults(workdir, capsys):
+    """For each force its name and the user's settings."""
+    (workdir / "small.toml").write_text(CASE.replace("[forces.contact]", '[forces.contact]\nslip = "reset"'))
+    (workdir / "small.toml").open("a").write('[forces.field]\nflux_density = "1 mT"\n')
     assert main(["info", "small.toml"]) == 0
     assert "contact (slip = reset), dipoles, field (flux_density = [0.0, 0.0, 0.001])" in capsys.readouterr().out
 
 
 @pytest.mark.compiled("dipoles")
-def test_run_as_json_prints_the_summary_alone(place, capsys):
+def test_run_as_json_prints_the_summary_alone(workdir, capsys):
     """--json: one object, the content of summary.json and the folder."""
     assert main(["run", "small.toml", "--json", "--out", "there"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == {**json.loads((place / "there" / "summary.json").read_text()), "folder": "there"}
+    assert printed == {**json.loads((workdir / "there" / "summary.json").read_text()), "folder": "there"}
     assert printed["outcome"] == "finished"
 
 
 @pytest.mark.compiled("dipoles")
-def test_quiet_run_prints_nothing_to_stdout(place, capsys):
+def test_quiet_run_prints_nothing_to_stdout(workdir, capsys):
     """--quiet leaves notes on stderr, nothing else."""
     assert main(["run", "small.toml", "--quiet"]) == 0
     out, err = capsys.readouterr()
@@ -120,22 +120,22 @@ def test_quiet_run_prints_nothing_to_stdout(place, capsys):
 
 
 @pytest.mark.compiled("dipoles")
-def test_options_replace_what_the_case_says(place, capsys):
-    """--until takes text with a unit or SI seconds, as a case does; --seed and --out replace the case's own."""
+def test_options_override_the_case(workdir, capsys):
+    """--until takes text with a unit or SI seconds, as in a case; --seed and --out override the case."""
     assert main(["run", "small.toml", "--until", "6 ns", "--seed", "7", "--json"]) == 0
     first = json.loads(capsys.readouterr().out)
     assert main(["run", "small.toml", "--until", "6e-9", "--seed", "7", "--json", "--out", "again"]) == 0
     second = json.loads(capsys.readouterr().out)
     assert first["time"] == second["time"] == pytest.approx(6e-9, rel=1e-2, abs=0.0)
     assert first["seed"] == 7
-    case = read_case(place / "again" / "case.toml")
+    case = read_case(workdir / "again" / "case.toml")
     assert (case.run.until, case.run.seed) == (6e-9, 7)
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_case_may_end_at_a_number_of_steps(place, capsys):
-    """[run] steps: the run takes that many, and is then at its end for `sand resume`, too."""
-    (place / "small.toml").write_text(CASE.replace('until = "20 ns"', "steps = 500"))
+def test_a_case_may_end_at_a_number_of_steps(workdir, capsys):
+    """[run] steps: the run takes that many; `sand resume` then has nothing to do."""
+    (workdir / "small.toml").write_text(CASE.replace('until = "20 ns"', "steps = 500"))
     assert main(["run", "small.toml"]) == 0
     assert "to step 500" in capsys.readouterr().out
     assert main(["resume", "small"]) == 0
@@ -144,7 +144,7 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
     assert json.loads(capsys.readouterr().out)["steps"] > 500
 
 
-# --- the user's mistakes ------------------------------------------------------------------------------
+# --- wrong input ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -171,10 +171,10 @@ def test_a_case_may_end_at_a_number_of_steps(place, capsys):
         (["--json"], "No such option"),
     ],
 )
-def test_mistakes_are_lines_and_exit_code_2(place, capsys, words, part):
-    """Each mistake is one line that names it, on stderr; with --json it is on stdout as well; no traceback."""
-    (place / "picture.png").write_bytes(b"\x89PNG")
-    before = sorted(place.rglob("*"))
+def test_wrong_input_gives_lines_and_exit_code_2(workdir, capsys, words, part):
+    """One line on stderr names the error; with --json on stdout as well; no traceback."""
+    (workdir / "picture.png").write_bytes(b"\x89PNG")
+    before = sorted(workdir.rglob("*"))
     assert main(words) == 2
     out, err = capsys.readouterr()
     assert part in err
@@ -184,34 +184,34 @@ def test_mistakes_are_lines_and_exit_code_2(place, capsys, words, part):
         assert out == ""
         assert main([*words, "--json"]) == 2
         out, err = capsys.readouterr()
-    told = json.loads(out)
-    assert told["exit_code"] == 2
-    assert [f"sand: {line}" for line in told["error"]] == err.splitlines()
-    assert sorted(place.rglob("*")) == before
+    message = json.loads(out)
+    assert message["exit_code"] == 2
+    assert [f"sand: {line}" for line in message["error"]] == err.splitlines()
+    assert sorted(workdir.rglob("*")) == before
 
 
-def test_every_mistake_of_a_case_is_a_line(place, capsys):
-    """Two mistakes, two lines, each with the name of the file; no folder is made."""
-    (place / "small.toml").write_text(CASE.replace("10 nm", "10 ns").replace("seed", "sead"))
+def test_every_mistake_of_a_case_is_a_line(workdir, capsys):
+    """Two errors, two lines, each with the name of the file; no folder is created."""
+    (workdir / "small.toml").write_text(CASE.replace("10 nm", "10 ns").replace("seed", "sead"))
     assert main(["run", "small.toml"]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
     assert all(line.startswith("sand: small.toml: ") for line in lines)
-    assert not (place / "small").exists()
+    assert not (workdir / "small").exists()
 
 
-def test_what_shows_only_together_names_the_file_too(place, capsys):
-    """A box too small for its grains is found when the grains are placed; the line names the case all the same."""
-    (place / "small.toml").write_text(CASE.replace("400 nm", "30 nm"))
+def test_errors_of_combined_settings_name_the_file(workdir, capsys):
+    """A box too small for its grains is found when grains are placed; the line names the case."""
+    (workdir / "small.toml").write_text(CASE.replace("400 nm", "30 nm"))
     for command in ("run", "info"):
         assert main([command, "small.toml"]) == 2
         assert capsys.readouterr().err.startswith("sand: small.toml: a box of 30 nm is too small")
-    assert not (place / "small").exists()
+    assert not (workdir / "small").exists()
 
 
 @pytest.mark.compiled("dipoles")
 def test_a_used_folder_is_refused_and_untouched(done, capsys):
-    """An earlier run is never replaced unasked; the line says how to go on with it."""
+    """An earlier run is not replaced without --overwrite; the line says how to continue it."""
     before = {p: (p.stat().st_mtime_ns, p.read_bytes()) for p in done.iterdir()}
     assert main(["run", "small.toml"]) == 2
     err = capsys.readouterr().err
@@ -222,7 +222,7 @@ def test_a_used_folder_is_refused_and_untouched(done, capsys):
 
 @pytest.mark.compiled("dipoles")
 def test_overwrite_replaces_the_run_and_nothing_else(done, capsys):
-    """--overwrite removes the files of the earlier run, keeps what others put there."""
+    """--overwrite removes the files of the earlier run and keeps other files."""
     (done / "thoughts.txt").write_text("mine")
     assert main(["run", "small.toml", "--overwrite", "--seed", "9", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["seed"] == 9
@@ -240,16 +240,16 @@ def test_overwrite_never_replaces_the_case_it_reads(done, capsys):
 
 @pytest.mark.skipif(IS_ROOT, reason="root may write everywhere")
 @keeps_modes
-def test_a_folder_without_permission(place, capsys):
-    """Said in one line before anything is computed."""
-    (place / "locked").mkdir(mode=0o500)
+def test_a_folder_without_permission(workdir, capsys):
+    """One line before anything is computed."""
+    (workdir / "locked").mkdir(mode=0o500)
     assert main(["run", "small.toml", "--out", "locked/run"]) == 2
     assert "no permission in" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_full_disk_is_a_line(place, capsys, monkeypatch):
-    """Files that cannot be written: exit 2, one line, no traceback."""
+def test_a_full_disk_gives_one_line(workdir, capsys, monkeypatch):
+    """Files that cannot be written: exit code 2, one line, no traceback."""
 
     def full(*_):
         raise FilesFailed("cannot write small/summary.json: No space left on device")
@@ -259,11 +259,11 @@ def test_a_full_disk_is_a_line(place, capsys, monkeypatch):
     assert "sand: cannot write small/summary.json: No space left" in capsys.readouterr().err
 
 
-# --- faults and interruptions -------------------------------------------------------------------------
+# --- internal errors and interruptions --------------------------------------------------------------------
 
 
-def test_a_fault_of_ours_is_one_line_unless_debug(place, capsys, monkeypatch):
-    """Exit 1 and how to get more; --debug, before or after the command, lets the traceback out."""
+def test_an_internal_error_is_one_line_unless_debug(workdir, capsys, monkeypatch):
+    """Exit code 1 and how to see more; --debug, before or after the command, shows the traceback."""
 
     def broken(_path):
         raise ZeroDivisionError("float\ndivision")
@@ -278,8 +278,8 @@ def test_a_fault_of_ours_is_one_line_unless_debug(place, capsys, monkeypatch):
             main(words)
 
 
-def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
-    """Ctrl-C while the case is being read: 130, one line."""
+def test_interrupted_before_anything_ran(workdir, capsys, monkeypatch):
+    """Ctrl-C while the case is read: 130, one line."""
 
     def slow(_path):
         raise KeyboardInterrupt
@@ -291,8 +291,8 @@ def test_interrupted_before_anything_ran(place, capsys, monkeypatch):
 
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
-    """Ctrl-C or SIGTERM while kernels are compiled: 130, and the same command works afterwards."""
+def test_interrupted_before_the_first_step(workdir, capsys, monkeypatch, number):
+    """Ctrl-C or SIGTERM during compilation: 130, and the same command works afterwards."""
 
     def slow(_self, _until=None, **_):
         signal.raise_signal(number)
@@ -306,8 +306,8 @@ def test_interrupted_before_the_first_step(place, capsys, monkeypatch, number):
 
 
 @pytest.mark.compiled("dipoles")
-def test_an_interrupt_lost_in_the_compiler_is_found_again(place, capsys, monkeypatch):
-    """Ctrl-C while the compiler calls back into Python: the exception gets lost there, the run ends all the same."""
+def test_an_interrupt_swallowed_by_the_compiler_ends_the_run(workdir, capsys, monkeypatch):
+    """Ctrl-C in a callback of the compiler: the exception is lost there; the run ends all the same."""
     real = Simulation.run
 
     def swallow(self, *words, **options):
@@ -319,10 +319,10 @@ def test_an_interrupt_lost_in_the_compiler_is_found_again(place, capsys, monkeyp
     monkeypatch.setattr(Simulation, "run", swallow)
     assert main(["run", "small.toml", "--quiet"]) == 130
     assert "interrupted before the first step" in capsys.readouterr().err
-    assert not list((place / "small").glob("checkpoint-*"))
+    assert not list((workdir / "small").glob("checkpoint-*"))
 
 
-def test_a_reader_that_goes_away_is_no_fault(place):
+def test_a_closed_pipe_is_no_error(workdir):
     """`sand info … | head -0`: nothing on stderr."""
     with subprocess.Popen([*SAND, "cite"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as started:
         started.stdout.close()
@@ -331,15 +331,15 @@ def test_a_reader_that_goes_away_is_no_fault(place):
 
 
 @pytest.mark.compiled("dipoles")
-def test_stopped_by_physics(place, capsys):
-    """A fixed step that is much too long: exit 3, the sentence, the grains, a checkpoint that can be read."""
-    (place / "small.toml").write_text(CASE + '[stepping]\nstep = "10 ns"\n')
+def test_a_run_stopped_by_an_outcome(workdir, capsys):
+    """A fixed step that is too long: exit code 3, one sentence, the grains, a readable checkpoint."""
+    (workdir / "small.toml").write_text(CASE + '[stepping]\nstep = "10 ns"\n')
     assert main(["run", "small.toml"]) == 3
     err = capsys.readouterr().err
     assert "stopped by physics at t = " in err
     assert "step is too long (grains " in err
     path = err.strip().rsplit(" ", 1)[1]
-    assert read_checkpoint(place / path)[1]["until"] == 2e-8
+    assert read_checkpoint(workdir / path)[1]["until"] == 2e-8
     assert main(["run", "small.toml", "--json", "--overwrite"]) == 3
     summary = json.loads(capsys.readouterr().out)
     assert summary["outcome"] == "too_fast"
@@ -359,13 +359,13 @@ def same_state(one, other):
 @stops_others
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.validate)])
-def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number):
-    """Exit 130 with the time and what to type; then `sand resume` ends in the same bits as one run without a stop."""
+def test_interrupted_and_resumed_run_is_bit_for_bit(workdir, capsys, number):
+    """Exit code 130 with time and advice; `sand resume` gives the bits of an uninterrupted run."""
     words = [*SAND, "run", "small.toml", "--until", "1 s"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(words, **pipes) as started:
         for _ in range(1200):
-            if started.poll() is not None or list((place / "small").glob("checkpoint-*.npz")):
+            if started.poll() is not None or list((workdir / "small").glob("checkpoint-*.npz")):
                 break
             time.sleep(0.05)
         time.sleep(0.3)
@@ -378,7 +378,7 @@ def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number
     last = err.splitlines()[-1]
     assert last.startswith("sand: interrupted at t = ")
     assert last.endswith("resume with: sand resume small")
-    meta = newest_checkpoint(place / "small")[1]
+    meta = newest_checkpoint(workdir / "small")[1]
     assert meta["steps"] > 0
     assert main(["info", "small"]) == 0
     assert "sand resume small" in capsys.readouterr().out
@@ -386,7 +386,7 @@ def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number
     assert main(["resume", "small", "--until", end, "--quiet"]) == 0
     assert "instead of 1 s" in capsys.readouterr().err
     assert main(["run", "small.toml", "--until", end, "--out", "whole", "--quiet"]) == 0
-    assert same_state(place / "small", place / "whole")
+    assert same_state(workdir / "small", workdir / "whole")
 
 
 # --- resume and info -------------------------------------------------------------------------------------
@@ -394,7 +394,7 @@ def test_interrupted_and_resumed_is_as_if_nothing_had_been(place, capsys, number
 
 @pytest.mark.compiled("dipoles")
 def test_resume_of_a_finished_run(done, capsys):
-    """Nothing to do is said, with exit 0 and no file changed; a later end goes on; an earlier one is a mistake."""
+    """Nothing to do: exit code 0, no file changed; a later end continues; an earlier end is refused."""
     before = (done / "summary.json").read_bytes()
     assert main(["resume", "small"]) == 0
     assert "has reached its planned end" in capsys.readouterr().out
@@ -409,7 +409,7 @@ def test_resume_of_a_finished_run(done, capsys):
 
 @pytest.mark.compiled("dipoles")
 def test_resume_after_damage(done, capsys):
-    """A damaged checkpoint is passed over; with none left that is whole, each is named."""
+    """A damaged checkpoint is skipped; if none is intact, each is named."""
     newest = max(done.glob("checkpoint-*.npz"))
     newest.write_bytes(newest.read_bytes()[:100])
     assert main(["resume", "small", "--json"]) == 0
@@ -433,7 +433,7 @@ def test_resume_after_damage(done, capsys):
     ],
 )
 def test_info_knows_every_file_of_a_run(done, capsys, name, kind, part):
-    """For people a screen, for machines one object that says which kind it is."""
+    """Text for users; with --json one object that names the kind of file."""
     assert main(["info", str(done / name)]) == 0
     assert part in capsys.readouterr().out
     assert main(["info", str(done / name), "--json"]) == 0
@@ -442,7 +442,7 @@ def test_info_knows_every_file_of_a_run(done, capsys, name, kind, part):
 
 @pytest.mark.compiled("dipoles")
 def test_info_of_a_run_that_was_killed(done, capsys):
-    """Without a summary the ledger says how far it came."""
+    """Without a summary the ledger gives the last time."""
     (done / "summary.json").unlink()
     assert main(["info", "small"]) == 0
     out = capsys.readouterr().out
@@ -453,10 +453,10 @@ def test_info_of_a_run_that_was_killed(done, capsys):
 
 @pytest.mark.parametrize("name", ["summary.json", "ledger.csv", "trajectory.gsd", "checkpoint-000000000000000.npz"])
 @pytest.mark.parametrize("content", [b"", b"{", b"{}", b"a,b\n1,2\n", b"\xff\x00"])
-def test_info_of_broken_files(place, capsys, name, content):
-    """A file that is not what its name says: one line with its name, exit 2; the same for a folder that holds it."""
-    (place / "case.toml").write_text(CASE)
-    (place / name).write_bytes(content)
+def test_info_of_broken_files(workdir, capsys, name, content):
+    """A file with other content than its name says: one line with its name, exit code 2; the same for its folder."""
+    (workdir / "case.toml").write_text(CASE)
+    (workdir / name).write_bytes(content)
     assert main(["info", name]) == 2
     err = capsys.readouterr().err
     assert name in err
@@ -467,7 +467,7 @@ def test_info_of_broken_files(place, capsys, name, content):
 
 
 def test_cite_names_version_and_paper(capsys):
-    """For people and for machines."""
+    """As text and as JSON."""
     assert main(["cite"]) == 0
     assert "Dominik C., Nübold H. (2002)" in capsys.readouterr().out
     assert main(["cite", "--json"]) == 0
@@ -478,7 +478,7 @@ def test_cite_names_version_and_paper(capsys):
 
 
 class Terminal(io.StringIO):
-    """Takes what is drawn."""
+    """Records what is drawn."""
 
     def isatty(self):
         return True
@@ -486,8 +486,8 @@ class Terminal(io.StringIO):
 
 @pytest.mark.compiled("dipoles")
 @pytest.mark.parametrize("by", ["until", "steps"])
-def test_progress_shows_time_and_numbers(place, monkeypatch, by):
-    """Physical time, rate, clusters, S and drift, whether the run goes to a time or to a number of steps."""
+def test_progress_shows_time_and_numbers(workdir, monkeypatch, by):
+    """Physical time, rate, clusters, S and drift, for an end time or a number of steps."""
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
     simulation = simulation_of(read_case("small.toml"), None)
     ends = {"until": [2e-8, 4e-8], "steps": [400, 400]}[by]
@@ -506,7 +506,7 @@ def test_progress_shows_time_and_numbers(place, monkeypatch, by):
 
 @pytest.mark.compiled("dipoles")
 def test_progress_of_a_resumed_run_has_numbers_from_the_start(done, monkeypatch):
-    """Between two frames the last row of the ledger serves."""
+    """Until the first frame the last row of the ledger is shown."""
     from sand.config.build import resume
 
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())

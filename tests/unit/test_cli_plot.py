@@ -1,4 +1,4 @@
-"""`sand plot`: files made, refusals that leave nothing behind."""
+"""`sand plot`: files written, and refusals that leave nothing behind."""
 
 import json
 
@@ -10,25 +10,25 @@ from sand.plotting.plots import HISTORY
 
 
 @pytest.mark.compiled("fields")
-def test_everything_by_default(in_a_field, tmp_path, capsys):
-    """Five figures over time and a still picture, in DIR/plots, and what was written is told."""
-    assert main(["plot", str(in_a_field), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)["files"]
-    assert told == [str(in_a_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]
-    assert Image.open(in_a_field / "plots" / "still.png").size == (1600, 1000)
-    assert main(["plot", str(in_a_field)]) == 2
+def test_default_figures(run_in_field, tmp_path, capsys):
+    """Five figures over time and a still picture in DIR/plots; the written files are listed."""
+    assert main(["plot", str(run_in_field), "--json"]) == 0
+    message = json.loads(capsys.readouterr().out)["files"]
+    assert message == [str(run_in_field / "plots" / f"{name}.png") for name in (*HISTORY, "still")]
+    assert Image.open(run_in_field / "plots" / "still.png").size == (1600, 1000)
+    assert main(["plot", str(run_in_field)]) == 2
     assert capsys.readouterr().err.count("exists; give another --out, or --overwrite") == 1
-    assert main(["plot", str(in_a_field), "--overwrite", "--what", "size"]) == 0
-    assert main(["info", str(in_a_field)]) == 0  # a run's folder is one still
+    assert main(["plot", str(run_in_field), "--overwrite", "--what", "size"]) == 0
+    assert main(["info", str(run_in_field)]) == 0  # the folder is still recognised as a run
 
 
 @pytest.mark.compiled("fields")
-def test_chosen_ones_as_other_formats(in_a_field, tmp_path, capsys):
-    """Histograms of quantities, a still of a frame in a size of one's own; PDF and SVG are what they are called."""
+def test_chosen_figures_and_formats(run_in_field, tmp_path, capsys):
+    """Histograms of quantities, a still of a frame with a given size; PDF and SVG."""
     out = str(tmp_path / "there")
     words = ["--what", "speed,still", "--size", "300x200", "--frame", "0", "--bonds", "load", "--colour", "size"]
     for form, start in (("pdf", b"%PDF"), ("svg", b"<?xml"), ("png", b"\x89PNG")):
-        assert main(["plot", str(in_a_field), "--out", out, "--format", form, *words, "--dark", "--transparent"]) == 0
+        assert main(["plot", str(run_in_field), "--out", out, "--format", form, *words, "--dark", "--transparent"]) == 0
         for name in ("speed", "still"):
             assert (tmp_path / "there" / f"{name}.{form}").read_bytes().startswith(start)
     assert Image.open(tmp_path / "there" / "still.png").size == (300, 200)
@@ -36,10 +36,10 @@ def test_chosen_ones_as_other_formats(in_a_field, tmp_path, capsys):
 
 
 @pytest.mark.compiled("fields")
-def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
-    """A .gsd has no ledger: a still picture by default, beside it."""
+def test_a_trajectory_alone(run_in_field, tmp_path, capsys):
+    """A .gsd file has no ledger: a still picture by default, beside it."""
     alone = tmp_path / "alone.gsd"
-    alone.write_bytes((in_a_field / "trajectory.gsd").read_bytes())
+    alone.write_bytes((run_in_field / "trajectory.gsd").read_bytes())
     assert main(["plot", str(alone), "--size", "300x200"]) == 0
     assert [p.name for p in (tmp_path / "alone-plots").iterdir()] == ["still.png"]
     assert main(["plot", str(alone), "--what", "size"]) == 2
@@ -48,7 +48,7 @@ def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["--what", "sise,still"], "'sise' is unknown; did you mean 'size'?"),
         (["--what", ""], "'' is unknown"),
@@ -63,31 +63,31 @@ def test_a_trajectory_alone(in_a_field, tmp_path, capsys):
         (["--out", "/nowhere/at/all"], "cannot be a folder"),
     ],
 )
-def test_mistakes_are_told_and_nothing_is_written(in_a_field, tmp_path, capsys, words, told):
+def test_wrong_arguments_write_nothing(run_in_field, tmp_path, capsys, words, message):
     """One line, exit code 2, no folder."""
     out = [] if "--out" in words else ["--out", str(tmp_path / "there")]
-    assert main(["plot", str(in_a_field), *out, *words]) == 2
+    assert main(["plot", str(run_in_field), *out, *words]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and told in lines[0]
+    assert len(lines) == 1 and message in lines[0]
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.compiled("fields")
-def test_several_mistakes_have_a_line_each(in_a_field, tmp_path, capsys):
-    """All at once, not one after the other."""
-    assert main(["plot", str(in_a_field), "--what", "sise", "--view", "botom", "--size", "1x1", "--colour", "x"]) == 2
+def test_several_mistakes_have_a_line_each(run_in_field, tmp_path, capsys):
+    """All errors at once."""
+    assert main(["plot", str(run_in_field), "--what", "sise", "--view", "botom", "--size", "1x1", "--colour", "x"]) == 2
     assert len(capsys.readouterr().err.strip().splitlines()) == 4
 
 
 @pytest.mark.compiled("fields")
-def test_what_is_not_there(in_a_field, tmp_path, capsys):
-    """No run, no ledger, a ledger without rows, no frame: told, and nothing is written."""
+def test_missing_run_ledger_or_frame(run_in_field, tmp_path, capsys):
+    """No run, no ledger, a ledger without rows, no frame: one line, and nothing is written."""
     assert main(["plot", str(tmp_path)]) == 2
     assert "is not the folder of a run" in capsys.readouterr().err
-    (tmp_path / "trajectory.gsd").write_bytes((in_a_field / "trajectory.gsd").read_bytes())
+    (tmp_path / "trajectory.gsd").write_bytes((run_in_field / "trajectory.gsd").read_bytes())
     assert main(["plot", str(tmp_path), "--what", "size"]) == 2
     assert "there is no file" in capsys.readouterr().err
-    (tmp_path / "ledger.csv").write_text((in_a_field / "ledger.csv").read_text().split("\n")[0] + "\n")
+    (tmp_path / "ledger.csv").write_text((run_in_field / "ledger.csv").read_text().split("\n")[0] + "\n")
     assert main(["plot", str(tmp_path), "--what", "size"]) == 2
     assert "the ledger has no row yet" in capsys.readouterr().err
     (tmp_path / "ledger.csv").write_text("step,time\n0,0.0\n")

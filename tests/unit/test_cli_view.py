@@ -1,4 +1,4 @@
-"""`sand view`: files and addresses it gives, runs it waits for, mistakes it refuses."""
+"""`sand view`: HTML files, addresses, waiting for a run, wrong arguments."""
 
 import json
 import re
@@ -13,40 +13,40 @@ from sand.cli.main import main
 from sand.viewer import browser
 
 from .pages import blocks
-from .reels import reel
+from .synthetic_trajectories import write_trajectory
 
 pytestmark = pytest.mark.usefixtures("bundle")
 
 
 @pytest.mark.compiled("fields")
-def test_the_command_writes_a_file(looked_at, tmp_path, capsys):
-    """Not over what is there, without leave; says how large it is; slices and thinning go in."""
+def test_the_command_writes_a_file(finished_run, tmp_path, capsys):
+    """Existing files are kept without --overwrite; prints the size; slices and thinning apply."""
     target = tmp_path / "out.html"
-    words = ["view", str(looked_at[0]), "--html", str(target)]
+    words = ["view", str(finished_run[0]), "--html", str(target)]
     assert main([*words, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told == {"file": str(target), "bytes": target.stat().st_size}
+    output = json.loads(capsys.readouterr().out)
+    assert output == {"file": str(target), "bytes": target.stat().st_size}
     assert main(words) == 2
     assert "--overwrite" in capsys.readouterr().err
     assert main([*words, "--overwrite", "--every", "2", "--frames", "1:"]) == 0
     assert "MB" in capsys.readouterr().out
     manifest, _, packets = blocks(target)
-    assert len(packets) == 3 and manifest["steps"] == [sand.open(looked_at[0]).frames[k].step for k in (1, 3, 5)]
+    assert len(packets) == 3 and manifest["steps"] == [sand.open(finished_run[0]).frames[k].step for k in (1, 3, 5)]
     assert "one frame of 2" in manifest["note"] and manifest["field"]["directions"]
 
 
 @pytest.mark.compiled("fields")
-def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
-    """Above 100 MB it says what to do."""
+def test_a_large_file_gives_a_warning(finished_run, tmp_path, capsys, monkeypatch):
+    """Above 100 MB the line advises what to do."""
     monkeypatch.setattr(view_command, "LARGE", 1e3)
-    assert main(["view", str(looked_at[0]), "--html", str(tmp_path / "a.html"), "--quiet"]) == 0
-    told = capsys.readouterr()
-    assert "--every" in told.err and told.out == ""
+    assert main(["view", str(finished_run[0]), "--html", str(tmp_path / "a.html"), "--quiet"]) == 0
+    output = capsys.readouterr()
+    assert "--every" in output.err and output.out == ""
 
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["/nowhere/at/all"], "no such folder"),
         (["RUN", "--html", "/nowhere/at/all.html"], "no folder"),
@@ -61,25 +61,25 @@ def test_a_large_file_is_warned_of(looked_at, tmp_path, capsys, monkeypatch):
         ([], "DIR"),
     ],
 )
-def test_mistakes(looked_at, capsys, words, said):
-    """One line, exit 2."""
-    assert main(["view", *(str(looked_at[0]) if word == "RUN" else word for word in words)]) == 2
+def test_wrong_arguments_are_refused(finished_run, capsys, words, message):
+    """One line, exit code 2."""
+    assert main(["view", *(str(finished_run[0]) if word == "RUN" else word for word in words)]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and said in lines[0]
+    assert len(lines) == 1 and message in lines[0]
 
 
 @pytest.mark.compiled("fields")
-def test_without_the_page(looked_at, bundle, capsys):
-    """An installation that lacks the bundle says so, in one line."""
+def test_without_the_page(finished_run, bundle, capsys):
+    """An installation without the bundle says so in one line."""
     (bundle / "grainview.js").unlink()
-    assert main(["view", str(looked_at[0])]) == 2
+    assert main(["view", str(finished_run[0])]) == 2
     assert "not part of this installation" in capsys.readouterr().err
 
 
 @pytest.mark.compiled("fields")
 @pytest.mark.parametrize("form", [[], ["--json"], ["--quiet"]])
-def test_the_command_serves(looked_at, capsys, monkeypatch, form):
-    """It prints the address, answers there while it waits, and Ctrl-C ends it with 0."""
+def test_the_command_serves(finished_run, capsys, monkeypatch, form):
+    """It prints the address, answers there while waiting, and Ctrl-C ends it with exit code 0."""
     got = {}
 
     def wait():
@@ -94,25 +94,25 @@ def test_the_command_serves(looked_at, capsys, monkeypatch, form):
     ended = []
     monkeypatch.setattr(browser, "remove_redirects", lambda: ended.append(True))
     before = threading.active_count()
-    assert main(["view", str(looked_at[0]), *form]) == 0
+    assert main(["view", str(finished_run[0]), *form]) == 0
     assert got["manifest"]["grains"] == 6 and ended
-    told = got["err"] + capsys.readouterr().err
-    assert ("ssh -L" in told and "ended" in told) if not form else told == ""
+    output = got["err"] + capsys.readouterr().err
+    assert ("ssh -L" in output and "ended" in output) if not form else output == ""
     assert threading.active_count() <= before + 2
     if form == ["--json"]:
         assert list(json.loads(got["out"])) == ["url"]
 
 
 @pytest.mark.compiled("fields")
-def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
-    """An empty folder, as while a run is compiled; then a case, then a trajectory: the page has its frames."""
+def test_waiting_for_the_first_frame(finished_run, tmp_path, capsys):
+    """An empty folder, as during compilation; then a case, then a trajectory: the page has its frames."""
     run = tmp_path / "run"
     run.mkdir()
 
     def begin():
-        (run / "case.toml").write_bytes((looked_at[0] / "case.toml").read_bytes())
-        # both frames at once: a page may be made after the first as well
-        reel(tmp_path / "made.gsd", [[(0, 1)], []], 3).rename(run / "trajectory.gsd")
+        (run / "case.toml").write_bytes((finished_run[0] / "case.toml").read_bytes())
+        # both frames at once, because a page may be written after the first frame
+        write_trajectory(tmp_path / "made.gsd", [[(0, 1)], []], 3).rename(run / "trajectory.gsd")
 
     later = threading.Timer(1.0, begin)
     later.start()
@@ -123,8 +123,8 @@ def test_a_run_that_has_no_frame_yet_is_waited_for(looked_at, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_run_that_never_begins(tmp_path, capsys, monkeypatch):
-    """After the time for waiting: one line that says what to look for; not for a run that has ended."""
+def test_waiting_ends_without_a_run(tmp_path, capsys, monkeypatch):
+    """After the time limit: one line with what to look for; a run that has ended is not waited for."""
     monkeypatch.setattr(view_command, "WAIT", 0.5)
     (tmp_path / "case.toml").write_text("")
     assert main(["view", str(tmp_path), "--quiet"]) == 2

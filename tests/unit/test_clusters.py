@@ -9,8 +9,8 @@ from sand.box import Box
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(("n", "contacts"), [(200, 90), (3, 2), (40, 12), (40, 35), (110, FEW - 110), (110, FEW - 109)])
-def test_labels_are_those_of_a_flood(seed, n, contacts):
-    """Each grain floods its neighbours; clusters are numbered by their lowest grain.  Few are followed one by one."""
+def test_labels_against_flood_fill(seed, n, contacts):
+    """Flood fill from each grain; clusters are labelled by their lowest grain."""
     rng = np.random.default_rng(seed)
     pairs = rng.integers(0, n, size=(contacts, 2))
     labels, number = np.full(n, -1), 0
@@ -28,12 +28,12 @@ def test_labels_are_those_of_a_flood(seed, n, contacts):
 
 
 def test_two_contacts_are_two_rows():
-    """Exactly two contacts: (2, 2) rows are contacts, never columns."""
+    """Exactly two contacts: the (2, 2) array is rows of contacts, never columns."""
     assert cluster_labels(4, np.array([[0, 1], [2, 3]])).tolist() == [0, 0, 1, 1]
 
 
 def test_mean_cluster_size():
-    """Eq. 17 by hand: sizes 3, 1, 1 give (9+1+1)/5; nobody touching gives 1."""
+    """Eq. 17 by hand: sizes 3, 1, 1 give (9+1+1)/5; without contacts 1."""
     labels = cluster_labels(5, np.array([[0, 1], [1, 2]]))
     assert cluster_sizes(labels).tolist() == [3, 1, 1]
     assert mean_cluster_size(labels) == pytest.approx(11 / 5, rel=1e-6, abs=0.0)
@@ -41,7 +41,7 @@ def test_mean_cluster_size():
 
 
 def test_clusters_are_made_whole():
-    """A chain across a face comes out straight."""
+    """A chain across a periodic face becomes straight."""
     box = Box.periodic(10.0)
     chain = np.array([[3.5, 0, 0], [4.5, 0, 0], [5.5, 0, 0], [6.5, 0, 0]])
     cut = box.wrap(chain)

@@ -1,4 +1,4 @@
-"""Collisions: outcomes that are known, many seeds, case files and the command."""
+"""Collisions: known outcomes, many seeds, case files and the command."""
 
 import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -25,7 +25,7 @@ def two(seed):
 
 @pytest.mark.compiled("contacts")
 def test_two_grains_stick_or_bounce():
-    """Below v_s one body is left; above it two that part at √(v² − v_s²) (1 %), and E_cycle is lost."""
+    """Below v_s one body remains; above it two that separate at √(v² − v_s²) (1 %), and E_cycle is dissipated."""
     numbers = contact("silica", R)
     slow, _ = collide(*two(0), speed=0.9 * numbers.sticking_speed)
     assert (slow.outcome, slow.fragments, slow.largest_remnant) == ("stick", (2,), 1.0)
@@ -40,7 +40,7 @@ def test_two_grains_stick_or_bounce():
 
 @pytest.mark.compiled("contacts")
 def test_a_fast_grain_breaks_a_chain():
-    """100 m/s against 7 grains of 0.2 µm: more than two pieces, every grain accounted for."""
+    """100 m/s against 7 grains of 0.2 µm: more than two fragments, every grain accounted for."""
     result, sim = collide(
         chain(7, radius=R, material="silica"), grain(radius=R, material="silica"), speed=100.0, along="y"
     )
@@ -54,20 +54,20 @@ def test_a_fast_grain_breaks_a_chain():
 
 @pytest.mark.compiled("contacts")
 def test_a_miss():
-    """An offset beyond the reach: two bodies as before, nothing lost."""
+    """An impact parameter beyond the sum of radii: two bodies, no loss."""
     result, _ = collide(*two(0), speed=1.0, impact_parameter="1.1 b")
     assert (result.outcome, result.made, result.rebound) == ("miss", 0, pytest.approx(1.0, rel=1e-6, abs=0.0))
     assert sum(result.lost.values()) == 0.0
 
 
 def aggregates(seed):
-    """Two small ones for a seed."""
+    """Two small aggregates for a seed."""
     return (pca(8, radius=R, material="silica", seed=2 * seed), pca(8, radius=R, material="silica", seed=2 * seed + 1))
 
 
 @pytest.mark.compiled("contacts", "small")
 def test_any_executor_gives_the_same_numbers():
-    """Here, in threads, in processes: the same results in the order of the seeds."""
+    """In this process, in threads and in processes: the same results in the order of the seeds."""
     here = collide_many(aggregates, [3, 1, 2], speed=2.0)
     assert [r.seed for r in here] == [3, 1, 2]
     assert here[0] != here[1]
@@ -92,7 +92,7 @@ seeds = [1, 2]
 
 @pytest.mark.compiled("contacts", "small")
 def test_a_case_in_processes(tmp_path):
-    """Workers read the case themselves and give what the parent would."""
+    """Worker processes read the case themselves and give the results of the parent."""
     path = tmp_path / "hit.toml"
     path.write_text(CASE)
     read_collision(path)
@@ -105,21 +105,21 @@ def test_a_case_in_processes(tmp_path):
 
 @pytest.mark.compiled("contacts", "small")
 def test_the_command(tmp_path, capsys, monkeypatch):
-    """Many seeds: collision.json and a figure; one seed: a whole run's folder; an old folder is refused."""
+    """Many seeds: collision.json and a figure; one seed: a run folder; an existing folder is refused."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hit.toml").write_text(CASE)
     assert main(["collide", "hit.toml", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert len(told["collisions"]) == 2
-    assert sum(told["counts"].values()) == 2
+    message = json.loads(capsys.readouterr().out)
+    assert len(message["collisions"]) == 2
+    assert sum(message["counts"].values()) == 2
     assert (tmp_path / "hit" / "figure.png").stat().st_size > 0
-    assert json.loads((tmp_path / "hit" / "collision.json").read_text()) == told
+    assert json.loads((tmp_path / "hit" / "collision.json").read_text()) == message
     assert main(["collide", "hit.toml"]) == 2
     assert "not empty" in capsys.readouterr().err
     assert main(["collide", "hit.toml", "--seeds", "2", "--out", "one"]) == 0
     assert "seed 2" in capsys.readouterr().out
     assert (tmp_path / "one" / "trajectory.gsd").exists()
-    assert json.loads((tmp_path / "one" / "collision.json").read_text())["collisions"][0] == told["collisions"][1]
+    assert json.loads((tmp_path / "one" / "collision.json").read_text())["collisions"][0] == message["collisions"][1]
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     ],
 )
 def test_bad_cases(tmp_path, old, new, message):
-    """One line each, with file and place."""
+    """One line each, with file and key."""
     path = tmp_path / "bad.toml"
     assert old in CASE
     path.write_text(CASE.replace(old, new))
@@ -161,7 +161,7 @@ def test_bad_seeds(tmp_path, capsys, seeds):
 
 @pytest.mark.compiled("contacts", "small")
 def test_bodies_from_files(tmp_path):
-    """Plain columns in nanometres, and the last frame of a trajectory, collide like built bodies."""
+    """Text columns in nanometres and the last frame of a trajectory collide like built bodies."""
     built = pca(8, radius=R, material="silica", seed=3)
     lines = "\n".join(" ".join(f"{1e9 * x:.17g}" for x in row) for row in built.position)
     (tmp_path / "body.txt").write_text(f"# x y z in nm\n\n{lines}\n")

@@ -1,4 +1,4 @@
-"""The table of contacts against formulas evaluated one by one."""
+"""The table of contacts against formulas evaluated contact by contact."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from sand.simulation.contact_table import COLUMNS
 from ..physics.setups import random_aggregate
 
 
-def busy(**options):
-    """An aggregate in motion, contacts near and at their limits."""
+def moving_aggregate(**options):
+    """An aggregate in motion, with contacts near and at their limits."""
     rng = np.random.default_rng(5)
     grains = random_aggregate(15, 6, radii=(5e-8, 1e-7), velocity=0.5 * rng.normal(size=(15, 3)))
     sim = sand.Simulation(grains, [sand.Contact(**options)])
@@ -23,9 +23,9 @@ def busy(**options):
 
 @pytest.mark.compiled("contacts")
 @pytest.mark.parametrize("stiffness", ["frozen", "dt97"])
-def test_every_column_row_by_row(stiffness):
-    """Displacements, shares, loads and energies of each contact from its pose; forces add up to the grains'."""
-    sim = busy(stiffness=stiffness)
+def test_every_column_against_formulas(stiffness):
+    """Displacements, fractions of limits, loads and energies from each pose; forces add up to the grains'."""
+    sim = moving_aggregate(stiffness=stiffness)
     table, w = sim.contacts, sim.state
     assert set(table) == {name for name, _, _ in COLUMNS}
     force = np.zeros((15, 3))
@@ -67,9 +67,9 @@ def test_every_column_row_by_row(stiffness):
 
 @pytest.mark.compiled("contacts")
 def test_as_a_data_frame_and_a_dataset():
-    """One row per contact, vectors split into components, units where the format has room for them."""
+    """One row per contact, vectors split into components, units where the format supports them."""
     pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
-    table = busy().contacts
+    table = moving_aggregate().contacts
     frame, dataset = table.to_pandas(), table.to_xarray()
     assert isinstance(frame, pandas.DataFrame)
     assert isinstance(dataset, xarray.Dataset)

@@ -1,4 +1,4 @@
-"""Files of a run that were changed or cut: said in a line, kept beside, and no other number is ever read from them."""
+"""Damaged files of a run: reported in one line, kept under another name, and no wrong number is ever read."""
 
 import json
 import random
@@ -18,13 +18,13 @@ from sand.io.live_trajectory import LiveTrajectory
 from sand.io.trajectory import Frames, TrajectoryWriter, read_frames
 from sand.viewer.dataset import run_dataset
 
-from .reels import grains_of, reel
+from .synthetic_trajectories import grains_of, write_trajectory
 
 COLUMNS = ("step", "time", "translation", "normal", "lost_forming", "total", "momentum_x", "contacts")
 
 
 def rows_of(count):
-    """Rows of a ledger like those of a run."""
+    """Synthetic ledger rows."""
     rng = np.random.default_rng(1)
     rows = []
     for k in range(count):
@@ -37,7 +37,7 @@ def rows_of(count):
 
 
 def ended_run(folder, count=40):
-    """ledger.csv and summary.json of a run that has ended."""
+    """ledger.csv and summary.json of a finished run."""
     folder.mkdir(exist_ok=True)
     file = LedgerFile(folder / files.LEDGER, COLUMNS, rows_of(count)[:3])
     for row in rows_of(count)[3:]:
@@ -48,7 +48,7 @@ def ended_run(folder, count=40):
 
 
 def read_with_notes(read, path):
-    """What is read, and how many warnings came with it; None in place of what is refused in one line."""
+    """What is read, and the number of warnings; None if it is refused in one line."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -61,8 +61,8 @@ def read_with_notes(read, path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "read"), [(files.LEDGER, read_ledger), (files.SUMMARY, files.read_json)])
-def test_changed_bytes_give_no_other_number(tmp_path, name, read):
-    """Each of 800 changed bytes: refused, or a note, or the same numbers."""
+def test_changed_bytes_never_give_other_numbers(tmp_path, name, read):
+    """Each of 800 changed bytes: refused, a warning, or the same numbers."""
     ended_run(tmp_path)
     path, rng = tmp_path / name, random.Random(3)
     good, whole = path.read_bytes(), read(path)
@@ -81,15 +81,15 @@ def test_changed_bytes_give_no_other_number(tmp_path, name, read):
     assert refused > 600
 
 
-def test_a_run_that_goes_on_is_checked_by_its_rows(tmp_path):
-    """Without a summary a digit of an energy, a step or a column more is noticed; a torn last row is no fault."""
+def test_the_ledger_of_a_running_simulation_is_checked_by_rows(tmp_path):
+    """Without a summary a changed digit or an extra column is noticed; an incomplete last row is no error."""
     ended_run(tmp_path)
     (tmp_path / files.SUMMARY).unlink()
     path = tmp_path / files.LEDGER
     good = path.read_text()
     lines = good.splitlines()
     parts = lines[5].split(",")
-    for changed, said in (
+    for changed, message in (
         (lambda: [*parts[:2], str(2 * float(parts[2])), *parts[3:]], "total = .*columns add up to"),
         (lambda: ["60", *parts[1:]], "steps and times must grow"),
         (lambda: [*parts, "1"], "has 9 columns, not 8"),
@@ -97,18 +97,18 @@ def test_a_run_that_goes_on_is_checked_by_its_rows(tmp_path):
         (lambda: [*parts[:2], "x", *parts[3:]], "not a number"),
     ):
         path.write_text("\n".join([*lines[:5], ",".join(changed()), *lines[6:]]) + "\n")
-        with pytest.raises(sand.BadInput, match=f"row 5 .*{said}"):
+        with pytest.raises(sand.BadInput, match=f"row 5 .*{message}"):
             read_ledger(path)
     path.write_text(good[:-20])
     assert read_with_notes(read_ledger, path) == (rows_of(40)[:-1], 0)
     path.write_text(
         "\n".join([*lines[:-1], ",".join([*lines[-1].split(",")[:2], "nan", "1.0", "1.0", "nan", "0.0", "1"])]) + "\n"
     )
-    assert np.isnan(read_ledger(path)[-1]["total"])  # the last row of a run that the physics stopped
+    assert np.isnan(read_ledger(path)[-1]["total"])  # the last row of a run that ended with an error outcome
 
 
-def test_a_ledger_that_ends_early_and_one_that_goes_on(tmp_path):
-    """Half of it: a note. More than the summary counts, of a run that was resumed: nothing. A missing row: a note."""
+def test_ledgers_shorter_or_longer_than_the_summary(tmp_path):
+    """Half of it: a warning.  More rows (a resumed run): none.  A missing row: a warning."""
     rows = ended_run(tmp_path)
     path = tmp_path / files.LEDGER
     lines = path.read_text().splitlines(keepends=True)
@@ -128,8 +128,8 @@ def test_a_ledger_that_ends_early_and_one_that_goes_on(tmp_path):
         read_ledger(path)
 
 
-def test_a_ledger_from_which_a_run_does_not_go_on_is_kept(tmp_path):
-    """Before it is written anew from a checkpoint; one that merely is shorter, or longer, is not."""
+def test_a_damaged_ledger_is_kept_on_resume(tmp_path):
+    """Before it is rewritten from a checkpoint; one that is only shorter or longer is not kept."""
     rows = ended_run(tmp_path)
     path, aside = tmp_path / files.LEDGER, tmp_path / "ledger.csv.damaged"
     good = path.read_text()
@@ -148,13 +148,13 @@ def test_a_ledger_from_which_a_run_does_not_go_on_is_kept(tmp_path):
 
 
 @pytest.fixture
-def run(looked_at, tmp_path):
+def run(finished_run, tmp_path):
     """A copy of a finished run."""
-    return shutil.copytree(looked_at[0], tmp_path / "run")
+    return shutil.copytree(finished_run[0], tmp_path / "run")
 
 
-def test_readers_of_a_run_say_so(run, capsys):
-    """A changed ledger and summary: `sand.open`, `sand info`, `sand plot` and the page; half a ledger: a note."""
+def test_all_readers_report_damage(run, capsys):
+    """Changed ledger and summary: `sand.open`, `sand info`, `sand plot` and the page; half a ledger: a warning."""
     ledger, summary = run / files.LEDGER, run / files.SUMMARY
     known = json.loads(summary.read_text())
     assert known["ledger_rows"] == 6 and len(known["ledger_sha256"]) == len(known["sha256"]) == 64
@@ -164,8 +164,8 @@ def test_readers_of_a_run_say_so(run, capsys):
         assert len(sand.open(run).ledger["step"]) == 3
     for words in (["info", str(run)], ["plot", str(run), "--what", "energies"]):
         assert main(words) == 0
-        said = capsys.readouterr().err.strip().splitlines()
-        assert len(said) == 1 and "note:" in said[0] and "3 of the 6 rows" in said[0]
+        message = capsys.readouterr().err.strip().splitlines()
+        assert len(message) == 1 and "note:" in message[0] and "3 of the 6 rows" in message[0]
     assert "3 of the 6 rows" in run_dataset(run).manifest()["note"]
     ledger.write_text("".join([*lines[:3], lines[3].replace("5", "6"), *lines[4:]]))
     for words in (["info", str(run)], ["plot", str(run), "--what", "energies", "--overwrite"]):
@@ -181,8 +181,8 @@ def test_readers_of_a_run_say_so(run, capsys):
     assert "summary.json is damaged" in run_dataset(run).manifest()["note"]
 
 
-def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
-    """`sand resume` names it, and the older one it goes on from; the file is there under another name."""
+def test_a_damaged_checkpoint_is_reported_and_kept(run, capsys):
+    """`sand resume` names it and the older one it uses; the file is kept under another name."""
     old, new = sorted(run.glob("checkpoint-*.npz"))
     bad = bytearray(new.read_bytes())
     bad[len(bad) // 2] ^= 1
@@ -197,12 +197,12 @@ def test_a_damaged_checkpoint_is_said_and_kept(run, capsys):
 
 
 @pytest.mark.validate
-def test_every_entry_of_an_index_that_is_damaged(tmp_path):
-    """Of 40 frames, 30 up to the checkpoint: if some of these are lost it is said and the file kept; else neither."""
-    good = reel(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)
-    place, entries = read_index(good)
+def test_every_entry_of_a_damaged_index(tmp_path):
+    """Of 40 frames, 30 are before the checkpoint: if one of these is lost it is reported and the file kept."""
+    good = write_trajectory(tmp_path / "good.gsd", [[(0, 1)]] * 40, 4)
+    offset, entries = read_index(good)
     written, rng = [10 * k for k in range(41)], random.Random(5)
-    told = 0
+    message = 0
     for number in sorted(rng.sample(range(len(entries)), 40)):
         for field, value in (("location", 0), ("location", 2**40), ("frame", 2**33), ("type", 200)):
             path = tmp_path / f"{number}-{field}-{value}" / "trajectory.gsd"
@@ -210,7 +210,7 @@ def test_every_entry_of_an_index_that_is_damaged(tmp_path):
             bad = entries.copy()
             bad[number][field] = value
             content = bytearray(good.read_bytes())
-            content[place : place + len(entries) * ENTRY.itemsize] = bad.tobytes()
+            content[offset : offset + len(entries) * ENTRY.itemsize] = bad.tobytes()
             path.write_bytes(content)
             with pytest.raises(sand.BadInput):
                 Frames(path)
@@ -230,18 +230,18 @@ def test_every_entry_of_an_index_that_is_damaged(tmp_path):
                     caught[0].message
                 )
                 assert kept[0].read_bytes() == bytes(content)
-                TrajectoryWriter(path, 290, written).close()  # what was told once is not told again
-                told += 1
+                TrajectoryWriter(path, 290, written).close()  # damage is reported once only
+                message += 1
             shutil.rmtree(path.parent)
-    assert told > 40
+    assert message > 40
 
 
-def test_data_without_a_frame(tmp_path):
-    """An index that names nothing, of a file that holds something: an error; mended and kept."""
-    path = reel(tmp_path / "trajectory.gsd", [[(0, 1)]] * 5, 3)
-    place, entries = read_index(path)
+def test_a_trajectory_whose_index_is_empty(tmp_path):
+    """A file with data but no index entry: an error; repaired and kept."""
+    path = write_trajectory(tmp_path / "trajectory.gsd", [[(0, 1)]] * 5, 3)
+    offset, entries = read_index(path)
     with open(path, "r+b") as file:
-        file.seek(place)
+        file.seek(offset)
         file.write(bytes(len(entries) * ENTRY.itemsize))
     for read in (read_frames, LiveTrajectory, Frames):
         with pytest.raises(sand.BadInput, match="holds data but no frame"):
@@ -254,11 +254,11 @@ def test_data_without_a_frame(tmp_path):
     assert read_frames(empty) == []
 
 
-def test_step_and_materials_are_inside_the_check(tmp_path):
-    """Other numbers there are refused, frame by frame."""
+def test_the_checksum_covers_step_and_materials(tmp_path):
+    """Other values there are refused, frame by frame."""
     import gsd.hoomd
 
-    path = reel(tmp_path / "new.gsd", [[(0, 1)]] * 3, 3)
+    path = write_trajectory(tmp_path / "new.gsd", [[(0, 1)]] * 3, 3)
     with gsd.hoomd.open(str(path), "r") as file:
         frames = [file[k] for k in range(3)]
     for change, number in (("step", 1), ("types", 0)):

@@ -1,4 +1,4 @@
-"""Two dipoles obey the textbook, each other, and their cut-off."""
+"""Forces between two dipoles: textbook values, gradients, angular momentum, cut-off."""
 
 import math
 
@@ -20,7 +20,7 @@ def loads(apart, m1, m2, cut):
     return dipole.pair_load_cut(apart, m1, m2, 1.0, CUT) if cut else dipole.pair_load(apart, m1, m2, 1.0)
 
 
-def test_head_to_tail_pair_pulls_with_six_k_over_r_to_the_fourth():
+def test_head_to_tail_attraction():
     """On one axis: F = 6 k m1 m2/r⁴ attractive, U = −2 k m1 m2/r³, B at 1 = 2 k m2/r³ (Eqs. 6, 7)."""
     force, b1, b2, energy = dipole.pair_load((2.0, 0, 0), (1.0, 0, 0), (3.0, 0, 0), 1e-7)
     assert force == pytest.approx((-6e-7 * 3 / 16, 0, 0), rel=1e-14, abs=0.0)
@@ -45,7 +45,7 @@ def test_force_equals_the_papers_matrix_form():
 
 @pytest.mark.parametrize("cut", [False, True])
 @given(vector, vector, vector)
-def test_force_is_the_slope_of_the_energy(cut, apart, m1, m2):
+def test_force_is_minus_the_gradient_of_the_energy(cut, apart, m1, m2):
     """F = −∂U/∂x1 by central differences with Richardson: truncation ~h⁴, rounding ε U/h."""
     x, h = np.array(apart), 1e-3
 
@@ -67,8 +67,8 @@ def test_force_is_the_slope_of_the_energy(cut, apart, m1, m2):
 
 @pytest.mark.parametrize("cut", [False, True])
 @given(vector, vector, vector)
-def test_a_pair_cannot_spin_itself_up(cut, apart, m1, m2):
-    """M1 + M2 + r×F = 0 to rounding, with the cut-off too, since its slope points along r."""
+def test_angular_momentum_of_a_pair_is_conserved(cut, apart, m1, m2):
+    """M1 + M2 + r×F = 0 to rounding, with the cut-off too, because its gradient is along r."""
     force, b1, b2, energy = loads(apart, m1, m2, cut)
     total = np.cross(m1, b1) + np.cross(m2, b2) + np.cross(apart, force)
     size = np.linalg.norm(m1) * np.linalg.norm(m2) / np.linalg.norm(apart) ** 3
@@ -77,7 +77,7 @@ def test_a_pair_cannot_spin_itself_up(cut, apart, m1, m2):
     assert energy == pytest.approx(-np.dot(m2, b2), abs=1e-13 * size)
 
 
-def test_the_cut_is_smooth_and_complete():
+def test_the_cutoff_is_smooth():
     """Weight 1 inside the shell, 0 outside, S and S′ continuous at both ends."""
     inside, outside = (0.5 - 1e-9) ** 2, (1.5 + 1e-9) ** 2
     assert dipole.cut_weight(inside, CUT) == (1.0, 0.0)
@@ -107,7 +107,7 @@ def test_scales_of_20_nm_iron():
 
 
 def test_capture_radius_is_where_the_barrier_equals_the_energy():
-    """Eqs. 10–12 by brute force: the top of U_eff = m̄b²v²/2r² − α/r³ equals m̄v²/2 at b = b_max."""
+    """Eqs. 10–12 numerically: the maximum of U_eff = m̄b²v²/2r² − α/r³ is m̄v²/2 at b = b_max."""
     alpha, reduced, speed = 2.0, 0.7, 1.3
     b = dipole.capture_radius(1.0, 1.0, reduced, speed, 1.0)
     r = np.linspace(0.2, 10, 2_000_000)

@@ -1,4 +1,4 @@
-"""The built docs need no network: what a page would load from another machine is found."""
+"""The built docs need no network: resources of other machines are found."""
 
 import importlib.util
 import tomllib
@@ -48,8 +48,8 @@ def test_addresses_that_a_browser_would_load(offline, text):
         "<p>see https://a.b and url(https://a.b)</p>",
     ],
 )
-def test_what_is_no_load(offline, text):
-    """Files of our own, text, and links that a reader follows."""
+def test_addresses_that_a_browser_does_not_load(offline, text):
+    """Local files, text, and links that a reader follows."""
     assert offline.loaded_from_elsewhere(f"<html><body>{text}</body></html>") == []
 
 
@@ -59,8 +59,8 @@ def test_style_sheets(offline):
     ]
 
 
-def test_the_docs_are_looked_through():
-    """conf.py has the check and MathJax from a package, and the extra `docs` brings it."""
+def test_the_docs_build_runs_the_check():
+    """conf.py has the check and MathJax from a package, which the extra `docs` installs."""
     text = (TOP / "docs" / "conf.py").read_text("utf-8")
     assert '"offline"' in text and '"sphinx-mathjax-offline"' in text and "mathjax_path" not in text
     project = tomllib.loads((TOP / "pyproject.toml").read_text("utf-8"))["project"]

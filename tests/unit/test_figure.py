@@ -1,4 +1,4 @@
-"""The figure of a run: what it draws is what the run holds, and no run is too odd for it."""
+"""The figure of a run: drawn values are those of the run, also for unusual runs."""
 
 import io
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ from sand.simulation.ledger import Ledger
 
 
 def ledger_of(rows, outside=()):
-    """A ledger of rows in which all that is not given is zero, but for one cluster of one grain."""
+    """A ledger with these columns; others are zero, except one cluster of one grain."""
     ledger = Ledger(outside)
     for step, row in enumerate(rows):
         blank = dict.fromkeys(ledger.columns, 0.0)
@@ -32,7 +32,7 @@ def ledger_of(rows, outside=()):
 
 
 def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.0, outside=(), **more):
-    """What the figure needs of a simulation."""
+    """The attributes of a simulation that the figure needs."""
     grains = sand.Grains(position, radius, sand.SILICA, **more)
     ledger = ledger_of(rows, outside)
     return SimpleNamespace(
@@ -46,7 +46,7 @@ def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.
 
 
 @pytest.fixture(scope="module")
-def grown():
+def run_with_clusters():
     """Four grains in a periodic box, three of them in a cluster across a face, with a history."""
     rows = [
         {
@@ -80,8 +80,8 @@ def grown():
 
 
 @pytest.fixture(scope="module")
-def figure(grown):
-    return run_figure(grown)
+def figure(run_with_clusters):
+    return run_figure(run_with_clusters)
 
 
 def lines(axes):
@@ -90,7 +90,7 @@ def lines(axes):
 
 
 def texts(figure):
-    """All that is written in a figure outside its ticks."""
+    """All text in a figure outside its ticks."""
     inside = [text.get_text() for axes in figure.axes for text in axes.texts]
     return " ".join([text.get_text() for text in figure.texts] + inside)
 
@@ -99,52 +99,52 @@ def texts(figure):
 
 
 @pytest.mark.slow
-def test_clusters_drawn_are_the_ledgers(grown, figure):
+def test_clusters_drawn_are_the_ledgers(run_with_clusters, figure):
     """S, the largest cluster and the number of clusters are the ledger's columns over its times."""
     drawn = lines(figure.axes[0])
     columns = {"mean size $S$ (grains)": "mean_cluster_size", "largest (grains)": "largest_cluster"}
     for label, column in {**columns, "number of clusters": "clusters"}.items():
-        np.testing.assert_allclose(drawn[label][0], grown.ledger["time"] / 1e-9)
-        np.testing.assert_array_equal(drawn[label][1], grown.ledger[column])
+        np.testing.assert_allclose(drawn[label][0], run_with_clusters.ledger["time"] / 1e-9)
+        np.testing.assert_array_equal(drawn[label][1], run_with_clusters.ledger[column])
 
 
 @pytest.mark.slow
-def test_energies_drawn_are_the_ledgers(grown, figure):
+def test_energies_drawn_are_the_ledgers(run_with_clusters, figure):
     """Kinetic, contact, magnetic and outside energies are sums of columns over N k_B T of the start."""
-    unit, books = 4 * BOLTZMANN * 100.0, grown.ledger
+    unit, ledger = 4 * BOLTZMANN * 100.0, run_with_clusters.ledger
     drawn = lines(figure.axes[1])
     expected = {
-        "kinetic": books["translation"] + books["rotation"],
-        "contacts (elastic, adhesion)": books["normal"] + books["sliding"],
-        "magnetic": books["magnetic"],
-        "field": books["field"],
+        "kinetic": ledger["translation"] + ledger["rotation"],
+        "contacts (elastic, adhesion)": ledger["normal"] + ledger["sliding"],
+        "magnetic": ledger["magnetic"],
+        "field": ledger["field"],
     }
     assert set(drawn) == set(expected)
     for label, energy in expected.items():
         np.testing.assert_allclose(drawn[label][1] * unit, energy)
 
 
-def test_losses_drawn_are_the_ledgers(grown, figure):
+def test_losses_drawn_are_the_ledgers(run_with_clusters, figure):
     """Channels that lost something are drawn where they did; the others are named."""
     drawn = lines(figure.axes[2])
     assert set(drawn) == {"forming", "sliding"}
     for channel in drawn:
         lost = drawn[channel][1] * 4 * BOLTZMANN * 100.0
-        np.testing.assert_allclose(np.nan_to_num(lost), grown.ledger[f"lost_{channel}"])
+        np.testing.assert_allclose(np.nan_to_num(lost), run_with_clusters.ledger[f"lost_{channel}"])
     assert "none: breaking, rolling, twisting" in texts(figure)
 
 
-def test_balance_is_the_change_of_the_total(grown, figure):
-    """The lowest panel shows the total minus its start, inside its frame, and the ledger's own drift."""
+def test_balance_is_the_change_of_the_total(run_with_clusters, figure):
+    """The lowest panel shows the total minus its start, within its limits, and the ledger's drift."""
     axes = figure.axes[3]
     change = axes.get_lines()[-1].get_ydata() * 4 * BOLTZMANN * 100.0
-    np.testing.assert_allclose(change, grown.ledger["total"] - 1e-19, atol=1e-30)
+    np.testing.assert_allclose(change, run_with_clusters.ledger["total"] - 1e-19, atol=1e-30)
     low, high = axes.get_ylim()
     assert low < min(axes.get_lines()[-1].get_ydata()) and max(axes.get_lines()[-1].get_ydata()) < high
-    assert f"{grown.ledger.drift:.1e}".split("e")[0] in texts(figure)
+    assert f"{run_with_clusters.ledger.drift:.1e}".split("e")[0] in texts(figure)
 
 
-def test_every_curve_lies_in_its_frame(figure):
+def test_every_curve_is_within_the_axis_limits(figure):
     """No limit of an axis cuts off a curve of energies or clusters."""
     for axes in figure.axes[:2]:
         low, high = axes.get_ylim()
@@ -153,7 +153,7 @@ def test_every_curve_lies_in_its_frame(figure):
 
 
 def test_units_are_natural():
-    """Time has the prefix of its largest value; energy is in N k_B T, without T in prefixed joules."""
+    """Time has the prefix of its largest value; energy is in N k_B T, without T in joules with a prefix."""
     ledger = ledger_of([{"time": 0.0}, {"time": 3e-7, "translation": 2.5e-17}])
     assert time_unit(ledger).name == "ns"
     assert time_unit(ledger).size == 1e-9
@@ -165,14 +165,14 @@ def test_units_are_natural():
 # --- grains ------------------------------------------------------------------------------------------
 
 
-def test_spheres_stand_where_the_grains_are(grown):
-    """Positions are the unwrapped ones, each cluster moved by whole boxes; radii are the true ones."""
-    pairs = grown.contacts["pair"]
-    scene = make_scene(grown.grains, pairs, grown.box)
-    moved = (scene.position - unwrapped(grown.grains.position, pairs, grown.box)) / 2e-7
-    np.testing.assert_allclose(moved, np.round(moved), atol=1e-9)
-    np.testing.assert_allclose(np.diff(moved[:3], axis=0), 0.0, atol=1e-9)
-    np.testing.assert_array_equal(scene.radius, grown.grains.radius)
+def test_spheres_stand_where_the_grains_are(run_with_clusters):
+    """Positions are unwrapped, each cluster shifted by whole boxes; radii are unscaled."""
+    pairs = run_with_clusters.contacts["pair"]
+    scene = make_scene(run_with_clusters.grains, pairs, run_with_clusters.box)
+    shifted = (scene.position - unwrapped(run_with_clusters.grains.position, pairs, run_with_clusters.box)) / 2e-7
+    np.testing.assert_allclose(shifted, np.round(shifted), atol=1e-9)
+    np.testing.assert_allclose(np.diff(shifted[:3], axis=0), 0.0, atol=1e-9)
+    np.testing.assert_array_equal(scene.radius, run_with_clusters.grains.radius)
     np.testing.assert_allclose(np.diff(scene.position[:3, 0]), 1.9e-8)
 
 
@@ -184,9 +184,9 @@ def test_projection_is_a_rotation():
     assert rotation[0, 2] == 0.0 and rotation[1, 2] > 0.9
 
 
-def test_picture_shows_each_grain_at_its_place(grown):
-    """The picture has a grain's colour at its projected centre, its true size, and nothing beside it."""
-    scene = make_scene(grown.grains, grown.contacts["pair"], grown.box)
+def test_picture_shows_each_grain_at_its_place(run_with_clusters):
+    """The picture has a grain's colour at its projected centre, with its size, and nothing beside it."""
+    scene = make_scene(run_with_clusters.grains, run_with_clusters.contacts["pair"], run_with_clusters.box)
     balls = scene.projected(camera_rotation())
     np.testing.assert_allclose(balls.centre[:, 0], scene.position @ camera_rotation()[0])
     bare = Spheres(balls.centre, balls.radius, balls.colour, np.zeros_like(balls.arrow))
@@ -204,7 +204,7 @@ def test_picture_shows_each_grain_at_its_place(grown):
 
 
 def test_nearer_grains_hide_farther_ones():
-    """Of two spheres behind each other the one nearer to the eye (larger z) is seen."""
+    """Of two spheres behind each other the nearer one (larger z) is visible."""
     red, blue = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
     for order in ([0, 1], [1, 0]):
         centre = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])[order]
@@ -213,7 +213,7 @@ def test_nearer_grains_hide_farther_ones():
         assert picture[20, 20, 0] > picture[20, 20, 2]
 
 
-def test_clusters_can_be_told_apart():
+def test_clusters_have_different_colours():
     """Grains of one cluster share a colour, other clusters have another, single grains are grey."""
     chain = [[2.0 * i, 0.0, 0.0] for i in range(6)]
     scene = make_scene(sand.Grains(np.array(chain), 1.0, "ice"), np.array([(0, 1), (1, 2), (3, 4)]), Box.open())
@@ -224,7 +224,7 @@ def test_clusters_can_be_told_apart():
 
 
 def test_arrows_point_along_moments():
-    """An arrow is wider towards its head than at its tail; along the line of sight it is a dot."""
+    """An arrow is wider at its head than at its tail; along the line of sight it is a dot."""
     bare = Spheres(np.zeros((1, 3)), np.ones(1), np.ones((1, 3)), np.zeros((1, 3)))
 
     def covered(half):
@@ -245,17 +245,17 @@ def test_arrows_point_along_moments():
     assert dot[60, 60] and not dot[np.hypot(x, y) > 0.4].any()
 
 
-def test_arrows_are_in_proportion(grown):
+def test_arrows_are_in_proportion(run_with_clusters):
     """The largest moment has the longest arrow, weak ones stay visible, grains without one have none."""
     moment = np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [1e-3, 0.0, 0.0], [0.0, 0.0, 0.0]]) * 1e-18
-    grains = sand.Grains(grown.grains.position, 1e-9, sand.SILICA, moment=moment)
-    size = np.linalg.norm(make_scene(grains, np.empty((0, 2)), grown.box).arrow, axis=1)
+    grains = sand.Grains(run_with_clusters.grains.position, 1e-9, sand.SILICA, moment=moment)
+    size = np.linalg.norm(make_scene(grains, np.empty((0, 2)), run_with_clusters.box).arrow, axis=1)
     assert size[0] == pytest.approx(2 * size[1], rel=1e-6, abs=0.0)
     assert size[0] > size[1] > size[2] > 0.0 == size[3]
 
 
-def test_largest_clusters_are_moved_as_rigid_bodies(grown):
-    """Clusters shown by themselves keep all distances, do not overlap, and come largest first."""
+def test_largest_clusters_are_moved_as_rigid_bodies(run_with_clusters):
+    """Separately drawn clusters keep all distances, do not overlap, and are sorted by size."""
     position = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [9, 9, 9], [9, 9, 11]]
     pairs = np.array([(3, 4), (0, 1), (1, 2)])
     scene = make_scene(sand.Grains(np.array(position, float), 1.0, "ice"), pairs, Box.open())
@@ -270,8 +270,8 @@ def test_largest_clusters_are_moved_as_rigid_bodies(grown):
     assert balls.centre[3:, 0].min() - balls.centre[:3, 0].max() > 2.0
 
 
-def test_scale_bar_is_as_long_as_it_says(figure):
-    """The bar's length in the axes' own coordinates (metres) is the number written over it."""
+def test_scale_bar_has_the_stated_length(figure):
+    """The bar's length in data coordinates (metres) equals its label."""
     axes = figure.axes[4]
     (bar,) = [line for line in axes.get_lines() if line.get_gid() == "scale"]
     length = float(np.ptp(bar.get_xdata()))
@@ -280,18 +280,18 @@ def test_scale_bar_is_as_long_as_it_says(figure):
 
 @pytest.mark.slow
 def test_box_has_twelve_edges(figure):
-    """A periodic box is outlined; open space is not."""
+    """A periodic box is drawn; open space is not."""
     edges = [line for line in figure.axes[4].get_lines() if line.get_gid() == "box"]
     assert len(edges) == 12
     alone = run_figure(run_of([[0.0, 0.0, 0.0]]))
     assert not [line for line in alone.axes[4].get_lines() if line.get_gid() == "box"]
 
 
-# --- odd runs ----------------------------------------------------------------------------------------
+# --- unusual runs ------------------------------------------------------------------------------------
 
 
-def odd_runs():
-    """Runs at the edge of what there can be."""
+def unusual_runs():
+    """Extreme but valid runs."""
     two = [[0.0, 0.0, 0.0], [3e-8, 0.0, 0.0]]
     nan = {"time": 1e-9, "translation": np.nan, "normal": np.inf, "total": np.nan, "lost_forming": np.nan}
     far = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
@@ -314,18 +314,18 @@ def odd_runs():
     "name",
     [
         name if name in ("no history", "numbers that are none") else pytest.param(name, marks=pytest.mark.validate)
-        for name in odd_runs()
+        for name in unusual_runs()
     ],
 )
-def test_odd_runs_have_a_figure(name):
-    """A PNG of 1600 × 1000 pixels comes of every run, and no warning."""
-    picture = Image.open(io.BytesIO(figure_bytes(run_figure(odd_runs()[name]))))
+def test_unusual_runs_have_a_figure(name):
+    """Each gives a PNG of 1600 × 1000 pixels without a warning."""
+    picture = Image.open(io.BytesIO(figure_bytes(run_figure(unusual_runs()[name]))))
     assert picture.size == (1600, 1000)
 
 
 @pytest.mark.slow
-def test_grains_without_a_place_are_left_out():
-    """After a run that blew up, what still has a position is drawn, and the rest is mentioned."""
+def test_grains_with_nan_positions_are_omitted():
+    """After numerical failure finite grains are drawn and the others mentioned."""
     run = run_of([[0.0, 0.0, 0.0], [3e-8, 0.0, 0.0]])
     run.grains.arrays.position[0, 1] = np.nan
     figure = run_figure(run)
@@ -336,7 +336,7 @@ def test_grains_without_a_place_are_left_out():
 
 @pytest.mark.slow
 def test_thousand_grains_keep_their_shades(tmp_path):
-    """A thousand grains in one crowd are drawn in full: colours are not rounded to make the file small."""
+    """A thousand grains in one cluster are drawn without colour quantisation."""
     rng = np.random.default_rng(7)
     position = rng.normal(size=(1000, 3)) * 6e-8
     run = run_of(position, 1e-8, [(i, i + 1) for i in range(0, 998, 3)], moment=rng.normal(size=(1000, 3)))
@@ -350,8 +350,8 @@ def test_thousand_grains_keep_their_shades(tmp_path):
 
 @pytest.mark.draws
 @pytest.mark.compiled("contacts")
-def test_a_real_run_has_its_figure():
-    """A simulation's `figure` returns the figure, which notebooks show as a PNG, even before the first step."""
+def test_figure_of_a_simulation():
+    """`figure` returns a figure, which notebooks show as PNG, also before the first step."""
     grains = sand.Grains([[0.0, 0.0, 0.0], [2.5e-8, 0.0, 0.0]], "10 nm", sand.SILICA)
     figure = sand.Simulation(grains, forces=[sand.Contact()]).figure()
     assert isinstance(figure, Figure)
@@ -359,37 +359,37 @@ def test_a_real_run_has_its_figure():
 
 
 @pytest.mark.slow
-def test_nothing_global_changes(grown):
-    """Neither the settings of matplotlib nor the list of open figures knows that a figure was made."""
+def test_nothing_global_changes(run_with_clusters):
+    """Neither matplotlib's settings nor its list of open figures change."""
     from matplotlib import pyplot
 
-    before, opened = dict(matplotlib.rcParams), pyplot.get_fignums()
+    before, open_figures = dict(matplotlib.rcParams), pyplot.get_fignums()
     with matplotlib.rc_context({"font.size": 31.0, "axes.grid": True}):
-        figure = run_figure(grown)
+        figure = run_figure(run_with_clusters)
         figure_bytes(figure)
         assert matplotlib.rcParams["font.size"] == 31.0
     assert figure.texts[0].get_size() < 31.0
     assert dict(matplotlib.rcParams) == before
-    assert pyplot.get_fignums() == opened
+    assert pyplot.get_fignums() == open_figures
     assert show(figure) is figure
 
 
 @pytest.mark.slow
-def test_same_run_same_picture(grown):
-    """Two figures of one run agree byte for byte."""
-    assert figure_bytes(run_figure(grown)) == figure_bytes(run_figure(grown))
+def test_figures_are_reproducible(run_with_clusters):
+    """Two figures of one run are equal byte for byte."""
+    assert figure_bytes(run_figure(run_with_clusters)) == figure_bytes(run_figure(run_with_clusters))
 
 
 @pytest.mark.parametrize(
     ("size", "text"), [(1.2e-6, "1.2 µm"), (1e-9, "1 nm"), (0.0, "0 m"), (999.0e-9, "999 nm"), (1e-3, "1 mm")]
 )
-def test_pretty_numbers(size, text):
-    """Numbers are written with the SI prefix that leaves one to three digits before the point."""
+def test_numbers_with_si_prefix(size, text):
+    """The prefix leaves one to three digits before the decimal point."""
     assert format_si(size, "m") == text
 
 
 def test_prefixes_and_round_lengths():
-    """Prefixes end where SI's do; round lengths are 1, 2 or 5 and never above what is allowed."""
+    """Prefixes end with the largest SI prefix; round lengths are 1, 2 or 5 × 10^n within the limit."""
     assert si_prefix(np.nan, "s") == (1.0, "s")
     assert si_prefix(1e-30, "J") == (1e-24, "yJ")
     for at_most in (1e-9, 1.99e-9, 2e-9, 4.7e-8, 9.9e-7, 5.0):

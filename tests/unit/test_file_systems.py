@@ -1,4 +1,4 @@
-"""What files need of the system: modes, the sync of folders, room on the disk; where Windows and macOS differ."""
+"""File modes, folder sync and disk space, where Linux, Windows and macOS differ."""
 
 import errno
 import os
@@ -30,8 +30,8 @@ def add_frame(writer, step):
 
 @keeps_modes
 @pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
-def test_all_files_of_a_run_are_readable_by_the_same_people(tmp_path, mask):
-    """Each has 0666 less the umask: GSD by itself takes 0660, so that others could read all but the frames."""
+def test_all_files_of_a_run_have_the_same_mode(tmp_path, mask):
+    """Each has 0666 minus the umask; GSD itself would use 0660."""
     before = os.umask(mask)
     try:
         writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
@@ -47,8 +47,8 @@ def test_all_files_of_a_run_are_readable_by_the_same_people(tmp_path, mask):
     assert set(modes.values()) == {0o666 & ~mask}, modes
 
 
-def test_a_closed_trajectory_goes_on_with_the_next_frame(tmp_path):
-    """Between runs the file is closed, so that Windows lets it be moved or removed; no frame is lost."""
+def test_a_closed_trajectory_is_reopened_for_the_next_frame(tmp_path):
+    """Between runs the file is closed, so that Windows can move or remove it; no frame is lost."""
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     for step in range(4):
         add_frame(writer, step)
@@ -63,7 +63,7 @@ def test_a_closed_trajectory_goes_on_with_the_next_frame(tmp_path):
 
 @pytest.mark.parametrize("code", [errno.EINVAL, errno.EBADF, errno.EACCES])
 def test_folders_that_cannot_be_synced(tmp_path, monkeypatch, code):
-    """Some file systems refuse the sync of a folder, which is no reason to refuse the file."""
+    """Some file systems refuse to sync a folder; the file is written all the same."""
     plain = os.fsync
 
     def sync(number):
@@ -90,8 +90,8 @@ def test_folders_that_cannot_be_opened(tmp_path, monkeypatch):
     assert (tmp_path / "a.json").read_bytes() == b"{}"
 
 
-def test_an_error_of_the_disk_is_not_passed_over(tmp_path, monkeypatch):
-    """EIO while a folder is synced is an error of the disk."""
+def test_a_disk_error_is_raised(tmp_path, monkeypatch):
+    """EIO during the sync of a folder is an error of the disk."""
     plain = os.fsync
 
     def sync(number):
@@ -106,7 +106,7 @@ def test_an_error_of_the_disk_is_not_passed_over(tmp_path, monkeypatch):
 
 
 def test_a_full_disk_without_posix_fallocate(tmp_path, monkeypatch):
-    """macOS and Windows do not have it: the free space of the disk is asked for instead."""
+    """macOS and Windows lack it: the free space of the disk is checked instead."""
     writer = TrajectoryWriter(tmp_path / "trajectory.gsd")
     add_frame(writer, 0)
     writer.close()
@@ -120,8 +120,8 @@ def test_a_full_disk_without_posix_fallocate(tmp_path, monkeypatch):
     assert (tmp_path / "trajectory.gsd").stat().st_size == size
 
 
-def test_overwriting_a_run_that_is_looked_at(tmp_path, monkeypatch):
-    """Windows removes no file that another program has open: then no other file is removed either."""
+def test_overwriting_a_run_that_is_open_elsewhere(tmp_path, monkeypatch):
+    """Windows removes no open file: then no other file is removed either."""
     names = {"case.toml", "trajectory.gsd", "summary.json"}
     for name in names:
         (tmp_path / name).write_text("{}", encoding="utf-8")
@@ -139,7 +139,7 @@ def test_overwriting_a_run_that_is_looked_at(tmp_path, monkeypatch):
 
 
 def test_too_many_processes_for_windows(monkeypatch):
-    """Said in a line, where `concurrent.futures` raises ValueError."""
+    """BadInput with one line, where `concurrent.futures` raises ValueError."""
     monkeypatch.setattr(sys, "platform", "win32")
     with pytest.raises(sand.BadInput, match="at most 61"), executor_for(MOST_ON_WINDOWS + 1):
         pass

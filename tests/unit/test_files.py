@@ -1,4 +1,4 @@
-"""Files: never half there, never silently wrong."""
+"""Checkpoint, ledger and trajectory files: complete or reported as damaged."""
 
 import json
 import os
@@ -26,14 +26,14 @@ META = {name: value for name, value in META.items() if name not in ("format", "v
 
 
 def write_state(folder, steps):
-    """A checkpoint of this step, its numbers those of the reference."""
+    """A checkpoint of this step with the reference state."""
     count = ARRAYS["count"].copy()
     count[STEPS] = steps
     return write_checkpoint(folder, {**ARRAYS, "count": count}, {**META, "steps": steps})
 
 
-def test_a_checkpoint_comes_back_bit_for_bit(tmp_path):
-    """Arrays, types and meta; two are kept."""
+def test_checkpoint_round_trip_is_bit_for_bit(tmp_path):
+    """Arrays, types and metadata; the two newest are kept."""
     for steps in (1, 2, 30):
         write_state(tmp_path, steps)
     assert len(list(tmp_path.glob("checkpoint-*.npz"))) == 2
@@ -47,7 +47,7 @@ def test_a_checkpoint_comes_back_bit_for_bit(tmp_path):
 
 @pytest.mark.parametrize("damage", ["flip", "truncate", "empty", "text"])
 def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage):
-    """A flipped bit in the data, a torn file, an empty one, a foreign one: one line, never wrong numbers."""
+    """A flipped bit, a truncated, empty or foreign file: one line and the older checkpoint."""
     write_state(tmp_path, 1)
     path = write_state(tmp_path, 2)
     content = bytearray(path.read_bytes())
@@ -67,19 +67,19 @@ def test_a_damaged_checkpoint_is_refused_and_the_older_one_used(tmp_path, damage
     ("version", "advice"), [(99, "update SAND"), (VERSION - 1, "the development version that wrote")]
 )
 def test_a_checkpoint_of_another_format_is_refused(tmp_path, monkeypatch, version, advice):
-    """One line says what to do; the file stays, and no older one is taken instead."""
+    """One line says what to do; the file stays, and no older one is used instead."""
     monkeypatch.setattr("sand.io.checkpoint.VERSION", version)
     path = write_state(tmp_path, 2)
     monkeypatch.undo()
     write_state(tmp_path, 1)
-    for read, place in ((read_checkpoint, path), (newest_checkpoint, tmp_path)):
+    for read, source in ((read_checkpoint, path), (newest_checkpoint, tmp_path)):
         with pytest.raises(sand.BadInput, match=rf"format {version}.*{advice}"):
-            read(place)
+            read(source)
     assert path.exists()
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
-    """A disk that fills up while writing: the old content stays, the message names the file."""
+    """The disk fills up during writing: the old content stays, and the message names the file."""
     path = tmp_path / "x.json"
     replace_file(path, b"old")
 
@@ -93,7 +93,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_folders_are_never_overwritten_unasked(tmp_path):
-    """A folder with anything in it is refused; `overwrite` removes our own files and nothing else."""
+    """A non-empty folder is refused; `overwrite` removes SAND's files only."""
     folder = tmp_path / "run"
     make_folder(folder)
     (folder / "notes.txt").write_text("mine")
@@ -108,7 +108,7 @@ def test_folders_are_never_overwritten_unasked(tmp_path):
 
 
 def test_json_and_toml(tmp_path):
-    """NumPy numbers become plain, NaN becomes null, floats survive TOML to the last bit."""
+    """NumPy numbers become plain numbers, NaN becomes null, floats survive TOML to the last bit."""
     write_json(tmp_path / "a.json", {"x": np.float64(1.5), "n": np.int64(3), "bad": float("nan"), "l": [np.inf]})
     assert json.loads((tmp_path / "a.json").read_text()) == {"x": 1.5, "n": 3, "bad": None, "l": [None]}
     values = {"run": {"until": 0.1 + 0.2, "tiny": 5e-324}}
@@ -117,7 +117,7 @@ def test_json_and_toml(tmp_path):
 
 
 def test_the_ledger_file_begins_with_the_rows_it_is_given(tmp_path):
-    """A restart replaces the file; a torn last line is not read; numbers come back to the last bit."""
+    """A restart rewrites the file; an incomplete last line is ignored; numbers are exact to the last bit."""
     path = tmp_path / "ledger.csv"
     file = LedgerFile(path, ["step", "x"])
     for step in (0, 5, 9):
@@ -130,7 +130,7 @@ def test_the_ledger_file_begins_with_the_rows_it_is_given(tmp_path):
 
 
 @pytest.mark.validate
-def test_the_trajectory_holds_what_the_world_held(tmp_path):
+def test_trajectory_round_trip(tmp_path):
     """Positions to float32 of a radius, moments and times to the last bit, contacts as bonds; GSD reads it."""
     sim = struck_chain(moment="200 A m^2/kg")
     sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="0.1 ns")
@@ -151,7 +151,7 @@ def test_the_trajectory_holds_what_the_world_held(tmp_path):
 
 
 def test_foreign_files_are_named(tmp_path):
-    """A file that is not a trajectory, and one that is not there."""
+    """A file that is not a trajectory, and a missing one."""
     path = tmp_path / "trajectory.gsd"
     with pytest.raises(sand.BadInput, match="there is no file"):
         read_frames(path)
@@ -162,14 +162,14 @@ def test_foreign_files_are_named(tmp_path):
     whole = path.read_bytes()
     for size in (0, 3, 50, len(whole) // 3):
         path.write_bytes(whole[:size])
-        with pytest.raises(sand.BadInput, match=r"cut off.*sand resume") as told:
+        with pytest.raises(sand.BadInput, match=r"cut off.*sand resume") as message:
             read_frames(path)
-        assert str(told.value).count(str(path)) == 1
+        assert str(message.value).count(str(path)) == 1
 
 
 @pytest.mark.compiled("small")
 def test_the_reference_checkpoint_is_read(tmp_path):
-    """The folder made by tests/reference/make_checkpoint.py: time and contacts are those of then."""
+    """The folder made by tests/reference/make_checkpoint.py has the recorded time and contacts."""
     folder = tmp_path / "run"
     shutil.copytree(Path(__file__).parents[1] / "reference" / f"run-v{VERSION}", folder)
     sim = sand.resume(folder)
@@ -191,8 +191,8 @@ def test_the_reference_checkpoint_is_continued(tmp_path):
 
 
 @pytest.mark.compiled("contacts")
-def test_the_checkpoint_knows_case_and_ledger(tmp_path):
-    """Without case.toml and ledger.csv a run goes on and both come back; a case that was changed is refused."""
+def test_case_and_ledger_are_restored_from_the_checkpoint(tmp_path):
+    """Without case.toml and ledger.csv a run resumes and both are restored; a changed case is refused."""
     folder = tmp_path / "run"
     sim = struck_chain()
     sim = sand.Simulation(sim.grains, sim.forces, out=folder, frame_every="0.1 ns")
@@ -215,7 +215,7 @@ def test_the_checkpoint_knows_case_and_ledger(tmp_path):
         (folder / "case.toml").write_text(wrong)
         with pytest.raises(sand.BadInput):
             sand.resume(folder)
-    (folder / "case.toml").write_text(case.replace("until = 5e-10", 'until = "0.6 ns"'))  # the end may change
+    (folder / "case.toml").write_text(case.replace("until = 5e-10", 'until = "0.6 ns"'))  # the end time may change
     assert sand.resume(folder).run().time >= 6e-10
     (folder / "case.toml").write_text("grains = 3\n")
     with pytest.raises(sand.BadInput, match=r"case\.toml"):
@@ -224,7 +224,7 @@ def test_the_checkpoint_knows_case_and_ledger(tmp_path):
 
 @pytest.mark.validate
 def test_forces_and_columns_keep_the_order_of_the_script(tmp_path):
-    """Whatever order the forces were given in, a resumed ledger has each energy in its own column."""
+    """For any order of the forces, each energy of a resumed ledger is in its own column."""
     grains = sand.Grains([[0, 0, 0], [3e-6, 0, 0]], 1e-6, "silica", charge=1e-17)
     forces = [sand.Gravity([0, 0, -9.81]), sand.ElectricField([0, 0, 1000.0]), sand.Contact()]
     settings = {"frame_every": 1e-8, "stepping": sand.Verlet(step=1e-9)}
@@ -242,7 +242,7 @@ def test_forces_and_columns_keep_the_order_of_the_script(tmp_path):
 
 @pytest.mark.compiled("contacts")
 def test_frames_of_another_history_are_replaced(tmp_path):
-    """Frames after the checkpoint that are not the same bits (another machine, a damaged file) are written anew."""
+    """Frames after the checkpoint that differ in any bit (other machine, damage) are rewritten."""
     sim = struck_chain()
     true = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "true", frame_every="0.1 ns")
     true.run(until="1 ns")
@@ -265,8 +265,8 @@ def test_frames_of_another_history_are_replaced(tmp_path):
 
 
 @pytest.mark.compiled("contacts")
-def test_a_trajectory_beyond_mending_is_moved_aside(tmp_path):
-    """The checkpoint is what counts: told, kept under another name, a new file begun."""
+def test_an_unrepairable_trajectory_is_renamed(tmp_path):
+    """The checkpoint suffices: the damage is reported, the file renamed, a new one started."""
     sim = struck_chain()
     sim = sand.Simulation(sim.grains, sim.forces, out=tmp_path / "run", frame_every="0.1 ns")
     sim.run(until="0.3 ns")

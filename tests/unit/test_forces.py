@@ -1,4 +1,4 @@
-"""Per-grain forces: the uniform field, and one that a user writes."""
+"""External forces written by users, and the uniform field."""
 
 import math
 from pathlib import Path
@@ -28,7 +28,7 @@ def weight(time, grain, parameters):
 
 
 class Gravity:
-    """A force as a user would write it in a script."""
+    """A force as users write it in a script."""
 
     name = "gravity"
     references = "Galileo 1638"
@@ -48,8 +48,8 @@ class Gravity:
 
 
 @pytest.mark.validate
-def test_a_force_of_the_user():
-    """Free fall, z = z0 − g t²/2 exactly (Verlet is exact for it); its energy has its own column and closes."""
+def test_a_users_force():
+    """Free fall, z = z0 − g t²/2 exactly (Verlet is exact for it); its energy has a column and the balance closes."""
     grains = sand.Grains([[0, 0, 1e-3], [1e-6, 0, 0]], 1e-8, sand.SILICA)
     sim = sand.Simulation(grains, [Gravity()], frame_every="1 us")
     sim.run(until="10 us")
@@ -60,8 +60,8 @@ def test_a_force_of_the_user():
     assert change < 1e-9 * sim.ledger["translation"][-1] + 1e-15 * sim.ledger["gravity"][0]
 
 
-def test_compiled_code_with_a_users_formula_is_not_kept():
-    """Its edits are not seen by the digest of our sources: a stale copy would compute the old force."""
+def test_compiled_code_with_a_users_formula_is_not_cached():
+    """The digest of SAND's sources does not cover its edits: a cached copy would be outdated."""
     assert is_builtin(uniform_field)
     assert not is_builtin(weight)
     if not COMPILED:
@@ -83,8 +83,8 @@ def test_composed_forces_add_up():
     assert compose([]) == (nothing, ())
 
 
-def test_the_field_is_minus_the_gradient_of_its_energy():
-    """Torque μ×B = −∂U/∂θ for U = −μ·B, by central differences, rounding 1e-9."""
+def test_torque_of_the_field_is_minus_the_gradient_of_its_energy():
+    """Torque μ×B = −∂U/∂θ for U = −μ·B, by central differences, to 1e-9 (rounding)."""
     b, moment = np.array([0.3, -0.2, 0.9]), np.array([0.5, 1.0, -0.4])
     numbers = sand.Field(b).numbers()
 

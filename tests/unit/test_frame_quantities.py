@@ -7,18 +7,18 @@ import sand
 from sand.box import Box
 from sand.io.trajectory import TrajectoryWriter, read_frames
 
-from .reels import contacts_of
+from .synthetic_trajectories import contacts_of
 
 SINGLE = 6e-8
-"""Half a unit of the last place of float32, in which the format holds most numbers."""
+"""Rounding error of float32, in which the format stores most numbers."""
 
 
 @pytest.mark.parametrize("box", [Box.open(), Box.periodic("1 um", None, "0.8 um")])
 def test_a_frame_holds_grains_and_contacts(tmp_path, box):
-    """Unequal grains of two materials, turned by chance, and three contacts: all of them by name, in SI.
+    """Unequal grains of two materials, random orientations, three contacts: all by name, in SI.
 
-    Numbers that the format has in float32 come back to its rounding, positions to that of a mean radius times the size
-    of the cloud in mean radii; what is logged comes back to the last bit.
+    Values in float32 return to its rounding, positions to that of a mean radius times the extent in mean radii; logged
+    values return to the last bit.
     """
     rng = np.random.default_rng(3)
     grains = sand.Grains(

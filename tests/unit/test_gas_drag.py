@@ -1,4 +1,4 @@
-"""Drag and Brownian motion in a thin gas: the laws from the molecules, the kicks from the laws, the settings."""
+"""Drag and Brownian motion in a thin gas: friction from molecular collisions, kicks from friction, settings."""
 
 import math
 
@@ -18,7 +18,7 @@ SPEED = math.sqrt(8.0 / math.pi)
 
 
 def gauss(low, high, count):
-    """Nodes and weights of Gauss and Legendre on low … high."""
+    """Nodes and weights of Gauss–Legendre quadrature on low … high."""
     x, w = np.polynomial.legendre.leggauss(count)
     return 0.5 * (high - low) * x + 0.5 * (high + low), 0.5 * (high - low) * w
 
@@ -27,12 +27,12 @@ def maxwell(c):
     return np.exp(-0.5 * c * c) / math.sqrt(2.0 * math.pi)
 
 
-def impacts(velocity, spin, accommodation):
-    """What molecules do to a sphere, blow by blow: r = ρ_g = k_B T/m_g = 1.
+def molecular_momentum_transfer(velocity, spin, accommodation):
+    """Momentum transfer of molecules to a sphere by quadrature: r = ρ_g = k_B T/m_g = 1.
 
-    Integrals over the directions n of the sphere and the velocities c of the molecules that reach the element there,
-    drifting at −(v + ω×n) in its frame, weighted with −c·n; a molecule leaves mirrored, or at random with the flux of
-    a Maxwellian at rest.  No expansion in v or ω.
+    Integrals over surface normals n and velocities c of molecules that reach the surface element, drifting at
+    −(v + ω×n) in its frame, weighted with −c·n.  A molecule leaves by specular reflection, or diffusely with the flux
+    distribution of a Maxwellian at rest.  No expansion in v or ω.
 
     Returns:
         Force, torque, and the sums of Δp_x² and of (n×Δp)_x² per time, for molecules of mass 1.
@@ -41,7 +41,7 @@ def impacts(velocity, spin, accommodation):
     c, weight = gauss(-10.0, 0.0, 60)
     x, weight_x = np.polynomial.hermite_e.hermegauss(6)
     weight_x = weight_x / weight_x.sum()
-    # leaving diffusely: mean of the normal speed and of its square, each with the flux as weight
+    # diffuse reflection: mean of the normal speed and of its square, weighted with the flux
     leave = [(weight * abs(c) ** k * abs(c) * maxwell(c)).sum() for k in range(3)]
     mean_out, square_out = np.array([leave[1] / leave[0], 0.0, 0.0]), np.array([leave[2] / leave[0], 1.0, 1.0])
     for cosine, weight_n in zip(*gauss(-1.0, 1.0, 12), strict=True):
@@ -56,11 +56,11 @@ def impacts(velocity, spin, accommodation):
             rate = np.einsum("i,j,k->ijk", weight * -c * maxwell(c - drift[0]), weight_x, weight_x).ravel()
             rate *= weight_n * 2.0 * math.pi / 16.0
             mirrored = here * [2.0, 0.0, 0.0]
-            blow = (1.0 - accommodation) * mirrored + accommodation * (here - mean_out)
-            push = frame.T @ (rate @ blow)
+            momentum_change = (1.0 - accommodation) * mirrored + accommodation * (here - mean_out)
+            push = frame.T @ (rate @ momentum_change)
             force += push
             torque += np.cross(n, push)
-            # ⟨Δp Δpᵀ⟩ in the frame of the element: what leaves is independent of what came
+            # ⟨Δp Δpᵀ⟩ in the frame of the element: outgoing and incoming momenta are independent
             both = (1.0 - accommodation) * np.einsum("a,ai,aj->ij", rate, mirrored, mirrored)
             came = np.einsum("a,ai,aj->ij", rate, here - mean_out, here - mean_out)
             both += accommodation * (came + rate.sum() * np.diag(square_out - mean_out**2))
@@ -71,10 +71,10 @@ def impacts(velocity, spin, accommodation):
 
 
 @pytest.mark.parametrize("accommodation", [0.0, 0.3, 1.0])
-def test_friction_from_the_blows_of_the_molecules(accommodation):
-    """F = −f_t v to O(s²), s² = v²/2: the next term is s²/5 for mirrors (1.1e-4 here), less for diffuse walls."""
+def test_friction_from_molecular_collisions(accommodation):
+    """F = −f_t v to O(s²), s² = v²/2: the next term is s²/5 for specular reflection (1.1e-4 here), less for diffuse."""
     velocity = np.array([0.02, -0.01, 0.025])
-    force, torque, _, _ = impacts(velocity, np.zeros(3), accommodation)
+    force, torque, _, _ = molecular_momentum_transfer(velocity, np.zeros(3), accommodation)
     expected = -law.translation_friction(1.0, 1.0, SPEED, accommodation) * velocity
     excess = force / expected - 1.0
     square = 0.5 * velocity @ velocity
@@ -86,19 +86,19 @@ def test_friction_from_the_blows_of_the_molecules(accommodation):
 
 @pytest.mark.parametrize("accommodation", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("size", [0.01, 1.0])
-def test_torque_from_the_blows_of_the_molecules(accommodation, size):
+def test_torque_from_molecular_collisions(accommodation, size):
     """M = −f_r ω for any ω, no force; quadrature and rounding 1e-11."""
     spin = size * np.array([0.5, 0.7, -0.4])
-    force, torque, _, _ = impacts(np.zeros(3), spin, accommodation)
+    force, torque, _, _ = molecular_momentum_transfer(np.zeros(3), spin, accommodation)
     expected = -law.rotation_friction(1.0, 1.0, SPEED, accommodation) * spin
     assert torque == pytest.approx(expected, rel=1e-11, abs=1e-12)
     assert np.abs(force).max() < 1e-12
 
 
 @pytest.mark.parametrize("accommodation", [0.0, 0.3, 1.0])
-def test_the_blows_scatter_as_the_friction_demands(accommodation):
-    """Σ Δp_x² per time = 2 f_t k_B T, Σ (r×Δp)_x² = 2 f_r k_B T (m_g = 1): fluctuation and dissipation, rel 1e-10."""
-    _, _, force_noise, torque_noise = impacts(np.zeros(3), np.zeros(3), accommodation)
+def test_momentum_fluctuations_obey_fluctuation_dissipation(accommodation):
+    """Σ Δp_x² per time = 2 f_t k_B T, Σ (r×Δp)_x² = 2 f_r k_B T (m_g = 1), relative 1e-10."""
+    _, _, force_noise, torque_noise = molecular_momentum_transfer(np.zeros(3), np.zeros(3), accommodation)
     assert force_noise == pytest.approx(
         2.0 * law.translation_friction(1.0, 1.0, SPEED, accommodation), rel=1e-10, abs=0
     )
@@ -106,17 +106,17 @@ def test_the_blows_scatter_as_the_friction_demands(accommodation):
     assert torque_noise == pytest.approx(expected, rel=1e-10, abs=1e-12)
 
 
-def test_what_the_linear_law_lacks_at_half_the_molecular_speed():
-    """At v = v̄/2 the drag is 6.2 % above −f_t v for mirrors and 4.5 % for diffuse walls, see forces/gas/model.py."""
+def test_error_of_the_linear_law_at_half_the_molecular_speed():
+    """At v = v̄/2 the drag exceeds f_t v by 6.2 % (specular) and 4.5 % (diffuse), see forces/gas/model.py."""
     velocity = np.array([0.0, 0.0, 0.5 * SPEED])
     for accommodation, excess in ((0.0, 0.062), (1.0, 0.045)):
-        force = impacts(velocity, np.zeros(3), accommodation)[0]
+        force = molecular_momentum_transfer(velocity, np.zeros(3), accommodation)[0]
         linear = -law.translation_friction(1.0, 1.0, SPEED, accommodation) * velocity
         assert force[2] / linear[2] - 1.0 == pytest.approx(excess, abs=1e-3)
 
 
 def test_numbers_of_a_gas():
-    """v̄ of N2 at 293.15 K is 470.7 m/s; air of 101325 Pa and 28.97 u at 288.15 K has 1.225 kg/m³, λ = m_g/(√2 ρ σ)."""
+    """v̄ of N2 at 293.15 K is 470.7 m/s; air at 101325 Pa, 28.97 u, 288.15 K: 1.225 kg/m³, λ = m_g/(√2 ρ σ)."""
     energy = BOLTZMANN * 293.15
     assert law.mean_speed(energy, 28.0134 * law.ATOMIC_MASS) == pytest.approx(470.7, rel=1e-6, abs=0.05)
     mass = 28.97 * law.ATOMIC_MASS
@@ -128,7 +128,7 @@ def test_numbers_of_a_gas():
 @pytest.mark.interpreted
 @pytest.mark.parametrize("parts", [2, 3, 7])
 def test_many_short_updates_equal_a_long_one(parts):
-    """Σ over parts: the factors e^(−t/τ) multiply, the variances add up; exact, rounding 1e-14 × parts."""
+    """The factors e^(−t/τ) multiply and the variances add up: exact, rounding 1e-14 × parts."""
     rate, time, energy, mass = 3.0, 0.4, 2.0, 5.0
     part = law.decayed_fraction(rate, time / parts)
     mean, variance = 1.0, 0.0
@@ -141,7 +141,7 @@ def test_many_short_updates_equal_a_long_one(parts):
 
 @pytest.mark.interpreted
 def test_short_and_long_times_lose_no_digits():
-    """t ≪ τ: 1 − e^(−x) → x − x²/2, variance → 2 f k_B T t/m²; t ≫ τ: all is forgotten, variance k_B T/m."""
+    """t ≪ τ: 1 − e^(−x) → x − x²/2, variance → 2 f k_B T t/m²; t ≫ τ: full decay, variance k_B T/m."""
     tiny = law.decayed_fraction(1e-3, 1e-12)
     assert tiny == pytest.approx(1e-15, rel=1e-14, abs=0)
     assert law.thermal_spread(tiny, 3.0, 2.0) ** 2 == pytest.approx(2.0 * 1e-15 * 3.0 / 2.0, rel=1e-14, abs=0)
@@ -154,7 +154,7 @@ def test_short_and_long_times_lose_no_digits():
     assert law.ornstein_uhlenbeck((9.0, 8.0, 7.0), wind, 0.0, 0.0, noise) == (9.0, 8.0, 7.0)
 
 
-# ---- the kicks ----------------------------------------------------------------------------------------
+# ---- kicks --------------------------------------------------------------------------------------------
 
 
 def many_kicks(grains, seed, first, count, elapsed, gas):
@@ -170,7 +170,7 @@ compiled = pytest.mark.skipif(not hasattr(kicks, "_cache"), reason="too many gra
 
 
 def free_grains(count, velocity=0.0, spin=0.0, seed=0):
-    """Grains of 10 … 40 nm; thermal where `velocity` and `spin` are 1, in units of √(k_B T/m) and √(k_B T/I)."""
+    """Grains of 10 … 40 nm; `velocity` and `spin` in units of √(k_B T/m) and √(k_B T/I)."""
     rng = np.random.default_rng(seed)
     radius = rng.uniform(1e-8, 4e-8, count)
     grains = sand.Grains(np.zeros((count, 3)), radius, sand.SILICA)
@@ -184,12 +184,12 @@ def times(grains, gas):
     """Stopping times [s] of translation and rotation, from the friction."""
     rules = gas.numbers()
     numbers = (grains.radius, rules.density, rules.mean_speed, rules.accommodation)
-    with np.errstate(divide="ignore"):  # mirrors never stop a spin
+    with np.errstate(divide="ignore"):  # specular reflection exerts no torque
         spin_down = grains.arrays.inertia / law.rotation_friction(*numbers)
     return grains.mass / law.translation_friction(*numbers), spin_down
 
 
-def reduced(grains):
+def reduced_squares(grains):
     """m v²/k_B T and I ω²/k_B T by component, (3, N) each."""
     a, energy = grains.arrays, BOLTZMANN * TEMPERATURE
     return a.mass * a.velocity**2 / energy, a.inertia * a.spin**2 / energy
@@ -207,7 +207,7 @@ def still_gas(**changes):
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("accommodation", [0.0, 0.4, 1.0])
 def test_drag_alone_is_an_exponential(accommodation):
-    """v − u = (v0 − u) e^(−t/τ_t), ω = ω0 e^(−t/τ_r), each with its own τ; 10 kicks, rounding 1e-13."""
+    """v − u = (v0 − u) e^(−t/τ_t), ω = ω0 e^(−t/τ_r), separate τ; 10 kicks, rounding 1e-13."""
     gas = still_gas(brownian=False, accommodation=accommodation, wind=(3.0, -20.0, 1.0))
     grains = free_grains(50, 1.0, 1.0)
     before = grains.copy()
@@ -227,7 +227,7 @@ def test_drag_alone_is_an_exponential(accommodation):
 @pytest.mark.parametrize(("count", "part", "start"), [(1, 20.0, 0.0), (200, 0.1, 0.0), (200, 0.1, 3.0)])
 @pytest.mark.parametrize("accommodation", [0.2, 1.0])
 def test_equipartition(count, part, start, accommodation):
-    """⟨m v_k²⟩ = ⟨I ω_k²⟩ = k_B T after ≥ 20 of the longest time, in one kick or in many, from rest or from 9 T.
+    """⟨m v_k²⟩ = ⟨I ω_k²⟩ = k_B T after ≥ 20 relaxation times, in one kick or many, from rest or from 9 T.
 
     Each of the six is a mean of N squares of normal deviates, 1 ± √(2/N): 0.01 for N = 20,000; within 3 σ.
     """
@@ -235,25 +235,25 @@ def test_equipartition(count, part, start, accommodation):
     grains = free_grains(n, start, start)
     longest = max(float(t.max()) for t in times(grains, gas))
     kicks(grains.arrays, 1, 0, count, part * longest, gas.numbers())
-    for squares in reduced(grains):
+    for squares in reduced_squares(grains):
         assert np.abs(squares.mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
 
 
 @pytest.mark.compiled("small")
 @compiled
-def test_mirrors_heat_no_spin():
-    """α = 0: translation comes to k_B T, spins stay at rest exactly; N = 20,000, within 3 σ = 3 √(2/N)."""
+def test_specular_reflection_does_not_heat_spins():
+    """α = 0: translation reaches k_B T, spins stay exactly at rest; N = 20,000, within 3 σ = 3 √(2/N)."""
     gas, n = still_gas(accommodation=0.0), 20_000
     grains = free_grains(n)
     kicks(grains.arrays, 2, 0, 1, 20.0 * float(times(grains, gas)[0].max()), gas.numbers())
-    assert np.abs(reduced(grains)[0].mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
+    assert np.abs(reduced_squares(grains)[0].mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
     assert not grains.spin.any()
 
 
 @pytest.mark.compiled("small")
 @compiled
-def test_velocities_and_spins_are_kicked_apart():
-    """In equilibrium the correlation of any two of v_k, ω_l is 0 ± 1/√N, N = 20,000; 15 numbers, within 4 σ."""
+def test_kicks_of_velocities_and_spins_are_uncorrelated():
+    """In equilibrium correlations of v_k and ω_l are 0 ± 1/√N, N = 20,000; 15 values, within 4 σ."""
     gas, n = still_gas(), 20_000
     grains = free_grains(n)
     kicks(grains.arrays, 10, 0, 1, 20.0 * max(float(t.max()) for t in times(grains, gas)), gas.numbers())
@@ -265,7 +265,7 @@ def test_velocities_and_spins_are_kicked_apart():
 @pytest.mark.compiled("small")
 @compiled
 def test_grains_follow_the_wind():
-    """Mean of √(m/k_B T)(v − u) is 0 ± 1/√N, and its square 1 ± √(2/N), N = 20,000; within 3 σ."""
+    """The mean of √(m/k_B T)(v − u) is 0 ± 1/√N, of its square 1 ± √(2/N), N = 20,000; within 3 σ."""
     gas, n = still_gas(wind=(5.0, 0.0, -7.0)), 20_000
     grains = free_grains(n)
     kicks(grains.arrays, 3, 0, 50, float(times(grains, gas)[0].max()), gas.numbers())
@@ -277,24 +277,24 @@ def test_grains_follow_the_wind():
 @pytest.mark.compiled("small")
 @compiled
 @pytest.mark.parametrize("pieces", [1, 2, 16])
-def test_spread_from_rest_whatever_the_pieces(pieces):
-    """After t = 0.3 τ from rest: m⟨v²⟩ = (1 − e^(−0.6)) k_B T, spins likewise with τ_r, however t is cut up.
+def test_variance_does_not_depend_on_the_number_of_kicks(pieces):
+    """After t = 0.3 τ from rest: m⟨v²⟩ = (1 − e^(−0.6)) k_B T, spins likewise with τ_r, for one or several kicks.
 
-    Each grain's variance is known, so N squares of normal deviates: 1 ± √(2/N), N = 20,000; within 3 σ.
+    Each grain's variance is known, so these are N squares of normal deviates: 1 ± √(2/N), N = 20,000; within 3 σ.
     """
     gas, n = still_gas(), 20_000
     grains = free_grains(n)
     time = 0.3 * float(times(grains, gas)[0].mean())
     kicks(grains.arrays, 4, 0, pieces, time / pieces, gas.numbers())
-    for squares, tau in zip(reduced(grains), times(grains, gas), strict=True):
+    for squares, tau in zip(reduced_squares(grains), times(grains, gas), strict=True):
         ratio = squares / (1.0 - np.exp(-2.0 * time / tau))
         assert np.abs(ratio.mean(axis=1) - 1.0).max() < 3.0 * math.sqrt(2.0 / n)
 
 
 @pytest.mark.compiled("small")
 @compiled
-def test_velocities_are_forgotten_at_the_rate_of_the_drag():
-    """⟨v(0)·v(t)⟩ = e^(−t/τ)⟨v²⟩, spins with τ_r, in equilibrium: what is left is noise of variance 1 − e^(−2t/τ).
+def test_velocity_autocorrelation():
+    """⟨v(0)·v(t)⟩ = e^(−t/τ)⟨v²⟩, spins with τ_r, in equilibrium; the noise has variance 1 − e^(−2t/τ).
 
     With x0, x1 the reduced components: Σ x0 (x1 − x0 e^(−t/τ)) = 0 ± √(Σ x0² (1 − e^(−2t/τ))); within 3 σ.
     """
@@ -316,8 +316,8 @@ def test_velocities_are_forgotten_at_the_rate_of_the_drag():
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("brownian", [True, False])
-def test_what_is_given_to_the_gas_is_what_the_grains_lost(brownian):
-    """Sum over kicks of ½m(v² − v'²) + ½I(ω² − ω'²) = −ΔK, rounding 1e-12; drag alone only takes, kicks heat."""
+def test_energy_given_to_the_gas(brownian):
+    """Sum over kicks of ½m(v² − v'²) + ½I(ω² − ω'²) = −ΔK, rounding 1e-12; pure drag only dissipates."""
     gas = still_gas(brownian=brownian, wind=(0.0, 0.0, 0.0))
     for start in (0.0, 1.0):
         grains = free_grains(200, start, start)
@@ -332,8 +332,8 @@ def test_what_is_given_to_the_gas_is_what_the_grains_lost(brownian):
 
 
 @pytest.mark.compiled("small")
-def test_same_address_same_bits():
-    """Same seed and numbers: the same bits; another seed, number or id: every component is another."""
+def test_kicks_are_reproducible():
+    """Same seed and numbers: the same bits; another seed, number or id changes every component."""
     gas = still_gas().numbers()
 
     def after(seed=7, first=0, ids=None):
@@ -349,8 +349,8 @@ def test_same_address_same_bits():
 
 
 @pytest.mark.compiled("small")
-def test_order_and_pieces_change_no_bit():
-    """Grains one by one, in sevens or backwards: each gets the same bits, for the deviates belong to its id."""
+def test_order_and_blocks_of_grains_change_no_bit():
+    """Grains one by one, in sevens or backwards: the same bits, because deviates belong to ids."""
     gas, n = still_gas().numbers(), 101
 
     def part(index):
@@ -368,8 +368,8 @@ def test_order_and_pieces_change_no_bit():
 
 @pytest.mark.compiled("small")
 @pytest.mark.interpreted
-def test_no_time_and_no_gas_change_nothing():
-    """A kick over 0 s, or in vacuum, leaves every bit and books nothing; position and orientation are never touched."""
+def test_zero_time_and_vacuum_change_nothing():
+    """Kicks over 0 s or in vacuum change no bit and record nothing; positions are never changed."""
     gas = still_gas().numbers()
     for rules, elapsed in ((gas, 0.0), (VACUUM, 1.0), (gas._replace(on=False), 1e-9)):
         grains = free_grains(10, 1.0, 1.0)
@@ -383,7 +383,7 @@ def test_no_time_and_no_gas_change_nothing():
 
 @pytest.mark.compiled("small")
 @pytest.mark.interpreted
-def test_the_compiler_changes_nothing_but_rounding():
+def test_compiled_and_interpreted_kicks_agree():
     """Three kicks of 20 grains in plain Python and compiled: 1e-13 of the largest component."""
     gas = still_gas(wind=(1.0, 2.0, 3.0)).numbers()
     fast, plain = free_grains(20, 1.0, 1.0), free_grains(20, 1.0, 1.0)
@@ -393,11 +393,11 @@ def test_the_compiler_changes_nothing_but_rounding():
     assert fast.spin == pytest.approx(plain.spin, rel=0, abs=1e-13 * np.abs(plain.spin).max())
 
 
-# ---- the settings -------------------------------------------------------------------------------------
+# ---- settings -----------------------------------------------------------------------------------------
 
 
-def test_a_gas_in_numbers():
-    """Text, SI, defaults; pressure gives ρ_g = p m_g/k_B T; a gas is a Force but no per-grain formula."""
+def test_settings_of_a_gas():
+    """Text, SI, defaults; pressure gives ρ_g = p m_g/k_B T; a gas is a Force but not an ExternalForce."""
     gas = Gas("280 K", density="1e-6 kg/m^3")
     assert gas.molecule_mass == pytest.approx(2.34 * 1.66053907e-27, rel=1e-8, abs=0)
     assert gas.molecule_mass == pytest.approx(Gas(280, 1e-6, molecule_mass="2.34 u").molecule_mass, rel=1e-8, abs=0)
@@ -415,16 +415,16 @@ def test_a_gas_in_numbers():
 
 @pytest.mark.parametrize("given", [{"density": 1e-6}, {"pressure": "1 Pa", "cross_section": 2e-19}])
 def test_parameters_build_the_same_gas(given):
-    """What a case file would give: plain numbers, no empty entries, and the same gas again."""
+    """Parameters as in a case file (plain numbers, no empty entries) rebuild an equal gas."""
     gas = Gas(100, wind=[1, 2, 3], brownian=False, accommodation=0.9, **given)
-    told = gas.parameters()
-    assert None not in told.values() and isinstance(told["wind"], list)
-    assert Gas(**told) == gas
+    message = gas.parameters()
+    assert None not in message.values() and isinstance(message["wind"], list)
+    assert Gas(**message) == gas
 
 
 @pytest.mark.parametrize("accommodation", [0.0, 0.5, 1.0])
-def test_the_shortest_time(accommodation):
-    """min of m/f_t, and of I/f_r, which is 0.8 (1/α + π/8) times as long; infinite in vacuum."""
+def test_shortest_relaxation_time(accommodation):
+    """Minimum of m/f_t, and of I/f_r, which is 0.8 (1/α + π/8) times as long; infinite in vacuum."""
     gas, grains = still_gas(accommodation=accommodation), free_grains(30)
     rules, small = gas.numbers(), grains.radius.min()
     friction = 4 / 3 * math.pi * small**2 * rules.density * rules.mean_speed * (1 + math.pi / 8 * accommodation)
@@ -466,8 +466,8 @@ def test_bad_input(changes, message):
     assert len(caught.value.problems) == 1
 
 
-def test_all_mistakes_at_once():
-    """Each mistake has its line: temperature, density, pressure, both of them, and so on."""
+def test_all_errors_are_reported_together():
+    """Each error has its line: temperature, density, pressure, both of them, and so on."""
     with pytest.raises(sand.BadInput) as caught:
         Gas(-1, 0, -5, "1 m", 2, "yes", [math.nan, 0, "1 s"], cross_section=0)
     assert len(caught.value.problems) == 10
@@ -475,7 +475,7 @@ def test_all_mistakes_at_once():
 
 
 def test_warnings():
-    """Grains faster than half the molecules, and grains too large for the mean free path, if that is known."""
+    """Grains faster than half the molecules, and grains too large for a known mean free path."""
     grains, box = free_grains(5), sand.Box.open()
     assert still_gas(cross_section="2e-19 m^2").check(grains, box) == []
     grains.arrays.velocity[1, 3] = 0.51 * still_gas().numbers().mean_speed

@@ -1,4 +1,4 @@
-"""Grains, their table of quantities, and what bad input is told."""
+"""Grains: derived quantities, read-only views, and errors of wrong input."""
 
 import copy
 import math
@@ -16,7 +16,7 @@ def two(**changes):
     return sand.Grains(**given)
 
 
-def test_what_follows_from_radius_and_material():
+def test_derived_quantities():
     """m = ρ (4/3)π r³, I = (2/5) m r², moment = specific moment × mass along +z, orientation (0,0,0,1)."""
     grains = two(moment="200 A m^2/kg", radius=[1e-8, 2e-8], material=["iron", sand.SILICA])
     mass = np.array([7874.0, 2650.0]) * 4 / 3 * math.pi * np.array([1e-8, 2e-8]) ** 3
@@ -28,13 +28,13 @@ def test_what_follows_from_radius_and_material():
 
 
 def test_moments_of_the_material():
-    """moment="material": the material's own moment per mass."""
+    """moment="material" uses the material's moment per mass."""
     grains = two(moment="material", material=["iron", sand.SILICA])
     assert grains.moment[:, 2] == pytest.approx([200 * grains.mass[0], 0.0], rel=1e-6, abs=0.0)
 
 
 def test_every_quantity_of_the_table_is_there():
-    """Public shape (N,) or (N, width), a view without a copy, read only."""
+    """Public shape (N,) or (N, width), a read-only view without a copy."""
     grains = two()
     for field in FIELDS:
         view = getattr(grains, field.name)
@@ -46,7 +46,7 @@ def test_every_quantity_of_the_table_is_there():
 
 
 def test_a_copy_is_independent():
-    """A snapshot does not follow."""
+    """A snapshot does not change with the original."""
     grains = two()
     snapshot, deep = grains.copy(), copy.deepcopy(grains)
     grains.arrays.position[0, 0] = 1.0
@@ -75,20 +75,20 @@ def test_a_copy_is_independent():
     ],
 )
 def test_bad_input_says_what_where_and_which_unit(changes, message):
-    """One clear line."""
+    """One line each."""
     with pytest.raises(sand.BadInput, match=message):
         two(**changes)
 
 
-def test_all_mistakes_at_once():
+def test_all_errors_are_reported_together():
     """Three wrong quantities, three lines."""
     with pytest.raises(sand.BadInput) as caught:
         two(radius=-1.0, velocity=[[0, 0, 0]], charge=math.nan)
     assert len(caught.value.problems) == 3
 
 
-def test_materials_check_themselves():
-    """All problems at once; a copy with changes is checked too; unknown keys get a hint."""
+def test_materials_are_checked():
+    """All errors at once; a modified copy is checked, too; unknown keys get a suggestion."""
     with pytest.raises(sand.BadInput) as caught:
         sand.Material("x", -1, -1, "3 kg", 0.7)
     assert len(caught.value.problems) == 4

@@ -1,4 +1,4 @@
-"""Ensembles of boxes: run, go on, measure, tell; tiny ones."""
+"""Ensembles of growth simulations: run, resume, analyse, report."""
 
 import json
 import math
@@ -29,7 +29,7 @@ CASE = {
 
 @pytest.fixture(scope="module")
 def ensembles(tmp_path_factory):
-    """Three magnetic boxes and three without moments, run in this process."""
+    """Three boxes with moments and three without, run in this process."""
     top = tmp_path_factory.mktemp("growth")
     grow(CASE, [1, 2, 3], top / "magnetic")
     plain = CASE | {
@@ -42,7 +42,7 @@ def ensembles(tmp_path_factory):
 
 @pytest.mark.compiled("dipoles", "contacts")
 def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
-    """The same bits as a simulation of that seed by itself, in a process of its own, too."""
+    """The bits of a simulation with that seed, also from a process of its own."""
     alone = tmp_path / "alone"
     with executor_for(2) as executor:
         grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2, 3], alone, executor)
@@ -53,8 +53,8 @@ def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
 
 
 @pytest.mark.compiled("dipoles")
-def test_called_again_it_goes_on(tmp_path):
-    """To a later end, with the bits of a run that never stopped; a finished one is left as it is."""
+def test_a_second_call_continues_the_boxes(tmp_path):
+    """To a later end, with the bits of an uninterrupted run; a finished box is left unchanged."""
     short = CASE | {"run": {"until": "10 ns", "frame_every": "1 ns"}}
     assert run_box(short, 1, str(tmp_path / "seed-1")) == "finished"
     assert run_box(CASE, 1, str(tmp_path / "seed-1")) == "finished"
@@ -67,14 +67,14 @@ def test_called_again_it_goes_on(tmp_path):
     other = CASE | {"box": {"periodic": "0.26 um"}}
     with pytest.raises(sand.BadInput, match=r"different \[box\]"):
         run_box(other, 1, str(tmp_path / "seed-1"))
-    (tmp_path / "seed-x").mkdir()  # not ours, and no hindrance
+    (tmp_path / "seed-x").mkdir()  # a foreign file, which is ignored
     with pytest.raises(sand.BadInput, match=r"seed-1 contains a box with different \[box\]"):
         grow(other, [2], tmp_path)
 
 
 @pytest.mark.compiled("dipoles")
 def test_what_is_read_of_a_box(ensembles):
-    """S(t) is the ledger's; the census of the last look is that of the last frame."""
+    """S(t) is that of the ledger; the last cluster table is that of the last frame."""
     box = read_box(ensembles / "magnetic" / "seed-1", looks=5)
     run = sand.open(ensembles / "magnetic" / "seed-1")
     assert (box.size == run.ledger["mean_cluster_size"]).all()
@@ -86,8 +86,8 @@ def test_what_is_read_of_a_box(ensembles):
     assert (box.aggregates["moment"] <= box.aggregates["grains"] * box.moment * (1 + 1e-6)).all()
 
 
-def made_up(z, gamma, dimension, seed, grains=1000):
-    """A box whose S(t), moments and sizes follow given laws, with a factor of its own."""
+def synthetic_box(z, gamma, dimension, seed, grains=1000):
+    """A box whose S(t), moments and sizes follow given laws, with a random factor in τ."""
     rng = np.random.default_rng(seed)
     time = np.linspace(0, 1e-5, 201)
     own = math.exp(0.1 * rng.normal())
@@ -111,9 +111,9 @@ def made_up(z, gamma, dimension, seed, grains=1000):
     )
 
 
-def test_laws_that_were_put_in_come_out():
-    """z, γ and D_f of made-up boxes within four of their errors; a straight line misses z, because S begins at 1."""
-    growth = growth_of([made_up(2.0, 0.63, 1.4, seed) for seed in range(8)], (2.0, 100.0))
+def test_exponents_of_synthetic_boxes():
+    """z, γ and D_f within four standard errors; a straight line misses z, because S begins at 1."""
+    growth = growth_of([synthetic_box(2.0, 0.63, 1.4, seed) for seed in range(8)], (2.0, 100.0))
     assert growth.z.exponent == pytest.approx(2.0, rel=0.01)  # boxes differ in τ by a tenth, and z by its square
     assert growth.slope.exponent < 1.8
     for law, exact in ((growth.moment, 0.63), (growth.moment_without_rings, 0.63)):
@@ -124,29 +124,29 @@ def test_laws_that_were_put_in_come_out():
 
 
 @pytest.mark.compiled("dipoles")
-def test_what_cannot_be_told_says_why(ensembles):
-    """Boxes without moments, and ones that hardly grew."""
+def test_missing_results_give_a_reason(ensembles):
+    """Boxes without moments, and boxes that hardly grew."""
     growth = growth_of([read_box(one) for one in boxes_in(ensembles / "plain")])
     assert growth.moment is None and growth.missing["moment"] == "the grains have no moments"
     assert growth.z is None and "fewer than three times have S between 2" in growth.missing["z"]
     with pytest.raises(sand.BadInput, match=r"different \[grains\]"):
-        growth_of([made_up(2, 0.6, 1.4, 1), made_up(2, 0.6, 1.4, 2, grains=10)])
+        growth_of([synthetic_box(2, 0.6, 1.4, 1), synthetic_box(2, 0.6, 1.4, 2, grains=10)])
 
 
 @pytest.mark.compiled("dipoles")
 def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
-    """`sand grow` leaves what `grow` does; `sand analyse` tells, compares, writes tables and a figure, once."""
+    """`sand grow` writes what `grow` does; `sand analyse` reports, compares, writes tables and a figure."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "box.toml").write_text(tomli_w.dumps(CASE | {"run": CASE["run"] | {"until": "3 ns"}}))
     assert main(["grow", "box.toml", "--seeds", "1-2", "--out", "few", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["outcomes"] == {"1": "finished", "2": "finished"}
     words = [str(ensembles / "magnetic"), str(ensembles / "plain")]
     assert main(["analyse", *words, "--out", "told", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["comparison"]["sigma"] > 3
-    assert told == json.loads((tmp_path / "told" / "analysis.json").read_text())
-    assert [one["boxes"] for one in told["ensembles"]] == [3, 3]
-    assert told["ensembles"][0]["mean_size"] > 1.5 * told["ensembles"][1]["mean_size"]
+    message = json.loads(capsys.readouterr().out)
+    assert message["comparison"]["sigma"] > 3
+    assert message == json.loads((tmp_path / "told" / "analysis.json").read_text())
+    assert [one["boxes"] for one in message["ensembles"]] == [3, 3]
+    assert message["ensembles"][0]["mean_size"] > 1.5 * message["ensembles"][1]["mean_size"]
     assert (tmp_path / "told" / "growth.png").stat().st_size > 10_000
     assert len((tmp_path / "told" / "growth.csv").read_text().splitlines()) == 1 + 2 * 31
     assert main(["analyse", *words, "--out", "told"]) == 2
@@ -171,7 +171,7 @@ def test_the_commands(ensembles, tmp_path, monkeypatch, capsys):
         (["grow", "wrong.toml"], "wrong.toml: grains.radius"),
     ],
 )
-def test_mistakes(ensembles, tmp_path, monkeypatch, capsys, words, part):
+def test_wrong_arguments_are_refused(ensembles, tmp_path, monkeypatch, capsys, words, part):
     """One line, exit code 2, nothing written."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "box.toml").write_text(tomli_w.dumps(CASE))

@@ -1,4 +1,4 @@
-"""Smoluchowski's equation against exact solutions and power laws; kernels, their tables, and what DustPy takes."""
+"""Smoluchowski's equation against exact solutions and power laws; kernels, their tables, the DustPy export."""
 
 import math
 
@@ -33,10 +33,10 @@ def measured_z(kernel, per_decade=6, largest=1e11):
 
 
 def test_constant_kernel_against_the_exact_solution():
-    """n_k = n0 T^(k−1)/(1+T)^(k+1), T = t/τ, τ = 2/(K n0); dM2/dt = K M1² makes S = 1 + 2T, dS/dt = 2/τ.
+    """n_k = n0 T^(k−1)/(1+T)^(k+1), T = t/τ, τ = 2/(K n0); dM2/dt = K M1² gives S = 1 + 2T, dS/dt = 2/τ.
 
-    Asked for: 1e-4 of n0.  Sums of sizes are sizes, so only the integrator errs (1e-8 a step), and what left the grid:
-    e^(−300/5) of n0 at T = 5.
+    Tolerance 1e-4 of n0.  Sums of sizes are on the grid, so errors are those of the integrator (1e-8 per step) and of
+    mass beyond the grid: e^(−300/5) of n0 at T = 5.
     """
     sizes, scaled = all_sizes(300), np.array([0.1, 0.5, 1.0, 2.0, 5.0])
     grown = solved(kinetics.constant(RATE), sizes, scaled * TAU, method="DOP853")
@@ -53,7 +53,7 @@ def test_constant_kernel_against_the_exact_solution():
 def test_additive_kernel_against_golovin():
     """n_k = n0 (1−φ) (kφ)^(k−1) e^(−kφ)/k!, φ = 1 − e^(−T), T = b n0 t, and S = e^(2T), for K = b(N1 + N2).
 
-    Tolerance: 1e-8 a step; at T = 0.5 the 300 sizes hold all but 1e-10.
+    Tolerance: 1e-8 per step; at T = 0.5 the 300 sizes hold all but 1e-10.
     """
     sizes, scaled = all_sizes(300), np.array([0.1, 0.3, 0.5])
     grown = solved(kinetics.additive(RATE, MASS), sizes, scaled * TAU / 2, method="DOP853")
@@ -64,8 +64,8 @@ def test_additive_kernel_against_golovin():
     assert grown.mean_size == pytest.approx(np.exp(2 * scaled), rel=1e-6, abs=0.0)
 
 
-def test_product_kernel_is_stopped_at_its_gel():
-    """S = 1/(1 − T), T = c n0 t, infinite at T = 1 for K = c N1N2: the grid is left before, and said so."""
+def test_product_kernel_stops_at_gelation():
+    """S = 1/(1 − T), T = c n0 t, infinite at T = 1 for K = c N1N2: mass leaves the grid before, which is reported."""
     grown = solved(kinetics.product(RATE, MASS), all_sizes(300), np.linspace(0.0, 2.0, 21) * TAU / 2, method="DOP853")
     assert grown.outcome == smoluchowski.MASS_LOST
     scaled = 2 * grown.times / TAU
@@ -75,8 +75,8 @@ def test_product_kernel_is_stopped_at_its_gel():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sizes", [all_sizes(60), log_sizes(1e4, 7), np.array([1.0, 3.5, 4.0, 9.0, 40.0, 1e3])])
-def test_mass_is_kept_to_rounding(sizes):
-    """Σ x_k n_k + what left = n0, whatever the grid: each pair gives what it takes (1e-13: 1e3 steps of rounding)."""
+def test_mass_is_conserved(sizes):
+    """Σ x_k n_k + lost mass = n0 on any grid (1e-13: rounding of 1e3 steps)."""
     for kernel in (kinetics.constant(RATE), kinetics.brownian(R, MASS, 100.0)):
         unit = 2.0 / (kernel(MASS, MASS) * DENSITY)
         grown = solved(kernel, sizes, np.array([1.0, 30.0, 1e3]) * unit, may_lose=0.999)
@@ -86,16 +86,16 @@ def test_mass_is_kept_to_rounding(sizes):
         assert (grown.numbers @ sizes) * MASS == pytest.approx(grown.mass, rel=1e-13, abs=0.0)
 
 
-def test_numbers_are_kept_by_sharing():
-    """N = n0/(1 + T) for a constant kernel on any grid: a sum shared by two sizes is one cluster (1e-6: steps)."""
+def test_number_is_conserved_on_any_grid():
+    """N = n0/(1 + T) for a constant kernel: a sum shared by two sizes is one cluster (1e-6: time steps)."""
     scaled = np.array([1.0, 10.0, 100.0])
     grown = solved(kinetics.constant(RATE), log_sizes(1e5, 6), scaled * TAU)
     assert grown.numbers.sum(axis=1) / DENSITY == pytest.approx(1 / (1 + scaled), rel=1e-6, abs=0.0)
 
 
 @pytest.mark.slow
-def test_the_grid_errs_by_the_square_of_its_spacing():
-    """S on a logarithmic grid is too large, by a factor of 4 less on one twice as fine (2.6 % at 10 per decade)."""
+def test_grid_error_is_of_order_two():
+    """S on a logarithmic grid is too large, by a quarter on one twice as fine (2.6 % at 10 per decade)."""
     off = []
     for per_decade in (10, 20, 40):
         grown = solved(kinetics.constant(RATE), log_sizes(2e4, per_decade), [100 * TAU], accuracy=1e-7)
@@ -107,9 +107,9 @@ def test_the_grid_errs_by_the_square_of_its_spacing():
 @pytest.mark.slow
 @pytest.mark.parametrize(("eta", "nu"), [(0.0, -0.5), (0.5, -0.5), (0.8, -0.5), (1.0, -0.5), (0.5, 0.0)])
 def test_z_from_the_exponents(eta, nu):
-    """z = 1/(1 − η − ν) (Eq. 20) to 1 %, which is asked for, at λ = −0.5, 0, 0.3, 0.5, 0.5.
+    """z = 1/(1 − η − ν) (Eq. 20) to 1 % at λ = −0.5, 0, 0.3, 0.5, 0.5.
 
-    A logarithmic grid looks the same from each of its sizes, so z has no error of the grid.
+    A logarithmic grid is scale-invariant, so z has no grid error.
     """
     kernel = kinetics.power(RATE, MASS, eta, nu)
     assert kernel.degree == eta + nu
@@ -129,7 +129,7 @@ def test_z_of_magnetic_growth(reading, speed):
 
 @pytest.mark.slow
 def test_z_of_33_is_out_of_reach():
-    """λ = 0.97: at S = 1e8 z is still some 20 % low, since the mass of small clusters falls as S^(λ−1) only."""
+    """λ = 0.97: at S = 1e8 z is still about 20 % low, as the mass of small clusters falls as S^(λ−1)."""
     aligned = measured_z(kinetics.capture(R, MASS, MOMENT, 100.0, reading="aligned"))
     assert 22.0 < aligned < 30.0
 
@@ -144,7 +144,7 @@ def test_kernels_are_those_of_the_closed_forms():
     impact = math.sqrt(-2.0 * theory.lowest_energy(MOMENT, 2 * R) / reduced)
     made = kinetics.capture(R, MASS, MOMENT, 100.0, c=0.85)
     assert made(MASS, MASS) == pytest.approx(0.85 * sigma * impact, rel=1e-12, abs=0.0)
-    # Maxwell's distribution by quadrature: a referee for the Γ functions
+    # Maxwell's distribution by quadrature: an independent check of the Γ functions
     v = (np.arange(200000) + 0.5) * (12.0 * thermal / 200000)
     weight = v**2 * np.exp(-0.5 * (v / thermal) ** 2)
     sigmas = sigma * (v / thermal) ** (-4.0 / 3.0)
@@ -183,8 +183,8 @@ def rows_of(kernel, masses):
     return [(a, b, kernel(a, b) / 0.3, 0.3) for a in masses for b in masses if a <= b]
 
 
-def test_measured_rows_become_the_kernel():
-    """Between measured masses ln K is linear: a product of powers comes out exactly, another within its curvature."""
+def test_interpolation_of_measured_kernels():
+    """ln K is linear between measured masses: exact for products of powers, else within the curvature."""
     product = kinetics.product(RATE, MASS)
     known = kernel_table.measured(rows_of(product, MASS * np.array([1.0, 8.0, 64.0])))
     m = MASS * np.geomspace(1.0, 64.0, 7)
@@ -193,14 +193,14 @@ def test_measured_rows_become_the_kernel():
     known = kernel_table.measured(rows_of(brownian, MASS * 2.0 ** np.arange(7)))
     table = kernel_table.on_grid(known, m)
     assert table == pytest.approx(kernel_table.on_grid(brownian, m), rel=0.03, abs=0.0)
-    # where triangles on either side of the diagonal are cut another way (here by 6 %), the order must not matter
+    # where the triangulation differs on the two sides of the diagonal (here by 6 %), K must be symmetric
     coarse = kernel_table.measured(rows_of(brownian, MASS * 10 ** np.linspace(0.0, 2.0, 6)))
     table = kernel_table.on_grid(coarse, MASS * np.geomspace(1.0, 100.0, 13))
     assert (table == table.T).all()
 
 
-def test_beyond_what_was_measured():
-    """Refused; if asked for, the power law goes on, exactly where K is one, and without a jump at the edge."""
+def test_extrapolation_of_measured_kernels():
+    """Refused by default; on request by the power law, exact for powers and continuous at the edge."""
     product = kinetics.product(RATE, MASS)
     rows = rows_of(product, MASS * np.array([1.0, 8.0, 64.0]))
     with pytest.raises(sand.BadInput, match="extrapolate=True"):
@@ -216,7 +216,7 @@ def test_beyond_what_was_measured():
 
 
 def test_tables_are_written_and_read(tmp_path):
-    """Numbers to the last bit; g and cm³/s in the plain text."""
+    """Values to the last bit; g and cm³/s in the plain text."""
     kernel, m = kinetics.brownian(R, MASS, 100.0), MASS * 2.0 ** np.arange(4)
     kernel_table.write_csv(tmp_path / "k.csv", kernel, m)
     read = np.genfromtxt(tmp_path / "k.csv", delimiter=",", names=True)
@@ -230,10 +230,10 @@ def test_tables_are_written_and_read(tmp_path):
     assert np.array(table) == pytest.approx(1e6 * kernel_table.on_grid(kernel, m), rel=1e-15, abs=0.0)
 
 
-def test_what_dustpy_takes():
-    """DustPy's own kernel, (1 − δ/2) π(a_i + a_j)² v/√(2π(H_i² + H_j²)), written out; 0 at the two ends in radius.
+def test_kernel_for_dustpy():
+    """DustPy's own kernel, (1 − δ/2) π(a_i + a_j)² v/√(2π(H_i² + H_j²)); 0 at the ends of the radial grid.
 
-    Checked by integral, too: ∫ of two Gaussian layers' densities times K over the height.
+    Also by quadrature: ∫ of two Gaussian layers' densities times K over the height.
     """
     size, speed, height = np.array([1.0, 2.0, 4.0]), 3.0, np.array([[9.0, 9.0, 9.0], [5.0, 4.0, 2.0], [9.0, 9.0, 9.0]])
     table = np.pi * (size[:, None] + size) ** 2 * speed
@@ -257,7 +257,7 @@ def grow(**changed):
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "expected"),
     [
         (lambda: kinetics.constant("1 m"), "rate"),
         (lambda: kinetics.power(RATE, 0.0, 1, 0), "mass"),
@@ -291,20 +291,20 @@ def grow(**changed):
         (lambda: kernel_table.for_dustpy(np.ones((2, 2)), np.ones((3, 3))), "scale heights"),
     ],
 )
-def test_mistakes_are_told(call, said):
-    """One line, with the name."""
-    with pytest.raises(sand.BadInput, match=said) as caught:
+def test_wrong_arguments_are_refused(call, expected):
+    """One line with the name."""
+    with pytest.raises(sand.BadInput, match=expected) as caught:
         call()
     assert len(caught.value.problems) == 1
 
 
 @pytest.mark.parametrize("largest", [40, 100])
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-8, 1e-10])
-def test_growth_faster_than_any_power_is_said(largest, accuracy):
+def test_exponential_growth_is_reported(largest, accuracy):
     """The additive kernel grows exponentially, dS/dt ∝ S: there is no z.
 
-    Whichever last digits the solver leaves, and although the mean of what the grid holds grows a little slower than S:
-    with 40 sizes λ comes out 7e-5 too low, as 6e-7 of the mass has left.
+    For any rounding of the solver, and although the mean size on the grid grows slightly slower than S: with 40 sizes λ
+    is 7e-5 too low, because 6e-7 of the mass has left.
     """
     times = np.linspace(0.0, 0.6, 30) * TAU / 2
     grown = solved(kinetics.additive(RATE, MASS), all_sizes(largest), times, method="DOP853", accuracy=accuracy)

@@ -9,7 +9,7 @@ from sand.io.page_bundle import PAGE, read_bundle
 from sand.viewer.dataset import run_dataset
 from sand.viewer.html import write_page
 
-from .reels import reel
+from .synthetic_trajectories import write_trajectory
 
 HOLDERS = {
     "three": "three.js authors",
@@ -36,7 +36,7 @@ def licences_in(text):
 
 
 def test_script_and_styles_begin_with_the_licences(bundle):
-    """Name, version, copyright and the whole text of each package; the sheet has styles of uPlot alone."""
+    """Name, version, copyright and full text of each package; the style sheet has those of uPlot alone."""
     script, sheet = (licences_in(part) for part in bundle)
     for name, holder in HOLDERS.items():
         assert re.search(rf"^{name} [0-9(]", script, re.MULTILINE), name
@@ -47,9 +47,9 @@ def test_script_and_styles_begin_with_the_licences(bundle):
     assert (PAGE / "licences.txt").read_text("utf-8") == script
 
 
-def test_a_file_to_send_carries_them(bundle, tmp_path, monkeypatch):
-    """`sand view --html` puts script and sheet into the file, and their first comments with them."""
-    reel(tmp_path / "a.gsd", [[(0, 1)], []], 3)
+def test_html_files_contain_the_licences(bundle, tmp_path, monkeypatch):
+    """`sand view --html` embeds script and style sheet with their first comments."""
+    write_trajectory(tmp_path / "a.gsd", [[(0, 1)], []], 3)
     monkeypatch.setattr("sand.viewer.html.read_bundle", lambda: bundle)
     write_page(run_dataset(tmp_path / "a.gsd"), tmp_path / "a.html")
     text = (tmp_path / "a.html").read_text("utf-8")

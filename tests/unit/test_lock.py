@@ -1,4 +1,4 @@
-"""One writer for a folder: others are refused in a line, whoever they are; a kill lets go."""
+"""One writer per folder: others are refused in one line; the lock ends with its process."""
 
 import errno
 import subprocess
@@ -24,8 +24,8 @@ HOLD = (
 
 
 @pytest.fixture
-def held(tmp_path):
-    """A folder that holds a file and that another process writes to; and that process."""
+def locked_folder(tmp_path):
+    """A folder with a file, locked by another process; and that process."""
     (tmp_path / "case.toml").write_text("")
     job = subprocess.Popen(
         [sys.executable, "-c", HOLD, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -36,9 +36,9 @@ def held(tmp_path):
     job.communicate()
 
 
-def test_another_process_is_named_and_a_kill_lets_go(held):
-    """Refused with the number of the process, again and again; when it is killed the system releases the lock."""
-    folder, job = held
+def test_the_lock_names_its_process_and_ends_with_it(locked_folder):
+    """Refused with the process id; when the process is killed the system releases the lock."""
+    folder, job = locked_folder
     for _ in range(2):
         with pytest.raises(sand.BadInput, match=rf"another process \(pid {job.pid}\) writes to {folder}"):
             FolderLock(folder)
@@ -52,9 +52,9 @@ def test_another_process_is_named_and_a_kill_lets_go(held):
     "words",
     [["resume"], ["run", "CASE", "--out"], ["run", "CASE", "--overwrite", "--out"], ["scatter", "CASE", "--out"]],
 )
-def test_commands_end_with_a_line(held, tmp_path, capsys, words):
-    """Exit code 2, one line; the files stay as they are."""
-    folder, job = held
+def test_commands_refuse_a_locked_folder(locked_folder, tmp_path, capsys, words):
+    """Exit code 2, one line; the files are unchanged."""
+    folder, job = locked_folder
     case = tmp_path.parent / f"{tmp_path.name}.toml"
     if words[0] == "run":
         case.write_text(
@@ -68,13 +68,13 @@ def test_commands_end_with_a_line(held, tmp_path, capsys, words):
         )
     (folder / "checkpoint-000000000000001.npz").write_bytes(b"")
     assert main([*(str(case) if word == "CASE" else word for word in words), str(folder)]) == 2
-    said = capsys.readouterr().err.strip().splitlines()
-    assert len(said) == 1 and f"another process (pid {job.pid}) writes to {folder}" in said[0]
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and f"another process (pid {job.pid}) writes to {folder}" in lines[0]
     assert sorted(path.name for path in folder.iterdir()) == [LOCK, "case.toml", "checkpoint-000000000000001.npz"]
 
 
-def test_what_a_lock_leaves_is_no_run(tmp_path):
-    """The lock file stays, with a number that says nothing once the lock is released; the folder counts as empty."""
+def test_a_released_lock_file_is_no_run(tmp_path):
+    """The lock file stays with a process id that means nothing; the folder counts as empty."""
     with writing(tmp_path), pytest.raises(sand.BadInput, match="another simulation of this process"):
         make_folder(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [LOCK]
@@ -84,8 +84,8 @@ def test_what_a_lock_leaves_is_no_run(tmp_path):
         pass
 
 
-def test_one_that_is_released_twice_and_a_folder_that_has_gone(tmp_path):
-    """The first is no error; the second is a line, and the folder is not made again."""
+def test_double_release_and_removed_folder(tmp_path):
+    """The first is no error; the second is one line, and the folder is not created again."""
     one = FolderLock(tmp_path)
     one.release()
     other = FolderLock(tmp_path)
@@ -99,7 +99,7 @@ def test_one_that_is_released_twice_and_a_folder_that_has_gone(tmp_path):
 
 
 def test_without_locks_a_run_goes_on_with_a_warning(tmp_path, monkeypatch):
-    """A network file system that knows none; a disk that is full is an error."""
+    """A network file system without locks gives a warning; a full disk is an error."""
     import filelock
 
     for number, raised in ((errno.ENOLCK, False), (errno.ENOSYS, False), (errno.ENOSPC, True)):
@@ -116,22 +116,22 @@ def test_without_locks_a_run_goes_on_with_a_warning(tmp_path, monkeypatch):
                 FolderLock(tmp_path).release()
 
 
-def test_a_number_that_cannot_be_read(held, monkeypatch):
-    """As on Windows, or while it is being written: the line does without it."""
+def test_an_unreadable_process_id(locked_folder, monkeypatch):
+    """As on Windows, or while it is being written: the line omits it."""
     monkeypatch.setattr(lock_files, "LOCK", LOCK)
-    (held[0] / LOCK).write_bytes(b"")
+    (locked_folder[0] / LOCK).write_bytes(b"")
     with pytest.raises(sand.BadInput, match="another process writes to"):
-        FolderLock(held[0])
+        FolderLock(locked_folder[0])
 
 
-class Others(Observer):
-    """Tries to write to the folder of a run while it is on its way."""
+class CompetingWriter(Observer):
+    """Tries to write to the folder of a run while it runs."""
 
     def __init__(self, folder):
-        self.folder, self.said = folder, []
+        self.folder, self.messages = folder, []
 
     def see(self, simulation, row):
-        if self.said:
+        if self.messages:
             return
         for attempt in (
             lambda: sand.resume(self.folder),
@@ -139,20 +139,22 @@ class Others(Observer):
         ):
             with pytest.raises(sand.BadInput) as error:
                 attempt()
-            self.said.append(str(error.value))
+            self.messages.append(str(error.value))
 
 
 @pytest.mark.compiled("contacts")
 def test_simulations_of_one_process(tmp_path):
-    """While one runs no other writes to its folder; afterwards another may, and then the first is refused."""
+    """While one runs no other writes to its folder; afterwards another may, and the first is refused."""
     folder, setup = tmp_path / "run", struck_chain()
     first = sand.Simulation(setup.grains, setup.forces, out=folder, frame_every="0.1 ns")
     late = sand.Simulation(setup.grains, setup.forces, out=folder, frame_every="0.1 ns")
     first.run(until="0.1 ns")
-    others = Others(folder)
+    others = CompetingWriter(folder)
     first.observers.append(others)
     first.run(until="0.2 ns")
-    assert len(others.said) == 2 and all("another simulation of this process" in said for said in others.said)
+    assert len(others.messages) == 2 and all(
+        "another simulation of this process" in message for message in others.messages
+    )
     with pytest.raises(sand.BadInput, match=r"another run has written to .*give another folder"):
         late.run(until="0.1 ns")
     again, never = sand.resume(folder), sand.resume(folder)
@@ -164,5 +166,5 @@ def test_simulations_of_one_process(tmp_path):
         warnings.simplefilter("error")
         assert again.run(until="0.4 ns").outcome is sand.Outcome.FINISHED
         assert [row["step"] for row in again.ledger.rows] == sand.open(folder).ledger["step"].tolist()
-    with pytest.raises(sand.BadInput, match="another run"):  # refused once, refused again
+    with pytest.raises(sand.BadInput, match="another run"):  # refused twice
         first.run(until="0.4 ns")

@@ -1,4 +1,4 @@
-"""What the compiler leaves out for our code (`compiler/lowering.py`) must not swallow what is raised."""
+"""The reduced compilation of SAND's functions (`compiler/lowering.py`) must not swallow exceptions."""
 
 import gc
 import json
@@ -31,7 +31,7 @@ try:
 except IndexError as error:
     print("told", error)
 """
-"""A function of ours that calls a function of ours that reads beyond the end of an array."""
+"""A SAND kernel that calls a SAND function that reads beyond the end of an array."""
 
 CACHED = """
 import importlib.util, sys
@@ -77,7 +77,7 @@ def root_of(x):
 
 @pytest.mark.compiled("small")
 def test_an_error_in_an_inner_function_reaches_python():
-    """Raised two calls below a kernel; and what is not raised is right."""
+    """Raised two calls below a kernel; results without an error are right."""
 
     def roots(values):
         total = 0.0
@@ -93,8 +93,8 @@ def test_an_error_in_an_inner_function_reaches_python():
 
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="Python checks bounds by itself")
-def test_bounds_that_are_checked_are_told(tmp_path):
-    """With NUMBA_BOUNDSCHECK=1, which one turns on to find a wrong index, one in our own functions is an IndexError."""
+def test_bounds_checks_raise_index_errors(tmp_path):
+    """With NUMBA_BOUNDSCHECK=1 a wrong index in SAND's functions raises IndexError."""
     env = os.environ | {"NUMBA_BOUNDSCHECK": "1", "SAND_CACHE": str(tmp_path)}
     done = subprocess.run([sys.executable, "-c", BEYOND], env=env, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -115,8 +115,8 @@ def test_an_error_in_a_kernel_from_the_disk_cache_reaches_its_caller(tmp_path):
 
 @pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
-def test_who_passes_arguments_otherwise_is_told():
-    """Numba's own functions take named tuples apart, ours do not: a call across says so instead of reading rubbish."""
+def test_incompatible_calling_conventions_raise():
+    """Plain numba functions unpack named tuples, SAND's do not: a call across raises instead of reading garbage."""
 
     def speed(grains):
         return kicked(grains, 0, 1.0)[0][0]
@@ -129,8 +129,8 @@ def test_who_passes_arguments_otherwise_is_told():
 
 @pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
-def test_rubbish_is_collected_again_after_compiling():
-    """As before the first call, whether that was on or off."""
+def test_garbage_collection_is_restored_after_compiling():
+    """On or off as before the first call."""
     for wanted in (True, False):
         try:
             (gc.enable if wanted else gc.disable)()

@@ -1,4 +1,4 @@
-"""Files that are not what they were: refused in a line, or read right; never a traceback, a hang, or much memory."""
+"""Fuzzed files: refused in one line or read right; no traceback, hang or excessive memory."""
 
 import _thread
 import contextlib
@@ -24,17 +24,17 @@ from sand.io.trajectory import read_frames
 from ..physics.test_full_disk import CASE
 
 LONGEST = 20
-"""Seconds that a file may take."""
+"""Time limit per file [s]."""
 MEMORY = 100 * 2**20
-"""Bytes that Python and NumPy may have taken at once for a file; the files are of some 10 kB."""
+"""Memory limit per file [bytes]; the files have about 10 kB."""
 
 
 @contextlib.contextmanager
 def within_bounds(longest=LONGEST, memory=MEMORY):
-    """No file takes long or much memory: the block calls what it is given before each file, and once at the end.
+    """Fails if a file takes too long or too much memory; the block calls the yielded function before each file.
 
-    A file that takes too long is interrupted as by Ctrl-C; if that is not heard, in compiled code, the process ends
-    with a traceback after twice the time.
+    A file that takes too long is interrupted as by Ctrl-C; if compiled code ignores that, the process ends with a
+    traceback after twice the time.
     """
     timers = []
 
@@ -59,7 +59,7 @@ def within_bounds(longest=LONGEST, memory=MEMORY):
         try:
             yield next_one
         except KeyboardInterrupt:
-            if not timers or time.monotonic() - timers[-1][1] < longest:  # somebody pressed Ctrl-C
+            if not timers or time.monotonic() - timers[-1][1] < longest:  # a real Ctrl-C
                 raise
         settle()
     finally:
@@ -69,8 +69,8 @@ def within_bounds(longest=LONGEST, memory=MEMORY):
         tracemalloc.stop()
 
 
-def test_the_bounds_hold():
-    """What takes too long, or too much memory, however short and whatever was taken before, fails; all else passes."""
+def test_the_time_and_memory_limits_work():
+    """Too long or too much memory fails, however brief and whatever came before; everything else passes."""
     before = np.zeros(40 * 2**20)
     with within_bounds(memory=10 * 2**20) as next_one:
         for _ in range(3):
@@ -89,19 +89,19 @@ def test_the_bounds_hold():
 
 
 def mutated(good, rng):
-    """The bytes cut, with some changed, taken out or put in."""
-    bad, kind, place = bytearray(good), rng.randrange(5), rng.randrange(len(good))
+    """The bytes truncated, or with some changed, removed or inserted."""
+    bad, kind, offset = bytearray(good), rng.randrange(5), rng.randrange(len(good))
     if kind == 0:
-        del bad[place:]
+        del bad[offset:]
     elif kind == 1:
         for _ in range(rng.randrange(1, 8)):
             bad[rng.randrange(len(bad))] = rng.randrange(256)
     elif kind == 2:
-        bad[place : place + 100] = rng.randbytes(min(100, len(bad) - place))
+        bad[offset : offset + 100] = rng.randbytes(min(100, len(bad) - offset))
     elif kind == 3:
-        del bad[place : place + rng.randrange(1, 100)]
+        del bad[offset : offset + rng.randrange(1, 100)]
     else:
-        bad[place:place] = rng.randbytes(rng.randrange(1, 50))
+        bad[offset:offset] = rng.randbytes(rng.randrange(1, 50))
     return bytes(bad)
 
 
@@ -121,7 +121,7 @@ def run(tmp_path_factory):
 @pytest.mark.parametrize("count", [100, pytest.param(2000, marks=pytest.mark.validate)])
 @pytest.mark.parametrize(("pattern", "read"), [("checkpoint-*.npz", read_checkpoint), ("trajectory.gsd", read_frames)])
 def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, count):
-    """BadInput, or, where nothing that counts was hit, what the whole file holds."""
+    """BadInput, or the content of the intact file if no relevant byte changed."""
     path = sorted(run.glob(pattern))[-1]
     good, rng, other = path.read_bytes(), random.Random(count), tmp_path / path.name
     whole = read(path)
@@ -144,7 +144,7 @@ def test_mutated_files_are_refused_or_read_right(run, tmp_path, pattern, read, c
             else:
                 assert all((found[0][name] == whole[0][name]).all() for name in whole[0])
                 assert found[1] == whole[1]
-    assert refused > 0.8 * count  # the others hit what the format leaves empty
+    assert refused > 0.8 * count  # the others hit unused bytes of the format
 
 
 COLLISION = """
@@ -225,8 +225,8 @@ STRANGE = [
 ]  # fmt: skip
 
 
-def spoilt(content, rng):
-    """The case with one to three entries made strange, taken out, renamed or moved."""
+def mutated_case(content, rng):
+    """The case with one to three entries changed, removed, renamed or moved."""
     tables = [content]
     for table in tables:
         tables += [value for value in table.values() if isinstance(value, dict)]
@@ -247,7 +247,7 @@ def spoilt(content, rng):
     return content
 
 
-def look(name, path):
+def read_and_build(name, path):
     """Read a case of a kind, and build the simulation if it is one."""
     found = KINDS[name][1](path)
     if name == "run" and found.grains.kind == "gas" and found.grains.number <= 200:
@@ -259,20 +259,20 @@ def look(name, path):
 @pytest.mark.parametrize("count", [150, pytest.param(3400, marks=pytest.mark.validate)])
 @pytest.mark.parametrize("name", list(KINDS))
 def test_mutated_cases_are_read_or_refused_in_lines(tmp_path, name, count):
-    """Half of them changed as text, half as tables: a case, or lines that name the file; nothing else."""
+    """Half changed as text, half as tables: a case, or lines that name the file."""
     text = KINDS[name][0]
     path, rng, refused = tmp_path / "case.toml", random.Random(count), 0
     path.write_text(text)
-    look(name, path)  # it is right before
+    read_and_build(name, path)  # the unchanged case is valid
     with within_bounds() as next_one:
         for number in range(count):
             if number % 2:
                 path.write_bytes(mutated(text.encode(), rng))
             else:
-                path.write_bytes(tomli_w.dumps(spoilt(tomllib.loads(text), rng)).encode("utf-8", "replace"))
+                path.write_bytes(tomli_w.dumps(mutated_case(tomllib.loads(text), rng)).encode("utf-8", "replace"))
             next_one()
             try:
-                look(name, path)
+                read_and_build(name, path)
             except sand.BadInput as error:
                 refused += 1
                 assert all(line and "\n" not in line for line in error.problems), (path.read_text(), error.problems)

@@ -1,4 +1,4 @@
-"""Packets: what the page decodes is what was there."""
+"""Packets of the viewer: decoding returns the encoded frame."""
 
 import json
 
@@ -9,17 +9,17 @@ from sand.io.trajectory import Frames
 from sand.viewer.packets import encode, frame_bytes, frame_packet, grains_packet
 
 from .pages import decode
-from .reels import reel
+from .synthetic_trajectories import write_trajectory
 
 
 @pytest.fixture(scope="module")
 def frame(tmp_path_factory):
     """One of seven grains and two contacts."""
-    return Frames(reel(tmp_path_factory.mktemp("packets") / "a.gsd", [[(0, 1), (5, 3)]], 7))[0]
+    return Frames(write_trajectory(tmp_path_factory.mktemp("packets") / "a.gsd", [[(0, 1), (5, 3)]], 7))[0]
 
 
-def test_a_frame_comes_back(frame):
-    """All arrays to single precision, positions and names exactly; each begins at a multiple of 8."""
+def test_packets_round_trip(frame):
+    """All arrays to single precision, positions and cluster ids exactly; each begins at a multiple of 8."""
     names = np.array([0, 0, 2**32 - 1, 3, 2**32 - 1, 3, 2**32 - 1], np.uint32)
     packet = frame_packet(4, frame, names, 1e-8)
     head, arrays = decode(packet)
@@ -35,7 +35,7 @@ def test_a_frame_comes_back(frame):
 
 
 def test_compact_packets_keep_eleven_bits(frame):
-    """Half precision within 2⁻¹¹ of each number, positions untouched; no warning, nothing infinite."""
+    """Half precision within 2⁻¹¹ of each value, positions unchanged; no warning, nothing infinite."""
     _, whole = decode(frame_packet(0, frame, np.zeros(7), 1e-8))
     head, arrays = decode(frame_packet(0, frame, np.zeros(7), 1e-8, compact=True))
     assert {entry["type"] for entry in head["arrays"]} == {"f4", "f2", "u4"}
@@ -45,7 +45,7 @@ def test_compact_packets_keep_eleven_bits(frame):
 
 
 def test_scales_span_nine_decades():
-    """From the largest number down to 1e-9 of it all keep 11 bits, wherever the largest is; zeros and NaN stay."""
+    """From the maximum to 1e-9 of it all values keep 11 bits, for any maximum; zeros and NaN stay."""
     for peak in (1e-30, 7e-7, 1.0, 65504.0, 3e38, 1e200):
         values = peak * np.concatenate([np.geomspace(1e-9, 1.0, 1000), [-1.0, 0.0, np.nan]])
         _, arrays = decode(encode({}, {"force": values}, compact=True))
@@ -66,6 +66,6 @@ def test_grains_keep_their_size(frame):
 
 
 def test_headers_are_json():
-    """A header never holds NaN, which is not JSON."""
+    """A header never contains NaN, which is not JSON."""
     packet = encode({"time": np.nan}, {"a": np.arange(6.0)})
     assert json.loads(packet[12 : 12 + int.from_bytes(packet[8:12], "little")])["time"] is None

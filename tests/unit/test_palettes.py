@@ -1,4 +1,4 @@
-"""Maps of colours are even, and the page gets those of the pictures."""
+"""Colour maps have uniform lightness steps, and the page uses those of the pictures."""
 
 import numpy as np
 import pytest
@@ -23,28 +23,28 @@ def lightness(shades):
 
 
 def test_lightness_rises_evenly():
-    """From deep to bright in a straight line, to 0.5 of 57; the eye tells apart about 1."""
+    """Linear in the map from dark to bright, to 0.5 of 57; the eye resolves about 1."""
     light = lightness(SEQUENTIAL(np.linspace(0.0, 1.0, 256))[:, :3])
     assert (np.diff(light) > 0.0).all()
     assert light == pytest.approx(np.linspace(light[0], light[-1], 256), rel=0.0, abs=0.5)
     assert light[-1] - light[0] > 50.0
 
 
-def test_both_sides_of_zero_are_as_dark():
-    """The same lightness at the same distance from the middle, which is the lightest, to 3 of 57."""
+def test_diverging_map_is_symmetric_in_lightness():
+    """Equal lightness at equal distance from the middle, which is the lightest, to 3 of 57."""
     light = lightness(DIVERGING(np.linspace(0.0, 1.0, 257))[:, :3])
     assert light == pytest.approx(light[::-1], rel=0.0, abs=3.0)
     assert (np.diff(light[:128]) > 0.0).all() and light[128] - light[0] > 50.0
 
 
 def test_the_page_has_the_pictures_colours():
-    """Deep is the first, 64 steps from end to end; a colour for each mode, of materials, and of contacts within."""
-    told = palettes()
-    assert list(told) == ["deep", "cividis", "viridis", "diverging"]
-    assert all(np.shape(steps) == (64, 3) for steps in told.values())
+    """The first map is "deep", 64 steps from end to end; colours of modes, materials, contacts within limits."""
+    colour_maps = palettes()
+    assert list(colour_maps) == ["deep", "cividis", "viridis", "diverging"]
+    assert all(np.shape(steps) == (64, 3) for steps in colour_maps.values())
     for name, way in (("deep", SEQUENTIAL), ("diverging", DIVERGING)):
         ends = np.rint(255 * way(np.array([0.0, 1.0]))[:, :3])
-        assert [told[name][0], told[name][-1]] == ends.tolist()
+        assert [colour_maps[name][0], colour_maps[name][-1]] == ends.tolist()
     named = colours()
     assert list(named) == ["big", "small", "single", "modes", "within", "materials"]
     assert named["modes"] == list(MODE_COLOURS) and len(MODE_COLOURS) == len(MODES) - 1

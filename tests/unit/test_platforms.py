@@ -1,4 +1,4 @@
-"""What is made for systems other than this one: compiled code, the number of cores, another numba."""
+"""Parts for other systems: compiled code, the number of cores, other versions of numba."""
 
 import os
 import subprocess
@@ -27,8 +27,8 @@ SYSTEMS = {
 
 
 @pytest.mark.parametrize(("triple", "name"), SYSTEMS.items())
-def test_waiting_threads_let_others_run(triple, name):
-    """The code calls the function that its system has, without arguments; where there is none it goes on waiting."""
+def test_waiting_threads_yield_the_cpu(triple, name):
+    """The code calls the system's yield function without arguments; without one it only spins."""
     module = ir.Module("waiting")
     module.triple = triple
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), []), "wait")
@@ -44,14 +44,14 @@ def test_waiting_threads_let_others_run(triple, name):
         assert f'declare i32 @"{name}"()' in code
 
 
-def test_this_machine_has_the_function():
-    """LLVM finds it in this process, as it does when it loads code from the cache; compiled code calls it."""
+def test_the_yield_function_exists_on_this_machine():
+    """LLVM finds it in this process, as when code is loaded from the cache; compiled code calls it."""
     name = atomics.yield_function(binding.get_process_triple())
     assert name is None or binding.address_of_symbol(name)
 
 
 def test_cores_are_counted_everywhere(monkeypatch):
-    """Where a process cannot be told which cores it may use, those of the machine count, and one if nobody knows."""
+    """Without CPU affinity the cores of the machine count, and one if the number is unknown."""
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     assert threads.cores() == os.cpu_count()
     monkeypatch.setattr(os, "cpu_count", lambda: None)
@@ -70,18 +70,23 @@ print(jit.HAS_NOINLINE, jit.LONG_VECTORS)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("version", "jit", "told"),
+    ("version", "jit", "number"),
     [((0, 99), True, True), ((0, 61), True, True), ((0, 68), True, False), ((0, 99), False, False)],
 )
-def test_another_numba_is_told_once(version, jit, told, tmp_path):
-    """One line that says what is lost and which versions are known; nothing where nothing is lost."""
+def test_untested_numba_warns_once(version, jit, number, tmp_path):
+    """One line with the consequences and the tested versions; nothing if there are no consequences."""
     env = os.environ | {"SAND_CACHE": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0" if jit else "1"}
     done = subprocess.run(
         [sys.executable, "-c", OTHER_NUMBA.format(*version, *version)], env=env, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[0] == str(version == (0, 68))
-    said = done.stderr.splitlines()
-    assert len(said) == told
-    for words in [f"numba {version[0]}.{version[1]}.0", "0.62 to 0.68", "three times as long", "one thread"] * told:
-        assert words in said[0]
+    lines = done.stderr.splitlines()
+    assert len(lines) == number
+    for words in [
+        f"numba {version[0]}.{version[1]}.0",
+        "0.62 to 0.68",
+        "three times as long",
+        "one thread",
+    ] * number:
+        assert words in lines[0]

@@ -1,4 +1,4 @@
-"""What grains and contacts are told by."""
+"""Quantities of grains and contacts."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,10 @@ import pytest
 from sand.analysis.quantities import GRAIN_NAMES, cluster_rank, measured, quantity
 from sand.errors import BadInput
 
-from .stills import R, frame_of
+from .synthetic_frames import R, frame_of
 
 
-def test_quantities_are_what_they_say():
+def test_quantities_follow_their_formulas():
     """Each of the table by its formula: cosines, speeds, energies with spin, ranks of clusters."""
     frame = frame_of(
         np.eye(3) * 3 * R,

@@ -87,7 +87,7 @@ def test_public_names_of_packages(package):
     assert not names
 
 
-def test_names_that_are_loaded_late():
+def test_lazily_loaded_names():
     """The names of sand.experiments.scattering, which its module attribute hook loads."""
     from sand.experiments import scattering
 

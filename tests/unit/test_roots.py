@@ -1,4 +1,4 @@
-"""1/√x of sums over pairs, by both roads, in vectors and alone."""
+"""1/√x of sums over pairs, by both methods, vectorised and scalar."""
 
 import numpy as np
 import pytest
@@ -27,9 +27,9 @@ def filled_by(function):
 @pytest.mark.parametrize("name", ["exact_inverse_root", "seeded_inverse_root"])
 @pytest.mark.parametrize("together", [4096, 1])
 def test_inverse_roots_are_right_to_rounding(name, together):
-    """1/√x against extended precision: 3e-16, two roundings of at most 1.1e-16, and 5/16 e³ < 3e-18 for a seed to 1e-6.
+    """1/√x against extended precision: 3e-16 = two roundings of 1.1e-16, and 5/16 e³ < 3e-18 for a seed to 1e-6.
 
-    From 1e-37 to 1e37, and where single precision rounds x up or down; vectors of 4096 and numbers alone.
+    From 1e-37 to 1e37, and where single precision rounds x up or down; arrays of 4096 and scalars.
     """
     rng = np.random.default_rng(4)
     x = np.concatenate([10.0 ** rng.uniform(-37, 37, 4000), 1.0 + np.arange(-48, 48) * 2.0**-25])
@@ -41,14 +41,14 @@ def test_inverse_roots_are_right_to_rounding(name, together):
 
 
 @pytest.mark.compiled("small")
-def test_no_root_of_a_distance_that_is_none():
-    """Grains on top of each other, x = 0, give no number, by either road: what stops a run sees it."""
+def test_inverse_root_of_zero_is_not_finite():
+    """Coincident grains, x = 0, give inf or NaN by either method, which the driver detects."""
     with np.errstate(all="ignore"):
         for function in (roots.exact_inverse_root, roots.seeded_inverse_root):
             fill, found = filled_by(function), np.zeros(16)
             try:
                 fill(np.zeros(16), found)
-            except ZeroDivisionError:  # the interpreter's way
+            except ZeroDivisionError:  # as the interpreter does
                 assert not COMPILED
                 continue
             assert not np.isfinite(found).any()
@@ -56,14 +56,14 @@ def test_no_root_of_a_distance_that_is_none():
 
 @pytest.mark.compiled("small")
 @pytest.mark.parametrize("count", [77, *(pytest.param(n, marks=pytest.mark.validate) for n in (2, 1001))])
-def test_sums_with_seeds_are_those_without(count):
-    """Forces and fields of all pairs, with either root: ten roundings in each of 1000 terms, 1e-13 of the largest.
+def test_sums_with_seeded_roots_agree(count):
+    """Forces and fields of all pairs with either root: ten roundings in 1000 terms, 1e-13 of the largest.
 
     Rows that fill whole vectors and rows that do not; from 1000 grains on in blocks.
     """
     rng = np.random.default_rng(3)
-    place = rng.permutation(11**3)[:count, None] // [1, 11, 121] % 11
-    grains = sand.Grains(place * 1e-7, 1e-8, sand.IRON, moment=6e-18 * rng.normal(size=(count, 3)))
+    positions = rng.permutation(11**3)[:count, None] // [1, 11, 121] % 11
+    grains = sand.Grains(positions * 1e-7, 1e-8, sand.IRON, moment=6e-18 * rng.normal(size=(count, 3)))
     span, found = sand.Box.open().span, []
     for pair in (dipoles.uncut_pair, dipoles.uncut_pair_seeded):
         loads, far, own = (
@@ -75,11 +75,11 @@ def test_sums_with_seeds_are_those_without(count):
         found.append((far.force, far.torque, own.arrays.field))
     for exact, seeded in zip(*found, strict=True):
         assert np.abs(exact - seeded).max() < 1e-13 * np.abs(exact).max()
-        assert np.abs(exact - seeded).max() > 0.0 or count == 2  # two roads, not one twice
+        assert np.abs(exact - seeded).max() > 0.0 or count == 2  # the two methods differ
 
 
-def test_seeds_are_for_many_grains_on_processors_with_long_vectors():
-    """Fewer grains than WIDE_FROM, cut-offs, and other processors have the processor's own root."""
+def test_when_seeded_roots_are_used():
+    """Fewer grains than WIDE_FROM, cut-offs, and other processors use the processor's square root."""
     for count in (WIDE_FROM - 1, WIDE_FROM):
         grains = sand.Grains(
             1e-6 * np.arange(3 * count).reshape(count, 3), 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * count

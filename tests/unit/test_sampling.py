@@ -8,19 +8,19 @@ import pytest
 from sand.experiments.scattering.sampling import CERTAIN, EMPTY, PILOT, Strata, Task, cut, wilson
 
 
-def flown(strata, chance, relative_error, seed):
-    """Sample a known chance P(b) until the goal is reached; rounds taken."""
+def sampled(strata, chance, relative_error, seed):
+    """Sample a known probability P(b) until the requested error is reached; rounds taken."""
     rng = np.random.default_rng(seed)
     rounds = 0
     while tasks := strata.round(relative_error):
         rounds += 1
-        flights = []
+        trajectories = []
         for task in tasks:
             low, high = strata.edges(task.stratum)
             for number in range(task.first, task.last):
                 b = math.sqrt(rng.uniform(low**2, high**2))
-                flights.append((task.stratum, number, float(rng.random() < chance(b)), 1.0))
-        strata.add(*np.transpose(flights))
+                trajectories.append((task.stratum, number, float(rng.random() < chance(b)), 1.0))
+        strata.add(*np.transpose(trajectories))
     return rounds
 
 
@@ -47,14 +47,15 @@ def test_wilson_against_its_definition():
 
 @pytest.mark.slow
 def test_a_known_cross_section_is_found_within_its_error():
-    """σ of a ramp P(b): unbiased, and the interval of one sigma holds it in 60 to 85 % of 80 samplings (Wilson is wide
-    where P is 0 or 1), that of 95 % in at least 75 of them.
+    """σ of a ramp P(b): unbiased; the 1σ interval covers it in 60 to 85 % of 80 samplings.
+
+    Wilson intervals are wide where P is 0 or 1.  The 95 % interval covers it in at least 75 samplings.
     """
     inside = sure = 0
     off = []
     for seed in range(80):
         strata = Strata(1.0)
-        flown(strata, ramp, 0.03, seed)
+        sampled(strata, ramp, 0.03, seed)
         found = strata.estimate()
         inside += found.low <= AREA <= found.high
         wide = strata.estimate(CERTAIN)
@@ -67,9 +68,9 @@ def test_a_known_cross_section_is_found_within_its_error():
 
 
 def test_annuli_are_added_where_hits_reach_the_rim():
-    """P reaches three times farther than the first guess: more annuli until the outermost are empty."""
+    """P extends to three times the first guess: annuli are added until the outermost are empty."""
     strata = Strata(1.0)
-    flown(strata, lambda b: ramp(b / 3.0), 0.05, 1)
+    sampled(strata, lambda b: ramp(b / 3.0), 0.05, 1)
     hits, _ = strata.counts()
     assert len(strata) * strata.width > 3.0
     assert not hits[-EMPTY:].any()
@@ -77,7 +78,7 @@ def test_annuli_are_added_where_hits_reach_the_rim():
 
 
 def test_no_annulus_beyond_a_sphere_of_starts():
-    """Everything hits, but no flight can begin farther out than the sphere: b stops there."""
+    """Everything hits, but no trajectory begins outside the sphere: b ends there."""
     strata = Strata(1.0, 0.8)
     for _ in range(3):
         for task in strata.round(0.2):
@@ -86,22 +87,22 @@ def test_no_annulus_beyond_a_sphere_of_starts():
     assert len(strata) * strata.width == pytest.approx(0.8, rel=1e-12, abs=0.0)
 
 
-def test_flights_go_where_they_help():
-    """After the pilot most flights are where P is neither 0 nor 1."""
+def test_allocation_of_trajectories():
+    """After the pilot most trajectories are where P is neither 0 nor 1."""
     strata = Strata(1.0)
-    flown(strata, ramp, 0.01, 3)
+    sampled(strata, ramp, 0.01, 3)
     _, tries = strata.counts()
     low, _ = strata.edges(np.arange(len(strata)))
     between = (low >= 0.5) & (low < 1.0)
     assert tries[between].mean() > 3 * tries[low >= 1.05].mean()
 
 
-def test_order_and_pieces_change_no_bit():
-    """The same flights in another order: the same sums."""
+def test_order_and_batches_change_no_bit():
+    """The same trajectories in another order: the same sums."""
     rng = np.random.default_rng(2)
-    flights = [(int(k), n, float(rng.random() < 0.5), rng.random()) for k in range(24) for n in range(PILOT)]
+    trajectories = [(int(k), n, float(rng.random() < 0.5), rng.random()) for k in range(24) for n in range(PILOT)]
     ends = []
-    for order in (flights, flights[::-1]):
+    for order in (trajectories, trajectories[::-1]):
         strata = Strata(1.0)
         for part in (order[:100], order[100:]):
             strata.add(*np.transpose(part))
@@ -109,8 +110,8 @@ def test_order_and_pieces_change_no_bit():
     assert ends[0] == ends[1]
 
 
-def test_pieces_hold_all_flights_once():
-    """Pieces of at most so many flights, in their order."""
+def test_batches_contain_every_trajectory_once():
+    """Batches up to a maximum size, in order."""
     tasks = [Task(0, 5, 40), Task(1, 0, 3), Task(4, 0, 100)]
     rest, sizes, got = tasks, [], []
     while rest:
@@ -122,10 +123,10 @@ def test_pieces_hold_all_flights_once():
 
 
 @pytest.mark.validate
-def test_a_soft_rim_is_not_lost():
-    """P = 0.6 (1.3 − b) up to 1.3: flights must not follow an annulus's own luck; bias of 300 below 0.7 %.
+def test_cross_section_of_a_gradual_edge():
+    """P = 0.6 (1.3 − b) up to 1.3: allocation must not depend on an annulus's own hits; bias of 300 below 0.7 %.
 
-    Their mean has an error of 3 %/√300 = 0.17 % and is 0.4 % low; with allocation by its own hits, 0.9 %.
+    Their mean has a standard error of 3 %/√300 = 0.17 % and is 0.4 % low; with allocation by own hits, 0.9 %.
     """
 
     def soft(b):
@@ -135,6 +136,6 @@ def test_a_soft_rim_is_not_lost():
     found = []
     for seed in range(300):
         strata = Strata(1.0)
-        flown(strata, soft, 0.03, 1000 + seed)
+        sampled(strata, soft, 0.03, 1000 + seed)
         found.append(strata.estimate().value)
     assert np.mean(found) / area == pytest.approx(1.0, abs=0.007)

@@ -1,4 +1,4 @@
-"""Cross-sections: replay, executors, interruptions, the command, mistakes."""
+"""Cross-sections: replay, executors, interruptions, the command, errors."""
 
 import json
 import os
@@ -39,8 +39,8 @@ seed = 3
 """
 
 
-class Backwards(Executor):
-    """Does the work when it is asked for, the last first."""
+class ReversingExecutor(Executor):
+    """Runs tasks when results are requested, the last first."""
 
     def __init__(self):
         self.waiting = []
@@ -56,10 +56,10 @@ class Backwards(Executor):
 
 
 def numbers(found):
-    """All that does not depend on the clock."""
-    told = found.to_dict()
-    told.pop("seconds")
-    return json.dumps({k: np.asarray(v).tolist() for k, v in told.items()})
+    """Everything that does not depend on wall time."""
+    output = found.to_dict()
+    output.pop("seconds")
+    return json.dumps({k: np.asarray(v).tolist() for k, v in output.items()})
 
 
 @pytest.fixture
@@ -70,13 +70,13 @@ def here():
 
 
 @pytest.mark.compiled("scattering")
-def test_a_flight_of_a_batch_can_be_flown_alone(here):
-    """A row of 200 and its replay: the same end, time and distance, to the bit."""
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
+def test_replay_of_one_trajectory(here):
+    """A row of a batch of 200 and its replay: the same end, time and distance, to the bit."""
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max", spin="kT/2")
     width = float(here.profile[0, 1])
-    rows = fly(flying, [Task(5, 100, 300)], width, seed=9)
+    rows = fly(pair, [Task(5, 100, 300)], width, seed=9)
     for k in (0, 77, 199):
-        alone = replay(flying, 5, 100 + k, width, seed=9)
+        alone = replay(pair, 5, 100 + k, width, seed=9)
         row = dict(zip(COLUMNS, rows[k], strict=True))
         assert alone.time[-1] == row["time"]
         assert alone.time.size == row["steps"] + 1
@@ -86,23 +86,23 @@ def test_a_flight_of_a_batch_can_be_flown_alone(here):
 
 @pytest.mark.compiled("scattering")
 def test_any_split_gives_the_same_numbers(here, monkeypatch):
-    """Pieces of 64 in two processes, or backwards here: the bits of one process."""
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    """Batches of 64 in two processes, or in reverse order here: the bits of one process."""
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     monkeypatch.setattr(scattering, "MOST", 64)
-    again = scattering.measure(flying, relative_error=0.05, seed=3, executor=Backwards())
+    again = scattering.measure(pair, relative_error=0.05, seed=3, executor=ReversingExecutor())
     assert numbers(again) == numbers(here)
     with executor_for(2) as pool:
-        assert numbers(scattering.measure(flying, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
-    other = scattering.measure(flying, relative_error=0.05, seed=4)
+        assert numbers(scattering.measure(pair, relative_error=0.05, seed=3, executor=pool)) == numbers(here)
+    other = scattering.measure(pair, relative_error=0.05, seed=4)
     assert numbers(other) != numbers(here)
 
 
 @pytest.mark.validate
 def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
-    """dask.distributed with two workers, one of which is killed after the first piece: the same numbers."""
+    """dask.distributed with two workers, one killed after the first batch: the same numbers."""
     distributed = pytest.importorskip("distributed", reason="dask is an extra; the test extra brings it")
     monkeypatch.setattr(scattering, "MOST", 32)
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None
     ) as cluster:
@@ -115,29 +115,29 @@ def test_on_a_cluster_that_loses_a_worker(here, monkeypatch):
                 os.kill(victim.pid, KILL)
 
         with executor_for(scheduler=cluster.scheduler_address) as executor:
-            found = scattering.measure(flying, relative_error=0.05, seed=3, executor=executor, keep=kill)
+            found = scattering.measure(pair, relative_error=0.05, seed=3, executor=executor, keep=kill)
         assert killed
     assert numbers(found) == numbers(here)
 
 
 @pytest.mark.compiled("scattering")
-def test_what_is_known_is_not_flown_again(here):
-    """With the rows of half the flights the other half is flown, and the result is the same."""
-    flying = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
+def test_resume_computes_missing_trajectories_only(here):
+    """With the rows of half the trajectories the other half is computed; the same result."""
+    pair = scattering.flight(**GRAINS, speed=1, speed_unit="thermal", start="4 b_max")
     rows, later = [], []
-    whole = scattering.measure(flying, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
+    undisturbed = scattering.measure(pair, relative_error=0.05, seed=3, keep=lambda new: rows.extend(new.tolist()))
     again = scattering.measure(
-        flying, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
+        pair, relative_error=0.05, seed=3, known=rows[::2], keep=lambda new: later.extend(new.tolist())
     )
-    assert numbers(again) == numbers(whole) == numbers(here)
+    assert numbers(again) == numbers(undisturbed) == numbers(here)
     assert len(later) == len(rows) - len(rows[::2])
 
 
 @pytest.mark.compiled("scattering")
-def test_a_map():
-    """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all flights are told."""
-    flights = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
-    found = probability_map(flights, cells=6, per_cell=16)
+def test_hit_map():
+    """Hits where σ has them: P = 1 in the middle, 0 beyond b_max; all trajectories are listed."""
+    trajectories = [scattering.flight(**GRAINS, speed=v, speed_unit="thermal", start="4 b_max") for v in (0.5, 2)]
+    found = probability_map(trajectories, cells=6, per_cell=16)
     assert (found.flights == 16).all()
     assert (found.probability[:, 0] == 1.0).all()
     assert (found.probability[:, 5] == 0.0).all()
@@ -149,13 +149,13 @@ def test_a_map():
 
 @pytest.mark.compiled("scattering")
 def test_the_command(tmp_path, capsys):
-    """Two speeds: files, figure, JSON; the folder is not overwritten; a resume finds all flights and flies none."""
+    """Two speeds: files, figure, JSON; the folder is not overwritten; resuming computes no trajectory."""
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE)
     assert main(["scatter", str(case), "--out", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [round(one["c"], 1) for one in told["cross_sections"]] == [1.0, 1.0]
-    assert told["versions"]["numba"] and told["seed"] == 3
+    output = json.loads(capsys.readouterr().out)
+    assert [round(one["c"], 1) for one in output["cross_sections"]] == [1.0, 1.0]
+    assert output["versions"]["numba"] and output["seed"] == 3
     assert {p.name for p in out.iterdir()} == {
         ".lock",
         "case.toml",
@@ -171,21 +171,21 @@ def test_the_command(tmp_path, capsys):
     assert "sigma = " in capsys.readouterr().out
     for name in ("flights.csv", "results.csv", "figure.png"):
         assert (out / name).read_bytes() == before[name]
-    for path, said in ((case, "scattering case"), (out, "results.csv"), (out / "scattering.json", "sigma = ")):
+    for path, expected in ((case, "scattering case"), (out, "results.csv"), (out / "scattering.json", "sigma = ")):
         assert main(["info", str(path)]) == 0
-        assert said in capsys.readouterr().out
+        assert expected in capsys.readouterr().out
     case.write_text(CASE.replace("seed = 3", "seed = 4"))
     assert main(["scatter", str(case), "--out", str(out), "--resume"]) == 2
     assert "another case" in capsys.readouterr().err
 
 
 @pytest.mark.validate
-def test_a_killed_job_goes_on(tmp_path):
-    """Killed while it flies, a torn line at the end: resumed, its files are those of one that was left alone."""
+def test_killed_job_is_resumed(tmp_path):
+    """Killed, with an incomplete last line: resumed, its files equal those of an undisturbed job."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace("[1, 2]", "[1, 1.5, 2]").replace("0.05", "0.01").replace('"4 b_max"', '"20 b_max"'))
-    whole, cut = tmp_path / "whole", tmp_path / "cut"
-    assert main(["scatter", str(case), "--out", str(whole), "--quiet"]) == 0
+    undisturbed, cut = tmp_path / "whole", tmp_path / "cut"
+    assert main(["scatter", str(case), "--out", str(undisturbed), "--quiet"]) == 0
     job = subprocess.Popen([sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(cut), "--quiet"])
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline and job.poll() is None:
@@ -194,18 +194,18 @@ def test_a_killed_job_goes_on(tmp_path):
         time.sleep(0.005)
     job.kill()
     job.wait()
-    assert (cut / "flights.csv").stat().st_size < 0.9 * (whole / "flights.csv").stat().st_size
+    assert (cut / "flights.csv").stat().st_size < 0.9 * (undisturbed / "flights.csv").stat().st_size
     assert not (cut / "scattering.json").exists()
     with open(cut / "flights.csv", "a") as file:
         file.write("0,3,77,1,3.3e-")
     assert main(["resume", str(cut), "--quiet"]) == 0
     for name in ("flights.csv", "results.csv"):
-        assert (cut / name).read_bytes() == (whole / name).read_bytes()
+        assert (cut / name).read_bytes() == (undisturbed / name).read_bytes()
 
 
 @pytest.mark.compiled("scattering")
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         ({"speed": 0}, "speed = 0"),
         ({"speed": "3 m"}, "speed = '3 m'"),
@@ -244,36 +244,36 @@ def test_a_killed_job_goes_on(tmp_path):
         ({"relative_error": 0.9}, "relative_error"),
     ],
 )
-def test_mistakes_are_told(options, said):
-    """One line each, with what was given."""
+def test_wrong_arguments_are_refused(options, expected):
+    """One line each, with the given value."""
     given = GRAINS | {"speed": 0.2} | options
-    with pytest.raises(sand.BadInput, match=said) as caught:
+    with pytest.raises(sand.BadInput, match=expected) as caught:
         scattering.cross_section(**given)
     assert len(caught.value.problems) == 1
 
 
-def test_all_mistakes_at_once():
+def test_all_errors_are_reported_together():
     """Three at a time."""
     with pytest.raises(sand.BadInput) as caught:
         scattering.flight(**(GRAINS | {"temperature": "3 m"}), speed=-1, spin="none", start_shape="cube")
     assert len(caught.value.problems) == 3
 
 
-def test_impact_parameters_that_cannot_be():
-    """Below 0, in b_max without moments, outside the sphere of starts."""
-    flying = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
+def test_impossible_impact_parameters():
+    """Negative, in b_max without moments, outside the sphere of starts."""
+    pair = scattering.flight(**GRAINS, speed=0.2, start="1 um", start_shape="sphere")
     plain = scattering.flight(radius="10 nm", material="iron", speed=0.2)
-    for one, b, said in (
-        (flying, "-1 nm", "at least 0"),
+    for one, b, expected in (
+        (pair, "-1 nm", "at least 0"),
         (plain, "1 b_max", "without moments"),
-        (flying, "2 um", "below"),
+        (pair, "2 um", "below"),
     ):
-        with pytest.raises(sand.BadInput, match=said):
+        with pytest.raises(sand.BadInput, match=expected):
             scattering.trajectory(one, b)
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "expected"),
     [
         (("speed = [1, 2]", "speed = 0"), "speed = 0"),
         (("speed = [1, 2]", "sped = 1"), "did you mean 'speed'"),
@@ -286,20 +286,22 @@ def test_impact_parameters_that_cannot_be():
         (('material = "iron"', 'material = "irn"'), "did you mean 'iron'"),
     ],
 )
-def test_wrong_cases_leave_nothing(tmp_path, capsys, change, said):
-    """Exit 2, one line with the file's name, no folder."""
+def test_wrong_cases_write_nothing(tmp_path, capsys, change, expected):
+    """Exit code 2, one line with the file's name, no folder."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace(*change))
     assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1 and said in lines[0] and "case.toml" in lines[0]
+    assert len(lines) == 1 and expected in lines[0] and "case.toml" in lines[0]
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("address", "said"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")])
-def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, said):
-    """One line, exit 2, nothing written."""
+@pytest.mark.parametrize(
+    ("address", "expected"), [("127.0.0.1:8786", "tcp://"), ("tcp://127.0.0.1:9", "does not answer")]
+)
+def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address, expected):
+    """One line, exit code 2, nothing written."""
     from sand.experiments import executors
 
     monkeypatch.setattr(executors, "ANSWER", 0.5)
@@ -307,7 +309,7 @@ def test_a_scheduler_that_does_not_answer(tmp_path, capsys, monkeypatch, address
     case.write_text(CASE)
     assert main(["scatter", str(case), "--out", str(tmp_path / "out"), "--scheduler", address]) == 2
     lines = [line for line in capsys.readouterr().err.strip().splitlines() if line.startswith("sand:")]
-    assert len(lines) == 1 and said in lines[0]
+    assert len(lines) == 1 and expected in lines[0]
     assert not (tmp_path / "out").exists()
 
 
@@ -321,7 +323,7 @@ class Done(Future):
 
 @pytest.mark.compiled("scattering")
 def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
-    """One line with the way to go on, exit 2; then the rest is flown."""
+    """One line with the command to continue, exit code 2; then the rest is computed."""
     from concurrent.futures import process
 
     case, out = tmp_path / "case.toml", tmp_path / "out"
@@ -334,16 +336,16 @@ def test_a_worker_that_dies(tmp_path, capsys, monkeypatch):
         patch.setattr(process.ProcessPoolExecutor, "submit", lambda *a, **k: Done())
         patch.setattr(process.ProcessPoolExecutor, "map", dead)
         assert main(["scatter", str(case), "--out", str(out), "--workers", "2"]) == 2
-    told = capsys.readouterr().err
-    assert "a worker process died" in told
-    assert "sand resume" in told
+    output = capsys.readouterr().err
+    assert "a worker process died" in output
+    assert "sand resume" in output
     assert main(["scatter", str(case), "--out", str(out), "--resume", "--quiet"]) == 0
 
 
 @stops_others
 @pytest.mark.compiled("scattering")
-def test_sigterm_says_how_to_go_on(tmp_path):
-    """SIGTERM while it flies: exit 130 and one line with --resume."""
+def test_sigterm_tells_how_to_resume(tmp_path):
+    """SIGTERM during the job: exit code 130 and one line with --resume."""
     case, out = tmp_path / "case.toml", tmp_path / "out"
     case.write_text(CASE.replace("0.05", "0.001").replace('"4 b_max"', '"4 b_max"\nspin = "equipartition"'))
     words = [sys.executable, "-m", "sand.cli.main", "scatter", str(case), "--out", str(out)]
@@ -352,14 +354,14 @@ def test_sigterm_says_how_to_go_on(tmp_path):
     while time.monotonic() < deadline and not (table.exists() and table.stat().st_size > 9000):
         time.sleep(0.02)
     job.terminate()
-    told = job.communicate(timeout=30)[1]
+    output = job.communicate(timeout=30)[1]
     assert job.returncode == 130
-    assert told.count("sand:") == 1
-    assert "sand resume" in told
+    assert output.count("sand:") == 1
+    assert "sand resume" in output
 
 
 def test_a_map_needs_speeds_that_differ(tmp_path, capsys):
-    """One line; and speeds in any order make the same map."""
+    """One line; speeds in any order give the same map."""
     case = tmp_path / "case.toml"
     case.write_text(CASE.replace("[1, 2]", "[1, 1]").replace("relative_error = 0.05", 'job = "map"'))
     assert main(["scatter", str(case), "--out", str(tmp_path / "out")]) == 2

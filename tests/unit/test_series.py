@@ -1,4 +1,4 @@
-"""What happened over time, as the page is told it: the ledger's numbers, thinned."""
+"""Time series for the page: the ledger's columns, thinned."""
 
 import json
 
@@ -8,13 +8,13 @@ from sand.analysis.ledger_columns import LedgerColumns
 from sand.viewer.dataset import run_dataset
 from sand.viewer.series import MAX_POINTS, evenly_spaced, series_from_ledger
 
-from .reels import reel
+from .synthetic_trajectories import write_trajectory
 
 
 @pytest.mark.compiled("fields")
-def test_series_are_the_ledgers(looked_at):
-    """Plots hold the ledger's columns; the change of the total is computed before numbers are rounded; event counts."""
-    folder, sim = looked_at
+def test_series_are_the_ledgers(finished_run):
+    """Plots have the ledger's columns; the change of the total is computed before rounding; event counts."""
+    folder, sim = finished_run
     series = run_dataset(folder).series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert list(plots) == ["clusters", "energies", "losses", "contacts", "balance"]
@@ -24,7 +24,7 @@ def test_series_are_the_ledgers(looked_at):
     assert plots["balance"]["change of the total"] == pytest.approx(change.tolist(), rel=1e-6, abs=1e-40)
     assert plots["contacts"]["contacts"] == sim.ledger["contacts"].tolist()
     assert plots["losses"]
-    for label, lost in plots["losses"].items():  # a logarithmic axis has no 0
+    for label, lost in plots["losses"].items():  # a logarithmic axis cannot show 0
         name = {"external": "outside"}.get(label, label)
         assert [v is None for v in lost] == [v == 0.0 for v in sim.ledger[f"lost_{name}"]]
     for plot in series["plots"]:
@@ -33,9 +33,9 @@ def test_series_are_the_ledgers(looked_at):
 
 
 @pytest.mark.compiled("fields")
-def test_long_and_broken_ledgers(looked_at):
-    """At most 2000 points, the last among them; no event is lost; what is not a number is null."""
-    row = dict(looked_at[1].ledger.rows[-1])
+def test_long_and_broken_ledgers(finished_run):
+    """At most 2000 points, the last included; no event is lost; NaN becomes null."""
+    row = dict(finished_run[1].ledger.rows[-1])
     rows = [row | {"step": k, "time": 1e-9 * k, "made": 3 * k, "broken": k // 2} for k in range(5001)]
     rows[-1] = rows[-1] | {"total": float("nan"), "translation": float("inf")}
     series = series_from_ledger(LedgerColumns.from_rows(rows))
@@ -49,12 +49,12 @@ def test_long_and_broken_ledgers(looked_at):
 
 
 def test_without_a_ledger(tmp_path):
-    """A file by itself: clusters and contacts are counted in its frames."""
-    story = run_dataset(reel(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
-    series = story.series()
+    """A trajectory file alone: clusters and contacts are counted in its frames."""
+    dataset = run_dataset(write_trajectory(tmp_path / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5))
+    series = dataset.series()
     plots = {plot["id"]: {line["label"]: line["values"] for line in plot["lines"]} for plot in series["plots"]}
     assert plots["contacts"]["contacts"] == [0, 1, 2]
     assert plots["clusters"]["largest"] == [1, 2, 3] and plots["clusters"]["number of clusters"] == [5, 4, 3]
     assert plots["clusters"]["mean size S"] == pytest.approx([1.0, 7 / 5, 11 / 5], rel=1e-6, abs=0)
-    told = story.manifest()
-    assert not told["running"] and told["outcome"] is None and told["name"] == "a"
+    series_points = dataset.manifest()
+    assert not series_points["running"] and series_points["outcome"] is None and series_points["name"] == "a"

@@ -1,4 +1,4 @@
-"""The server of `sand view`: tells those who may know, and nobody else, whatever they send."""
+"""The server of `sand view`: access, addresses, malformed requests, limits."""
 
 import http.client
 import inspect
@@ -14,17 +14,17 @@ from sand.viewer.dataset import run_dataset
 from sand.viewer.server import Server
 
 from .pages import decode
-from .reels import reel
+from .synthetic_trajectories import write_trajectory
 
 BUNDLE = ("console.log(1)\n", "body {}\n")
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory):
-    """One that tells of three frames."""
+    """A server of three frames."""
     patch = pytest.MonkeyPatch()
     patch.setattr(servers, "read_bundle", lambda: BUNDLE)
-    path = reel(tmp_path_factory.mktemp("served") / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5)
+    path = write_trajectory(tmp_path_factory.mktemp("served") / "a.gsd", [[], [(0, 1)], [(0, 1), (1, 2)]], 5)
     one = Server(run_dataset(path))
     one.start()
     yield one
@@ -33,7 +33,7 @@ def server(tmp_path_factory):
 
 
 def ask(server, address, method="GET", headers=None, token=None):
-    """Status, headers and content of an answer."""
+    """Status, headers and content of a response."""
     line = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
     line.putrequest(method, f"/{server.token if token is None else token}/{address}", skip_host=True)
     for name, value in {"Host": f"127.0.0.1:{server.port}", **(headers or {})}.items():
@@ -46,15 +46,15 @@ def ask(server, address, method="GET", headers=None, token=None):
 
 
 def raw(server, text):
-    """What a socket gets for these bytes."""
+    """Response on a socket to these bytes."""
     with socket.create_connection(("127.0.0.1", server.port), timeout=10) as line:
         line.sendall(text)
         line.shutdown(socket.SHUT_WR)
         return b"".join(iter(lambda: line.recv(65536), b""))
 
 
-def test_what_it_tells(server):
-    """Page, script, styles, manifest, grains, frames, series, dimensions: each of its kind, and the story's own."""
+def test_responses(server):
+    """Page, script, styles, manifest, grains, frames, series, dimensions: content types and the dataset's bytes."""
     status, headers, page = ask(server, "")
     assert status == 200 and headers["Content-Type"].startswith("text/html") and b'<div id="grainview">' in page
     assert (ask(server, "grainview.js")[2].decode(), ask(server, "grainview.css")[2].decode()) == BUNDLE
@@ -76,8 +76,8 @@ def test_a_head_has_no_body(server):
     assert int(headers["Content-Length"]) == len(ask(server, "frame/1")[2])
 
 
-def test_every_answer_is_closed_to_others(server):
-    """The page may load its own and nothing else, no other page may look in, nothing is kept: of errors, too."""
+def test_security_headers(server):
+    """The page loads its own resources only, no other page may embed it, no caching; also for errors."""
     for address in ("", "manifest", "nothing"):
         headers = ask(server, address)[1]
         policy = headers["Content-Security-Policy"]
@@ -92,7 +92,7 @@ def test_every_answer_is_closed_to_others(server):
 
 @pytest.mark.parametrize("token", ["", "x", "%2e%2e", "..", "é" * 32])
 def test_a_wrong_token(server, token):
-    """Nobody without the token sees anything, not even whether an address exists."""
+    """Without the token every address gives the same refusal."""
     for address in ("", "manifest", "frame/0", "nowhere"):
         line = f"GET /{token}/{address} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
         head, _, content = raw(server, line.encode()).partition(b"\r\n\r\n")
@@ -100,15 +100,16 @@ def test_a_wrong_token(server, token):
 
 
 def test_tokens_are_new_each_time(server):
-    """They are long, and no two servers share one."""
+    """Tokens are long, and differ between servers."""
     other = Server(server.dataset)
     other.server_close()
     assert len(other.token) >= 32 and other.token != server.token
 
 
-def test_it_listens_at_one_address_of_this_machine(server):
-    """The socket is bound to 127.0.0.1, a neighbour of it in the loopback network is refused, and nothing can be asked
-    for but a story and a port: no setting opens the server to other machines.
+def test_the_server_listens_on_localhost_only(server):
+    """The socket is bound to 127.0.0.1; another loopback address is refused.
+
+    The constructor takes a dataset and a port only: no setting opens the server to other machines.
     """
     assert server.socket.family == socket.AF_INET and server.socket.getsockname() == ("127.0.0.1", server.port)
     with pytest.raises(OSError), socket.create_connection(("127.0.0.2", server.port), timeout=5):
@@ -119,13 +120,13 @@ def test_it_listens_at_one_address_of_this_machine(server):
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:{port}", "127.0.0.1.evil.example", "0.0.0.0:{port}", ""]
 )
-def test_names_that_are_made_to_point_here(server, host):
-    """A page of another name that resolves to 127.0.0.1 is refused, though it had the token."""
+def test_foreign_host_names_are_refused(server, host):
+    """A host name that resolves to 127.0.0.1 is refused even with the token (DNS rebinding)."""
     status, _, content = ask(server, "manifest", headers={"Host": host.format(port=server.port)})
     assert status == 403 and json.loads(content)["error"]
 
 
-def test_hosts_that_are_its_own(server):
+def test_own_host_names(server):
     """127.0.0.1 and localhost, with or without the port; not two hosts, not none."""
     for host in (f"localhost:{server.port}", "localhost", "127.0.0.1"):
         assert ask(server, "manifest", headers={"Host": host})[0] == 200
@@ -175,8 +176,8 @@ def test_hosts_that_are_its_own(server):
         "?since=1",
     ],
 )
-def test_what_is_not_there(server, address):
-    """Anything but the few addresses is 404 and a sentence: other files, dots, numbers that are none or too large."""
+def test_unknown_addresses(server, address):
+    """Anything else is 404 and a sentence: other files, dots, frame numbers that are malformed or too large."""
     line = f"GET /{server.token}/{address} HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
     head, _, content = raw(server, line.encode()).partition(b"\r\n\r\n")
     assert b" 404 " in head.splitlines()[0] and json.loads(content)["error"]
@@ -184,13 +185,13 @@ def test_what_is_not_there(server, address):
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "CONNECT", "FOO"])
 def test_other_methods(server, method):
-    """It only tells."""
+    """Only GET and HEAD are answered."""
     status, _, content = ask(server, "manifest", method)
     assert status == 501 and server.token.encode() not in content
 
 
 def test_long_addresses(server):
-    """Above 512 characters, and above what the line may be."""
+    """Above 512 characters, and above the length of a request line."""
     assert ask(server, "frame/" + "0" * 600)[0] == 414
     assert b" 414 " in raw(server, b"GET /" + b"a" * 70000 + b" HTTP/1.1\r\n\r\n").splitlines()[0]
 
@@ -198,14 +199,14 @@ def test_long_addresses(server):
 @pytest.mark.parametrize(
     "text", [b"\r\n\r\n", b"\x16\x03\x01\x02\x00", b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"x" * 5000]
 )
-def test_what_is_no_request(server, text):
-    """Nonsense ends the connection and nothing else; nothing is printed."""
+def test_malformed_requests(server, text):
+    """Malformed bytes end the connection; nothing is printed."""
     raw(server, text)
     assert ask(server, "manifest")[0] == 200
 
 
-def test_one_slow_client_keeps_nobody_waiting(server, capfd):
-    """While some send nothing, or half a request, others are answered; when they leave, nothing is printed."""
+def test_slow_clients_do_not_block_others(server, capfd):
+    """While some send nothing or half a request, others are answered; nothing is printed when they leave."""
     slow = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(10)]
     for line in slow:
         line.sendall(b"GET /")
@@ -215,12 +216,12 @@ def test_one_slow_client_keeps_nobody_waiting(server, capfd):
     for line in slow:
         line.close()
     assert ask(server, "frame/1")[0] == 200
-    told = capfd.readouterr()
-    assert told.out == told.err == ""
+    output = capfd.readouterr()
+    assert output.out == output.err == ""
 
 
 def test_the_number_of_connections_is_limited(server, monkeypatch):
-    """With all connections in use a further one is closed; when they end, requests are answered again."""
+    """With all connections in use another is closed; when they end, requests are answered again."""
     monkeypatch.setattr(servers, "MAX_CONNECTIONS", 2)
     small = Server(server.dataset)
     small.start()
@@ -239,8 +240,8 @@ def test_the_number_of_connections_is_limited(server, monkeypatch):
     small.stop()
 
 
-def test_a_frame_that_cannot_be_read(server, monkeypatch):
-    """A broken frame is a sentence, status 500; what nobody thought of, too."""
+def test_an_unreadable_frame(server, monkeypatch):
+    """A damaged frame gives a sentence and status 500; so does an unexpected error."""
     monkeypatch.setattr(server.dataset, "frame", lambda k: (_ for _ in ()).throw(BadInput("frame 1 is broken")))
     status, _, content = ask(server, "frame/1")
     assert status == 500 and json.loads(content) == {"error": "frame 1 is broken"}

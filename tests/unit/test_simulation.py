@@ -1,4 +1,4 @@
-"""The simulation object: what it refuses, what it warns of, how it ends."""
+"""The simulation object: refused input, warnings, choices, outcomes."""
 
 import math
 import signal
@@ -52,7 +52,7 @@ def test_bad_input(build, message):
 
 
 def test_overlaps_name_ten_pairs_and_count_the_rest():
-    """Twenty grains in one place: 190 pairs, ten lines and a remark."""
+    """Twenty coincident grains: 190 pairs, ten lines and the number of others."""
     grains = sand.Grains(1e-9 * np.arange(60).reshape(20, 3) * 0.01, 1e-8, sand.IRON)
     with pytest.raises(sand.BadInput) as caught:
         sand.Simulation(grains, [sand.Contact()])
@@ -61,38 +61,38 @@ def test_overlaps_name_ten_pairs_and_count_the_rest():
 
 
 @pytest.mark.compiled("small")
-def test_contacts_that_are_held_may_overlap_by_more():
-    """A row of 31 pairs too close together: those given as contacts, in whatever order, are not among the complaints.
+def test_given_contacts_may_overlap_more():
+    """A row of 31 overlapping pairs: those given as contacts, in any order, are not reported.
 
-    Pairs alternate between two sizes, of which only the larger may overlap by so much: 2 δ0, which goes as r^(1/3).
+    Pairs alternate between two sizes; only the larger may overlap by so much: 2 δ0, which scales as r^(1/3).
     """
     limit = 2.0 * (2e-8 - rest_distance(sand.SILICA, 1e-8, 1e-8))
     size = np.repeat(np.where(np.arange(31) % 2, 1e-8, 4e-8), 2)
-    place = 1e-6 * np.repeat(np.arange(31), 2)
-    place[1::2] += 2.0 * size[1::2] - 1.3 * limit
-    grains = sand.Grains(np.stack([place, 0 * place, 0 * place], axis=1), size, sand.SILICA)
+    x_positions = 1e-6 * np.repeat(np.arange(31), 2)
+    x_positions[1::2] += 2.0 * size[1::2] - 1.3 * limit
+    grains = sand.Grains(np.stack([x_positions, 0 * x_positions, 0 * x_positions], axis=1), size, sand.SILICA)
     wrong = [2 * k for k in range(31) if k % 2]
     first = [2, 10, 58]
     pairs = np.array([[2, 3], [11, 10], [59, 58]])
-    held = sand.setup.StrainedContacts(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
+    kept = sand.setup.StrainedContacts(pairs, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3))
     with pytest.raises(sand.BadInput) as caught:
-        sand.Simulation(grains, [sand.Contact()], contacts=held)
+        sand.Simulation(grains, [sand.Contact()], contacts=kept)
     named = [f"grains {i} and {i + 1} overlap by {1.3 * limit:.3g} m at the start" for i in wrong if i not in first]
-    *told, rest = caught.value.problems
-    assert [line.split(";")[0] for line in told] == named[:10]
-    assert all(f"at most {limit:.3g} m is allowed: move them apart" in line for line in told)
+    *lines_of_pairs, rest = caught.value.problems
+    assert [line.split(";")[0] for line in lines_of_pairs] == named[:10]
+    assert all(f"at most {limit:.3g} m is allowed: move them apart" in line for line in lines_of_pairs)
     assert rest == f"… and {len(named) - 10} more overlapping pairs"
 
 
 def test_overlap_is_measured_across_the_faces_of_the_box():
-    """Two grains that touch only through the periodic boundary are seen."""
+    """Two grains that overlap through the periodic boundary are reported."""
     grains = sand.Grains([[-9.5e-8, 0, 0], [9.5e-8, 0, 0]], 1e-8, sand.SILICA)
     with pytest.raises(sand.BadInput, match="overlap by 1e-08"):
         sand.Simulation(grains, [sand.Contact()], box="0.2 um")
 
 
 def test_warnings():
-    """a0/R > 0.3, moments that are missing, images without a cut."""
+    """a0/R > 0.3, missing moments, periodic images without a cut-off."""
     with pytest.warns(UserWarning, match=r"a0/R = 0\.53"):
         sand.Simulation(pair(), [sand.Contact()])
     with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
@@ -105,7 +105,7 @@ def test_warnings():
 
 
 def test_the_cutoff_is_stated_with_its_reason():
-    """Open box: none. Periodic: the smaller of 1.5 b_max and half the box / 1.35, and which one."""
+    """Open box: none. Periodic: the smaller of 1.5 b_max and half the box / 1.35, and which."""
     hot = pair(moment="200 A m^2/kg", velocity=[[1.0, 0, 0], [-1.0, 0, 0]])
     assert "open box" in sand.Simulation(hot, [sand.Dipoles()]).choices["dipoles cut-off"]
     small = sand.Simulation(hot, [sand.Dipoles()], box="0.2 um").choices["dipoles cut-off"]
@@ -115,7 +115,7 @@ def test_the_cutoff_is_stated_with_its_reason():
 
 
 def test_the_automatic_cutoff_reaches_beyond_the_grains():
-    """Weak moments: 1.5 b_max lies within a grain; two diameters of the largest, 60 nm, are taken instead."""
+    """Weak moments: 1.5 b_max is less than a grain; two diameters of the largest, 60 nm, are used."""
     grains = sand.Grains(
         [[0, 0, 0], [1e-7, 0, 0]],
         [1e-8, 1.5e-8],
@@ -131,7 +131,7 @@ def test_the_automatic_cutoff_reaches_beyond_the_grains():
     ("moment", "reason"), [(1e-21, "less than two grain diameters"), (0.0, "no grain has a magnetic")]
 )
 def test_the_automatic_cutoff_in_a_small_box_reaches_beyond_contact(moment, reason):
-    """L < 10.8 r: two diameters do not fit, and (L/2)/1.35 is taken, never a capture radius within a grain."""
+    """L < 10.8 r: two diameters do not fit, and (L/2)/1.35 is used, never a capture radius inside a grain."""
     grains = pair(moment=[0, 0, moment], velocity=[[900.0, 0, 0], [0, 0, 0]])
     choice = sand.Dipoles().choose(grains, sand.Box.periodic("0.1 um"))
     assert choice.radius == pytest.approx(0.5 * 1e-7 / 1.35, rel=1e-12) and reason in choice.reason
@@ -140,7 +140,7 @@ def test_the_automatic_cutoff_in_a_small_box_reaches_beyond_contact(moment, reas
 
 @pytest.mark.compiled("contacts")
 def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
-    """A fixed step in which a grain flies more than half its radius: an Outcome and a checkpoint."""
+    """A fixed step in which a grain moves more than half its radius: an Outcome and a checkpoint."""
     grains = pair(velocity=[[0, 0, 0], [0, 100.0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="1 ns"), out=tmp_path / "run")
     result = sim.run(until="1 us")
@@ -151,8 +151,8 @@ def test_a_step_that_is_too_long_ends_the_run_and_names_the_grain(tmp_path):
 
 
 @pytest.mark.compiled("contacts")
-def test_crushed_grains_end_the_run():
-    """An impact so fast that a centre enters the other grain: JKR has nothing to say."""
+def test_overcompressed_grains_end_the_run():
+    """An impact so fast that a centre enters the other grain, outside the range of JKR."""
     grains = pair(velocity=[[0, 0, 0], [-2e5, 0, 0]], material=sand.SILICA)
     result = sand.Simulation(grains, [sand.Contact()]).run(until="1 ns")
     assert result.outcome is sand.Outcome.OVERCOMPRESSED
@@ -161,7 +161,7 @@ def test_crushed_grains_end_the_run():
 
 @pytest.mark.compiled("contacts")
 def test_numbers_that_are_not_finite_end_the_run():
-    """A spin driven to NaN from outside is seen within 16 steps, and its grain is named."""
+    """A spin set to NaN is detected within 16 steps, and its grain is named."""
     sim = sand.Simulation(sand.Grains(1e-6 * np.arange(15).reshape(5, 3), 1e-8, sand.IRON), [sand.Contact()])
     sim.run(steps=100)
     sim.state.grains.arrays.spin[0, 3] = math.nan
@@ -171,7 +171,7 @@ def test_numbers_that_are_not_finite_end_the_run():
 
 
 def too_long_steps(out):
-    """Half a contact period per step, which is beyond what Verlet bears."""
+    """Half a contact period per step, where Verlet is unstable."""
     d = 2e-8 - 2e-11
     fast = sand.theory.contact(sand.IRON, 1e-8).twist_period
     periods = [getattr(sand.theory.contact(sand.IRON, 1e-8), f"{k}_period") for k in ("normal", "slide", "roll")]
@@ -188,7 +188,7 @@ def too_long_steps(out):
 
 @pytest.mark.compiled("contacts")
 def test_a_runaway_energy_ends_the_run(tmp_path):
-    """Seen within 1e4 steps; the state from before is kept, and going on from it ends at the same step."""
+    """Detected within 1e4 steps; the earlier state is kept, and resuming ends at the same step."""
     sim = too_long_steps(tmp_path / "run")
     result = sim.run(steps=60_000)
     assert result.outcome is sand.Outcome.RUNAWAY
@@ -196,15 +196,15 @@ def test_a_runaway_energy_ends_the_run(tmp_path):
     assert len(result.grains) == 2
     arrays, meta = sand.io.checkpoint.newest_checkpoint(tmp_path / "run")
     assert meta["steps"] < result.steps
-    assert np.abs(arrays["grains/velocity"]).max() < 1.0  # a state from before
+    assert np.abs(arrays["grains/velocity"]).max() < 1.0  # a state from before the error
     go_on = sand.resume(tmp_path / "run")
     assert go_on.run().outcome is sand.Outcome.RUNAWAY
     assert go_on.state.steps == result.steps
 
 
 @pytest.mark.compiled("contacts")
-def test_a_short_run_cannot_finish_with_energy_from_nowhere(tmp_path):
-    """The end is looked at, too, and its state is not written over a good one."""
+def test_the_energy_error_is_checked_at_the_end(tmp_path):
+    """The final state is checked, too, and does not overwrite a good checkpoint."""
     result = too_long_steps(tmp_path / "run").run(steps=9_000)
     assert result.outcome is sand.Outcome.RUNAWAY
     assert result.steps == 9_000
@@ -214,7 +214,7 @@ def test_a_short_run_cannot_finish_with_energy_from_nowhere(tmp_path):
 
 @pytest.mark.compiled("dipoles")
 def test_no_false_alarm_in_a_cold_start_without_frames():
-    """Two cold magnetic grains far apart fall together: 1e4 times the energy of the start, booked once, at the end."""
+    """Two distant cold magnetic grains collide: 1e4 times the initial energy, recorded once at the end."""
     moment = [[6.6e-18, 0, 0]] * 2
     grains = sand.Grains([[0, 0, 0], [1.2e-7, 1e-9, 0]], 1e-8, sand.IRON, moment=moment)
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 mm")], frame_every="1 s")
@@ -228,17 +228,17 @@ def test_no_false_alarm_in_a_cold_start_without_frames():
 
 @pytest.mark.validate
 def test_no_false_alarm_where_there_was_no_energy():
-    """A grain that falls from rest at the origin, 3e4 steps: all energy comes later, the total stays 0 to rounding."""
+    """A grain falls from rest at the origin, 3e4 steps: the initial energy is 0, the total stays 0 to rounding."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.IRON), [sand.Gravity("9.81 m/s^2")])
     assert sim.run(steps=30_000).outcome is sand.Outcome.FINISHED
     assert sim.ledger.rows[-1]["translation"] > 0.0
 
 
 @pytest.mark.compiled("contacts")
-def test_what_is_rounding_is_no_drift():
-    """A lattice at rest: its energy changes in the last digit, over a kinetic energy of next to nothing.
+def test_rounding_is_not_reported_as_drift():
+    """A lattice at rest: its energy changes in the last digit, while the kinetic energy is almost zero.
 
-    Ten units of the last digit are none of rounding, and count: slow motion of large bodies is not to hide its drift.
+    Ten units of the last digit are more than rounding and count, so slow motion of large bodies cannot hide a drift.
     """
     sim = sand.Simulation(sand.setup.lattice(6, radius="10 nm", material=sand.SILICA), [sand.Contact()])
     sim.run(until="0.5 ns")
@@ -252,7 +252,7 @@ def test_what_is_rounding_is_no_drift():
 
 @pytest.mark.compiled("contacts")
 def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
-    """6 radians in a step: the rotation parameters would be destroyed; the run stops and names the grain."""
+    """6 radians per step would invalidate the quaternions; the run stops and names the grain."""
     sim = sand.Simulation(pair(spin=[[0, 0, 0], [0, 0, 6e9]]), [sand.Contact()], stepping=sand.Verlet(step="1 ns"))
     result = sim.run(steps=200)
     assert result.outcome is sand.Outcome.SPINS_TOO_FAST
@@ -262,10 +262,10 @@ def test_a_spin_too_fast_for_a_fixed_step_ends_the_run():
 
 @pytest.mark.compiled("contacts")
 def test_steps_are_counted_through_growing_arrays():
-    """run(steps=N) takes N steps, also when the list of pairs outgrows its arrays on the way."""
+    """run(steps=N) takes N steps, also when the pair list outgrows its arrays."""
     sim = struck_chain(length=30)
     near = sim.state.pair_list
-    own = ("anchor", "inner", "skin")  # not by pair
+    own = ("anchor", "inner", "skin")  # without one column per pair
     columns = {name: array[..., :1].copy() for name, array in near._asdict().items() if name not in own}
     sim.state.pair_list = near._replace(**columns)
     sim.run(steps=32)
@@ -280,10 +280,10 @@ def test_steps_are_counted_through_growing_arrays():
         ("every step", ("force", "torque"), ("constant_torque", "force_rate", "past_position", "order")),
     ],
 )
-def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
-    """Far arrays have columns where the plan needs them; contacts begin with a tenth more than touch, in eights."""
-    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
-    grains = sand.Grains(place, 1e-8, sand.SILICA, moment="1 A m^2/kg")
+def test_arrays_are_allocated_as_needed(far, there, not_there):
+    """Long-range arrays have columns the kernel needs; contacts 10 % extra, in multiples of eight."""
+    x_positions = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(x_positions, 1e-8, sand.SILICA, moment="1 A m^2/kg")
     forces, search = [sand.Contact(), sand.Dipoles(cutoff="none")], sand.Neighbours(search="all pairs")
     sim = sand.Simulation(grains, forces, stepping=sand.Verlet(far=far), neighbours=search)
     arrays = sim.state.long_range._asdict()
@@ -294,9 +294,9 @@ def test_there_is_no_room_for_what_is_not_needed(far, there, not_there):
 
 @pytest.mark.compiled("contacts")
 def test_contacts_alone_have_no_room_for_other_forces():
-    """No far loads and no list, one row for the cells; damping has its column only where something damps."""
-    place = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
-    grains = sand.Grains(place, 1e-8, sand.SILICA)
+    """No long-range loads and no list, one row for the cells; a damping column only with damping."""
+    x_positions = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
+    grains = sand.Grains(x_positions, 1e-8, sand.SILICA)
     for damping in ("none", "viscoelastic"):
         forces, search = [sand.Contact(damping=damping)], sand.Neighbours(search="cells")
         sim = sand.Simulation(grains, forces, neighbours=search)
@@ -308,12 +308,12 @@ def test_contacts_alone_have_no_room_for_other_forces():
         assert len(contacts.lost) == (6 if damping == "viscoelastic" else 4)
         near = sim.state.pair_list
         assert near.pair.shape[1] >= sim.state.count[PAIRS] >= 144 and near.inner.size == near.pair.shape[1] // 8
-        assert near.skin[INNER_COUNT] == 0  # those in contact need not be looked at, and all others are farther
+        assert near.skin[INNER_COUNT] == 0  # pairs in contact are skipped, and all others are farther apart
 
 
 @pytest.mark.compiled("contacts")
 def test_a_row_is_written_once(tmp_path):
-    """Asking again for a time that is reached adds no row and no frame."""
+    """Running again to a time already reached adds no row and no frame."""
     seen = []
 
     class Count(sand.Observer):
@@ -331,7 +331,7 @@ def test_a_row_is_written_once(tmp_path):
 
 @pytest.mark.compiled("contacts")
 def test_a_torn_ledger_does_not_stop_a_resume(tmp_path):
-    """A kill in the middle of a row: the row is dropped, the run goes on."""
+    """A kill during a row: the incomplete row is dropped, and the run resumes."""
     sim = sand.Simulation(pair(), [sand.Contact()], out=tmp_path / "run")
     sim.run(steps=1234)
     path = tmp_path / "run" / "ledger.csv"
@@ -343,8 +343,8 @@ def test_a_torn_ledger_does_not_stop_a_resume(tmp_path):
 
 
 @pytest.mark.compiled("contacts")
-def test_moments_that_are_not_there_do_not_make_a_cutoff_of_nothing(tmp_path):
-    """Thermal grains without moments in a periodic box: the cut-off is half the box, and a resume works."""
+def test_automatic_cutoff_without_moments(tmp_path):
+    """Thermal grains without moments in a periodic box: half the box, and a resume works."""
     grains = pair(velocity=[[1, 0, 0], [-1, 0, 0]])
     with pytest.warns(UserWarning, match="no grain has a magnetic moment"):
         sim = sand.Simulation(grains, [sand.Dipoles()], box="1 um", out=tmp_path / "run")
@@ -355,14 +355,14 @@ def test_moments_that_are_not_there_do_not_make_a_cutoff_of_nothing(tmp_path):
 
 @pytest.mark.validate
 def test_magnetite_flies_without_a_surface_energy(tmp_path):
-    """Where grains never touch, no surface energy is needed, and a resume works too."""
+    """Without contacts no surface energy is needed, and a resume works too."""
     grains = pair(distance=1e-7, material=sand.MAGNETITE, moment="material")
     sand.Simulation(grains, [sand.Dipoles(cutoff="1 um")], out=tmp_path / "run").run(steps=10)
     assert sand.resume(tmp_path / "run").run(steps=10).steps == 20
 
 
-def test_grains_do_not_share_memory_with_their_maker():
-    """Arrays are copied: later changes of the user's own arrays, or of a running simulation, do not reach in."""
+def test_grains_copy_their_arguments():
+    """Later changes of the user's arrays, or of a running simulation, do not affect grains."""
     radius, position = np.full(2, 1e-8), np.asfortranarray([[0, 0, 0], [3e-8, 0, 0]])
     grains = sand.Grains(position, radius, sand.IRON)
     radius[0] = position[1, 0] = 5.0
@@ -372,8 +372,8 @@ def test_grains_do_not_share_memory_with_their_maker():
 
 
 @pytest.mark.compiled("contacts")
-def test_nothing_happens_in_an_empty_world():
-    """One grain at rest: the run ends at its time, in steps of at most 1e5 sound-crossing times r √(ρ/E)."""
+def test_one_grain_at_rest():
+    """The run ends at its time, in steps of at most 1e5 sound-crossing times r √(ρ/E)."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, sand.IRON), [sand.Contact()])
     result = sim.run(until="1 ms")
     assert result.outcome is sand.Outcome.FINISHED
@@ -383,7 +383,7 @@ def test_nothing_happens_in_an_empty_world():
 
 @pytest.mark.compiled("contacts")
 def test_without_contact_grains_pass_through_each_other():
-    """No Contact in the list: no contact forms."""
+    """Without sand.Contact no contact forms."""
     sim = sand.Simulation(pair(velocity=[[0, 0, 0], [-1.0, 0, 0]]), [])
     sim.run(until="60 ns")
     assert len(sim.contacts["pair"]) == 0
@@ -391,8 +391,8 @@ def test_without_contact_grains_pass_through_each_other():
 
 
 @pytest.mark.compiled("contacts")
-def test_a_pair_that_touches_across_the_faces():
-    """Periodic images: a pair through the boundary sticks as it does in the middle, to rounding."""
+def test_contact_across_periodic_faces():
+    """A pair through the boundary sticks as in the middle of the box, to rounding."""
     ends = []
     for shift in (0.0, 1e-7):
         x = sand.Box.periodic(2e-7).wrap(np.array([[shift - 1.2e-8, 0, 0], [shift + 1.2e-8, 0, 0]]))
@@ -406,7 +406,7 @@ def test_a_pair_that_touches_across_the_faces():
 
 @pytest.mark.compiled("contacts")
 def test_the_starting_objects_are_untouched():
-    """The simulation works on a copy, and shows views nobody can write to."""
+    """The simulation copies its grains and exposes read-only views."""
     grains = pair(velocity=[[0, 0, 0], [-1.0, 0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()])
     sim.run(steps=10)
@@ -417,7 +417,7 @@ def test_the_starting_objects_are_untouched():
 
 @pytest.mark.compiled("contacts")
 def test_an_interrupt_stops_between_two_steps(tmp_path):
-    """SIGINT: the run raises Interrupted, a checkpoint is there, and a resumed run reaches the end."""
+    """SIGINT: the run raises Interrupted, a checkpoint exists, and a resumed run reaches the end."""
     d = rest_distance(sand.SILICA, 1e-7, 1e-7)
     grains = sand.Grains([[0, 0, 0], [d, 0, 0]], 1e-7, sand.SILICA, velocity=[[0.01, 0, 0], [0, 0, 0]])
     sim = sand.Simulation(grains, [sand.Contact()], out=tmp_path / "run")
@@ -433,7 +433,7 @@ def test_an_interrupt_stops_between_two_steps(tmp_path):
 
 
 def test_when_frames_are_due():
-    """Multiples of the interval, the first after the present time; none if there is no interval."""
+    """Multiples of the interval, the first after the present time; none without an interval."""
     schedule = Schedule(0.1, 0.0)
     assert schedule.due == pytest.approx(0.1, rel=1e-6, abs=0.0)
     schedule.advance(0.35)
@@ -443,8 +443,8 @@ def test_when_frames_are_due():
 
 
 @pytest.mark.compiled("contacts")
-def test_bound_grains_take_the_whole_step_of_their_contact():
-    """A ringing pair steps by its fastest period / 25, not by a power of two below it; unless it is struck hard.
+def test_step_of_a_vibrating_pair():
+    """Its fastest period / 25, not rounded down to a power of two; shorter only in a fast impact.
 
     The step has 24 binary digits, 6e-8.
     """

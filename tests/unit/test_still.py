@@ -1,8 +1,7 @@
-"""Still pictures: what is on the picture is the data.
+"""Still pictures: the drawn pixels agree with the data.
 
-Pictures are read back as numbers.  A pixel is averaged over 3 × 3 samples, so an edge is known to a third of a pixel,
-and a share of a pixel's area to a ninth; areas of discs are known to their circumference times that, which gives the
-tolerances below.
+Pictures are read back as numbers.  A pixel is the mean of 3 × 3 samples, so an edge is known to a third of a pixel
+and an area to its circumference times that, which gives the tolerances below.
 """
 
 import numpy as np
@@ -14,15 +13,15 @@ from sand.plotting.render.scene import camera_rotation
 from sand.plotting.render.still import still_picture
 from sand.plotting.style import rgb
 
-from .stills import R, alike, at_pixel, frame_of
+from .synthetic_frames import R, at_pixel, frame_of, pixels_of_hue
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("view", ["iso", "front", "top", "side", "1,-2,0.4"])
 def test_a_sphere_is_a_disc_of_its_size_at_its_place(view):
-    """Centre: mean of the disc's pixels by opacity, to 0.1 pixel; radius √(area/π).
+    """Centre: opacity-weighted mean of the disc's pixels, to 0.1 pixel; radius √(area/π).
 
-    The area is off by less than the circumference × 1/3 sample × 1/√(samples on it): 2πr/3/√(6πr) < 0.5 % of πr².
+    The area error is less than circumference × 1/3 sample × 1/√(samples on it): 2πr/3/√(6πr) < 0.5 % of πr².
     """
     frame = frame_of([[3e-8, -2e-8, 5e-8], [-4e-8, 6e-8, -1e-8]], radius=[2e-8, 1.2e-8])
     picture = still_picture(frame, view=view, size=(400, 300), arrows=False, colour="radius")
@@ -33,7 +32,7 @@ def test_a_sphere_is_a_disc_of_its_size_at_its_place(view):
         near = np.hypot(columns - x, rows - y) < 1.2 * frame.radius[k] * scale
         alpha = picture.grains_only[..., 3] * near
         if not np.linalg.norm((camera_of(view) @ (frame.position[0] - frame.position[1]))[:2]) > 4e-8:
-            continue  # the discs overlap from here: another test's matter
+            continue  # the discs overlap from here, which another test covers
         assert (columns * alpha).sum() / alpha.sum() == pytest.approx(x, rel=0.0, abs=0.1)
         assert (rows * alpha).sum() / alpha.sum() == pytest.approx(y, rel=0.0, abs=0.1)
         assert np.sqrt(alpha.sum() / np.pi) == pytest.approx(frame.radius[k] * scale, rel=0.005, abs=0.0)
@@ -45,7 +44,7 @@ def camera_of(view):
 
 
 @pytest.mark.slow
-def test_views_are_what_they_are_called():
+def test_named_views():
     """From the front x is to the right and z up; from the side y and z; from above x and y."""
     for view, right, up in (("front", 0, 2), ("side", 1, 2), ("top", 0, 1)):
         turn = camera_of(view)
@@ -55,7 +54,7 @@ def test_views_are_what_they_are_called():
 
 
 def test_perspective_shows_what_is_nearer_larger():
-    """Two equal grains one behind the other: the nearer disc is larger by the ratio of distances, nearly."""
+    """Two equal grains one behind the other: the ratio of disc sizes is about that of distances."""
     frame = frame_of([[0, -2e-7, -5e-8], [0, 2e-7, 5e-8]])
     flat, deep = (
         still_picture(frame, view="front", size=(400, 400), arrows=False, perspective=on).grains_only[..., 3]
@@ -68,10 +67,9 @@ def test_perspective_shows_what_is_nearer_larger():
 @pytest.mark.slow
 @pytest.mark.parametrize("angle", [20.0, 110.0, 200.0, 290.0])
 def test_an_arrow_points_along_its_moment(angle):
-    """The arrow's pixels, its head being heavier, lie along the moment.
+    """The principal axis of the arrow's pixels is along the moment to 2°, a pixel over its length.
 
-    Their longest axis is the moment's to 2°, a pixel over the arrow's length, and the third moment along it, which the
-    thicker head decides, has its sign.
+    The third moment along it has the moment's sign, because the head is thicker.
     """
     direction = np.array([np.cos(np.radians(angle)), 0.0, np.sin(np.radians(angle))])
     frame = frame_of([[0, 0, 0]], moment=direction[None] * 1e-18)
@@ -88,35 +86,35 @@ def test_an_arrow_points_along_its_moment(angle):
 
 
 def at_pixel_of_centre(frame):
-    """Where the only grain of a frame is, in pixels."""
+    """Pixel coordinates of the only grain of a frame."""
     return at_pixel(still_picture(frame, view="front", size=(400, 400)), frame.position[0])
 
 
 @pytest.mark.slow
 def test_a_contact_through_a_face_is_drawn_at_both():
-    """Two grains that touch through a face of the box, cut: a collar at each face, none between the grains.
+    """Two grains in contact through a face of the box, cross-section: a collar at each face, none between them.
 
-    Red marks the stretch mode at its limit, on blue grains: red pixels lie within a radius of the two points where the
-    grains touch, at ±L/2 along x.
+    Red marks stretching at its limit, on blue grains: red pixels are within a radius of the two contact points, at ±L/2
+    along x.
     """
     box = sand.Box.periodic("200 nm")
     share = np.array([[1.0, 0.0, 0.0, 0.0]])
     frame = frame_of([[0.901e-7, 0, 0], [-0.901e-7, 0, 0]], [(0, 1)], box=box, share=share, velocity=np.eye(3)[:2])
     how = {"view": "front", "size": (600, 500), "bonds": "mode", "arrows": False, "colour": "material"}
     cut = still_picture(frame, whole=False, **how)
-    red = alike(cut.grains_only, rgb("#D55E00"), 1.5)
+    red = pixels_of_hue(cut.grains_only, rgb("#D55E00"), 1.5)
     columns = np.nonzero(red)[1] + 0.5
     faces = [at_pixel(cut, np.array([x, 0.0, 0.0]))[0] for x in (-1e-7, 1e-7)]
     reach = R * 600 / (cut.window[1] - cut.window[0])
     away = np.abs(columns[:, None] - np.array(faces))
     assert ((away < reach).sum(axis=0) > 10).all() and (away.min(axis=1) < reach).all()
     whole = still_picture(frame, **how)
-    columns = np.nonzero(alike(whole.grains_only, rgb("#D55E00"), 1.5))[1]
+    columns = np.nonzero(pixels_of_hue(whole.grains_only, rgb("#D55E00"), 1.5))[1]
     assert 3 < np.ptp(columns) < 2 * reach
 
 
 def test_box_edges_are_hidden_by_grains_in_front():
-    """An edge runs behind a grain that is nearer to the eye: at the grain's centre is the grain."""
+    """An edge passes behind a grain: at the grain's centre is the grain."""
     box = sand.Box.periodic("100 nm")
     frame = frame_of([[-4.6e-8, -4.2e-8, 0.0]], box=box)  # before the left edge at the back
     picture = still_picture(frame, view="0.1,-1,0.0", size=(400, 400), arrows=False)
@@ -127,14 +125,14 @@ def test_box_edges_are_hidden_by_grains_in_front():
     there = picture.grains_only[int(y), int(x), :3]
     gone = np.linalg.norm(at_pixel(picture, frame.position[0]) - np.array([x, y]))
     radius = R * 400 / (picture.window[1] - picture.window[0])
-    assert gone < radius  # the edge does pass behind
+    assert gone < radius  # the edge passes behind the grain
     assert np.abs(there - line).max() > 0.05 and np.ptp(there) < 0.1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
-def test_grounds(dark):
-    """Transparent: nothing where there is nothing, the grain opaque; otherwise the ground of the style."""
+def test_backgrounds(dark):
+    """Transparent: empty pixels have opacity 0, the grain is opaque; otherwise the background of the style."""
     frame = frame_of([[0, 0, 0]])
     clear = np.asarray(still_picture(frame, size=(300, 200), dark=dark, transparent=True).image())
     solid = np.asarray(still_picture(frame, size=(300, 200), dark=dark).image())
@@ -146,8 +144,8 @@ def test_grounds(dark):
 
 
 @pytest.mark.slow
-def test_the_same_frame_the_same_bits():
-    """Two pictures of a frame agree byte for byte, as PNG, PDF and SVG."""
+def test_pictures_are_reproducible():
+    """Two pictures of a frame are equal byte for byte, as PNG, PDF and SVG."""
     from sand.plotting.run_figure import figure_bytes
 
     frame = frame_of(np.arange(4)[:, None] * [2 * R, 0, 0], [(0, 1)], moment=np.eye(4, 3) * 1e-18)
@@ -158,14 +156,14 @@ def test_the_same_frame_the_same_bits():
 
 @pytest.mark.slow
 def test_scale_bar_and_caption():
-    """The bar is as long as it says; time and grains are told; the field's arrow is there if there is a field."""
+    """The bar has its stated length; time and grains are given; the field's arrow exists with a field."""
     from sand.plotting.style import format_si
 
     picture = still_picture(frame_of([[0, 0, 0]]), field=(0.0, 0.0, 1e-3))
     (bar,) = [line for line in picture.axes[0].get_lines() if line.get_gid() == "scale"]
     assert format_si(float(np.ptp(bar.get_xdata())), "m") in [text.get_text() for text in picture.axes[0].texts]
-    told = [text.get_text() for text in picture.texts]
-    assert "t = 1 µs" in told and any("1 grain of iron" in text for text in told)
+    message = [text.get_text() for text in picture.texts]
+    assert "t = 1 µs" in message and any("1 grain of iron" in text for text in message)
     inside = [text.get_text() for axes in picture.axes for text in axes.texts]
     assert "B" in inside
     none = [text.get_text() for axes in still_picture(frame_of([[0, 0, 0]])).axes for text in axes.texts]
@@ -173,7 +171,7 @@ def test_scale_bar_and_caption():
 
 
 def test_one_cluster_by_itself():
-    """The second largest cluster alone: its grains, no box, what it is of how many."""
+    """The second largest cluster alone: its grains, no box, its rank and the number of clusters."""
     frame = frame_of(np.arange(6)[:, None] * [2 * R, 0, 0], [(0, 1), (1, 2), (4, 5)], box=sand.Box.periodic("1 um"))
     picture = still_picture(frame, cluster=2, size=(300, 200))
     np.testing.assert_array_equal(picture.scene.number, [4, 5])
@@ -182,11 +180,11 @@ def test_one_cluster_by_itself():
         still_picture(frame, cluster=3)
 
 
-def test_all_mistakes_are_told():
-    """One line for each thing that cannot be."""
-    with pytest.raises(BadInput) as told:
+def test_all_errors_are_reported_together():
+    """One line per wrong option."""
+    with pytest.raises(BadInput) as message:
         still_picture(frame_of([[0, 0, 0]]), colour="sped", bonds="loud", view="botom", size=(10, 1000))
-    assert len(told.value.problems) == 4
+    assert len(message.value.problems) == 4
     for view in ("0,0,0", "1,2", "nan,1,1"):
         with pytest.raises(BadInput, match="direction to the eye"):
             still_picture(frame_of([[0, 0, 0]]), view=view)

@@ -16,8 +16,8 @@ def test_a_table_has_all_its_rows(tmp_path):
         assert list(csv.reader(file)) == [["name", "size"], *([row["name"], repr(row["size"])] for row in rows)]
 
 
-def test_a_growing_table_goes_on_with_all_it_had(tmp_path):
-    """All whole rows are there after a kill that tore the last one, and those that are added come after them."""
+def test_a_table_is_continued_after_a_kill(tmp_path):
+    """Complete rows survive a kill that cut the last one, and new rows follow them."""
     table = GrowingTable(tmp_path / "a.csv", HEAD)
     table.add(ROWS[:2])
     table.add(ROWS[2:3])
@@ -30,8 +30,8 @@ def test_a_growing_table_goes_on_with_all_it_had(tmp_path):
     assert GrowingTable(tmp_path / "a.csv", HEAD).rows == []
 
 
-def test_a_growing_table_is_put_in_order(tmp_path):
-    """By its numbers, not by their text, and none is lost."""
+def test_a_table_is_sorted_by_number(tmp_path):
+    """By value, not as text, without losing a row."""
     table = GrowingTable(tmp_path / "a.csv", HEAD)
     table.add([[10, 1.0], [9, 2.0], [9, 1.5]])
     table.sort()

@@ -9,7 +9,7 @@ from sand.theory import contact
 
 
 def test_two_silica_grains_of_0_6_um():
-    """Every number from its definition, equal grains: R = r/2, E* = E/(2(1−ν²)), G* = G/(2(2−ν)), G′ = G/2."""
+    """Every number by its definition, equal grains: R = r/2, E* = E/(2(1−ν²)), G* = G/(2(2−ν)), G′ = G/2."""
     m, r = sand.SILICA, 3e-7
     c = contact(m, r)
     radius, gamma = r / 2, m.surface_energy
@@ -44,7 +44,7 @@ def test_two_silica_grains_of_0_6_um():
 
 
 def test_two_materials_in_either_order():
-    """Swapping the grains changes nothing; the smaller ξ_c counts; mixing rules order γ_eff."""
+    """Swapping the grains changes nothing; the smaller ξ_c applies; mixing rules order γ_eff."""
     one = contact("ice", "0.1 um", "silica", "0.3 um")
     two = contact("silica", "0.3 um", "ice", "0.1 um")
     for name in one.__dataclass_fields__:

@@ -26,7 +26,7 @@ def test_eq_14_for_the_grains_of_the_paper():
     assert theory.capture_cross_section(MOMENT, reduced, speed, c=0.85) == pytest.approx(0.85 * sigma, rel=1e-15, abs=0)
 
 
-def test_the_barrier_is_the_top_of_the_effective_potential():
+def test_centrifugal_barrier():
     """max_r U_eff = U_0 (Eq. 11) at r = 3α/(m̄b²v²), and U_0 = m̄v²/2 at b_max (Eq. 12)."""
     reduced, alpha, speed = theory.reduced_mass(MASS), theory.potential_parameter(MOMENT), 0.2
     for b in (2e-7, 4e-7):
@@ -80,7 +80,7 @@ def test_exponents_of_growth():
 
 
 def test_sizes_and_moments():
-    """S = Σs²n/Σsn; μN^γ; the time to turn π/2 at a torque that stays is √(πI/M)."""
+    """S = Σs²n/Σsn; μN^γ; the time to turn by π/2 at constant torque is √(πI/M)."""
     assert theory.mean_size([1, 4], [3, 2]) == pytest.approx((3 + 32) / 11, rel=1e-15, abs=0.0)
     assert theory.mean_size([2, 2, 6]) == pytest.approx(44 / 10, rel=1e-15, abs=0.0)
     assert theory.aggregate_moment(MOMENT, 100) == pytest.approx(MOMENT * 100**0.63, rel=1e-12, abs=0.0)
@@ -89,7 +89,7 @@ def test_sizes_and_moments():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "expected"),
     [
         (lambda: theory.capture_radius(MOMENT, MASS, 0.0), "speed"),
         (lambda: theory.capture_radius(MOMENT, "3 m", 1.0), "mass"),
@@ -111,15 +111,15 @@ def test_sizes_and_moments():
         (lambda: theory.aggregate_moment(MOMENT, 0), "grains"),
     ],
 )
-def test_mistakes_are_told(call, said):
-    """One line, with the name."""
-    with pytest.raises(sand.BadInput, match=said) as caught:
+def test_wrong_arguments_are_refused(call, expected):
+    """One line with the name."""
+    with pytest.raises(sand.BadInput, match=expected) as caught:
         call()
     assert len(caught.value.problems) == 1
 
 
-def test_texts_with_units_are_the_same_numbers():
-    """20 nm is 2e-8."""
+def test_text_with_units():
+    """ "20 nm" is 2e-8."""
     parts = ["1e-18 A m^2", 0, 0]
     assert theory.dipole_energy(parts, parts, ["20 nm", 0, 0]) == theory.dipole_energy(
         [1e-18, 0, 0], [1e-18, 0, 0], [2e-8, 0, 0]

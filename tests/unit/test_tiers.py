@@ -1,4 +1,4 @@
-"""The tiers of the tests: what runs by default, what is left out, and that a test cannot compile in silence."""
+"""The tiers of the tests: default and excluded tests, and the guard against unmarked compilation."""
 
 import pytest
 
@@ -9,13 +9,13 @@ from ..validation import parse_part, part_of
 
 
 def test_at_most_eight_specifications():
-    """Drivers and flights; each name stands for one driver, and no two names for the same."""
+    """Drivers and scattering; each name has one kernel specification, and none has two names."""
     assert len(specs.DRIVERS) + 1 <= 8
-    assert sorted(specs._plans().values()) == sorted(specs.DRIVERS)
+    assert sorted(specs._kernel_specs().values()) == sorted(specs.DRIVERS)
 
 
 def test_other_drivers_have_no_name():
-    """Gravity alone is no canonical specification."""
+    """A simulation with gravity alone is not in tests/specs.py."""
     sim = sand.Simulation(sand.Grains([[0, 0, 0]], 1e-8, "silica"), [sand.Gravity("9.81 m/s^2")])
     assert specs.name_of(sim._engine._kernel_spec) is None
 
@@ -27,8 +27,8 @@ def test_an_unmarked_test_takes_no_steps():
         sim.run(steps=1)
 
 
-def test_parts_are_whole_and_apart():
-    """Each test belongs to one of ten parts, whatever the others are called."""
+def test_parts_are_a_partition():
+    """Each test is in exactly one of ten parts, independent of other tests."""
     names = [f"tests/unit/test_a.py::test_{k}" for k in range(200)]
     parts = [[name for name in names if part_of(name, (k, 10))] for k in range(10)]
     assert sorted(name for part in parts for name in part) == sorted(names)

@@ -1,4 +1,4 @@
-"""Units at the door."""
+"""Units of arguments."""
 
 import math
 import re
@@ -47,15 +47,15 @@ USUAL = [
     "angstrom",
     "Å",
 ]
-"""Units that are understood without loading pint."""
+"""Units that are parsed without importing pint."""
 
 
 FORMS = ("{}", "{}/m^2", "J {}^-1*A", "A m²/{}", "kg·{}**3 / s", "rad/{}", "{}/m^3", "J/{}")
 
 
 @pytest.fixture(scope="module")
-def usual():
-    """Three of each usual unit, alone and as a factor, as quantities of pint by our text."""
+def samples():
+    """Three of each common unit, alone and as a factor, as quantities of pint from SAND's text."""
     registry = pint.UnitRegistry()
     texts = [form.format(name) for form in FORMS for name in USUAL]
     spelled = [re.sub(r"(?<=[A-Za-zµμÅ])(-?\d)", r"**\1", t.replace("²", "**2").replace("·", "*")) for t in texts]
@@ -66,17 +66,17 @@ def usual():
 @pytest.mark.parametrize(
     "unit", ["m", "s", "kg", "K", "Pa", "T", "J/m^2", "A m^2/kg", "kg/m^3", "rad/s", "C", "A m^2", "1"]
 )
-def test_units_that_need_no_pint_are_those_of_pint(unit, usual, monkeypatch):
-    """Every prefix of every usual unit, alone and as a factor: pint's number to rounding, or refused as pint does.
+def test_built_in_units_agree_with_pint(unit, samples, monkeypatch):
+    """Every prefix of every common unit, alone and as a factor: pint's value to rounding, or refused.
 
-    pint cannot be imported while they are read, but for pure numbers, which it is asked for.
+    pint cannot be imported while they are read, except for pure numbers, which need it.
     """
     wanted = unit.replace("^", "**")
-    expected = {text: value.to(wanted).magnitude for text, value in usual.items() if value.is_compatible_with(wanted)}
+    expected = {text: value.to(wanted).magnitude for text, value in samples.items() if value.is_compatible_with(wanted)}
     assert len(expected) >= 2
     if unit != "1":
         monkeypatch.setitem(sys.modules, "pint", None)
-    found = {text: value for text in usual if (value := in_unit(f"3 {text}", unit)) is not None}
+    found = {text: value for text in samples if (value := in_unit(f"3 {text}", unit)) is not None}
     assert found == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
@@ -102,7 +102,7 @@ def test_what_is_not_a_length(text):
         si(text, "m", "radius")
 
 
-def test_ranges_and_numbers_that_are_none():
+def test_ranges_and_malformed_numbers():
     """One line each."""
     with pytest.raises(BadInput, match="radius = -1 must be above 0 m"):
         si(-1, "m", "radius", above=0.0)
@@ -116,14 +116,14 @@ def test_ranges_and_numbers_that_are_none():
 
 @pytest.mark.slow
 def test_quantities_of_pint():
-    """Of any registry."""
+    """From any registry."""
     registry = pint.UnitRegistry()
     assert in_unit(3 * registry.micrometer, "m") == pytest.approx(3e-6, rel=1e-6, abs=0.0)
     assert in_unit(3 * registry.second, "m") is None
 
 
-def test_quantities_of_astropy_by_what_they_can_do():
-    """Anything with `to_value(unit)`; astropy itself need not be installed."""
+def test_quantities_with_to_value():
+    """Anything with `to_value(unit)`, as in astropy, which need not be installed."""
 
     class Duck:
         def to_value(self, unit):
@@ -139,6 +139,6 @@ def test_quantities_of_astropy_by_what_they_can_do():
     ("value", "unit", "text"),
     [(1.2e-6, "m", "1.2 um"), (5e-6, "s", "5 us"), (0.0, "s", "0 s"), (1.0, "m", "1 m")],
 )
-def test_numbers_for_people(value, unit, text):
-    """With an SI prefix."""
+def test_numbers_with_si_prefix(value, unit, text):
+    """The prefix leaves one to three digits."""
     assert format_quantity(value, unit) == text

@@ -1,4 +1,4 @@
-"""The widget of a notebook: what it answers."""
+"""The notebook widget: its responses to messages of the page."""
 
 import json
 
@@ -15,15 +15,15 @@ pytestmark = pytest.mark.usefixtures("bundle")
 
 
 @pytest.mark.compiled("fields")
-def test_messages_of_the_widget(looked_at):
-    """Each message is answered from the run dataset, with its id, so that the page knows what it asked for."""
-    story = run_dataset(looked_at[0])
-    assert answer_message(story, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [story.grains()])
-    assert answer_message(story, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [story.frame(2)])
-    told, none = answer_message(story, {"kind": "manifest", "since": 4})
-    assert len(told["manifest"]["times"]) == 2 and none == []
-    assert answer_message(story, {"kind": "series"})[0]["series"] == json.loads(json.dumps(story.series()))
-    assert "reason" in answer_message(story, {"kind": "dimension", "k": 5, "grain": 0})[0]
+def test_messages_of_the_widget(finished_run):
+    """Each message is answered from the run dataset, with the id of the request."""
+    dataset = run_dataset(finished_run[0])
+    assert answer_message(dataset, {"kind": "grains", "id": 7}) == ({"kind": "grains", "id": 7}, [dataset.grains()])
+    assert answer_message(dataset, {"kind": "frame", "k": 2}) == ({"kind": "frame", "k": 2}, [dataset.frame(2)])
+    reply, none = answer_message(dataset, {"kind": "manifest", "since": 4})
+    assert len(reply["manifest"]["times"]) == 2 and none == []
+    assert answer_message(dataset, {"kind": "series"})[0]["series"] == json.loads(json.dumps(dataset.series()))
+    assert "reason" in answer_message(dataset, {"kind": "dimension", "k": 5, "grain": 0})[0]
 
 
 @pytest.mark.compiled("fields")
@@ -42,30 +42,30 @@ def test_messages_of_the_widget(looked_at):
         {"kind": "manifest", "since": None},
     ],
 )
-def test_wrong_messages(looked_at, content):
-    """A sentence, whatever comes; nothing is raised in the kernel."""
-    told, buffers = answer_message(run_dataset(looked_at[0]), content)
-    assert isinstance(told["error"], str) and buffers == []
+def test_wrong_messages(finished_run, content):
+    """Any content gives a sentence; nothing is raised in the kernel."""
+    reply, buffers = answer_message(run_dataset(finished_run[0]), content)
+    assert isinstance(reply["error"], str) and buffers == []
 
 
 @pytest.mark.compiled("fields")
-def test_what_nobody_thought_of(looked_at, monkeypatch):
-    """Any error is answered with a sentence, so that the page does not wait for ever."""
-    story = run_dataset(looked_at[0])
-    monkeypatch.setattr(story, "frame", lambda k: 1 / 0)
-    told, buffers = answer_message(story, {"kind": "frame", "k": 1, "id": 3})
-    assert told["id"] == 3 and "ZeroDivisionError" in told["error"] and buffers == []
+def test_unexpected_errors_are_answered(finished_run, monkeypatch):
+    """Any error gives a sentence, so that the page does not wait forever."""
+    dataset = run_dataset(finished_run[0])
+    monkeypatch.setattr(dataset, "frame", lambda k: 1 / 0)
+    reply, buffers = answer_message(dataset, {"kind": "frame", "k": 1, "id": 3})
+    assert reply["id"] == 3 and "ZeroDivisionError" in reply["error"] and buffers == []
 
 
 @pytest.mark.compiled("fields")
-def test_the_widget(looked_at, monkeypatch):
-    """It holds nothing that would be saved with the notebook, runs the bundle, and answers through its own channel."""
+def test_the_widget(finished_run, monkeypatch):
+    """Its state is not saved with the notebook, it runs the bundle, and answers through its own channel."""
     pytest.importorskip("anywidget", reason="anywidget is in the test extra")
-    one = widget(run_dataset(looked_at[0]))
+    one = widget(run_dataset(finished_run[0]))
     assert not {"manifest", "series"} & set(one.get_state()) and SCRIPT in str(one._esm)
     sent = []
     monkeypatch.setattr(one, "send", lambda content, buffers=None: sent.append((content, buffers)))
     one._handle_custom_msg({"kind": "frame", "k": 1}, [])
     assert sent[0][0] == {"kind": "frame", "k": 1} and decode(sent[0][1][0])[0]["frame"] == 1
     monkeypatch.setattr(show, "in_notebook", lambda: True)
-    assert type(sand.open(looked_at[0]).view()).__name__ == "GrainWidget"
+    assert type(sand.open(finished_run[0]).view()).__name__ == "GrainWidget"

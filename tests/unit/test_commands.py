@@ -1,0 +1,125 @@
+"""Which command a case file is for, and that `sand info` refuses what that command refuses."""
+
+import pytest
+
+import sand
+from sand.cli.main import main
+from sand.config.commands import command_for
+from sand.io.bodies import write_body
+
+RUN = """
+[run]
+until = "20 ns"
+[box]
+periodic = "400 nm"
+[grains]
+number = 8
+radius = "10 nm"
+"""
+COLLIDE = """
+[target]
+kind = "chain"
+grains = 3
+radius = "0.1 um"
+[projectile]
+kind = "grain"
+radius = "0.1 um"
+[impact]
+speed = "2 m/s"
+seeds = [1, 2]
+"""
+SCATTER = """
+[projectile]
+radius = "10 nm"
+material = "iron"
+moment = "200 A m^2/kg"
+[flight]
+temperature = "100 K"
+speed = "1 m/s"
+"""
+GROW = RUN + "[grow]\nseeds = [1, 2]\n"
+CASES = {"run": RUN, "collide": COLLIDE, "scatter": SCATTER, "grow": GROW}
+
+
+@pytest.mark.parametrize("meant", list(CASES))
+@pytest.mark.parametrize("given", list(CASES))
+def test_a_case_of_another_command(tmp_path, monkeypatch, capsys, meant, given):
+    """One line names the right command and nothing is written; `sand grow` takes cases of `sand run`."""
+    if given == meant or (given, meant) == ("grow", "run"):
+        return
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.toml").write_text(CASES[meant])
+    assert main([given, "a.toml"]) == 2
+    assert capsys.readouterr().err == f"sand: a.toml: this is a case for `sand {meant}`; use: sand {meant} a.toml\n"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_command_of_a_case():
+    """By its tables; a body alone means a collision; an empty case has no command."""
+    assert command_for({"target": {}, "impcat": {}}) == "collide"
+    assert command_for({"projectile": {}, "flight": {}}) == "scatter"
+    assert command_for({"forces": {}, "stepping": {}}) is None
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_info_names_the_command_of_a_case(tmp_path, capsys, name):
+    """`sand info` of each kind of case names its command."""
+    (tmp_path / "a.toml").write_text(CASES[name])
+    assert main(["info", str(tmp_path / "a.toml")]) == 0
+    assert (f"sand {name} " in capsys.readouterr().out) is (name != "run")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ('"2 m/s"', '"2 m/s"\nimpact_parameter = "x"', "impact_parameter = 'x' must be a length"),
+        ('"2 m/s"', '"2 m/s"\nimpact_parameter = "-1 nm"', "impact_parameter = '-1 nm' must be a length"),
+        ('"2 m/s"', '"2 m/s"\nimpact_parameter = "nan b"', "must be a length"),
+        ('"2 m/s"', '"2 m/s"\nimpact_parameter = 1e300', "must be a length"),
+        ('"2 m/s"', '"2 m/s"\nimpact_parameter = [1, 2]', "must be a length"),
+        ("seeds = [1, 2]", "seeds = [9223372036854775808]", "seeds is a whole number beyond 2^63"),
+        ("seeds = [1, 2]", "seeds = []", "impact.seeds"),
+        ('kind = "grain"', 'kind = "grain"\ngrains = 5', "grains = 5"),
+        ('kind = "chain"', 'kind = "chain"\ndimension = 2', "dimension"),
+        ('"2 m/s"', '"2 m/s"\n[materials.glass]\nlike = "silica"\ndensity = -1', "density"),
+        ('kind = "grain"\nradius = "0.1 um"', 'kind = "file"\npath = "nowhere.xyz"', "there is no file nowhere.xyz"),
+        ("[impact]", '[forces.field]\nflux_density = "1 K"\n[impact]', "flux_density"),
+    ],
+)
+def test_info_refuses_what_collide_refuses(tmp_path, monkeypatch, capsys, old, new, part):
+    """The same lines from both, before any file is written."""
+    monkeypatch.chdir(tmp_path)
+    assert old in COLLIDE
+    (tmp_path / "a.toml").write_text(COLLIDE.replace(old, new))
+    message = []
+    for words in (["info", "a.toml"], ["collide", "a.toml"], ["collide", "a.toml", "--seeds", "1"]):
+        assert main(words) == 2, capsys.readouterr().out
+        message.append(capsys.readouterr().err)
+    assert message[0] == message[1] == message[2]
+    assert part in message[0] and all(line.startswith("sand: a.toml: ") for line in message[0].splitlines())
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("given", ['"0"', "0", '"0 nm"', '"0.5 b"', '"10 nm"', '"0b"'])
+def test_impact_parameters(tmp_path, capsys, given):
+    """A length, or a fraction of the sum of radii; 0 needs no unit."""
+    (tmp_path / "a.toml").write_text(COLLIDE.replace('"2 m/s"', f'"2 m/s"\nimpact_parameter = {given}'))
+    assert main(["info", str(tmp_path / "a.toml")]) == 0
+
+
+@pytest.mark.parametrize("command", ["collide", "scatter"])
+def test_a_body_file_is_not_overwritten(tmp_path, monkeypatch, capsys, command):
+    """A job whose output would overwrite the file of one of its bodies is refused, and the file stays."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs").mkdir()
+    source = tmp_path / "runs" / "trajectory.gsd"
+    write_body(tmp_path / "one.gsd", sand.setup.grain(radius="10 nm", material="iron", moment="200 A m^2/kg"))
+    (tmp_path / "one.gsd").rename(source)
+    body = '[target]\nkind = "file"\npath = "runs/trajectory.gsd"\n'
+    other = COLLIDE[COLLIDE.index("[projectile]") :] if command == "collide" else SCATTER
+    (tmp_path / "a.toml").write_text(body + other)
+    before = source.read_bytes()
+    assert main([command, "a.toml", "--out", "runs", "--overwrite"]) == 2
+    message = capsys.readouterr().err
+    assert "--overwrite would replace runs/trajectory.gsd, the target of a.toml" in message.replace("\\", "/")
+    assert source.read_bytes() == before

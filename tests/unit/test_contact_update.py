@@ -1,0 +1,191 @@
+"""Contact update: the pass over all contacts against updating each flagged contact separately."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from sand.box import Box
+from sand.compiler.jit import kernel
+from sand.contact.columns import column_loops, constant_names
+from sand.contact.events import settle_loop
+from sand.contact.jkr import LAW as JKR
+from sand.contact.law import contact_constants
+from sand.contact.mechanics import displacements_of
+from sand.contact.model import Contact
+from sand.contact.tangential import pointers_for
+from sand.contact.update import (
+    BROKEN_FLAG,
+    PENDING_FLAG,
+    SLIPPED_FLAG,
+    _flag_contact,
+    contact_loop,
+    contact_pass_loop,
+    displacements_before,
+    log_slip_sums,
+    pose_at,
+    twist_increment,
+)
+from sand.grains import GrainArrays, Grains
+from sand.integrate.kernel_spec import ContactParameters
+from sand.integrate.motion import kick_and_drift_for
+from sand.material import SILICA
+from sand.numerics.quaternion import turned_back
+from sand.numerics.vec import axpy, load4, put, scale
+from sand.state.arrays import empty_contact_arrays, empty_pair_list
+from sand.state.state import BROKEN, CONTACTS, COUNT, LOST, ROLLING, SLIDING, SLIPPED, TWISTING
+
+PAIRS = 403
+"""Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""
+STEP = 1e-11
+STATE = ("pointer1", "pointer2", "twist", "force", "torque1", "torque2", "lost")
+contact_pass, update_flagged_contacts = contact_pass_loop(JKR), settle_loop(JKR)
+flag_contacts, columns = contact_loop(JKR, _flag_contact), column_loops(JKR)
+
+
+def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
+    passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, dt)
+    log_slip_sums(count, lost, passed)
+    update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
+    return passed.pending
+
+
+pass_and_update = kernel(_pass_and_update, cached=False)
+
+
+def update_flagged_only(grains, contacts, near, count, lost, span, law, dt):
+    """Reference: a pass that only flags contacts beyond a limit, then the update of each flagged contact."""
+    used = np.uint64(count[CONTACTS])
+    flag_contacts(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
+    update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
+
+
+def random_contacts(material, box, seed=1):
+    """Pairs of grains in a box with displacements below and above each limit, breaking included."""
+    rng = np.random.default_rng(seed)
+
+    def vectors(size):
+        v = rng.normal(size=(PAIRS, 3))
+        return size * v / np.linalg.norm(v, axis=1)[:, None]
+
+    pairing = Contact().pairing(material, material)
+    r1, r2 = rng.uniform(5e-9, 2e-8, (2, PAIRS))
+    mass = 4 / 3 * np.pi * 2000.0 * np.array([r1, r2]) ** 3
+    n, contacts = vectors(1.0), empty_contact_arrays(2 * PAIRS, PAIRS, len(constant_names(JKR)))
+    grains = GrainArrays(*(np.zeros_like(a) for a in Grains(np.zeros((2 * PAIRS, 3)), 1e-8, material).arrays))
+    grains.orientation[:] = rng.normal(size=(4, 2 * PAIRS))
+    grains.orientation[:] /= np.linalg.norm(grains.orientation, axis=0)
+    grains.radius[:], grains.mass[:] = np.concatenate((r1, r2)), mass.ravel()
+    grains.velocity[:] = rng.normal(size=(3, 2 * PAIRS))
+    grains.spin[:] = 1e8 * rng.normal(size=(3, 2 * PAIRS))
+    contacts.flag[:PAIRS] = 1.0  # all slipped in the previous step
+    contacts.lost[:] = rng.uniform(0.0, 1e-20, contacts.lost.shape)
+    for c in range(PAIRS):
+        constants = contact_constants(JKR)(pairing, r1[c], r2[c], *mass[:, c])
+        across = [np.cross(n[c], v) for v in vectors(1.0)[:2]]
+        slide, roll, twist = rng.uniform(0.0, 1.6, 3)
+        slide, roll = scale(slide * constants.slide_limit, across[0]), scale(roll * constants.roll_limit, across[1])
+        n1, n2 = pointers_for(slide, roll, n[c], r1[c], r2[c])
+        overlap_factor = rng.uniform(-1.1, 2.0) if c % 10 else rng.uniform(5.0, 20.0)
+        centre = rng.uniform(-1e-7, 1e-7, 3)
+        apart = (
+            r1[c]
+            + r2[c]
+            - overlap_factor * constants.normal.pull_off_overlap * (0.2 if constants.normal.hertz > 0.0 else 1.0)
+        )
+        put(grains.position, c, axpy(0.5 * apart, n[c], centre))
+        put(grains.position, c + PAIRS, axpy(-0.5 * apart, n[c], centre))
+        put(contacts.pointer1, c, turned_back(load4(grains.orientation, c), n1))
+        put(contacts.pointer2, c, turned_back(load4(grains.orientation, c + PAIRS), n2))
+        contacts.pair[:, c] = c, c + PAIRS
+        contacts.twist[c] = twist * constants.twist_limit * rng.choice((-1.0, 1.0))
+        columns.store(contacts.constants, c, constants)
+    grains.position[:] = box.wrap(grains.position.T).T
+    count = np.zeros(len(COUNT), np.int64)
+    count[CONTACTS] = PAIRS
+    return grains, contacts, empty_pair_list(2 * PAIRS, 16), count, np.zeros(len(LOST))
+
+
+def parameters_for(reset=False, follow=False):
+    return ContactParameters(True, np.zeros((10, 1, 1)), reset, follow, False, 25.0)
+
+
+OPTIONS = {
+    "clamped": (SILICA, Box.open(), parameters_for()),
+    "reset": (SILICA, Box.open(), parameters_for(reset=True)),
+    "periodic": (SILICA, Box.periodic(2.2e-7, None, 3e-7), parameters_for()),
+    "following": (SILICA, Box.open(), parameters_for(follow=True)),
+    "hertzian": (SILICA.but(name="dry", surface_energy=0.0), Box.open(), parameters_for()),
+}
+
+
+@pytest.mark.compiled("small")
+@pytest.mark.parametrize("option", OPTIONS)
+def test_pass_and_separate_update_agree(option):
+    """Same pointers, twists, loads and losses, to 1e-12 of the largest value of each array.
+
+    Pointers have errors of 1e-16 and displacements are 1e-3 of a radius, so forces and energies are known to 1e-13.
+    """
+    material, box, law = OPTIONS[option]
+    system = random_contacts(material, box)
+    other = copy.deepcopy(system)
+    pending = pass_and_update(*system, box.span, law, STEP)
+    with np.errstate(invalid="ignore"):
+        update_flagged_only(*other, box.span, law, STEP)
+    contacts, expected = system[1], other[1]
+    for name in STATE:
+        a, b = getattr(contacts, name)[..., :PAIRS], getattr(expected, name)[..., :PAIRS]
+        assert np.abs(a - b).max() <= 1e-12 * np.abs(b).max(), name
+    assert (system[3] == other[3]).all()
+    np.testing.assert_allclose(system[4], other[4], rtol=1e-12, atol=1e-12 * np.abs(other[4]).max())
+    flag, expected_flag = contacts.flag[:PAIRS], expected.flag[:PAIRS]
+    assert ((flag == BROKEN_FLAG) == (expected_flag == BROKEN_FLAG)).all() and ((flag > 0) == (expected_flag > 0)).all()
+    # all kinds of transitions occur, and the pass updates slipping contacts except those it must leave pending
+    assert 0 < system[3][BROKEN] < PAIRS / 2 and np.sum(flag == 0.0) > PAIRS / 10
+    if option in ("clamped", "reset", "periodic"):
+        assert np.sum(flag == SLIPPED_FLAG) > PAIRS / 4 and np.sum(flag == PENDING_FLAG) > 0
+        assert system[3][BROKEN] < pending < PAIRS / 3
+        assert system[3][SLIPPED] >= np.sum(flag == SLIPPED_FLAG)
+        assert (system[4][[SLIDING, ROLLING, TWISTING]] != 0.0).all()
+    if option == "following":
+        assert not np.any(flag == SLIPPED_FLAG)
+
+
+def test_displacements_before_a_step():
+    """Displacements at the start of a step equal those of grains that drift back, to 1e-12 of the largest."""
+    grains, contacts, *_ = random_contacts(SILICA, Box.periodic(2.2e-7, None, 3e-7))
+    span = Box.periodic(2.2e-7, None, 3e-7).span
+    back = copy.deepcopy(grains)
+    back.inertia[:] = 1.0
+    kick_and_drift_for(False)(back, span, -STEP)  # no forces act
+    found, expected = [], []
+    for c in range(PAIRS):
+        constants, radii = columns.load(contacts.constants, c), (grains.radius[c], grains.radius[c + PAIRS])
+        pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+        found.append(np.hstack(displacements_before(grains, contacts, c, pose, constants, STEP)))
+        twist = contacts.twist[c] - twist_increment(grains, contacts, c, pose, STEP)
+        then = pose_at(back, contacts, span, c, twist)
+        expected.append(np.hstack(displacements_of(then, sum(radii) - then.distance, *radii, constants)))
+    found, expected = np.array(found), np.array(expected)
+    assert (np.abs(found - expected).max(0) <= 1e-12 * np.abs(expected).max(0)).all()
+
+
+@pytest.mark.compiled("small")
+def test_contacts_that_do_not_slip_are_unchanged():
+    """Pointers and losses of contacts that do not slip stay the same bit by bit, whatever others in a block do."""
+    system = random_contacts(SILICA, Box.open(), seed=2)
+    before = copy.deepcopy(system[1])
+    pass_and_update(*system, Box.open().span, parameters_for(), STEP)
+    at_rest = system[1].flag[:PAIRS] == 0.0
+    for name in ("pointer1", "pointer2", "lost"):
+        assert (getattr(system[1], name)[:, :PAIRS][:, at_rest] == getattr(before, name)[:, :PAIRS][:, at_rest]).all()
+
+
+@pytest.mark.compiled("small")
+def test_blocks_without_slip_leave_contacts_pending():
+    """If no contact slipped in the previous step, the pass only flags; contacts are updated separately."""
+    system = random_contacts(SILICA, Box.open())
+    system[1].flag[:] = 0.0
+    pending = pass_and_update(*system, Box.open().span, parameters_for(), STEP)
+    assert pending > PAIRS / 2 and not np.any(system[1].flag == SLIPPED_FLAG)
+    assert system[3][SLIPPED] > PAIRS / 2

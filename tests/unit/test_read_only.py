@@ -1,0 +1,97 @@
+"""Attributes that cannot change after construction are refused in one line; others are checked. Nothing is compiled."""
+
+import pytest
+
+import sand
+from sand.schema import FIELDS
+
+
+@pytest.fixture
+def sim():
+    grains = sand.Grains([[0, 0, 0], [3e-8, 0, 0]], 1e-8, "silica")
+    return sand.Simulation(grains, [sand.Contact()])
+
+
+ARGUMENTS = ("forces", "box", "stepping", "neighbours", "seed", "contacts", "grains", "out")
+RESULTS = ("time", "steps", "state", "start", "temperature", "ledger", "writer", "choices", "is_sound")
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_arguments_cannot_be_assigned(sim, name):
+    """An assigned argument would be written to files while the dynamics use the old one: build a new simulation."""
+    with pytest.raises(sand.BadInput, match=rf"^{name} of a simulation .*build a new one: sand\.Simulation\("):
+        setattr(sim, name, None)
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_results_cannot_be_assigned(sim, name):
+    """Results are computed, so assignment is refused."""
+    with pytest.raises(sand.BadInput, match=rf"^{name} of a simulation follows from its run"):
+        setattr(sim, name, 0)
+
+
+@pytest.mark.parametrize("name", [*(field.name for field in FIELDS), "material", "materials", "id"])
+def test_quantities_of_grains_cannot_be_assigned(sim, name):
+    """Neither of a simulation nor of grains outside of one: the arrays do not change."""
+    before = {field.name: getattr(sim.grains, field.name).copy() for field in FIELDS}
+    for grains in (sim.grains, sim.start):
+        with pytest.raises(sand.BadInput, match=rf"^{name} of grains cannot be assigned; make new grains"):
+            setattr(grains, name, 1.0)
+    assert all((getattr(sim.grains, key) == value).all() for key, value in before.items())
+    assert not set(vars(sim.grains)) - {"arrays", "materials"}
+
+
+def test_misspelt_names_are_refused(sim):
+    """Assignment to an unknown attribute suggests the right name."""
+    with pytest.raises(sand.BadInput, match="a simulation has no 'focres'; did you mean 'forces'"):
+        sim.focres = []
+    with pytest.raises(sand.BadInput, match="grains have no 'velocty'; did you mean 'velocity'"):
+        sim.grains.velocty = 0.0
+    assert not hasattr(sim, "focres") and not hasattr(sim.grains, "velocty")
+
+
+def test_the_forces_of_a_simulation_cannot_change(sim):
+    """`forces` is no list that could be appended to."""
+    assert isinstance(sim.forces, tuple)
+    with pytest.raises(sand.BadInput, match=r"slip of sand\.Contact cannot be assigned; make a new one"):
+        sim.forces[0].slip = "reset"
+    with pytest.raises(sand.BadInput, match=r"lengths of sand\.Box cannot be assigned"):
+        sim.box.lengths = (1.0, 1.0, 1.0)
+    assert list(sim.forces) == [sand.Contact()]
+
+
+def test_assignable_attributes_are_checked(sim):
+    """`frame_every` and `observers` apply from the next `run` on."""
+    sim.frame_every = "1 ns"
+    assert sim.frame_every == 1e-9
+    one = sand.Observer()
+    sim.observers = (one,)
+    sim.observers.append(one)
+    assert sim.observers == [one, one]
+    for value in ("often", 0.0, "1 m"):
+        with pytest.raises(sand.BadInput, match="frame_every = "):
+            sim.frame_every = value
+    with pytest.raises(sand.BadInput, match="observers = 7"):
+        sim.observers = 7
+    assert sim.frame_every == 1e-9
+
+
+def test_a_single_force_is_accepted_as_a_list():
+    """A force without brackets is a list of one."""
+    grains = sand.Grains([[0, 0, 0]], 1e-8, "silica")
+    assert list(sand.Simulation(grains, sand.Contact()).forces) == [sand.Contact()]
+
+
+def test_derived_classes_may_have_attributes_of_their_own():
+    """Subclasses may assign new attributes."""
+
+    class Mine(sand.Simulation):
+        def __init__(self, *given, label, **more):
+            super().__init__(*given, **more)
+            self.label = label
+
+    sim = Mine(sand.Grains([[0, 0, 0]], 1e-8, "silica"), label="first")
+    sim.label = "second"
+    assert sim.label == "second"
+    with pytest.raises(sand.BadInput, match="box of a simulation"):
+        sim.box = None
