@@ -17,6 +17,7 @@ from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..io.trajectory import Frames
 from ..material import Material
+from ..schema import OWN
 from ..setup.checks import check_body
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
@@ -224,6 +225,7 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
             moment=part["body_moment"].T,
             charge=part["charge"],
             mass=part["mass"],
+            own={name: part[name] for name in OWN},
         )
     except (KeyError, IndexError) as error:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
