@@ -33,6 +33,7 @@ _MODULES = {
     "Dipoles": "forces.pair.dipoles",
     "Charges": "forces.pair.inverse_square",
     "Attraction": "forces.pair.inverse_square",
+    "ScreenedCharges": "forces.pair.screened_charges",
     "Gas": "forces.gas.model",
     "Field": "forces.external.magnetic_field",
     "Gravity": "forces.external.gravity",
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from .forces.pair.dipoles import Dipoles as Dipoles
     from .forces.pair.inverse_square import Attraction as Attraction
     from .forces.pair.inverse_square import Charges as Charges
+    from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
     from .grains import Grains as Grains
     from .integrate.adaptive import Adaptive as Adaptive
     from .integrate.verlet import Verlet as Verlet

@@ -12,7 +12,7 @@ from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBU
 
 from .test_sameness import state
 
-BY_PLACE = ("order", "packed_position", "source", "block_sums", "cell_of")
+BY_PLACE = ("order", "packed_position", "source", "packed_grain", "block_sums", "cell_of")
 """Far arrays that belong to the list, or are filled by each sum."""
 EVERY = 700
 """Steps between two orders in these tests, so that some are made."""

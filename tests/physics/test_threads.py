@@ -169,10 +169,10 @@ def test_helpers_go_home_with_their_simulation():
 @pytest.mark.validate
 @pytest.mark.parametrize(
     ("number", "forces", "helpers"),
-    [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 0), (1000, [sand.Dipoles("0.1 um")], 1)],
+    [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 1), (1000, [sand.Dipoles("0.1 um")], 1)],
 )
 def test_helpers_come_where_they_save_time(number, forces, helpers):
-    """1000 contacts are done before a helper has begun, 4200 are not; sums of dipoles are shared, of charges not."""
+    """1000 contacts are done before a helper has begun, 4200 are not; sums of pair forces are shared."""
     sand.set_threads(2)
     place = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
     chain = sand.Grains(place, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")

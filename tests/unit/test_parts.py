@@ -9,7 +9,6 @@ import sand
 from sand.compiler.jit import formula, kernel
 from sand.forces.base import compose_long_range
 from sand.forces.pair import dipole_loops as dipoles
-from sand.forces.pair import inverse_square_loops as central
 from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours.cell_list import build_verlet_list
 from sand.state.arrays import empty_long_range_arrays
@@ -33,7 +32,7 @@ def cloud():
 def test_blocks_of_forces_together_are_their_sum(order):
     """begin, blocks, end give what `loads` gives: F, M and B to rounding (1e-12 of the largest).
 
-    The functions are ordinary Python here.  Charges are summed whole, and use the same rooms of `far` as dipoles.
+    The functions are ordinary Python here.  Charges have arrays of their own in `far`.
     """
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
@@ -42,7 +41,7 @@ def test_blocks_of_forces_together_are_their_sum(order):
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
     loops = {
         "listed dipoles": dipoles.LISTED_PAIRS,
-        "listed charges": central.LISTED_PAIRS,
+        "listed charges": forces[1].sums(sim.box, True),
         "dipoles": dipoles.ALL_PAIRS_CUT,
     }
     sums, own = compose_long_range([loops[name] for name in order], [numbers[name] for name in order])
