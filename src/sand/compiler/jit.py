@@ -10,7 +10,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -24,8 +25,10 @@ from numba.extending import register_jitable
 from ..errors import warn
 from .cache import private_folder
 
-_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compiling formula is_builtin kernel loop noinline rare"
-__all__ = _NAMES.split()
+_NAMES = (
+    "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compile_error compiling formula is_builtin kernel loop noinline"
+)
+__all__ = [*_NAMES.split(), "rare"]
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -221,6 +224,25 @@ def kernel(function: Callable, *, cached: bool = True, nogil: bool = False, long
     if cached:
         _load_without_compiler(compiled)
     return compiled
+
+
+def compile_error(function: Callable, arguments: Iterable[Any]) -> str:
+    """Why numba cannot compile a formula for such arguments, in one line; "" if it can, or without the compiler."""
+    if not COMPILED:
+        return ""
+    try:
+        numba.njit(error_model="numpy")(function).compile(tuple(map(numba.typeof, arguments)))
+    except numba.core.errors.NumbaError as error:
+        text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        reason = next((line for line in lines if not line.startswith(_HEADINGS)), lines[0])
+        place = re.findall(r'File "([^"]+)", line (\d+)', text)
+        return reason + (f" (line {place[-1][1]} of {Path(place[-1][0]).name})" if place else "")
+    return ""
+
+
+_HEADINGS = ("Failed in nopython mode pipeline", "During:", "File ", "Use of unsupported")
+"""Beginnings of lines of numba's messages that say nothing of the reason."""
 
 
 class _Listener(event.Listener):
