@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 
 from .entry_points import register
+from .forces import BUILT_IN
 from .version import __version__
 
 register()
@@ -29,14 +30,9 @@ _MODULES = {
     "BadInput": "errors",
     "FilesFailed": "errors",
     "Interrupted": "errors",
-    "Contact": "contact.model",
-    "Dipoles": "forces.pair.dipoles",
-    "Charges": "forces.pair.inverse_square",
-    "Attraction": "forces.pair.inverse_square",
-    "Gas": "forces.gas.model",
-    "Field": "forces.external.magnetic_field",
-    "Gravity": "forces.external.gravity",
-    "ElectricField": "forces.external.electric_field",
+    **BUILT_IN,
+    "external_force": "forces.own",
+    "pair_force": "forces.own",
     "Verlet": "integrate.verlet",
     "Adaptive": "integrate.adaptive",
     "Neighbours": "neighbours.settings",
@@ -71,9 +67,12 @@ if TYPE_CHECKING:
     from .forces.external.gravity import Gravity as Gravity
     from .forces.external.magnetic_field import Field as Field
     from .forces.gas.model import Gas as Gas
+    from .forces.own import external_force as external_force
+    from .forces.own import pair_force as pair_force
     from .forces.pair.dipoles import Dipoles as Dipoles
     from .forces.pair.inverse_square import Attraction as Attraction
     from .forces.pair.inverse_square import Charges as Charges
+    from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
     from .grains import Grains as Grains
     from .integrate.adaptive import Adaptive as Adaptive
     from .integrate.verlet import Verlet as Verlet

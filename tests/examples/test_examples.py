@@ -87,6 +87,26 @@ def test_cross_sections(monkeypatch, capsys):
 
 
 @pytest.mark.validate
+def test_own_force(tmp_path, monkeypatch, capsys):
+    """Eight grains in a trap for 20 µs, resumed with `imports`; ½ k x² at the start, and the ledger closes."""
+    example = loaded("own_force")
+    monkeypatch.setattr(sand.Simulation, "run", lambda sim, until: _run(sim, until="20 us"))
+    example.main(str(tmp_path / "run"))
+    text = capsys.readouterr().out
+    assert "the requested end is reached" in text and "repulsion" in text
+    run = sand.open(tmp_path / "run")
+    start = 8 * 0.5 * 2e-7 * 1e-12 * (2.0**2 + 2.2**2 + 2.4**2)
+    assert run.ledger["trap"][0] == pytest.approx(start, rel=1e-9, abs=0.0)
+    assert abs(np.ptp(run.ledger["total"])) < 1e-3 * start
+    monkeypatch.undo()
+    rest = sand.resume(tmp_path / "run")  # `loaded` has imported the module, as `imports` would
+    assert [force.name for force in rest.forces] == ["contact", "trap", "soft_repulsion"]
+
+
+_run = sand.Simulation.run
+
+
+@pytest.mark.validate
 def test_growth_variants(tmp_path, monkeypatch, capsys):
     """Thirty grains for 20 ns in two boxes, at 10 K and 1000 K: S follows from contacts of the last frames.
 

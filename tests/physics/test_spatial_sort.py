@@ -12,7 +12,7 @@ from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBU
 
 from .test_reproducibility import state
 
-LIST_ARRAYS = ("order", "packed_position", "source", "block_sums", "cell_of")
+LIST_ARRAYS = ("order", "packed_position", "source", "packed_grain", "block_sums", "cell_of")
 """Long-range arrays that belong to the pair list or are filled by each sum."""
 SORT_EVERY = 700
 """Steps between two sorts in these tests."""

@@ -170,10 +170,10 @@ def test_worker_threads_end_with_their_simulation():
 @pytest.mark.validate
 @pytest.mark.parametrize(
     ("number", "forces", "workers"),
-    [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 0), (1000, [sand.Dipoles("0.1 um")], 1)],
+    [(1000, [], 0), (4200, [], 1), (1000, [sand.Charges(cutoff="0.1 um")], 1), (1000, [sand.Dipoles("0.1 um")], 1)],
 )
 def test_workers_are_used_where_they_save_time(number, forces, workers):
-    """1000 contacts take less time than waking a worker, 4200 take more; sums of dipoles are shared, of charges not."""
+    """1000 contacts take less time than waking a worker, 4200 take more; sums of pair forces are shared."""
     sand.set_threads(2)
     positions = np.arange(number)[:, None] * [[1.9999e-8, 0.0, 0.0]]
     chain = sand.Grains(positions, 1e-8, sand.SILICA, charge=1e-20, moment="1e-22 A m^2")

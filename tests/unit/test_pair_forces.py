@@ -10,7 +10,8 @@ from sand.constants import COULOMB, GRAVITATION, MAGNETIC
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import Cutoff, cut_weight, pair_load_cut
 from sand.forces.pair.dipole_rates import cut_curvature, pair_rates, uncut_rates
-from sand.forces.pair.inverse_square_formulas import central_field, central_potential, central_rate
+from sand.forces.pair.generic_loops import PairGrain, PairParameters, cut_pair, cut_rate
+from sand.forces.pair.inverse_square import InverseSquareConstants, coulomb, coulomb_rate
 
 SMOOTH = cutoff_for(1.0, "smooth")
 CUTOFFS = {"none": UNCUT, "inside": cutoff_for(3.0, "smooth"), "in the shell": SMOOTH}
@@ -96,15 +97,21 @@ def test_central_force_is_minus_the_gradient(name, k):
     apart, v, h = apart_for(name, rng), rng.normal(size=3), 1e-3
     cutoff = CUTOFFS[name]
 
+    one = PairGrain((0.0, 0.0, 0.0), 1.0, 1.0, 0.1)
+    parameters = PairParameters(InverseSquareConstants(k), cutoff)
+
+    def pair(x):
+        return cut_pair(coulomb, False)(x, one, one, parameters)
+
     def slope(function, direction):
         at = [np.array(function(tuple(apart + n * h * direction))) for n in (1, -1, 2, -2)]
         return (8 * (at[0] - at[1]) - (at[2] - at[3])) / (12 * h)
 
-    gradient = [slope(lambda x: central_potential(x, k, cutoff), axis) for axis in np.eye(3)]
-    force = np.array(central_field(tuple(apart), k, cutoff))
+    gradient = [slope(lambda x: pair(x)[3], axis) for axis in np.eye(3)]
+    force = np.array(pair(tuple(apart))[0])
     assert np.abs(force + gradient).max() < 1e-7 * np.abs(force).max()
-    rate = np.array(central_rate(tuple(apart), tuple(v), k, cutoff))
-    assert np.abs(rate - slope(lambda x: central_field(x, k, cutoff), v)).max() < 1e-6 * np.abs(rate).max()
+    rate = np.array(cut_rate(coulomb, coulomb_rate)(tuple(apart), tuple(v), one, one, parameters))
+    assert np.abs(rate - slope(lambda x: pair(x)[0], v)).max() < 1e-6 * np.abs(rate).max()
 
 
 def test_cutoff_weight_and_its_derivatives():

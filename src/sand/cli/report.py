@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from ..config.commands import command_for
-from ..errors import BadInput
+from ..errors import BadInput, FilesFailed
 from ..io.run_folder import CASE, ONE_COLLISION, OWN_FILES, is_job, plain, read_toml
 
 Rows = list[tuple[str, str]]
@@ -96,8 +96,15 @@ def naming(case: str | Path) -> Iterator[None]:
 
 
 def resume_line(folder: Path) -> str:
-    """The command that continues a run."""
-    return f"sand resume {shlex.quote(str(folder))}"
+    """The command that continues a run, with the modules of the user's own forces."""
+    try:
+        tables = read_toml(folder / CASE).get("forces", {})
+    except (BadInput, FilesFailed):
+        tables = {}
+    given = [table.get("import") for table in tables.values() if isinstance(table, dict)]
+    modules = dict.fromkeys(str(path).partition(":")[0] for path in given if path is not None)
+    imports = "".join(f" --import {shlex.quote(module)}" for module in modules)
+    return f"sand resume {shlex.quote(str(folder))}{imports}"
 
 
 def how_to_continue(folder: Path) -> str:

@@ -24,12 +24,25 @@ RESULTS = {"collide": COLLISION, "scatter": SCATTERING, "grow": GROWTH}
 @click.command("resume", short_help="Continue an interrupted run or job of any command.")
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @options.end_of_run('For a run: a new end instead of the planned one, such as "10 us".')
+@click.option(
+    "--import",
+    "imports",
+    metavar="MODULE",
+    multiple=True,
+    help="Module or file that defines a force of your own, which the run uses; may be repeated.",
+)
 @options.workers
 @options.scheduler
 @options.threads
 @options.quiet_output
 def command(
-    folder: str, until: float | None, workers: int, scheduler: str | None, threads: int | None, **output: bool
+    folder: str,
+    until: float | None,
+    imports: tuple[str, ...],
+    workers: int,
+    scheduler: str | None,
+    threads: int | None,
+    **output: bool,
 ) -> int | None:
     """Continue the run in DIR from its newest checkpoint to its planned end, or to --until.
 
@@ -37,6 +50,10 @@ def command(
     results are those of an uninterrupted job.
     """
     set_threads(threads)
+    if imports:
+        from ..forces.own import import_modules
+
+        import_modules(imports)
     place = Path(folder)
     kind = _kind(place)
     if kind != "run":

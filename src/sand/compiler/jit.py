@@ -10,7 +10,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -24,7 +25,7 @@ from ..errors import warn
 from .cache import private_folder
 from .progress import CompilationListener
 
-_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder formula is_builtin kernel loop noinline rare"
+_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compile_error formula is_builtin kernel loop noinline rare"
 __all__ = _NAMES.split()
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
@@ -232,3 +233,22 @@ def kernel(
         _load_without_compiler(compiled)
     _PURPOSES[id(compiled)] = purpose or f"'{function.__name__.replace('_', ' ')}'"
     return compiled
+
+
+def compile_error(function: Callable, arguments: Iterable[Any]) -> str:
+    """Why numba cannot compile a formula for such arguments, in one line; "" if it can, or without the compiler."""
+    if not COMPILED:
+        return ""
+    try:
+        numba.njit(error_model="numpy")(function).compile(tuple(map(numba.typeof, arguments)))
+    except numba.core.errors.NumbaError as error:
+        text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        reason = next((line for line in lines if not line.startswith(_HEADINGS)), lines[0])
+        place = re.findall(r'File "([^"]+)", line (\d+)', text)
+        return reason + (f" (line {place[-1][1]} of {Path(place[-1][0]).name})" if place else "")
+    return ""
+
+
+_HEADINGS = ("Failed in nopython mode pipeline", "During:", "File ", "Use of unsupported")
+"""Beginnings of lines of numba's messages that say nothing of the reason."""

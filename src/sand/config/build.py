@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import shlex
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from ..arguments import checked
 from ..box import Box, as_box
 from ..errors import BadInput
+from ..forces.own import import_modules
 from ..grains import Grains
 from ..io.bodies import read_body
 from ..io.checkpoint import newest_checkpoint
@@ -178,13 +180,15 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
 
 
 @checked
-def resume(folder: str | Path, **options: Any) -> Simulation:
+def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -> Simulation:
     """Load the newest checkpoint of a run as a simulation; `run()` continues to the planned end.
 
     Parameters
     ----------
     folder : str or Path
         Folder of an earlier run; new frames and rows are appended to its files.
+    imports : Iterable[str], optional
+        Modules that define forces of your own, by name or file, to be imported first; SAND imports no others.
     options
         Further arguments of `Simulation` (observers).
 
@@ -202,6 +206,7 @@ def resume(folder: str | Path, **options: Any) -> Simulation:
     place = Path(folder)
     if not place.is_dir():
         raise BadInput(f"there is no folder {place}")
+    import_modules(imports)
     if not any(place.glob("checkpoint-*.npz")):
         advice = ""
         if (place / TRAJECTORY).exists():

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, create_model, field_validator, model_validator
 
 from ..box import Box, as_box
-from ..contact.model import Contact
 from ..errors import BadInput, did_you_mean
-from ..forces.external.electric_field import ElectricField
-from ..forces.external.gravity import Gravity
-from ..forces.external.magnetic_field import Field as MagneticField
-from ..forces.gas.model import Gas
-from ..forces.pair.dipoles import Dipoles
-from ..forces.pair.inverse_square import Attraction, Charges
+from ..forces.own import IMPORT, own_force
+from ..forces.registry import FORCES
 from ..integrate.verlet import Verlet
 from ..io.run_folder import read_toml
 from ..material import PRESETS, Material, like_preset
@@ -138,32 +133,52 @@ GRAINS_KEYS: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
 """By kind: required keys, each with an example, and keys that do not apply."""
 
 
-class ForcesSection(Section):
+class _Forces(Section):
     """[forces.*]: each table adds one force."""
 
-    contact: Contact | None = None
-    dipoles: Dipoles | None = None
-    field: MagneticField | None = None
-    gravity: Gravity | None = None
-    electric: ElectricField | None = None
-    charges: Charges | None = None
-    attraction: Attraction | None = None
-    gas: Gas | None = None
     _order: tuple[str, ...] = PrivateAttr(())
+    _own: dict[str, dict[str, Any]] = PrivateAttr(default_factory=dict)  # forces of the user, which are not imported
 
     @model_validator(mode="wrap")
     @classmethod
     def _in_order(cls, value: Any, handler: Any) -> Any:
-        section = handler(value)
-        if isinstance(value, dict):
-            section._order = tuple(value)
+        if not isinstance(value, dict):
+            return handler(value)
+        own = {key: table for key, table in value.items() if isinstance(table, dict) and IMPORT in table}
+        section = handler({key: table for key, table in value.items() if key not in own})
+        section._order, section._own = tuple(value), own
         return section
 
     def build(self) -> list[Any]:
-        """Build the forces in the order of the file, in which loads are summed."""
+        """Build the forces in the order of the file, in which loads are summed.
+
+        Raises
+        ------
+        BadInput
+            If a force of the user has not been imported, or its parameters are invalid.
+        """
         given = {key: getattr(self, key) for key in type(self).model_fields}
+        for key, table in self._own.items():
+            try:
+                given[key] = own_force(table)
+            except BadInput as error:
+                raise error.at(f"forces.{key}") from None
         order = [*(key for key in self._order if key in given), *given]
         return [given[key] for key in dict.fromkeys(order) if given[key] is not None]
+
+
+if TYPE_CHECKING:
+
+    class ForcesSection(_Forces):
+        """[forces.*], with one key for each registered force."""
+else:
+    ForcesSection = create_model(
+        "ForcesSection",
+        __base__=_Forces,
+        __module__=__name__,
+        __doc__=_Forces.__doc__,
+        **{name: (force | None, None) for name, force in FORCES.items()},
+    )
 
 
 class Case(Section):

@@ -68,7 +68,8 @@ class ExternalForce(Force, Protocol):
 class LongRangeForce(Force, Protocol):
     """A force between all pairs of grains.
 
-    Its loops are in `forces/pair/dipole_loops.py` and `forces/pair/inverse_square_loops.py`.
+    A force given by a formula is a `pair.pair_force.PairForce`, with the loops of `pair/generic_loops.py`; dipoles have
+    loops of their own in `pair/dipole_loops.py`.
 
     Attributes
     ----------

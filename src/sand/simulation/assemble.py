@@ -10,10 +10,11 @@ from ..box import Box
 from ..compiler.jit import is_builtin
 from ..contact.columns import constant_names
 from ..contact.model import Contact
+from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
-from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks
+from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks, with_own_buffers
 from ..grains import Grains
 from ..integrate.base import Integrator
 from ..integrate.kernel_spec import ContactParameters, ExternalWork, GasSettings, KernelSpec, StepParameters
@@ -29,6 +30,7 @@ from ..state.arrays import (
     FORCE_ARRAYS,
     LIST_ARRAYS,
     OVER_ALLOCATION,
+    PACKED_ARRAYS,
     RATE_ARRAYS,
     RESPA_ARRAYS,
     empty_contact_arrays,
@@ -99,7 +101,8 @@ def build_engine(
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
     flights = stepping.flight_loop is not None
     found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], adaptive_steps=flights)
-    long_range = _long_range_loops(by_type, grains, box, [found.search.listed and r is not None for r in cutoffs])
+    listed = [found.search.listed and r is not None for r in cutoffs]
+    long_range = _long_range_loops(by_type, grains, box, listed)
     verlet = stepping.contact_stepping
     control = _step_control(grains, verlet, by_type, pair_gap)
     stepping = stepping.resolved(grains, control)
@@ -117,12 +120,12 @@ def build_engine(
         control,
         stepping.flight_limits(_longest_displacement(grains, box, found)),
     )
-    spec = _kernel_spec(grains, by_type, external, sums, stepping)
+    spec = _kernel_spec(grains, box, by_type, external, sums, stepping)
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
-    state = _new_state(wrapped, box, parameters, spec, capacity, all_pairs=not found.search.listed or None in cutoffs)
+    state = _new_state(wrapped, box, parameters, spec, capacity, buffers=listed.count(False))
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
@@ -141,7 +144,8 @@ def _long_range_loops(
     sums = [force.sums(box, own) for force, own in zip(forces.long_range, listed, strict=True)]
     if len(grains) >= WIDE_FROM:
         sums = [own.wide or own for own in sums]
-    return [(f, own, f.numbers(grains, box)) for f, own in zip(forces.long_range, sums, strict=True)]
+    numbers = with_own_buffers([force.numbers(grains, box) for force in forces.long_range], listed)
+    return list(zip(forces.long_range, sums, numbers, strict=True))
 
 
 def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
@@ -154,12 +158,23 @@ def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
 
 
 def _kernel_spec(
-    grains: Grains, forces: ForcesByType, external: Callable, sums: LongRangeSums, stepping: Integrator
+    grains: Grains,
+    box: Box,
+    forces: ForcesByType,
+    external: Callable,
+    sums: LongRangeSums,
+    stepping: Integrator,
 ) -> KernelSpec:
     """Specification from which the driver is compiled."""
     verlet = stepping.contact_stepping
     # without contacts, or with cycles of one step, there is neither extrapolation nor a constant force
     scheme = verlet.far if forces.long_range and forces.contact and verlet.max_cycle_steps > 1 else "every step"
+    if scheme.startswith("taylor") and sums.rates is None:
+        without = [f.name for f in forces.long_range if f.sums(box, False).rates is None]
+        raise BadInput(
+            f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "
+            "lacks; use far = 'impulse' or 'every step'"
+        )
     law = (forces.contact or Contact()).contact_law
     return KernelSpec(
         law,
@@ -171,24 +186,28 @@ def _kernel_spec(
         gas=bool(forces.gas),
         flight_loop=stepping.flight_loop,
         queue=uses_task_queue(len(grains)),
-        keep=is_builtin(law.force) and all(is_builtin(f.formula) for f in forces.external),
+        keep=is_builtin(law.force) and all(is_builtin(f.formula) for f in forces.external) and sums.kept,
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
     )
 
 
 def _new_state(
-    grains: Grains, box: Box, parameters: StepParameters, spec: KernelSpec, capacity: int, *, all_pairs: bool
+    grains: Grains, box: Box, parameters: StepParameters, spec: KernelSpec, capacity: int, *, buffers: int
 ) -> State:
-    """State with the arrays that the kernels need; `capacity` is that of contacts and pairs."""
+    """State with the arrays that the kernels need.
+
+    `capacity` is that of contacts and pairs, `buffers` the number of long-range forces summed over all pairs.
+    """
     count, search, contact = len(grains), parameters.search, parameters.contact
     uniform_contacts = contact.uniform_contacts
     channels = len(RECORDED) if contact.damped or contact.follow else ALWAYS_RECORDED
-    blocks = all_blocks(grains) if spec.long_range is not NO_LONG_RANGE_FORCE and all_pairs else 0
+    blocks = buffers * all_blocks(grains) if spec.long_range is not NO_LONG_RANGE_FORCE else 0
     needed = set(LIST_ARRAYS if search.listed else CELL_ARRAYS if search.celled else ())
     needed |= set(RESPA_ARRAYS if spec.impulse else ())
     needed |= set(RATE_ARRAYS if spec.taylor else ())
     needed |= {"packed_position", "source"} if blocks else set()
+    needed |= set(PACKED_ARRAYS if spec.long_range.packed else ())
     needed |= set(FORCE_ARRAYS if spec.long_range is not NO_LONG_RANGE_FORCE or spec.flight_loop else ())
     return State(
         grains,
@@ -201,7 +220,7 @@ def _new_state(
             count,
             NEIGHBOURS_PER_GRAIN * count if search.listed else CELL_NEIGHBOURS if search.celled else 0,
             blocks,
-            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
+            unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
         stages=stage_arrays(count if spec.flight_loop else 0),
         uniform_contacts=uniform_contacts,

@@ -245,7 +245,7 @@ class Engine:
         state = self.state
         shares = {force.column: np.zeros(len(state.grains)) for force, _, _ in self.long_range}
         for force, sums, numbers in self.long_range:
-            long_range_energies_for(sums.energies)(
+            long_range_energies_for(sums)(
                 state.grains.arrays, state.long_range, self.parameters.span, numbers, shares[force.column]
             )
         for outer in self.external:

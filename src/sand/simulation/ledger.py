@@ -86,6 +86,9 @@ class Ledger(LedgerColumns):
 
     def __init__(self, forces: Sequence[str] = ()):
         others = [name for name in forces if name != MAGNETIC]
+        own = {"step", "time", *ENERGIES, *LOSSES, "total", *MOMENTA, *NUMBERS}
+        if taken := [name for name in others if name in own]:
+            raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
         super().__init__(("step", "time", *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS))
 
     def add(self, row: dict[str, float]) -> bool:

@@ -66,7 +66,8 @@ class LongRangeArrays(NamedTuple):
     cell_of: np.ndarray  # (N,) uint32: cell of each grain
     cell_start: np.ndarray  # (M+1,) uint32: first sorted index of each cell
     packed_position: np.ndarray  # (3, V) positions by sorted index [m]; by grain in sums over all pairs
-    source: np.ndarray  # (3, V) moments, or charges in the first row; (1, P) if no force needs them
+    source: np.ndarray  # (3, V) moments; (1, P) if no force needs them
+    packed_grain: np.ndarray  # (9, N) position, moment, charge, mass, radius by sorted index, for generic pair forces
     force: np.ndarray  # (3, N) long-range forces [N]; (3, 0) if there are none
     torque: np.ndarray  # (3, N) long-range torques [N m]; likewise
     constant_force: np.ndarray  # (3, N) constant force: the part that acts in every step of an r-RESPA cycle [N]
@@ -101,9 +102,11 @@ SAVED_LONG_RANGE = (
 FORCE_ARRAYS = ("force", "torque")
 CELL_ARRAYS = ("order", "cell_of", "cell_start", "source")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
+PACKED_ARRAYS = ("packed_grain",)
 RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
-"""Long-range arrays needed only with long-range forces, cells, a Verlet list, r-RESPA cycles or Taylor series."""
+"""Long-range arrays needed only with long-range forces, cells, a Verlet list, generic pair forces over a list, r-RESPA
+cycles or Taylor series."""
 UNIFORM_ARRAYS = ("constants", "step", "break_overlap")
 """Arrays of contacts and candidate pairs with identical columns if all grains are equal."""
 NOT_SAVED = ("inner", "skin", "gather_order")
@@ -139,7 +142,7 @@ def empty_long_range_arrays(
         Arrays that no kernel of this simulation accesses; they get no columns.
     """
     vectors = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
-    vectors["anchor"] = np.full((3, grains), np.inf)
+    vectors["anchor"], vectors["packed_grain"] = np.full((3, grains), np.inf), np.zeros((9, grains))
     v, p = padded_size(grains), max(int(capacity), 16)
     # without forces, `source` is the buffer for squared distances of neighbours
     source = np.zeros((1, p) if "force" in unused else (3, v))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple
 
 from ...box import Box
@@ -39,12 +40,14 @@ def cutoff_for(radius: float | None, cut: str) -> Cutoff:
     return Cutoff(radius**2, 1.0 / (radius**2 - inner**2))
 
 
-@dataclass(frozen=True)
 class CutoffForce:
-    """Base class of the long-range forces: their cut-off and its warnings; subclasses document `cutoff` and `cut`."""
+    """Base class of the long-range forces: their cut-off and its warnings.
 
-    cutoff: Any = "auto"
-    cut: str = "smooth"
+    Subclasses are frozen dataclasses with the fields `cutoff: Any = "auto"` and `cut: str = "smooth"`.
+    """
+
+    cutoff: Any
+    cut: str
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str]
@@ -66,7 +69,8 @@ class CutoffForce:
 
     def parameters(self) -> dict[str, Any]:
         """Settings in SI units, as in a case file."""
-        return {"cutoff": "none" if self.cutoff is None else self.cutoff, "cut": self.cut}
+        given = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        return given | {"cutoff": "none" if self.cutoff is None else self.cutoff}
 
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """The cut-off radius, with the reason.
@@ -87,12 +91,12 @@ class CutoffForce:
                     f"({format_quantity(half, 'm')}); use a larger box or a cutoff up to that"
                 )
             return CutoffChoice(self.cutoff, f"{self.cut}, given by the user")
-        if box.is_open:
-            return CutoffChoice(None, "open box: all pairs")
-        return self.automatic(grains, 0.5 * box.shortest / HALF_BOX_RATIO)
+        return self.automatic(grains, math.inf if box.is_open else 0.5 * box.shortest / HALF_BOX_RATIO)
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
-        """The automatic cut-off in a periodic box; `largest` is its upper limit [m]."""
+        """The automatic cut-off; `largest` is its upper limit [m], infinite in an open box."""
+        if math.isinf(largest):
+            return CutoffChoice(None, "open box: all pairs")
         return CutoffChoice(largest, f"{self.cut}, half the box / {HALF_BOX_RATIO}")
 
     def acts_on(self, grains: Grains) -> bool:

@@ -5,7 +5,6 @@ row is an independent sum that vectorises.
 """
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -18,10 +17,8 @@ from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load, pair_load_at, pair_load_cut
 from .dipole_rates import pair_rates
-from .loops import BlockedSum, LongRangeSums, all_blocks
+from .loops import ROWS_PER_BLOCK, BlockedSum, LongRangeSums, all_blocks, first_row, listed_blocks
 
-ROWS_PER_BLOCK = 256
-"""Rows of the Verlet list in a block."""
 MAX_REMAINDER = 3
 """Remaining pairs of a row up to which scalar arithmetic is faster than a partly filled SIMD vector."""
 DUMMY_DISTANCE = 1.0
@@ -102,12 +99,6 @@ def listed_block(grains, long_range, span, parameters, b):
     first = b * ROWS_PER_BLOCK
     last = min(first + ROWS_PER_BLOCK, grains.mass.size)
     listed_rows(grains, long_range, span, parameters, np.uint64(first), np.uint64(last))
-
-
-@loop
-def listed_blocks(grains):
-    """Number of blocks of list rows."""
-    return (grains.mass.size + ROWS_PER_BLOCK - 1) // ROWS_PER_BLOCK
 
 
 @loop
@@ -203,14 +194,6 @@ def cut_pair(position1, position2, span, moment1, moment2, parameters, real):
     """As `uncut_pair`, with nearest images and a cut-off."""
     apart, k = separation_if(real, nearest_image(sub(position1, position2), span)), parameters.k if real else 0.0
     return pair_load_cut(apart, moment1, moment2, k, parameters.cutoff)
-
-
-@loop
-def first_row(grains, b, blocks):
-    """First row of block b of the triangle of all pairs j < i; the blocks have equal numbers of pairs."""
-    if blocks == 1:
-        return np.uint64(b * grains.mass.size)
-    return np.uint64(grains.mass.size * math.sqrt(b / blocks))
 
 
 @functools.cache

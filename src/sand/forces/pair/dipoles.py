@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -43,13 +43,18 @@ class Dipoles(CutoffForce):
         If a parameter is invalid; later, if the cut-off exceeds half the box.
     """
 
+    cutoff: Any = "auto"
+    cut: str = "smooth"
+
     name: ClassVar[str] = "dipoles"
     no_effect: ClassVar[str] = "dipoles are switched on but no grain has a magnetic moment"
     column: ClassVar[str] = "magnetic"
     references: ClassVar[str] = "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975"
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
-        """The thermal capture radius, at least two grain diameters, at most `largest`."""
+        """The thermal capture radius, at least two grain diameters, at most `largest`; none in an open box."""
+        if math.isinf(largest):
+            return super().automatic(grains, largest)
         capture = CAPTURE_RADII * thermal_capture(grains)
         shortest = 4.0 * float(grains.radius.max())
         full = f"{CAPTURE_RADII} b_max = {format_quantity(capture, 'm')}"

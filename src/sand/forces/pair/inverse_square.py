@@ -2,23 +2,69 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ...arguments import checked
-from ...box import Box
+from ...compiler.jit import formula
 from ...constants import COULOMB, GRAVITATION
 from ...grains import Grains
-from .cutoff import CutoffForce, cutoff_for
-from .inverse_square_loops import ALL_PAIRS, LISTED_PAIRS, InverseSquareParameters
-from .loops import LongRangeSums
+from ...numerics.vec import axpy, dot, scale
+from .pair_force import PairForce
+
+
+class InverseSquareConstants(NamedTuple):
+    """Parameters of the formulas."""
+
+    k: float  # 1/(4πε₀) [N m²/C²], or −G [N m²/kg²]
+
+
+@formula
+def inverse_square(apart, product):
+    """Force product r/r³ [N] and energy product/r [J]; `product` = k q1 q2 [N m²]."""
+    inverse = 1.0 / math.sqrt(dot(apart, apart))
+    energy = product * inverse
+    return scale(energy * inverse * inverse, apart), energy
+
+
+@formula
+def inverse_square_rate(apart, moving, product):
+    """Rate of the force product r/r³ for ṙ = `moving`: product (ṙ − 3 (r·ṙ) r/r²)/r³ [N/s]."""
+    inverse = 1.0 / math.sqrt(dot(apart, apart))
+    inverse2 = inverse * inverse
+    return scale(product * inverse2 * inverse, axpy(-3.0 * dot(apart, moving) * inverse2, apart, moving))
+
+
+@formula
+def coulomb(apart, a, b, constants):
+    """Force and energy k q1 q2/r of two charges."""
+    return inverse_square(apart, constants.k * a.charge * b.charge)
+
+
+@formula
+def coulomb_rate(apart, moving, a, b, constants):
+    """Rate of `coulomb`."""
+    return inverse_square_rate(apart, moving, constants.k * a.charge * b.charge)
+
+
+@formula
+def newton(apart, a, b, constants):
+    """Force and energy −G m1 m2/r of two masses."""
+    return inverse_square(apart, constants.k * a.mass * b.mass)
+
+
+@formula
+def newton_rate(apart, moving, a, b, constants):
+    """Rate of `newton`."""
+    return inverse_square_rate(apart, moving, constants.k * a.mass * b.mass)
 
 
 @checked
 @dataclass(frozen=True)
-class Charges(CutoffForce):
+class Charges(PairForce):
     """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
 
     Charges are located at the centres; the polarisation of neighbouring grains is neglected.
@@ -39,33 +85,25 @@ class Charges(CutoffForce):
         If a parameter is invalid; later, if the cut-off exceeds half the box.
     """
 
+    cutoff: Any = "auto"
+    cut: str = "smooth"
+
     name: ClassVar[str] = "charges"
     no_effect: ClassVar[str] = "charges are switched on but no grain is charged"
     column: ClassVar[str] = "coulomb"
     references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4"
+    formula = staticmethod(coulomb)
+    rate = staticmethod(coulomb_rate)
+    source: ClassVar[str] = "charge"
     constant: ClassVar[float] = COULOMB
-    by_mass: ClassVar[bool] = False
 
-    def strengths(self, grains: Grains) -> np.ndarray:
-        """The charges [C], or the masses [kg], (N,)."""
-        return grains.mass if self.by_mass else grains.charge
-
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
-        return LISTED_PAIRS if listed else ALL_PAIRS
-
-    def numbers(self, grains: Grains, box: Box) -> InverseSquareParameters:
-        """Parameters of the loops."""
-        radius = self.choose(grains, box).radius
-        return InverseSquareParameters(self.constant, cutoff_for(radius, self.cut), self.by_mass)
-
-    def acts_on(self, grains: Grains) -> bool:
-        """Whether any grain is subject to the force."""
-        return bool(self.strengths(grains).any())
+    def constants(self) -> InverseSquareConstants:
+        """Parameters of the formula."""
+        return InverseSquareConstants(self.constant)
 
     def energy_scale(self, grains: Grains) -> float:
         """Largest |k| q²/(2r) [J] of a grain in contact with an equal one."""
-        return float(abs(self.constant) * np.max(self.strengths(grains) ** 2 / (2.0 * grains.radius)))
+        return float(abs(self.constant) * np.max(getattr(grains, self.source) ** 2 / (2.0 * grains.radius)))
 
 
 @checked
@@ -91,5 +129,7 @@ class Attraction(Charges):
     name: ClassVar[str] = "attraction"
     column: ClassVar[str] = "gravitation"
     references: ClassVar[str] = "Newton 1687"
+    formula = staticmethod(newton)
+    rate = staticmethod(newton_rate)
+    source: ClassVar[str] = "mass"
     constant: ClassVar[float] = -GRAVITATION
-    by_mass: ClassVar[bool] = True
