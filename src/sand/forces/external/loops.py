@@ -74,4 +74,4 @@ def external_energies_for(formula_of_grain):
         for i in range(grains.mass.size):
             shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
 
-    return kernel(fill_shares, cached=is_builtin(formula_of_grain))
+    return kernel(fill_shares, cached=is_builtin(formula_of_grain), purpose="the energies of external forces")

@@ -164,7 +164,7 @@ def long_range_energies_for(sums: LongRangeSums) -> Callable:
     def fill_shares(grains, long_range, span, parameters, shares):
         energies(grains, long_range, span, parameters, shares)
 
-    return kernel(fill_shares, cached=sums.kept)
+    return kernel(fill_shares, cached=sums.kept, purpose="the energies of pairs")
 
 
 def with_own_buffers(numbers: Sequence[Any], listed: Sequence[bool]) -> list[Any]:
