@@ -182,9 +182,9 @@ class Grains:
         if name == "arrays" or (name == "materials" and name not in self.__dict__):
             object.__setattr__(self, name, value)
         elif name in NAMES or name == "materials":
-            key = "material" if name == "materials" else name
+            key = "material=…" if name == "materials" else f'own={{"{name}": …}}' if name in OWN else f"{name}=…"
             raise NoSuchAttribute(
-                f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}=…), "
+                f"{name} of grains cannot be assigned; make new grains, sand.Grains(…, {key}), "
                 "and build a new Simulation from them"
             )
         elif type(self).__module__.startswith("sand."):

@@ -28,7 +28,9 @@ FIELDS = (
     Field("mass", 1, "kg", "fixed", "mass", "m"),
     Field("inertia", 1, "kg m^2", "fixed", "moment of inertia, (2/5) m r²", "I"),
     Field("charge", 1, "C", "fixed", "electric charge", "q"),
-    Field("internal_temperature", 1, "K", "own", "temperature of the material of the grain", "T"),
+    Field(
+        "internal_temperature", 1, "K", "own", "temperature of the material of the grain; its range is not checked", "T"
+    ),
     Field("body_moment", 3, "A m^2", "fixed", "magnetic moment in the frame of the grain", "μ_body"),
     Field("position", 3, "m", "moving", "centre, laboratory frame", "r"),
     Field("velocity", 3, "m/s", "moving", "velocity of the centre, laboratory frame", "v"),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import sand
 from sand.contact import jkr, mechanics, tangential
-from sand.contact.law import LAWS, ContactLaw, contact_constants, register
+from sand.contact.law import LAWS, ContactLaw, contact_constants, is_builtin_law, register
 from sand.contact.model import Contact
 from sand.errors import BadInput
 from sand.material import ICE, IRON, SILICA
@@ -377,6 +377,24 @@ def test_pull_off_force_and_tabor_parameter():
 
     assert tabor_parameter(pairing.surface_energy, pairing.modulus, reduced) == pytest.approx(1.5, rel=0.02)
     assert "neither DMT nor JKR" in LAWS["dmt"].warning(pairing.surface_energy, pairing.modulus, reduced)
+
+
+def test_code_with_a_formula_of_the_user_is_not_cached():
+    """A law of SAND is cached on disk; with any one formula from elsewhere it is not, since edits would be ignored."""
+    assert all(is_builtin_law(law) for law in LAWS.values())
+    formulas = [name for name, member in jkr.LAW._asdict().items() if callable(member)]
+    assert len(formulas) == 11
+    for name in formulas:
+        assert not is_builtin_law(jkr.LAW._replace(**{name: lambda *numbers: 0.0})), name
+
+
+def test_warnings_name_the_grains_for_which_a_law_is_inaccurate():
+    """JKR is least accurate for the smallest radii (a0/R falls with R), DMT for the largest (μ_T rises with R)."""
+    position = [[0, 0, 0], [1e-5, 0, 0]]
+    with pytest.warns(UserWarning, match="silica grains of radius 1 um have Tabor parameter 0.73"):
+        sand.Simulation(sand.Grains(position, [1e-9, 1e-6], "silica"), [sand.Contact(law="dmt")])
+    with pytest.warns(UserWarning, match="iron grains of radius 10 nm have a0/R = 0.53"):
+        sand.Simulation(sand.Grains(position, [1e-8, 1e-6], "iron"), [sand.Contact()])
 
 
 def test_a_law_with_a_taken_name_or_without_a_member_is_refused():

@@ -1,14 +1,19 @@
 """Every own quantity of the schema reaches arrays, checkpoint, frames, tables, pictures and the viewer."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import sand
 from sand.analysis.quantities import GRAIN_NAMES, measured
+from sand.box import Box
 from sand.grains import GrainArrays
+from sand.io.bodies import read_body, write_body
 from sand.schema import BY_NAME, FIELDS, OWN
 from sand.setup.encounters import encounter
 from sand.viewer.packets import grains_packet
+from sand.viewer.series import quantity_ranges
 
 from ..unit.pages import decode
 
@@ -55,6 +60,30 @@ def test_an_own_quantity_is_kept_by_set_ups(name):
     assert getattr(encounter(*bodies, speed=1.0).grains, name).tolist() == [3.0, 4.0]
 
 
+@pytest.mark.parametrize("name", OWN)
+def test_an_own_quantity_is_kept_by_body_files(name, tmp_path):
+    """The grains read from a GSD file of a body have the values of those written."""
+    body = sand.Grains([[0, 0, 0], [2e-7, 0, 0]], 1e-7, "silica", own={name: [3.0, 4.0]})
+    write_body(tmp_path / "body.gsd", body)
+    assert getattr(read_body(tmp_path / "body.gsd"), name).tolist() == [3.0, 4.0]
+
+
+def test_ranges_of_own_quantities_have_signs():
+    """The colour scale of values −5 … 3 begins at −5; other quantities are magnitudes."""
+    zeros, own = np.zeros((2, 3)), {OWN[0]: np.array([-5.0, 3.0])}
+    frame = SimpleNamespace(radius=np.ones(2), mass=np.ones(2), pair=np.zeros((0, 2), int), **own)
+    frame.velocity = frame.spin = frame.moment = zeros
+    frame.force, frame.share, frame.position, frame.box = zeros[:0], np.zeros((0, 4)), zeros, Box.open()
+    assert quantity_ranges([frame])[OWN[0]] == [-5.0, 3.0]
+
+
+def test_assignment_names_the_argument():
+    """Quantities cannot be assigned; the message shows how to give them."""
+    grains = sand.Grains([[0, 0, 0]], 1e-7, "silica")
+    with pytest.raises(sand.BadInput, match=f'own={{"{OWN[0]}": …}}'):
+        setattr(grains, OWN[0], 3.0)
+
+
 def test_wrong_own_quantities_are_refused():
     """An unknown name and a wrong unit: one line each, with the unit of the quantity."""
     name = OWN[0]
@@ -67,8 +96,6 @@ def test_wrong_own_quantities_are_refused():
 
 def test_without_values_a_quantity_is_missing():
     """Frames without values have zeros; to draw them is refused with the reason."""
-    from types import SimpleNamespace
-
     frame = SimpleNamespace(radius=np.ones(3), pair=np.zeros((0, 2), int))
     with pytest.raises(sand.BadInput, match="is not known: no grain has a value"):
         measured(frame, OWN[0])

@@ -169,4 +169,4 @@ def test_a_compilation_is_noted_with_its_last_duration(tmp_path, monkeypatch):
             (tmp_path / "times.json").unlink()
             compile_anew()
     assert noted == [("square roots", None), ("square roots", 12.3), ("square roots", None)]
-    assert describe(*noted[1]) == "compiling square roots (last time 12 s), for this and later runs …"
+    assert describe(*noted[1]) == "compiling square roots (last time 12 s) …"

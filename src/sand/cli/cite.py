@@ -24,6 +24,11 @@ REFERENCES = (
         "Johnson K. L., Kendall K., Roberts A. D. (1971): Surface energy and the contact of elastic solids. "
         "Proc. R. Soc. Lond. A 324, 301. doi:10.1098/rspa.1971.0141",
     ),
+    (
+        "adhesion of small, hard grains (law = dmt)",
+        "Derjaguin B. V., Muller V. M., Toporov Yu. P. (1975): Effect of contact deformations on the adhesion of "
+        "particles. J. Colloid Interface Sci. 53, 314. doi:10.1016/0021-9797(75)90018-1",
+    ),
 )
 
 

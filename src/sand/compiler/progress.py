@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -23,7 +24,7 @@ Notify = Callable[[str, "float | None"], None]
 def describe(what: str, seconds: float | None) -> str:
     """The note on one compilation; `seconds` is its last duration, None if that is not known."""
     last = "" if seconds is None else f" (last time {seconds:.0f} s)"
-    return f"compiling {what}{last}, for this and later runs …"
+    return f"compiling {what}{last} …"
 
 
 def _on_terminal(what: str, seconds: float | None) -> None:
@@ -91,7 +92,7 @@ class CompilationListener(event.Listener):
             durations = self._durations() | {self._current: round(time.perf_counter() - self._began, 3)}
             self._current = ""
             try:
-                draft = self._record.with_suffix(".draft")
+                draft = self._record.with_suffix(f".{os.getpid()}")
                 draft.write_text(json.dumps(durations, indent=1), "utf-8")
                 draft.replace(self._record)
             except OSError:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..box import nearest_image
-from ..compiler.jit import is_builtin, kernel, loop, rare
+from ..compiler.jit import kernel, loop, rare
 from ..numerics.quaternion import turned_back
 from ..numerics.vec import accrue, dot, load, load4, put, scale, sub
 from ..state.state import (
@@ -29,7 +29,7 @@ from . import tangential
 from .columns import column_loops, uniform_contacts
 from .damping import damping_loops, log_loss, store_damping_force
 from .gather import sort_contacts_by_grain
-from .law import ContactLaw
+from .law import ContactLaw, is_builtin_law
 from .mechanics import (
     Displacements,
     contact_speed_gain,
@@ -333,4 +333,4 @@ def forming_loops(law: ContactLaw) -> FormingLoops:
         sort_contacts_by_grain(contacts, count, grains.mass.size)
         return broken
 
-    return FormingLoops(form_contacts, kernel(add_initial_contacts, cached=is_builtin(law.force)))
+    return FormingLoops(form_contacts, kernel(add_initial_contacts, cached=is_builtin_law(law)))

@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..compiler.jit import formula
-from ..errors import BadInput, did_you_mean
+from ..compiler.jit import formula, is_builtin
+from ..errors import BadInput
 from . import tangential
 
 
@@ -71,11 +71,9 @@ def register(law: ContactLaw) -> ContactLaw:
     return LAWS.setdefault(law.name, law)
 
 
-def law_named(name: str) -> ContactLaw:
-    """The registered law of this name.  Raises BadInput for an unknown name."""
-    if name not in LAWS:
-        raise BadInput(f"contact: law = {name!r}; {did_you_mean(str(name), tuple(LAWS))}")
-    return LAWS[name]
+def is_builtin_law(law: ContactLaw) -> bool:
+    """Whether all formulas of a law are part of SAND, so that compiled code with them may be cached on disk."""
+    return all(is_builtin(member) for member in law if callable(member))
 
 
 class Pairing(NamedTuple):

@@ -3,11 +3,11 @@
 import functools
 from collections.abc import Callable
 
-from ..compiler.jit import is_builtin, kernel, loop
+from ..compiler.jit import kernel, loop
 from ..numerics.vec import across, axpy, dot, load, norm
 from ..state.state import CONTACTS
 from .columns import column_loops
-from .law import ContactLaw
+from .law import ContactLaw, is_builtin_law
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
 from .update import pose_at, stored_damping_force
 
@@ -47,7 +47,7 @@ def energies_kernel(law: ContactLaw) -> Callable:
             for mode in range(4):
                 out[2 + mode] += stored[mode]
 
-    return kernel(measure_energies, cached=is_builtin(law.force), purpose="the energies of contacts")
+    return kernel(measure_energies, cached=is_builtin_law(law), purpose="the energies of contacts")
 
 
 CONTACT_ROWS = (
@@ -56,7 +56,7 @@ CONTACT_ROWS = (
     ("slide", "m", "size of the sliding displacement ζ"),
     ("roll", "m", "size of the rolling displacement ξ"),
     ("twist", "rad", "twisting angle φ"),
-    ("stretch_share", "1", "−δ/δ_c, 1 where the contact breaks; negative in compression; −δ/R without adhesion"),
+    ("stretch_share", "1", "−δ/δ_c, 1 where the contact breaks; negative in compression; −δ/R if it breaks at δ = 0"),
     ("slide_share", "1", "|ζ|/ζ_c"),
     ("roll_share", "1", "|ξ|/ξ_c"),
     ("twist_share", "1", "|φ|/φ_c"),
@@ -118,4 +118,4 @@ def contacts_kernel(law: ContactLaw) -> Callable:
                 out[17 + axis, c] = displacements.slide[axis]
                 out[20 + axis, c] = xi[axis]
 
-    return kernel(measure_contacts, cached=is_builtin(law.force), purpose="the table of contacts")
+    return kernel(measure_contacts, cached=is_builtin_law(law), purpose="the table of contacts")

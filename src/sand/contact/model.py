@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -75,7 +76,10 @@ class Contact:
 
     __pydantic_config__ = FORBID_EXTRA
     name = "contact"
-    references = "Johnson, Kendall & Roberts 1971; Dominik & Tielens 1997; Dominik & Nübold 2002, A.5–A.6"
+    references = (
+        "Johnson, Kendall & Roberts 1971; Derjaguin, Muller & Toporov 1975; Dominik & Tielens 1997; "
+        "Dominik & Nübold 2002, A.5–A.6"
+    )
 
     def __post_init__(self) -> None:
         problems: list[str] = []
@@ -156,20 +160,23 @@ class Contact:
             ]
         if problems:
             raise BadInput(problems)
-        smallest = [float(grains.radius[grains.material == k].min()) for k in range(len(grains.materials))]
+        of_material = [grains.radius[grains.material == k] for k in range(len(grains.materials))]
+        # JKR is least accurate for the smallest grains, DMT for the largest
+        extremes = [sorted({float(radius.min()), float(radius.max())}) for radius in of_material]
         return [
             text
             for k, a in enumerate(grains.materials)
             for j in range(k + 1)
-            if (text := self._inaccurate(a, smallest[k], grains.materials[j], smallest[j]))
+            if (text := self._inaccurate(a, extremes[k], grains.materials[j], extremes[j]))
         ]
 
-    def _inaccurate(self, a: Material, r1: float, b: Material, r2: float) -> str:
-        """A warning if the contact law is inaccurate for contacts between these grains, else ""."""
+    def _inaccurate(self, a: Material, radii1: list[float], b: Material, radii2: list[float]) -> str:
+        """A warning if the contact law is inaccurate for contacts between such grains, else ""."""
         both = self.pairing(a, b)
-        reason = self.contact_law.warning(both.surface_energy, both.modulus, r1 * r2 / (r1 + r2))
-        if not reason:
-            return ""
-        names = a.name if a is b else f"{a.name} and {b.name}"
-        radii = format_quantity(r1, "m") if r1 == r2 else f"{format_quantity(r1, 'm')} and {format_quantity(r2, 'm')}"
-        return f"contacts of {names} grains of radius {radii} have {reason}"
+        for r1, r2 in itertools.product(radii1, radii2):
+            reason = self.contact_law.warning(both.surface_energy, both.modulus, r1 * r2 / (r1 + r2))
+            if reason:
+                names = a.name if a is b else f"{a.name} and {b.name}"
+                sizes = " and ".join(format_quantity(r, "m") for r in dict.fromkeys((r1, r2)))
+                return f"contacts of {names} grains of radius {sizes} have {reason}"
+        return ""

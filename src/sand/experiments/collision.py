@@ -18,8 +18,7 @@ from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import Force
 from ..grains import Grains
-from ..integrate.adaptive import Adaptive
-from ..integrate.verlet import Verlet
+from ..integrate.base import Integrator
 from ..io.run_folder import TRAJECTORY
 from ..io.trajectory import Frames
 from ..setup.encounters import encounter, turned_at_random
@@ -44,7 +43,7 @@ def collide(
     along: Any = "x",
     seed: int | None = None,
     forces: Sequence[Force] | None = None,
-    stepping: Verlet | Adaptive | None = None,
+    stepping: Integrator | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
     observers: Sequence[Any] = (),
@@ -94,7 +93,7 @@ def approach(
 
 
 def prepare(
-    start: Approach, forces: Sequence[Force] | None = None, stepping: Verlet | Adaptive | None = None, **options: Any
+    start: Approach, forces: Sequence[Force] | None = None, stepping: Integrator | None = None, **options: Any
 ) -> Simulation:
     """Set up the simulation of a collision; options are those of `Simulation`. Raises BadInput."""
     return Simulation(
@@ -111,7 +110,7 @@ def resume_collision(
     start: Approach,
     folder: str | Path,
     forces: Sequence[Force] | None = None,
-    stepping: Verlet | Adaptive | None = None,
+    stepping: Integrator | None = None,
     **options: Any,
 ) -> Simulation:
     """Resume the simulation of an interrupted collision from its newest checkpoint.

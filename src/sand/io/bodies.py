@@ -14,6 +14,7 @@ from ..box import Box
 from ..errors import BadInput, FilesFailed, did_you_mean
 from ..grains import Grains
 from ..material import PRESETS, Material
+from ..schema import own_values
 from ..units import si
 from .extended_xyz import Columns, is_xyz, read_xyz, xyz_text
 from .frame import MODES
@@ -69,9 +70,9 @@ def read_body(
     if found.radius is None and radius is None:
         raise BadInput(f"{path} has no radii; give a radius for all grains")
     size = radius if found.radius is None else found.radius * unit
-    own = _materials(path, found, material or (otherwise if found.names is None else None), materials)
+    kinds = _materials(path, found, material or (otherwise if found.names is None else None), materials)
     try:
-        body = Grains(found.position * unit, size, own, moment=found.moment)
+        body = Grains(found.position * unit, size, kinds, moment=found.moment, own=found.own)
     except BadInput as error:
         raise error.at(str(path)) from None
     centre = np.average(body.position, axis=0, weights=body.mass)
@@ -99,7 +100,7 @@ def _read_gsd(path: Path) -> Columns:
         if frames.written_by_sand:
             frame = frames[-1]
             names = [frame.materials[k] for k in frame.material]
-            return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0)
+            return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0, own_values(frame))
         stored = frames.stored(-1)
         size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
         return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)

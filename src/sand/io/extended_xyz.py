@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ class Columns(NamedTuple):
     moment: np.ndarray | None  # (N, 3) [A m²]
     names: list[str] | None  # N names of materials
     unit: float  # unit of length [m], unless the caller gives another
+    own: Mapping[str, np.ndarray] = {}  # own quantities of the user
 
 
 def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from ..box import Box
 from ..compiler.jit import is_builtin
 from ..contact.columns import constant_names
+from ..contact.law import is_builtin_law
 from ..contact.model import Contact
 from ..errors import BadInput
 from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
@@ -175,7 +176,8 @@ def _kernel_spec(
             f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "
             "lacks; use far = 'impulse' or 'every step'"
         )
-    law = (forces.contact or Contact()).contact_law
+    law, flight = (forces.contact or Contact()).contact_law, stepping.flight_loop
+    formulas = [*(f.formula for f in forces.external), *([flight] if flight else [])]
     return KernelSpec(
         law,
         external,
@@ -184,9 +186,9 @@ def _kernel_spec(
         impulse=scheme == "impulse",
         taylor=scheme.startswith("taylor"),
         gas=bool(forces.gas),
-        flight_loop=stepping.flight_loop,
+        flight_loop=flight,
         queue=uses_task_queue(len(grains)),
-        keep=is_builtin(law.force) and all(is_builtin(f.formula) for f in forces.external) and sums.kept,
+        keep=is_builtin_law(law) and sums.kept and all(map(is_builtin, formulas)),
         magnetic=bool(grains.body_moment.any()),
         wide=len(grains) >= WIDE_FROM,
     )

@@ -88,8 +88,9 @@ def refuse_overlaps(grains: Grains, contact: Contact, found: OverlappingPairs, g
     count = np.int64(len(grains))
     reduced = radius[i] * radius[j] / (radius[i] + radius[j])
     gamma, modulus = contact.pairings(grains.materials)[:2, grains.material[i], grains.material[j]]
-    normal_mode = contact.contact_law.normal_mode
-    rest = np.array([normal_mode(*one).rest_overlap for one in zip(gamma, modulus, reduced, strict=True)])
+    different, number = np.unique(np.stack([gamma, modulus, reduced]), axis=1, return_inverse=True)
+    rest = np.array([contact.contact_law.normal_mode(*one).rest_overlap for one in different.T.tolist()])
+    rest = rest[number.ravel()] if len(reduced) else np.zeros(0)
     limit = most_overlap(rest, np.minimum(radius[i], radius[j]))
     is_new = ~np.isin(i * count + j, given[:, 0] * count + given[:, 1])
     wrong = np.flatnonzero((found.overlap > limit) & is_new)

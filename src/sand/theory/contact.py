@@ -111,7 +111,7 @@ def contact(
     mixing: str = "geometric",
     rolling_limit: Any = None,
 ) -> ContactNumbers:
-    """Characteristic values of a contact without damping, with the stiffnesses of the equilibrium contact radius.
+    """Characteristic values of a JKR contact without damping, with the stiffnesses of the equilibrium contact radius.
 
     Parameters
     ----------

@@ -156,10 +156,11 @@ def quantity_ranges(frames: Any) -> dict[str, list[float]]:
 def _magnitudes(frame: Any, name: str) -> np.ndarray:
     """Finite magnitudes of a quantity in a frame; empty if the frame does not have it."""
     try:
-        values = np.linalg.norm(frame.moment, axis=1) if name == "moment" else np.abs(measured(frame, name))
+        values = np.linalg.norm(frame.moment, axis=1) if name == "moment" else measured(frame, name)
     except BadInput:
         return np.zeros(0)
-    return np.asarray(values[np.isfinite(values)], dtype=np.float64)
+    found = np.asarray(values[np.isfinite(values)], dtype=np.float64)
+    return found if name in OWN else np.abs(found)
 
 
 def _range(values: np.ndarray, name: str) -> list[float]:
