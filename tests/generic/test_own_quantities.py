@@ -63,9 +63,11 @@ def test_an_own_quantity_is_kept_by_set_ups(name):
 @pytest.mark.parametrize("name", OWN)
 def test_an_own_quantity_is_kept_by_body_files(name, tmp_path):
     """The grains read from a GSD file of a body have the values of those written."""
-    body = sand.Grains([[0, 0, 0], [2e-7, 0, 0]], 1e-7, "silica", own={name: [3.0, 4.0]})
+    body = sand.Grains([[0, 0, 0], [2e-7, 0, 0]], 1e-7, "silica", own={name: [3.0, 4.0]}, charge=[0.0, 0.5])
     write_body(tmp_path / "body.gsd", body)
-    assert getattr(read_body(tmp_path / "body.gsd"), name).tolist() == [3.0, 4.0]
+    found = read_body(tmp_path / "body.gsd")
+    assert getattr(found, name).tolist() == [3.0, 4.0]
+    assert found.charge.tolist() == [0.0, 0.5]
 
 
 def test_ranges_of_own_quantities_have_signs():

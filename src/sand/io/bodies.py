@@ -72,7 +72,7 @@ def read_body(
     size = radius if found.radius is None else found.radius * unit
     kinds = _materials(path, found, material or (otherwise if found.names is None else None), materials)
     try:
-        body = Grains(found.position * unit, size, kinds, moment=found.moment, own=found.own)
+        body = Grains(found.position * unit, size, kinds, moment=found.moment, own=found.own, charge=found.charge)
     except BadInput as error:
         raise error.at(str(path)) from None
     centre = np.average(body.position, axis=0, weights=body.mass)
@@ -100,7 +100,7 @@ def _read_gsd(path: Path) -> Columns:
         if frames.written_by_sand:
             frame = frames[-1]
             names = [frame.materials[k] for k in frame.material]
-            return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0, own_values(frame))
+            return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0, own_values(frame), frame.charge)
         stored = frames.stored(-1)
         size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
         return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)

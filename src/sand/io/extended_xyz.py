@@ -28,6 +28,7 @@ class Columns(NamedTuple):
     names: list[str] | None  # N names of materials
     unit: float  # unit of length [m], unless the caller gives another
     own: Mapping[str, np.ndarray] = {}  # own quantities of the user
+    charge: np.ndarray | None = None  # (N,) [C]
 
 
 def format_rows(columns: Sequence[np.ndarray], form: str) -> list[str]:
