@@ -100,7 +100,8 @@ def _read_gsd(path: Path) -> Columns:
         if frames.written_by_sand:
             frame = frames[-1]
             names = [frame.materials[k] for k in frame.material]
-            return Columns(frame.position, frame.radius, np.asarray(frame.moment), names, 1.0, own_values(frame), frame.charge)
+            moment, own = np.asarray(frame.moment), own_values(frame)
+            return Columns(frame.position, frame.radius, moment, names, 1.0, own, frame.charge)
         stored = frames.stored(-1)
         size = 0.5 * np.asarray(stored.particles.diameter, dtype=np.float64)
         return Columns(np.asarray(stored.particles.position, dtype=np.float64), size, None, None, 1.0)
