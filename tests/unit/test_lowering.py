@@ -63,6 +63,22 @@ def inner(x):
 """A kernel that calls a kernel, which the second process loads from the disk cache."""
 
 
+TOGETHER = """
+import importlib.util, pathlib, sys, time
+here, number = pathlib.Path(sys.argv[1]), sys.argv[2]
+spec = importlib.util.spec_from_file_location("sand.inner_of_a_test", here / "inner.py")
+module = importlib.util.module_from_spec(spec)
+sys.modules[spec.name] = module
+spec.loader.exec_module(module)
+(here / f"ready-{number}").touch()
+while len(list(here.glob("ready-*"))) < 3:
+    time.sleep(0.001)
+module.inner(1.0)
+print(sum(module.inner.stats.cache_misses.values()))
+"""
+"""Three processes that want the same code at the same time: the number of compilations of each."""
+
+
 @formula
 def positive(x):
     if x < 0.0:
@@ -138,6 +154,17 @@ def test_garbage_collection_is_restored_after_compiling():
             assert gc.isenabled() is wanted
         finally:
             gc.enable()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
+def test_several_processes_compile_the_same_code_once(tmp_path):
+    """Of three processes that start to compile at the same time, one compiles, and the others load its code."""
+    (tmp_path / "inner.py").write_text(INNER)
+    env = os.environ | {"SAND_CACHE": str(tmp_path / "cache")}
+    words = [[sys.executable, "-c", TOGETHER, str(tmp_path), str(k)] for k in range(3)]
+    running = [subprocess.Popen(each, env=env, stdout=subprocess.PIPE, text=True) for each in words]
+    assert sorted(each.communicate()[0].strip() for each in running) == ["0", "0", "1"]
 
 
 @pytest.mark.compiled("small")

@@ -18,12 +18,13 @@ from types import FunctionType
 from typing import Any
 
 import numba
+from filelock import BaseFileLock
 from numba.core import event
 from numba.extending import register_jitable
 
 from ..errors import warn
 from .cache import private_folder
-from .progress import CompilationListener
+from .progress import CompilationListener, acquire_lock
 
 _NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compile_error formula is_builtin kernel loop noinline rare"
 __all__ = _NAMES.split()
@@ -164,22 +165,44 @@ def cache_folder() -> Path:
 _FOLDER = cache_folder()
 
 
-def _load_without_compiler(compiled: Any) -> None:
-    """Load cached code without initialising numba's compiler, which saves an eighth of a second at start."""
+def _share_cache(compiled: Any) -> None:
+    """Load cached code without initialising numba's compiler, and let only one of several processes compile.
+
+    The first saves an eighth of a second at start.  A process that finds no code in the cache takes the lock of this
+    code, looks again, and holds the lock until it has compiled; where there are no locks, it compiles without one.
+    """
     try:
         from numba.core.runtime import rtsys
 
         cache = compiled._cache
-        guard, load = cache._guard_against_spurious_io_errors, cache._load_overload
+        guard, load, key_of = cache._guard_against_spurious_io_errors, cache._load_overload, cache._index_key
     except (ImportError, AttributeError):
         return
+    held: list[BaseFileLock] = []
 
     def load_overload(signature: Any, target: Any) -> Any:
         rtsys.initialize(target)  # machine code may refer to its functions
         with guard():
-            return load(signature, target)
+            found = load(signature, target)
+        if found is None and not held:
+            name = hashlib.sha256(repr(key_of(signature, target.codegen())).encode()).hexdigest()[:16]
+            lock = acquire_lock(_FOLDER / f"{name}.lock", _PURPOSES[id(compiled)])
+            if lock is not None:
+                held.append(lock)
+                with guard():
+                    found = load(signature, target)
+        return found
 
-    cache.load_overload = load_overload
+    compile_or_load = compiled.compile
+
+    def compile_with_lock(signature: Any) -> Any:
+        try:
+            return compile_or_load(signature)
+        finally:
+            while held:
+                held.pop().release()
+
+    cache.load_overload, compiled.compile = load_overload, compile_with_lock
 
 
 _PURPOSES: dict[int, str] = {}
@@ -229,9 +252,9 @@ def kernel(
         compiled = numba.njit(cache=cached, nogil=nogil, no_cfunc_wrapper=True, **options)(function)
     finally:
         numba.config.CACHE_DIR = global_folder
-    if cached:
-        _load_without_compiler(compiled)
     _PURPOSES[id(compiled)] = purpose or f"'{function.__name__.replace('_', ' ')}'"
+    if cached:
+        _share_cache(compiled)
     return compiled
 
 

@@ -11,10 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import event
 
-__all__ = ["CompilationListener", "compilation_notes", "describe", "suppress_notes"]
+__all__ = ["CompilationListener", "acquire_lock", "compilation_notes", "describe", "suppress_notes"]
 
+LONGEST_WAIT = 300.0
+"""Wall time [s] to wait for a process that compiles the same code."""
 SHORT = 1.0
 """Wall time [s] of the last compilation below which no note is worth it."""
 
@@ -50,6 +53,25 @@ def compilation_notes(notify: Notify | None) -> Iterator[None]:
 def suppress_notes() -> None:
     """Show no notes in this process, for workers whose parent reports progress."""
     _notify.append(lambda what, seconds: None)
+
+
+def acquire_lock(path: Path, what: str) -> BaseFileLock | None:
+    """Take the lock of some compiled code, with a note if another process holds it; None if there are no locks here.
+
+    A process that waits longer than LONGEST_WAIT compiles without the lock.
+    """
+    lock = FileLock(path, thread_local=False, fallback_to_soft=False)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        _notify[-1](f"{what} in another process, and waiting for it", None)
+        try:
+            lock.acquire(timeout=LONGEST_WAIT)
+        except (Timeout, OSError, NotImplementedError):
+            return None
+    except (OSError, NotImplementedError):
+        return None
+    return lock
 
 
 class CompilationListener(event.Listener):
