@@ -15,8 +15,7 @@ from .trajectory import Frames
 
 INCOMPLETE_AT_MOST = 64
 """Incomplete frames at the end of a file above which the file counts as broken."""
-Head = tuple[float, int, int]
-"""Time [s], step and number of contacts of a frame."""
+Head = tuple[float, int, int]  # time [s], step and number of contacts of a frame
 
 
 class LiveTrajectory(FrameSequence):
