@@ -46,7 +46,7 @@ def compiling(quiet: bool = False) -> AbstractContextManager[None]:
     """Print a note on each kernel that is compiled inside the block, with the time that it took last."""
     from ..compiler import progress
 
-    return progress.compilation_notes(None if quiet else lambda what, seconds: note(progress.describe(what, seconds)))
+    return progress.compilation_notes(None if quiet else note)
 
 
 def emit(content: dict[str, Any]) -> None:

@@ -21,7 +21,7 @@ LONGEST_WAIT = 300.0
 SHORT = 1.0
 """Wall time [s] of the last compilation below which no note is worth it."""
 
-Notify = Callable[[str, "float | None"], None]
+Notify = Callable[[str], None]
 
 
 def describe(what: str, seconds: float | None) -> str:
@@ -30,10 +30,14 @@ def describe(what: str, seconds: float | None) -> str:
     return f"compiling {what}{last} …"
 
 
-def _on_terminal(what: str, seconds: float | None) -> None:
-    """Note for scripts and interactive sessions: only where somebody looks at the terminal."""
+def _on_terminal(note: str) -> None:
+    """Show a note of a script or an interactive session, only if stderr is a terminal."""
     if sys.stderr is not None and sys.stderr.isatty():
-        print(f"sand: {describe(what, seconds)}", file=sys.stderr, flush=True)
+        print(f"sand: {note}", file=sys.stderr, flush=True)
+
+
+def _nowhere(note: str) -> None:
+    """Show no note."""
 
 
 _notify: list[Notify] = [_on_terminal]
@@ -42,8 +46,8 @@ _notify: list[Notify] = [_on_terminal]
 
 @contextmanager
 def compilation_notes(notify: Notify | None) -> Iterator[None]:
-    """Within the block, pass `notify` what is compiled and how long it took the last time [s]; None: no notes."""
-    _notify.append(notify or (lambda what, seconds: None))
+    """Within the block, pass the notes on compilation to `notify`; None: no notes."""
+    _notify.append(notify or _nowhere)
     try:
         yield
     finally:
@@ -52,7 +56,7 @@ def compilation_notes(notify: Notify | None) -> Iterator[None]:
 
 def suppress_notes() -> None:
     """Show no notes in this process, for workers whose parent reports progress."""
-    _notify.append(lambda what, seconds: None)
+    _notify.append(_nowhere)
 
 
 def acquire_lock(path: Path, what: str) -> BaseFileLock | None:
@@ -64,7 +68,7 @@ def acquire_lock(path: Path, what: str) -> BaseFileLock | None:
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        _notify[-1](f"{what} in another process, and waiting for it", None)
+        _notify[-1](f"another process compiles {what}; waiting for it …")
         try:
             lock.acquire(timeout=LONGEST_WAIT)
         except (Timeout, OSError, NotImplementedError):
@@ -105,14 +109,16 @@ class CompilationListener(event.Listener):
         self._current, self._began, self._depth = what, time.perf_counter(), 1
         last = self._durations().get(what)
         if last is None or last >= SHORT:
-            _notify[-1](what, last)
+            _notify[-1](describe(what, last))
 
     def on_end(self, event: Any) -> None:
-        """Record the duration of a kernel."""
+        """Record the duration of a kernel, unless its compilation failed."""
         self._depth -= 1
         if self._current and self._depth == 0:
             durations = self._durations() | {self._current: round(time.perf_counter() - self._began, 3)}
             self._current = ""
+            if event.is_failed:
+                return
             try:
                 draft = self._record.with_suffix(f".{os.getpid()}")
                 draft.write_text(json.dumps(durations, indent=1), "utf-8")

@@ -31,9 +31,9 @@ class NormalMode(NamedTuple):
 class ContactLaw(NamedTuple):
     """A contact law.  Formulas are decorated with `sand.compiler.jit.formula`.
 
-    The overlap δ [m] is positive in compression; a contact forms at δ = 0.  The constants `c` of a contact are a
-    `ContactConstants`, whose member `c.normal` holds those that only this law has.  y = √(a/a₀), with the contact
-    radius a, is computed once per contact and step.
+    The overlap δ [m] is positive in compression; a contact forms at δ = 0.  The argument `c` is the
+    `ContactConstants` of the contact; the constants that only this law has are in `c.normal`.  y = √(a/a₀), with the
+    contact radius a, is computed once per contact and step.
     """
 
     name: str  # of `sand.Contact(law=…)` and of case files
@@ -56,7 +56,7 @@ LAWS: dict[str, ContactLaw] = {}
 
 
 def register(law: ContactLaw) -> ContactLaw:
-    """Register a contact law, for `sand.Contact(law=…)`, case files, the reference and the tests of all laws.
+    """Register a contact law, for `sand.Contact(law=…)`, case files and the tests of all laws.
 
     Raises
     ------

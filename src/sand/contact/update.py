@@ -187,7 +187,7 @@ def _slip_contact(grains, contacts, c, pose, displacements, constants, present, 
 
 
 @functools.cache
-def contact_loop(law: ContactLaw, handle: Callable) -> Callable:
+def contact_loop(law: ContactLaw, handle_limits: Callable) -> Callable:
     """The loop that updates a range of contacts, for a contact law and one of `_flag_contact`, `_slip_contact`."""
     load_constants, radius_root, normal_force = column_loops(law).load, law.fast_radius_root, law.force
 
@@ -228,7 +228,9 @@ def contact_loop(law: ContactLaw, handle: Callable) -> Callable:
             y, valid = radius_root(overlap, constants)
             present = scaled_stiffness(constants, y, settings.follow)
             displacements = displacements_of(pose, overlap, r1, r2, constants)
-            pose, lost, flag = handle(grains, contacts, c, pose, displacements, constants, present, valid, settings, dt)
+            pose, lost, flag = handle_limits(
+                grains, contacts, c, pose, displacements, constants, present, valid, settings, dt
+            )
             normal = normal_force(overlap, y, constants)
             force, torque1, torque2 = contact_load(pose, normal, r1, r2, present)
             contacts.twist[c] = pose.twist

@@ -64,7 +64,7 @@ class ForcesByType(NamedTuple):
     """The forces of a simulation by type."""
 
     contact: Contact | None
-    long_range: list[LongRangeForce]  # those that act on at least one grain
+    long_range: list[LongRangeForce]  # the forces that act on at least one grain
     external: list[ExternalForce]
     gas: list[Gas]  # at most one
 
