@@ -192,6 +192,10 @@ def test_a_compilation_is_noted_with_its_last_duration(tmp_path, monkeypatch):
         compile_anew()
         (tmp_path / "times.json").write_text("[]")
         compile_anew()
+        with pytest.raises(numba.core.errors.TypingError):
+            kernel(lambda x: x.missing, cached=False, purpose="nonsense")(4.0)
+        assert "nonsense" not in (tmp_path / "times.json").read_text()
+        del noted[-1]
         with compilation_notes(None):
             (tmp_path / "times.json").unlink()
             compile_anew()

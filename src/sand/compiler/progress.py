@@ -117,7 +117,7 @@ class CompilationListener(event.Listener):
         if self._current and self._depth == 0:
             durations = self._durations() | {self._current: round(time.perf_counter() - self._began, 3)}
             self._current = ""
-            if event.is_failed:
+            if sys.exc_info()[0] is not None:  # numba's `event.is_failed` is true for every compilation
                 return
             try:
                 draft = self._record.with_suffix(f".{os.getpid()}")
