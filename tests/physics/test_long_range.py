@@ -186,7 +186,7 @@ def test_heat_exchanged_with_the_gas():
     """Kinetic energy + lost_gas is constant to rounding: the gas heats grains at rest and cools fast ones."""
     cold, _, tau = brownian_grains(50)
     cold.run(until=float(3 * tau))
-    hot, _, _ = brownian_grains(50, brownian_grains=False)
+    hot, _, _ = brownian_grains(50, brownian=False)
     hot.grains.arrays.velocity[...] = 3.0
     hot.run(until=float(3 * tau))
     for sim, sign in ((cold, -1), (hot, 1)):
