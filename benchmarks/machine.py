@@ -9,22 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from sand.compiler.jit import kernel
+from sand.compiler.stage import stage
 
-from .timing import best
+from .timing import as_own, best
 
 TERMS = 16
-"""Multiply-adds per number in `_horner`: more would leave less chains in flight, less would show loads and stores."""
+"""Multiply-adds per number in `horner`: more would leave less chains in flight, less would show loads and stores."""
 NUMBERS = 1024
-"""Numbers that `_horner` works on: 16 kB in two arrays, which stay in the first cache."""
+"""Numbers that `horner` works on: 16 kB in two arrays, which stay in the first cache."""
 SIZES = {"L1": 24e3, "L2": 6e5, "L3": 8e6, "DRAM": 1.2e8}
 """Bytes of three arrays together that the table of bandwidths is measured with."""
 TRAFFIC = 4e8
 """Bytes per timed piece."""
 
 
-def _horner(x, y, a, b, c, d, times):
+@stage("a polynomial", long_vectors=True, cached=False)
+@as_own
+def horner(x, y, parameters):
     """y = a polynomial of degree TERMS in each x, `times` over: one chain for each number, many in flight."""
+    a, b, c, d, times = parameters
     for _ in range(times):
         for i in range(x.size):
             v = x[i]
@@ -34,17 +37,19 @@ def _horner(x, y, a, b, c, d, times):
             s = (((s * v + b) * v + c) * v + d) * v + a
             y[i] = s
         a += 1e-9
+    return 0
 
 
-def _triad(a, b, c, scale, times):
+@stage("a sum of arrays", long_vectors=True, cached=False)
+@as_own
+def triad(a, b, c, parameters):
     """a = b + scale × c, `times` over."""
+    scale, times = parameters
     for _ in range(times):
         for i in range(a.size):
             a[i] = b[i] + scale * c[i]
         scale += 1e-9
-
-
-horner, triad = kernel(_horner, long_vectors=True), kernel(_triad, long_vectors=True)
+    return 0
 
 
 @functools.cache
@@ -52,7 +57,7 @@ def flops() -> float:
     """Most floating-point operations per second of one core, a multiply-add counted as two."""
     times = 8000
     x, y = np.linspace(0.0, 0.5, NUMBERS), np.zeros(NUMBERS)
-    return 2.0 * TERMS * NUMBERS * times / best(lambda: horner(x, y, 0.1, 0.2, 0.3, 0.4, times), 9)
+    return 2.0 * TERMS * NUMBERS * times / best(lambda: horner(x, y, (0.1, 0.2, 0.3, 0.4, times)), 9)
 
 
 @functools.cache
@@ -61,7 +66,7 @@ def bandwidth(size: float) -> float:
     number = max(int(size / 24), 64)
     a, b, c = np.zeros(number), np.ones(number), np.ones(number)
     times = max(int(TRAFFIC / (24 * number)), 1)
-    return 24.0 * number * times / best(lambda: triad(a, b, c, 0.5, times), 5)
+    return 24.0 * number * times / best(lambda: triad(a, b, c, (0.5, times)), 5)
 
 
 def share_of_flops(operations: float, seconds: float) -> dict[str, Any]:

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 import sand
-from sand.compiler.jit import kernel
-from sand.integrate.motion import kick_and_drift_for
+from sand.compiler.stage import stage
+from sand.integrate.motion import drift_for
 from sand.neighbours.cell_list import rebuild_verlet_list
 from sand.state.arrays import empty_long_range_arrays
 
 from . import decks, machine, worlds
 from .steps import beside
 from .table import row
-from .timing import best, in_turns, thread
+from .timing import as_own, best, in_turns, thread
 
 BYTES_MOVED = 8 * (3 * (2 + 2) + 2 + 3 * 2 * 2 + 4 * 2 + 3 * 2)
 """Bytes per grain of a kick (v and ω read and written, F and M, m and I read) and a drift (x, ϱ; μ from the body's)."""
@@ -27,16 +27,17 @@ CANDIDATE = 17.0
 NEIGHBOURS = (14, 50, 200)
 
 
-kick_and_drift = kick_and_drift_for(True)
+drift = drift_for(True)
 
 
-def _move(grains, span, dt, times):
+@stage("kicks and drifts", cached=False)
+@as_own
+def move(grains, span, parameters):
     """Kick and drift, `times` over."""
+    dt, times = parameters
     for _ in range(times):
-        kick_and_drift(grains, span, dt)
-
-
-move = kernel(_move)
+        drift(grains, np.uint64(0), np.uint64(grains.mass.size), span, dt)
+    return 0
 
 
 def motion(count: int = 1000) -> dict[str, Any]:
@@ -50,7 +51,7 @@ def motion(count: int = 1000) -> dict[str, Any]:
     ).state
     times = 400_000 // count
     arrays = world.grains.arrays
-    seconds = best(lambda: move(arrays, world.box.span, 1e-12, times)) / times / count
+    seconds = best(lambda: move(arrays, world.box.span, (1e-12, times))) / times / count
     share = machine.share_of_bandwidth(BYTES_MOVED, BYTES_MOVED * count, seconds)
     return row(f"motion, {count} grains", seconds, "ns per grain", 2.5, scale=1e9, **share)
 

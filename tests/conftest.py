@@ -3,7 +3,7 @@
 Tiers (the last line of a run says which were left out and how to run them):
 
 * ``quick``      everything that compiles nothing and is not marked ``slow``; ``pytest -m quick``
-* ``compiled``   runs numba kernels; the argument names a kernel specification (see ``tests/specs.py``)
+* ``compiled``   runs numba kernels; the argument names a group (see ``tests/specs.py``)
 * ``validate``   long statistical checks; ``pytest --validate``
 * ``browser``    ``tests/browser``, the page in Chromium; ``pytest tests/browser``
 * ``peers``      ``tests/peers``, other programs; ``pytest tests/peers``
@@ -29,7 +29,7 @@ from numba.core.event import Event, Listener, register
 # run, workers and children, must load them in the same way, or they compile everything twice.
 compileall.compile_dir(Path(__file__).parents[1] / "src", quiet=2)
 
-from .specs import FIXTURES, SPECS, WORKERS, description_of, monitored_drivers  # noqa: E402
+from .specs import FIXTURES, SPECS, WORKERS  # noqa: E402
 from .validation import Recorder, parse_part, part_of  # noqa: E402
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a background job of a shell; tests send SIGINT
@@ -122,40 +122,31 @@ def _mark(item: pytest.Item, tier: str | None) -> None:
 
 # ---- what a test may compile -------------------------------------------------------------------------
 class CompilationGuard(Listener):
-    """Fails a test that compiles a kernel, or takes steps with a driver, that its mark `compiled` does not name."""
+    """Fails a test without the mark `compiled` that compiles a kernel, or makes the stages of a simulation."""
 
     def __init__(self) -> None:
-        self.allowed: tuple[str, ...] | None = None  # None: everything
+        self.allowed = True
 
     def on_start(self, event: Event) -> None:
         """Called by numba before it compiles a function."""
-        if self.allowed == ():
+        if not self.allowed:
             function = getattr(event.data.get("dispatcher"), "py_func", None)
             raise AssertionError(f"this test compiles {getattr(function, '__qualname__', function)}: {ADVICE}")
 
     def on_end(self, event: Event) -> None:
         """Called by numba after it compiled a function."""
 
-    def use(self, name: str | None, kernel_spec: Any) -> None:
-        """Called before a driver takes steps; `name` is its specification, None if it is not in tests/specs.py."""
-        if self.allowed is not None and name not in self.allowed:
-            what = f"the driver {name!r}" if name else f"a driver not in tests/specs.py ({description_of(kernel_spec)})"
-            raise AssertionError(f"this test takes steps with {what}: {ADVICE}")
 
-
-ADVICE = "mark it with pytest.mark.compiled(specifications), or as a long check (see tests/specs.py)"
+ADVICE = "mark it with pytest.mark.compiled(group), or as a long check (see tests/specs.py)"
 guard = CompilationGuard()
 register("numba:compile", guard)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    mark = item.get_closest_marker("compiled")
-    if _tier(item) is None and not DISABLE_JIT:
-        guard.allowed = mark.args if mark else ()
-    with monitored_drivers(guard.use):
-        result = yield
-    guard.allowed = None
+    guard.allowed = _tier(item) is not None or bool(DISABLE_JIT) or item.get_closest_marker("compiled") is not None
+    result = yield
+    guard.allowed = True
     return result
 
 

@@ -10,21 +10,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import sand
-from sand.compiler.jit import kernel
 from sand.config.case import ForcesSection
 from sand.constants import MAGNETIC
 from sand.errors import BadInput
 from sand.forces import BUILT_IN
 from sand.forces.external.formulas import GrainState
+from sand.forces.pair import dipole_loops, generic_loops, loops
 from sand.forces.pair.cutoff import UNCUT, cutoff_for
 from sand.forces.pair.dipole_formulas import pair_load_cut
 from sand.forces.pair.generic_loops import PairGrain, PairParameters, cut_pair
-from sand.forces.pair.loops import first_row, listed_blocks
+from sand.forces.pair.loops import ALL_PAIRS_BLOCKS, first_row, listed_blocks
 from sand.forces.pair.pair_force import PairForce
 from sand.forces.registry import FORCES, register
+from sand.integrate.force_stages import SUM, WHOLE, pair_force_stages
 from sand.neighbours.cell_list import build_verlet_list
 from sand.numerics.vec import cross
 from sand.state.arrays import empty_long_range_arrays
+
+from ..tables import table_of
 
 ARGUMENTS = {"screened_charges": {"screening_length": 1.5e-7}, "gas": {"temperature": 300.0, "pressure": 100.0}}
 ARGUMENTS |= {"gravity": {"acceleration": [1.0, -2.0, 9.0]}, "electric": {"strength": [1e3, 2e3, -3e3]}}
@@ -165,10 +168,11 @@ def by_hand(force, grains, box):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:screened_charges")
 @pytest.mark.parametrize("name", PAIR_FORCES)
-def test_all_loops_of_a_pair_force_agree(name):
-    """All pairs, list, blocks of both and single pairs give the loads of a double loop over nearest images.
+def test_all_loops_of_a_pair_force_agree(name, monkeypatch):
+    """All pairs, list, one block and several of both, single pairs: the loads of a double loop over nearest images.
 
-    The loops are ordinary Python here; sums of 60 terms differ by rounding, 1e-13 of the largest term.
+    The loops are ordinary Python here; sums of 60 terms differ by rounding, 1e-13 of the largest term.  The blocks of
+    large simulations are made for these 60 grains, and taken in reverse order.
     """
     grains, box = cloud(), sand.Box.periodic("1 um")
     force = FORCES[name](**ARGUMENTS.get(name, {}), cutoff="0.45 um")
@@ -178,15 +182,17 @@ def test_all_loops_of_a_pair_force_agree(name):
     for listed in (False, True):
         sums, numbers = force.sums(box, listed), force.numbers(grains, box)
         for blocked in (False, True):
-            far = empty_long_range_arrays(len(grains), 64 * len(grains))
+            monkeypatch.setattr(loops, "PARALLEL_FROM", 1 if blocked else 1000)
+            for module in (loops, generic_loops, dipole_loops):
+                monkeypatch.setattr(module, "ROWS_PER_BLOCK", 16 if blocked else 256)
+            far = empty_long_range_arrays(len(grains), 64 * len(grains), ALL_PAIRS_BLOCKS)
             build_verlet_list(arrays, far, sim.state.count.copy(), span, sim._engine.parameters.search)
-            if blocked:
-                sums.blocked.begin(arrays, far, span, numbers)
-                for b in reversed(range(sums.blocked.blocks(arrays))):
-                    sums.blocked.block(arrays, far, span, numbers, b)
-                sums.blocked.end(arrays, far, span, numbers)
-            else:
-                sums.loads(arrays, far, span, numbers)
+            number = sums.blocks(arrays)
+            assert number == ((4 if listed else ALL_PAIRS_BLOCKS) if blocked else 1)
+            sums.begin(arrays, far, span, numbers)
+            for b in reversed(range(number)):
+                sums.block(arrays, far, span, numbers, b)
+            sums.end(arrays, far, span, numbers)
             shares = np.zeros(len(grains))
             sums.energies(arrays, far, span, numbers, shares)
             for ours, theirs in zip((far.force.T, far.torque.T, shares), expected, strict=True):
@@ -268,15 +274,11 @@ def test_compiled_loops_are_those_of_python():
     grains, box = cloud(), sand.Box.periodic("1 um")
     force = sand.ScreenedCharges("0.2 um", cutoff="0.45 um")
     sums, numbers = force.sums(box, False), force.numbers(grains, box)
-    arrays, found = grains.arrays, []
-    loads = sums.loads
-
-    def fill(grains, far, span, numbers):
-        loads(grains, far, span, numbers)
-
-    for run in (fill, kernel(fill, cached=False)):
+    stage, found = pair_force_stages(sums, False)[SUM], []
+    for run in (stage.in_python, stage.run):
         far = empty_long_range_arrays(len(grains), 16)
-        run(arrays, far, box.span, numbers)
+        run(table_of(grains=grains.arrays, long_range=far, span=box.span), numbers, WHOLE)
+        assert far.force.any()
         found.append(far.force)
     assert np.abs(found[0] - found[1]).max() < 1e-13 * np.abs(found[0]).max()
 

@@ -46,7 +46,7 @@ def test_an_integrator_with_a_taken_name_or_without_a_member_is_refused():
 
     class Mine:
         name = "verlet"
-        flight_loop = None
+        flight = None
 
     with pytest.raises(sand.BadInput, match="integrator Mine lacks parameters, contact_stepping, resolved, flight_lim"):
         register(Mine)

@@ -384,7 +384,9 @@ def test_step_underflow_ends_the_run():
     along = SIZE * np.array([[1.0, 0, 0], [1.0, 0, 0]])
     grains = sand.Grains([[0, 0, 0], [4e-8, 0, 0]], R, sand.IRON, moment=along)
     sim = adaptive_run(grains)
-    sim._engine.parameters = sim._engine.parameters._replace(contact=sim._engine.parameters.contact._replace(on=False))
+    settings = sim._engine.parameters.settings._replace(on=False)
+    sim._engine.parameters = sim._engine.parameters._replace(settings=settings)
+    sim._engine._table.set("settings", settings)
     result = sim.run(until="1 us")
     assert result.outcome is sand.Outcome.NO_STEP
     assert result.grains != ()

@@ -143,3 +143,22 @@ def test_energy_drift_of_the_readme_gas(seed):
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box=box)
     assert sim.run(until="5 us").drift < 1e-3
     assert sim.state.count[LONG_RANGE_SUMS] < 0.25 * sim.state.steps
+
+
+@pytest.mark.compiled("dipoles")
+def test_every_pair_force_leaves_the_sums_when_a_contact_forms():
+    """Two charged magnetic grains in the step in which they touch: the long-range loads of both forces become 0.
+
+    The pair forces of grains in contact act in every step; they are subtracted from each sum, and the difference of
+    two equal numbers is below 1e-12 of the smaller one of the two forces.
+    """
+    position, velocity = [[0, 0, -1.1e-8], [0, 0, 1.1e-8]], [[0, 0, 0.5], [0, 0, -0.5]]
+    moment, charge = [[0, 0, 1e-18], [0, 0, 1e-18]], [1.6e-19, -1.6e-19]
+    grains = sand.Grains(position, 1e-8, sand.IRON, velocity=velocity, moment=moment, charge=charge)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff="1 um"), sand.Charges(cutoff="1 um")])
+    while len(sim.contacts["pair"]) == 0 and sim.time < 6e-9:
+        sim.run(steps=1)
+    assert len(sim.contacts["pair"]) == 1 and sim._engine.parameters.respa.impulse
+    coulomb = 8.9875e9 * 1.6e-19**2 / 2e-8**2
+    magnetic = 6e-7 * 1e-18**2 / 2e-8**4
+    assert np.abs(sim.state.long_range.force).max() < 1e-12 * min(coulomb, magnetic)

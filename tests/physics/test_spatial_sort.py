@@ -5,14 +5,14 @@ import pytest
 
 import sand
 from sand.contact.events import inner_list_overflowed
-from sand.integrate.step_parts import INNER_SKIN_FRACTION
+from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.spatial_sort import inverse, reorder_grains, spatial_order
 from sand.simulation import engine as engines
 from sand.state.state import CONTACTS, INNER_COUNT, LISTED, ORDERED, PAIRS, REBUILT
 
 from .test_reproducibility import state
 
-LIST_ARRAYS = ("order", "packed_position", "source", "packed_grain", "block_sums", "cell_of")
+LIST_ARRAYS = ("order", "packed_position", "packed_moment", "squared_distance", "packed_grain", "block_sums", "cell_of")
 """Long-range arrays that belong to the pair list or are filled by each sum."""
 SORT_EVERY = 700
 """Steps between two sorts in these tests."""

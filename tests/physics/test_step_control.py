@@ -105,12 +105,10 @@ def test_gravity_does_not_shorten_the_step():
     steps = []
     for pull in (0.0, 9.81):
         system.grains.arrays.force[2] = -pull * grains.mass
-        steps.append(
-            steps_of_free_grains(system.grains.arrays, system.long_range, system.contacts.start, system.count, control)
-        )
+        steps.append(steps_of_free_grains(system.grains.arrays, system.long_range, system.contacts.start, control))
     assert steps[0] == steps[1]
     system.long_range.force[2] = -9.81 * grains.mass  # as a long-range force it limits the step
     assert (
-        steps_of_free_grains(system.grains.arrays, system.long_range, system.contacts.start, system.count, control)[0]
+        steps_of_free_grains(system.grains.arrays, system.long_range, system.contacts.start, control)[0]
         < 0.1 * steps[0][0]
     )

@@ -27,8 +27,8 @@ from sand.contact.update import (
     twist_increment,
 )
 from sand.grains import GrainArrays, Grains
-from sand.integrate.kernel_spec import ContactParameters
-from sand.integrate.motion import kick_and_drift_for
+from sand.integrate.motion import drift_for
+from sand.integrate.parts import ContactParameters
 from sand.material import SILICA
 from sand.numerics.quaternion import turned_back
 from sand.numerics.vec import axpy, load4, put, scale
@@ -157,7 +157,7 @@ def test_displacements_before_a_step():
     span = Box.periodic(2.2e-7, None, 3e-7).span
     back = copy.deepcopy(grains)
     back.inertia[:] = 1.0
-    kick_and_drift_for(False)(back, span, -STEP)  # no forces act
+    drift_for(False)(back, np.uint64(0), np.uint64(2 * PAIRS), span, -STEP)  # no forces act
     found, expected = [], []
     for c in range(PAIRS):
         constants, radii = columns.load(contacts.constants, c), (grains.radius[c], grains.radius[c + PAIRS])

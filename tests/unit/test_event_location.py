@@ -7,7 +7,7 @@ from numpy.polynomial import Polynomial
 import sand
 from sand.integrate.event_location import curve_at, first_crossing, separation_curve
 from sand.integrate.runge_kutta import STAGES, V, X
-from sand.state.arrays import stage_arrays
+from sand.state.arrays import runge_kutta_arrays
 
 STEP = 0.3
 
@@ -15,7 +15,7 @@ STEP = 0.3
 def quintic_motion(rng, box):
     """Two grains on polynomials of degree 5 in time: stage values of a step, and the exact separation as function."""
     ways = [[Polynomial(rng.normal(size=6)) for _ in range(3)] for _ in range(2)]
-    grains, stages = sand.Grains(np.zeros((2, 3)), 1.0, sand.SILICA).arrays, stage_arrays(2)
+    grains, stages = sand.Grains(np.zeros((2, 3)), 1.0, sand.SILICA).arrays, runge_kutta_arrays(2)
     for g, way in enumerate(ways):
         for axis, x in enumerate(way):
             stages.start[X + axis, g], grains.position[axis, g] = x(0.0), x(STEP)

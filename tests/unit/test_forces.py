@@ -1,19 +1,20 @@
 """External forces written by users, and the uniform field."""
 
 import math
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import sand
-from sand.compiler.jit import COMPILED, cache_folder, formula
-from sand.forces.base import compose
-from sand.forces.external.formulas import GrainState, nothing, uniform_field
-from sand.forces.external.loops import is_builtin
-from sand.integrate.driver import driver_for
-from sand.integrate.kernel_spec import KernelSpec
+from sand.compiler.jit import formula
+from sand.compiler.user_code import user_code_digest
+from sand.forces.external.formulas import GrainState, uniform_field
+from sand.forces.external.loops import external_energies_for
+from sand.integrate.force_calls import add_external_loads, sum_external
+from sand.integrate.force_stages import ENERGY, external_force_stages, pair_force_stages
+from sand.integrate.parts import ExternalWork
+from sand.integrate.program import build_program
 
 
 class Weight(NamedTuple):
@@ -60,27 +61,100 @@ def test_a_users_force():
     assert change < 1e-9 * sim.ledger["translation"][-1] + 1e-15 * sim.ledger["gravity"][0]
 
 
-def test_compiled_code_with_a_users_formula_is_not_cached():
-    """The digest of SAND's sources does not cover its edits: a cached copy would be outdated."""
-    assert is_builtin(uniform_field)
-    assert not is_builtin(weight)
-    if not COMPILED:
-        pytest.skip("the compiler is off")
-    theirs, ours = (compose([force])[0] for force in (Gravity(), sand.Field(0.5)))
-    assert driver_for(KernelSpec(external=theirs, keep=False)).stats.cache_path is None
-    assert Path(driver_for(KernelSpec(external=ours)).stats.cache_path).is_relative_to(cache_folder())
+def test_only_stages_with_a_users_formula_have_a_digest():
+    """All stages of SAND's forces have none; a force of the user gives its stages, and no others, one and the same."""
+    sums = [sand.Charges().sums(sand.Box.open(), False), own_charges().sums(sand.Box.open(), False)]
+    ours = [*external_force_stages(sand.Field(0.5).formula).values(), *pair_force_stages(sums[0], False).values()]
+    theirs = [*external_force_stages(weight).values(), external_energies_for(weight)]
+    assert {user_code_digest(stage.function) for stage in ours} == {""}
+    for stages in (theirs, pair_force_stages(sums[1], False).values()):
+        digests = {user_code_digest(stage.function) for stage in stages}
+        assert len(digests) == 1 and len(digests.pop()) == 16
 
 
-def test_composed_forces_add_up():
-    """Two forces in one formula: sums of force, torque and energy, each with its own parameters."""
-    field = sand.Field([0.0, 0.0, 0.5])
-    both, numbers = compose([Gravity(), field])
-    grain = GrainState((0.0, 0.0, 2.0), (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0), 1.0, 3.0, 0.0)
-    force, torque, energy = both(0.0, grain, numbers)
-    assert force == pytest.approx((0, 0, -3 * 9.81), rel=1e-6, abs=0.0)
-    assert torque == pytest.approx((0, -0.5, 0), rel=1e-6, abs=0.0)
-    assert energy == pytest.approx(3 * 9.81 * 2, rel=1e-6, abs=0.0)
-    assert compose([]) == (nothing, ())
+SOURCE = """
+from numba import njit
+from sand.compiler.jit import formula
+import math
+FACTOR = 2.0
+AXIS = (0.0, 1.0)
+def half(x):
+    return 0.5 * x + math.sin(x - AXIS[0])
+@formula
+def force(x):
+    return FACTOR * half(x)
+"""
+"""A module of the user."""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "differs"),
+    [
+        ("FACTOR = 2.0", "FACTOR = 3.0", True),
+        ("0.5 * x", "0.25 * x", True),
+        ("def half", "@njit\ndef half", False),
+        ("    return 0.5", "    # half of it\n    return 0.5", False),
+        ("FACTOR *", "-FACTOR *", True),
+        ("math.sin", "math.cos", True),
+        ("x - AXIS[0]", "AXIS[0] - x", True),
+        ("AXIS = (0.0, 1.0)", "AXIS = (0.5, 1.0)", True),
+        ("FACTOR = 2.0", "FACTOR = object()", None),
+    ],
+)
+def test_the_digest_changes_with_the_code_of_the_user(old, new, differs):
+    """With the bytecode of a formula or of a function that it calls, and with globals; not with comments.
+
+    None, so that nothing is cached, for an object that cannot be told from its text.
+    """
+
+    def digest(text):
+        scope = {"__name__": "users_module"}
+        exec(text, scope)
+        return user_code_digest(scope["force"])
+
+    before, after = digest(SOURCE), digest(SOURCE.replace(old, new))
+    assert len(before) == 16 and digest(SOURCE) == before
+    assert after is None if differs is None else (after != before) is differs
+
+
+@formula
+def own_coulomb(apart, a, b, parameters):
+    """Charges, as users write the formula in a script."""
+    return (a.charge * b.charge * apart[0], 0.0, 0.0), 0.0
+
+
+def own_charges():
+    """A pair force with a formula from outside SAND."""
+
+    class OwnCharges(sand.Charges):
+        formula = staticmethod(own_coulomb)
+        rate = None
+
+    return OwnCharges()
+
+
+def test_external_forces_add_up():
+    """Two forces, each with its own parameters: sums of force, torque and energy; without forces nothing changes.
+
+    In plain Python, with the loops over all forces and with their stages.
+    """
+    grains = sand.Grains([[0.0, 0.0, 2.0]], 1.0, sand.SILICA, mass=3.0, moment=[[1.0, 0.0, 0.0]])
+    for forces, weighs, turns in (
+        ([Gravity(), sand.Field([0.0, 0.0, 0.5])], 1.0, 1.0),
+        ([sand.Field([0.0, 0.0, 0.5]), Gravity()], 1.0, 1.0),
+        ([Gravity()], 1.0, 0.0),
+        ([], 0.0, 0.0),
+    ):
+        engine = sand.Simulation(grains, forces)._engine
+        parameters = engine.parameters._replace(external_work=ExternalWork(True, False))
+        table, own = engine._current_table(engine.state), engine.state.grains.arrays
+        program = build_program(engine._components, parameters, table)
+        own.force[...] = own.torque[...] = 0.0
+        add_external_loads(table["scratch"], parameters.forces, program, table, 0.0)
+        assert own.force[:, 0] == pytest.approx((0, 0, -3 * 9.81 * weighs), rel=1e-6, abs=0.0)
+        assert own.torque[:, 0] == pytest.approx((0, -0.5 * turns, 0), rel=1e-6, abs=0.0)
+        energy = sum_external(table["scratch"], parameters.forces, program, table, 0.0, ENERGY)
+        assert energy == pytest.approx(3 * 9.81 * 2 * weighs, rel=1e-6, abs=0.0)
 
 
 def test_torque_of_the_field_is_minus_the_gradient_of_its_energy():

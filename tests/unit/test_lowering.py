@@ -131,16 +131,18 @@ def test_an_error_in_a_kernel_from_the_disk_cache_reaches_its_caller(tmp_path):
 
 @pytest.mark.compiled("small")
 @pytest.mark.skipif(not COMPILED, reason="nothing is compiled")
-def test_incompatible_calling_conventions_raise():
-    """Plain numba functions unpack named tuples, SAND's do not: a call across raises instead of reading garbage."""
+def test_plain_numba_code_may_call_functions_of_sand():
+    """A user's `numba.njit` code and a kernel of SAND get the same number from a function of a tuple of arrays."""
 
-    def speed(grains):
-        return kicked(grains, 0, 1.0)[0][0]
+    def speed(grains, i):
+        return kicked(grains, i, 1.0)[0][1]
 
-    grains = sand.Grains(np.zeros((1, 3)), 0.1, sand.SILICA, velocity=[[3.0, 0.0, 0.0]]).arrays
-    assert kernel(speed, cached=False)(grains) == 3.0
-    with pytest.raises(TypeError, match=r"sand\.compiler\.jit\.kernel"):
-        numba.njit(speed)(grains)
+    velocity = np.arange(9.0).reshape(3, 3)
+    for compiled in (kernel(speed, cached=False), numba.njit(speed)):
+        grains = sand.Grains(np.zeros((3, 3)), 0.1, sand.SILICA, velocity=velocity).arrays
+        grains.force[1, 2] = 2.0 * grains.mass[2]
+        assert compiled(grains, 2) == 7.0 + 2.0
+        assert grains.velocity[:, 2].tolist() == [6.0, 9.0, 8.0]
 
 
 @pytest.mark.compiled("small")

@@ -7,25 +7,17 @@ from hypothesis import strategies as st
 
 import sand
 from sand.box import Box, as_box
-from sand.compiler.jit import kernel
 from sand.contact.columns import column_loops
 from sand.contact.jkr import LAW as JKR
 from sand.forces.pair.dipole_loops import ALL_PAIRS_CUT
+from sand.integrate.force_stages import SUM, WHOLE, pair_force_stages
 from sand.integrate.respa import clear_long_range_loads
 from sand.neighbours import cell_list as cells
 from sand.neighbours.settings import Neighbours, share_within
 from sand.state.arrays import empty_long_range_arrays
 from sand.state.state import LISTED, MADE, PAIRS, REBUILT
 
-cut_loads = ALL_PAIRS_CUT.loads
-
-
-def _all_pairs(grains, far, span, rules):
-    clear_long_range_loads(far)
-    cut_loads(grains, far, span, rules)
-
-
-all_pairs = kernel(_all_pairs, cached=False)
+from ..tables import table_of
 
 
 def rows(position, box, reach):
@@ -171,7 +163,9 @@ def all_pairs_loads(sim):
     """Long-range forces, torques and fields of the same state over all pairs."""
     state = sim.state.copy()
     rules, far = sim._engine.parameters, empty_long_range_arrays(len(state.grains), 0)
-    all_pairs(state.grains.arrays, far, rules.span, rules.long_range[0])
+    clear_long_range_loads(far)
+    parts = table_of(grains=state.grains.arrays, long_range=far, span=rules.span)
+    pair_force_stages(ALL_PAIRS_CUT, False)[SUM].run(parts, sim._engine.long_range[0][2], WHOLE)
     return far.force, far.torque, state.grains.arrays.field
 
 
@@ -328,13 +322,11 @@ def test_long_rows_are_rebuilt_with_more_room():
     radius[30] = 2e-7
     sim = sand.Simulation(sand.Grains(position, radius, sand.SILICA), [sand.Contact()], neighbours=Neighbours("cells"))
     state = sim.state
-    state.long_range = state.long_range._replace(neighbour=np.zeros(9, np.uint32), source=np.zeros((1, 9)))
+    state.long_range = state.long_range._replace(neighbour=np.zeros(9, np.uint32))
     assert state.pair_list.pair.shape[1] == 16
     sim.run(steps=1)
     state = sim.state
-    assert (
-        state.long_range.source.shape == (1, state.long_range.neighbour.size) and state.long_range.neighbour.size > 29
-    )
+    assert state.long_range.neighbour.size > 29
     assert state.count[REBUILT] == 1 and state.count[PAIRS] == 29
     assert {tuple(sorted(pair)) for pair in state.pair_list.pair[:, :29].T.tolist()} == {(k, k + 1) for k in range(29)}
     assert np.array_equal(state.pair_list.anchor.T, position)
@@ -349,7 +341,7 @@ def test_near_pairs_have_the_step_of_their_own_contact():
     mixed = sand.Grains(1.03 * block.position, radius, [sand.IRON if k % 3 else sand.SILICA for k in range(125)])
     sim = sand.Simulation(mixed, [sand.Contact()])
     sim.run(steps=1)
-    near, law, a = sim.state.pair_list, sim._engine.parameters.contact, sim.grains.arrays
+    near, law, a = sim.state.pair_list, sim._engine.parameters.settings, sim.grains.arrays
     pairs = sim.state.count[PAIRS]
     assert pairs > 30
     for p, (i, j) in enumerate(near.pair[:, :pairs].T):

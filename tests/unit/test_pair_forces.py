@@ -80,7 +80,7 @@ def test_taylor_rate_of_the_torque():
     before = sim.loads()
     w, rules = sim.state, sim._engine.parameters
     far = empty_long_range_arrays(len(grains), 0)  # a run without r-RESPA cycles has no arrays for rates
-    kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, rules.span, rules.long_range[0])
+    kernel(fill, cached=False)(w.grains.arrays, far, w.contacts.start, rules.span, sim._engine.long_range[0][2])
     force_rate, torque_rate = far.force_rate.T.copy(), far.torque_rate.T.copy()
     sim.run(steps=10)
     after = sim.loads()

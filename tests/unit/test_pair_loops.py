@@ -1,4 +1,4 @@
-"""Sums of long-range loads in blocks against sums in one loop, for combined forces in any order."""
+"""Sums of long-range loads in blocks against sums in one loop, for several forces in any order."""
 
 import itertools
 
@@ -7,11 +7,18 @@ import pytest
 
 import sand
 from sand.compiler.jit import formula, kernel
-from sand.forces.base import compose_long_range
+from sand.compiler.stage import Program
 from sand.forces.pair import dipole_loops as dipoles
-from sand.integrate.respa import clear_long_range_loads
+from sand.forces.pair import generic_loops, loops
+from sand.integrate.force_calls import sum_pair_forces
+from sand.integrate.force_stages import PAIR_STAGES, SUM, pair_force_stages
+from sand.integrate.parts import ForceNumbers
+from sand.integrate.stages import FIRST_FORCE
+from sand.integrate.task_queue import SHARED, new_task_queue
 from sand.neighbours.cell_list import build_verlet_list
 from sand.state.arrays import empty_long_range_arrays
+
+from ..tables import table_of
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -29,38 +36,47 @@ def cloud():
     [p for name in ("listed dipoles", "dipoles") for p in itertools.permutations([name, "listed charges"])],
     ids=" then ".join,
 )
-def test_blocked_sums_of_combined_forces(order):
-    """begin, blocks and end give the result of `loads`: F, M and B to 1e-12 of the largest.
+def test_blocked_sums_of_several_forces(order, monkeypatch):
+    """Shared blocks give the result of one block; both are the sum of the two forces: F, M, B to 1e-12 of the largest.
 
-    The functions run as plain Python.  Charges have arrays of their own in `long_range`.
+    The functions run as plain Python.  Charges have arrays of their own in `long_range`.  The blocks of large
+    simulations are made for these 40 grains.
     """
     grains = cloud()
     forces = [sand.Dipoles(cutoff="0.1 um"), sand.Charges(cutoff="0.1 um")]
     sim = sand.Simulation(grains, forces, neighbours=sand.Neighbours("cells"))
-    of_dipoles, (of_charges, _) = sim._engine.parameters.long_range
+    (_, of_dipoles), (_, of_charges) = sim._engine._components.pair_forces
     numbers = {"listed dipoles": of_dipoles, "listed charges": of_charges, "dipoles": of_dipoles}
-    loops = {
+    sums = {
         "listed dipoles": dipoles.LISTED_PAIRS,
         "listed charges": forces[1].sums(sim.box, True),
         "dipoles": dipoles.ALL_PAIRS_CUT,
     }
-    sums, own = compose_long_range([loops[name] for name in order], [numbers[name] for name in order])
-    span, found = sim._engine.parameters.span, []
-    for loop in ("at once", "in blocks"):
-        arrays, far = sim.state.copy().grains.arrays, empty_long_range_arrays(40, 4000)
-        build_verlet_list(arrays, far, sim.state.count.copy(), span, sim._engine.parameters.search)
-        clear_long_range_loads(far)
-        if loop == "at once":
-            sums.loads(arrays, far, span, own)
-        else:
-            sums.blocked.begin(arrays, far, span, own)
-            for b in range(sums.blocked.blocks(arrays)):
-                sums.blocked.block(arrays, far, span, own, b)
-            sums.blocked.end(arrays, far, span, own)
-        found.append((far.force, far.torque, arrays.field))
-    for once, blocks in zip(*found, strict=True):
-        assert np.abs(once).max() > 0.0
-        assert np.abs(once - blocks).max() < 1e-12 * np.abs(once).max()
+    span = sim._engine.parameters.span
+
+    def loads(names, shared):
+        arrays, far = sim.state.copy().grains.arrays, empty_long_range_arrays(40, 4000, loops.ALL_PAIRS_BLOCKS)
+        count, queue = sim.state.count.copy(), new_task_queue(40, 0)
+        queue.words[SHARED] = shared
+        build_verlet_list(arrays, far, count, span, sim._engine.parameters.search)
+        table = table_of(grains=arrays, long_range=far, span=span)
+        stages = {
+            FIRST_FORCE + PAIR_STAGES * k + SUM: (pair_force_stages(sums[name], False)[SUM], numbers[name])
+            for k, name in enumerate(names)
+        }
+        program = Program(table, stages, FIRST_FORCE + PAIR_STAGES * len(names))
+        far.force[...] = far.torque[...] = 1.0  # of an earlier sum
+        sum_pair_forces(far, count, ForceNumbers(len(names), 0), queue, program, table)
+        return far.force, far.torque, arrays.field
+
+    once, alone = loads(order, False), [loads([name], False) for name in order]
+    monkeypatch.setattr(loops, "PARALLEL_FROM", 1)
+    for module in (loops, generic_loops, dipoles):
+        monkeypatch.setattr(module, "ROWS_PER_BLOCK", 16)
+    for whole, blocks, *parts in zip(once, loads(order, True), *alone, strict=True):
+        assert np.abs(whole).max() > 0.0
+        assert np.abs(whole - blocks).max() < 1e-12 * np.abs(whole).max()
+        assert np.abs(whole - sum(parts)).max() < 1e-12 * np.abs(whole).max()
 
 
 @pytest.mark.compiled("dipoles")

@@ -4,23 +4,30 @@ import numpy as np
 import pytest
 
 import sand
-from sand.compiler.jit import COMPILED, LONG_VECTORS, kernel
+from sand.compiler.jit import COMPILED
+from sand.compiler.processor import FAST_512_BIT
+from sand.compiler.stage import stage
 from sand.constants import MAGNETIC
 from sand.forces.pair import dipole_loops as dipoles
+from sand.forces.pair.cutoff import UNCUT
+from sand.integrate.force_stages import SUM, WHOLE, pair_force_stages
 from sand.numerics import roots
 from sand.simulation.assemble import WIDE_FROM
 from sand.state.arrays import empty_long_range_arrays
 
+from ..tables import table_of
+
 
 def filled_by(function):
-    """Kernels that fill an array with its roots, as long as whole vectors or one by one."""
+    """Stages that fill an array with its roots, as long as whole vectors or one by one."""
 
     def fill(x, out):
         for k in range(x.size):
             out[k] = function(x[k])
+        return 0
 
-    fill.__qualname__ += function.__name__
-    return kernel(fill, cached=False, long_vectors=True)
+    fill.__module__ = "sand.of_a_test"  # compiled, with the longest vectors, as functions of SAND are
+    return stage("inverse roots", long_vectors=True, cached=False)(fill)
 
 
 @pytest.mark.compiled("small")
@@ -67,11 +74,12 @@ def test_sums_with_seeded_roots_agree(count):
     span, found = sand.Box.open().span, []
     for pair in (dipoles.uncut_pair, dipoles.uncut_pair_seeded):
         loads, far, own = (
-            kernel(dipoles.all_pairs(pair).loads, cached=False, long_vectors=True),
+            pair_force_stages(dipoles.all_pairs(pair), True)[SUM],
             empty_long_range_arrays(count, 0, 8),
             grains.copy(),
         )
-        loads(own.arrays, far, span, dipoles.DipoleParameters(MAGNETIC, None))
+        numbers = dipoles.DipoleParameters(MAGNETIC, UNCUT)
+        loads.run(table_of(grains=own.arrays, long_range=far, span=span), numbers, WHOLE)
         found.append((far.force, far.torque, own.arrays.field))
     for exact, seeded in zip(*found, strict=True):
         assert np.abs(exact - seeded).max() < 1e-13 * np.abs(exact).max()
@@ -85,6 +93,6 @@ def test_when_seeded_roots_are_used():
             1e-6 * np.arange(3 * count).reshape(count, 3), 1e-8, sand.IRON, moment=[[6e-18, 0, 0]] * count
         )
         (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles()])._engine.long_range
-        assert (sums is dipoles.ALL_PAIRS) == (count < WIDE_FROM or not LONG_VECTORS)
+        assert (sums is dipoles.ALL_PAIRS) == (count < WIDE_FROM or not FAST_512_BIT)
         (_, sums, _), *_ = sand.Simulation(grains, [sand.Dipoles(cutoff="1 um")])._engine.long_range
         assert sums in (dipoles.ALL_PAIRS_CUT, dipoles.LISTED_PAIRS)

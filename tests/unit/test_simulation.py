@@ -294,7 +294,7 @@ def test_arrays_are_allocated_as_needed(far, there, not_there):
 
 @pytest.mark.compiled("contacts")
 def test_contacts_alone_have_no_room_for_other_forces():
-    """No long-range loads and no list, one row for the cells; a damping column only with damping."""
+    """No long-range loads and no list, one buffer for the cells; a damping column only with damping."""
     x_positions = (2e-8 - 1e-12) * np.indices((4, 4, 4)).reshape(3, -1).T
     grains = sand.Grains(x_positions, 1e-8, sand.SILICA)
     for damping in ("none", "viscoelastic"):
@@ -303,7 +303,8 @@ def test_contacts_alone_have_no_room_for_other_forces():
         sim.run(steps=2)
         far, contacts = sim.state.long_range, sim.state.contacts
         assert far.force.size == far.torque.size == far.anchor.size == far.start.size == 0
-        assert far.packed_position.size == 0 and far.source.shape == (1, far.neighbour.size) and far.order.size == 64
+        assert far.packed_position.size == far.packed_moment.size == far.packed_grain.size == 0
+        assert far.squared_distance.size == far.order.size == 64
         assert contacts.damped.size == (contacts.twist.size if damping == "viscoelastic" else 0)
         assert len(contacts.lost) == (6 if damping == "viscoelastic" else 4)
         near = sim.state.pair_list

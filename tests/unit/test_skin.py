@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import sand
-from sand.integrate.kernel_spec import Stop
-from sand.integrate.step_parts import INNER_SKIN_FRACTION
+from sand.integrate import task_queue
+from sand.integrate.parts import Stop
+from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.neighbours.skin import largest_displacement, largest_squared_speeds
-from sand.simulation import assemble as translate
+from sand.simulation import engine
 from sand.state.state import (
     BROKEN,
     INNER_SKIN,
@@ -62,7 +63,8 @@ def test_displacements_stay_within_the_skin(monkeypatch, blocks):
 
     Also with loops in blocks for threads.
     """
-    monkeypatch.setattr(translate, "uses_task_queue", lambda grains: blocks)
+    for module in (task_queue, engine):
+        monkeypatch.setattr(module, "uses_task_queue", lambda grains: blocks)
     sim = dense_gas(margin="5 nm")
     control, search = sim._engine.parameters.criteria, sim._engine.parameters.search
     limits = {

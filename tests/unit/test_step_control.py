@@ -8,8 +8,8 @@ import pytest
 import sand
 from sand.compiler.jit import kernel
 from sand.contact.events import inner_list_overflowed
+from sand.integrate.stages import INNER_SKIN_FRACTION
 from sand.integrate.step_control import closing_step, grain_step, pair_step, steps_of_free_grains
-from sand.integrate.step_parts import INNER_SKIN_FRACTION
 from sand.neighbours.pair_list import build_inner_list
 from sand.numerics.simd import float_bits, float_from_bits
 from sand.state.state import INNER_COUNT, INNER_SKIN, PAIRS
@@ -43,7 +43,7 @@ def test_vectorised_minima_equal_plain_minima():
     arrays, span, control = w.grains.arrays, rules.span, rules.criteria
 
     def minima(grains, far, start, near, count, span, control):
-        step, cycle = steps_of_free_grains(grains, far, start, count, control)
+        step, cycle = steps_of_free_grains(grains, far, start, control)
         return step, cycle, closing_step(grains, near, count, span, control, math.inf)
 
     step, cycle, closing = kernel(minima, cached=False)(

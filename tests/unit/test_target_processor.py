@@ -9,42 +9,50 @@ import sys
 import numpy as np
 import pytest
 
-from sand.compiler.jit import COMPILED, kernel
+from sand.compiler.jit import COMPILED
+from sand.compiler.processor import fast_512_bit
+from sand.compiler.stage import stage
 
 if not COMPILED:
     pytest.skip("nothing is compiled", allow_module_level=True)
-from sand.compiler import lowering
 
 COMPILE = """
 import json
-from numba import float64, int64
-from sand.compiler import jit
+import sys
+import numpy as np
+from sand.compiler.stage import Table, stage
 
 def doubled(x):
     for i in range(x.size):
         x[i] *= 2.0
+    return 0
 
 def gathered(x, k):
     total = 0.0
     for i in range(k.size):
         total += x[k[i]]
-    return total
+    x[0] = total
+    return 0
 
+table = Table(("x", "k"))
+table.set("x", np.zeros(100))
+table.set("k", np.zeros(100, np.int64))
 found = {"hits": 0, "attributes": {}, "instructions": {}}
-for name, function, types, wide in [
-    ("loop", doubled, (float64[::1],), False),
-    ("long loop", doubled, (float64[::1],), True),
-    ("gathering", gathered, (float64[::1], int64[::1]), False),
-]:
-    code = jit.kernel(function, long_vectors=wide)
-    code.compile(types)  # never run: this machine need not have these instructions
+sys.modules["sand.of_a_test"] = sys.modules["__main__"]
+doubled.__module__ = gathered.__module__ = "sand.of_a_test"  # compiled as functions of SAND are
+for name, function, wide in [("loop", doubled, False), ("long loop", doubled, True), ("gathering", gathered, False)]:
+    one = stage("a test", long_vectors=wide)(function)
+    dispatchers, make = [], one._dispatcher
+    one._dispatcher = lambda: dispatchers.append(make()) or dispatchers[-1]
+    one.address(table, ())  # never run: this machine need not have these instructions
+    (code,) = dispatchers
     found["hits"] += sum(code.stats.cache_hits.values())
     llvm, assembly = *code.inspect_llvm().values(), *code.inspect_asm().values()
     found["attributes"][name] = [w for w in ("+prefer-no-gather", '"prefer-vector-width"="512"') if w in llvm]
     found["instructions"][name] = [w for w in ("zmm", "vgatherq") if w in assembly]
 print(json.dumps(found))
 """
-"""Compiles three loops, as a user's process would; of two equal ones the second comes from the cache."""
+"""Compiles three stages, as a user's process would; of two equal ones the second comes from the cache."""
 
 NO_GATHER, WIDE = "+prefer-no-gather", '"prefer-vector-width"="512"'
 EXPECTED = {
@@ -102,7 +110,7 @@ def test_code_is_compiled_for_the_named_processor(tmp_path):
 )
 def test_named_features_override_the_processor_name(name, features, expected):
     """As in LLVM, which adds them to the features of the name."""
-    assert lowering._fast_512_bit(name, features) is expected
+    assert fast_512_bit(name, features) is expected
 
 
 @pytest.mark.compiled("small")
@@ -112,8 +120,9 @@ def test_vector_width_does_not_change_results():
     def doubled(x):
         for i in range(x.size):
             x[i] *= 2.0
+        return 0
 
     for wide in (False, True):
         numbers = np.arange(100.0)
-        kernel(doubled, cached=False, long_vectors=wide)(numbers)
+        stage("a test", cached=False, long_vectors=wide)(doubled)(numbers)
         assert (numbers == 2.0 * np.arange(100)).all()

@@ -1,1 +1,1 @@
-"""Decorators that compile functions with numba, the cache of compiled code, and atomic operations."""
+"""Functions compiled with numba, stages called by address, the cache of compiled code, and atomic operations."""

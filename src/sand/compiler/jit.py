@@ -1,10 +1,12 @@
-"""Decorators for compiled functions.  Only `lowering`, `convention`, `atomics` and this module import numba.
+"""Decorators for compiled functions.  Only the modules of this package import numba.
 
 `formula`   Scalar physics on floats and 3-tuples; inlined; remains an ordinary Python function.
 `rare`      Like `formula`, but not inlined: for code that is seldom executed.
-`loop`      A loop over arrays, inlined into a larger loop.  No array may be passed twice.
-`noinline`  A loop that remains a function of its own, so that all callers get the same bits.  No array twice.
+`loop`      A loop over arrays, inlined into a larger loop.  No array may be passed twice, and it calls no stage.
+`caller`    A function that calls stages, which may change its arrays; inlined.
+`separate`  A loop over arrays that is not inlined.  No array may be passed twice.
 `kernel`    A compiled entry point, called from Python.  No array may be passed twice.
+`stage`     A loop over parts of the state of a simulation, called by address: see the module of this name.
 """
 
 from __future__ import annotations
@@ -14,7 +16,6 @@ import re
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
 import numba
@@ -22,12 +23,10 @@ from filelock import BaseFileLock
 from numba.core import event
 from numba.extending import register_jitable
 
-from ..errors import warn
 from .cache import private_folder
 from .progress import CompilationListener, acquire_lock
 
-_NAMES = "HAS_NOINLINE COMPILED LONG_VECTORS cache_folder compile_error formula is_builtin kernel loop noinline rare"
-__all__ = _NAMES.split()
+__all__ = ["COMPILED", "cache_folder", "caller", "compile_error", "formula", "kernel", "loop", "rare", "separate"]
 
 # As fast as fastmath=True, but NaN and infinity are preserved, so that checks can detect them.
 _FAST = {"reassoc", "contract", "nsz", "arcp", "afn"}
@@ -50,44 +49,27 @@ _NO_ALIASES = _no_alias_option()
 
 
 TESTED_NUMBA = (0, 62), (0, 68)
-"""First and last version of numba with which `lowering` is tested.
-
-With other versions compiling takes three times as long, and there are no threads.
-"""
+"""First and last version of numba with which `lowering` is tested; with other versions compiling takes longer."""
 
 
-def _pipeline_options() -> list[dict[str, Any]]:
-    """Options for kernels, kernels with long loops, inner and noinline functions; empty for an untested numba."""
+def _pipeline_options() -> tuple[dict[str, Any], dict[str, Any]]:
+    """Options for kernels and for the functions that they call; empty for an untested numba."""
     if TESTED_NUMBA[0] <= numba.version_info.short <= TESTED_NUMBA[1]:
         try:
-            from .lowering import FAST_512_BIT, FunctionCompiler, KernelCompiler, LongVectorCompiler, NoinlineCompiler
+            from .lowering import FunctionCompiler, KernelCompiler
         except (ImportError, AttributeError):
             pass  # numba's internals differ from those of the tested versions
         else:
-            long_vectors = LongVectorCompiler if FAST_512_BIT else KernelCompiler
-            return [
-                {"pipeline_class": each} for each in (KernelCompiler, long_vectors, FunctionCompiler, NoinlineCompiler)
-            ]
-    if not numba.config.DISABLE_JIT:
-        first, last = (".".join(map(str, version)) for version in TESTED_NUMBA)
-        warn(
-            f"SAND is not tested with numba {numba.__version__} (tested: {first} to {last}): results are correct, but "
-            "compiling takes about three times as long and every simulation uses one thread only"
-        )
-    return [{}, {}, {}, {}]
+            return {"pipeline_class": KernelCompiler}, {"pipeline_class": FunctionCompiler}
+    return {}, {}
 
 
 # inner functions are never called from Python in compiled form: without wrappers compiling is faster
-_KERNEL, _LONG_VECTOR_KERNEL, _FUNCTION, _NOINLINE = _pipeline_options()
-_NO_WRAPPERS: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-_INNER = _NO_WRAPPERS | _FUNCTION
+_KERNEL, _FUNCTION = _pipeline_options()
+_INNER: dict[str, Any] = _COMMON | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True} | _FUNCTION
 
 COMPILED = not numba.config.DISABLE_JIT
 """False if NUMBA_DISABLE_JIT is set, so that all functions run in Python."""
-LONG_VECTORS = _LONG_VECTOR_KERNEL != _KERNEL
-"""Whether there are kernels with 512-bit vectors, on processors for which LLVM chooses 256 bits by default."""
-HAS_NOINLINE = bool(_NOINLINE)
-"""Whether `noinline` loops are compiled separately, so that all threads get the same bits from them."""
 
 
 def _compile_once_per_type(function: Callable) -> None:
@@ -130,9 +112,10 @@ def _registered(**options: Any) -> Callable[[Callable], Callable]:
 # options that are not given would be inherited from the caller: all are given
 _ALIASES = dict.fromkeys(_NO_ALIASES, False)
 formula = _registered(**_INNER, **_ALIASES, forceinline=True)
+caller = formula
 rare = _registered(**_INNER, **_ALIASES, forceinline=False)
 loop = _registered(**_INNER, **_NO_ALIASES, forceinline=True)
-noinline = _registered(**_NO_WRAPPERS, **_NOINLINE, **_NO_ALIASES, forceinline=False)
+separate = _registered(**_INNER, **_NO_ALIASES, forceinline=False)
 
 
 _COMPILED = (
@@ -148,7 +131,7 @@ def _digest() -> str:
     Numba detects edits only in the file of the kernel.  Without the digest, an edited formula in another file would be
     ignored.  Edits of other files, such as those of commands, recompile nothing.
     """
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(f"{numba.__version__} {sorted(_KERNEL)}".encode())
     package = Path(__file__).parents[1]
     for part in _COMPILED:
         for path in sorted((package / part).rglob("*.py")) if not part.endswith(".py") else [package / part]:
@@ -211,13 +194,8 @@ if COMPILED:
     event.register("numba:compile", CompilationListener(_PURPOSES, cache_folder().parent / "compile-times.json"))
 
 
-def is_builtin(function: Callable) -> bool:
-    """Whether a formula is part of SAND; compiled code with a user's own formula is not cached on disk."""
-    return str(function.__module__).startswith("sand.")
-
-
 def kernel(
-    function: Callable, *, cached: bool = True, nogil: bool = False, long_vectors: bool = False, purpose: str = ""
+    function: Callable, *, cached: bool = True, nogil: bool = False, wrapper: bool = True, purpose: str = ""
 ) -> Callable:
     """Compile `function` on its first call and cache the result in SAND's cache folder.
 
@@ -228,11 +206,11 @@ def kernel(
     function : callable
         The function.
     cached : bool, optional
-        False for code that contains formulas of the user, whose edits the digest does not detect.
+        False to compile it in each process, such as code with formulas of the user that cannot be told by their source.
     nogil : bool, optional
         True for code during which other Python threads may run.
-    long_vectors : bool, optional
-        True for loops of about 64 iterations and more, which profit from the longest SIMD vectors.
+    wrapper : bool, optional
+        False for code that is not called from Python.
     purpose : str, optional
         What is computed, for the note shown while it is compiled; by default from the name of the function.
 
@@ -241,19 +219,15 @@ def kernel(
     callable
         The compiled function.
     """
-    if long_vectors and LONG_VECTORS:  # cache entries are found by name; the two variants differ only here
-        name = f"{function.__qualname__}_wide"
-        function = FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
-        function.__qualname__ = name
     global_folder = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_FOLDER)
     try:
-        options = (_LONG_VECTOR_KERNEL if long_vectors else _KERNEL) | _COMMON | _NO_ALIASES
-        compiled = numba.njit(cache=cached, nogil=nogil, no_cfunc_wrapper=True, **options)(function)
+        options = _KERNEL | _COMMON | _NO_ALIASES | {"no_cpython_wrapper": not wrapper, "no_cfunc_wrapper": True}
+        compiled = numba.njit(cache=cached, nogil=nogil, **options)(function)
     finally:
         numba.config.CACHE_DIR = global_folder
     _PURPOSES[id(compiled)] = purpose or f"'{function.__name__.replace('_', ' ')}'"
-    if cached:
+    if cached and COMPILED:
         _share_cache(compiled)
     return compiled
 

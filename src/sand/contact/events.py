@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..box import nearest_image
-from ..compiler.jit import kernel, loop, rare
+from ..compiler.jit import loop, rare
+from ..compiler.stage import Stage, stage
 from ..numerics.quaternion import turned_back
 from ..numerics.vec import accrue, dot, load, load4, put, scale, sub
 from ..state.state import (
@@ -29,7 +30,7 @@ from . import tangential
 from .columns import column_loops, uniform_contacts
 from .damping import damping_loops, log_loss, store_damping_force
 from .gather import sort_contacts_by_grain
-from .law import ContactLaw, is_builtin_law
+from .law import ContactLaw
 from .mechanics import (
     Displacements,
     contact_speed_gain,
@@ -210,7 +211,7 @@ class FormingLoops(NamedTuple):
     """Loops that form contacts, for one contact law."""
 
     form: Callable  # contacts of pairs that began to touch within the step
-    add_initial: Callable  # kernel: contacts with given displacements, before the first step
+    add_initial: Stage  # contacts with given displacements, before the first step
 
 
 @functools.cache
@@ -288,6 +289,7 @@ def forming_loops(law: ContactLaw) -> FormingLoops:
             pair_list.in_contact[p] = 1
             count[MADE] += 1
 
+    @stage("the first contacts")
     def add_initial_contacts(grains, contacts, count, span, settings, pair, slide, roll, twist):
         """Append contacts with given displacements, before the first step.
 
@@ -333,4 +335,4 @@ def forming_loops(law: ContactLaw) -> FormingLoops:
         sort_contacts_by_grain(contacts, count, grains.mass.size)
         return broken
 
-    return FormingLoops(form_contacts, kernel(add_initial_contacts, cached=is_builtin_law(law)))
+    return FormingLoops(form_contacts, add_initial_contacts)

@@ -7,7 +7,8 @@ sorted by contact count.
 
 import math
 
-from ..compiler.jit import kernel, loop, rare
+from ..compiler.jit import loop, rare
+from ..compiler.stage import stage
 from ..numerics.vec import add, load, put, sub
 from ..state.arrays import GATHER_CLASSES
 from ..state.state import CONTACTS
@@ -119,7 +120,8 @@ def _set_gather_order(contacts, n, total):
                 order[n + gather_class] += 1
 
 
-@kernel
-def resort_contacts_by_grain(contacts, count, n):
-    """`sort_contacts_by_grain`, callable from Python."""
-    sort_contacts_by_grain(contacts, count, n)
+@stage("the order of contacts")
+def resort_contacts_by_grain(grains, contacts, count):
+    """`sort_contacts_by_grain` as a stage."""
+    sort_contacts_by_grain(contacts, count, grains.mass.size)
+    return 0

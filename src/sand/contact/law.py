@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..compiler.jit import formula, is_builtin
+from ..compiler.jit import formula
 from ..errors import BadInput
 from . import tangential
 
@@ -69,11 +69,6 @@ def register(law: ContactLaw) -> ContactLaw:
     if missing:
         raise BadInput(f"contact law '{law.name}' lacks {', '.join(missing)}")
     return LAWS.setdefault(law.name, law)
-
-
-def is_builtin_law(law: ContactLaw) -> bool:
-    """Whether all formulas of a law are part of SAND, so that compiled code with them may be cached on disk."""
-    return all(is_builtin(member) for member in law if callable(member))
 
 
 class Pairing(NamedTuple):

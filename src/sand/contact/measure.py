@@ -1,41 +1,30 @@
 """Energies, displacements and loads of contacts, measured between steps for the energy table and for output."""
 
 import functools
-from collections.abc import Callable
 
-from ..compiler.jit import kernel, loop
-from ..numerics.vec import across, axpy, dot, load, norm
+from ..compiler.stage import Stage, stage
+from ..numerics.vec import across, axpy, norm
 from ..state.state import CONTACTS
 from .columns import column_loops
-from .law import ContactLaw, is_builtin_law
+from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
 from .update import pose_at, stored_damping_force
 
-ENERGIES = ("translation", "rotation", "normal", "sliding", "rolling", "twisting")
-"""Energies [J] that `measure_energies` computes."""
-
-
-@loop
-def _kinetic(grains):
-    """Kinetic energies [J] of translation and rotation."""
-    translation = rotation = 0.0
-    for i in range(grains.mass.size):
-        v, w = load(grains.velocity, i), load(grains.spin, i)
-        translation += 0.5 * grains.mass[i] * dot(v, v)
-        rotation += 0.5 * grains.inertia[i] * dot(w, w)
-    return translation, rotation
+ENERGIES = ("normal", "sliding", "rolling", "twisting")
+"""Energies [J] of contacts that `measure_energies` computes."""
 
 
 @functools.cache
-def energies_kernel(law: ContactLaw) -> Callable:
-    """The kernel that measures energies, for one contact law."""
+def energies_stage(law: ContactLaw) -> Stage:
+    """The stage that measures energies, for one contact law."""
     constants_at, radius_root, normal_energy = column_loops(law).at, law.radius_root, law.energy
 
-    def measure_energies(grains, contacts, count, span, follow, out):
-        """Fill `out` with the energies [J] listed in ENERGIES."""
-        out[0], out[1] = _kinetic(grains)
+    @stage("the energies of contacts")
+    def measure_energies(grains, contacts, count, span, settings, parameters):
+        """Fill the array parameters[0] with the energies [J] listed in ENERGIES."""
+        out = parameters[0]
         for mode in range(4):
-            out[2 + mode] = 0.0
+            out[mode] = 0.0
         for c in range(count[CONTACTS]):
             i, j = contacts.pair[0, c], contacts.pair[1, c]
             r1, r2 = grains.radius[i], grains.radius[j]
@@ -43,11 +32,12 @@ def energies_kernel(law: ContactLaw) -> Callable:
             overlap, constants = r1 + r2 - pose.distance, constants_at(contacts, c)
             y = radius_root(overlap, constants)
             normal = normal_energy(overlap, y, constants)
-            stored = energies(pose, normal, r1, r2, scaled_stiffness(constants, y, follow))
+            stored = energies(pose, normal, r1, r2, scaled_stiffness(constants, y, settings.follow))
             for mode in range(4):
-                out[2 + mode] += stored[mode]
+                out[mode] += stored[mode]
+        return 0
 
-    return kernel(measure_energies, cached=is_builtin_law(law), purpose="the energies of contacts")
+    return measure_energies
 
 
 CONTACT_ROWS = (
@@ -79,11 +69,12 @@ CONTACT_LOADS = ("force", "torque1", "torque2")
 
 
 @functools.cache
-def contacts_kernel(law: ContactLaw) -> Callable:
-    """The kernel that measures contacts, for one contact law."""
+def contacts_stage(law: ContactLaw) -> Stage:
+    """The stage that measures contacts, for one contact law."""
     constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
     normal_force, normal_energy = law.force, law.energy
 
+    @stage("the table of contacts")
     def measure_contacts(grains, contacts, count, span, follow, out):
         """Fill `out` (rows, C) with the quantities of CONTACT_ROWS, CONTACT_VECTORS and CONTACT_LOADS."""
         for c in range(count[CONTACTS]):
@@ -117,5 +108,6 @@ def contacts_kernel(law: ContactLaw) -> Callable:
                 out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]
                 out[17 + axis, c] = displacements.slide[axis]
                 out[20 + axis, c] = xi[axis]
+        return 0
 
-    return kernel(measure_contacts, cached=is_builtin_law(law), purpose="the table of contacts")
+    return measure_contacts

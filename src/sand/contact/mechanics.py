@@ -39,14 +39,15 @@ def scaled_stiffness(constants, y, follow):
 
     With `follow` ("dt97") k_s ∝ a, k_r ∝ a^(3/2) and k_t ∝ a³; otherwise ("frozen") they are unchanged.
     """
+    y = y if follow else 1.0  # one choice, so that no branch remains in the loop over contacts
     y2 = y * y
     return ContactConstants(
         constants.reduced_radius,
         constants.rest_radius,
         constants.break_overlap,
-        constants.slide_stiffness * (y2 if follow else 1.0),
-        constants.roll_stiffness * (y2 * y if follow else 1.0),
-        constants.twist_stiffness * (y2 * y2 * y2 if follow else 1.0),
+        constants.slide_stiffness * y2,
+        constants.roll_stiffness * (y2 * y),
+        constants.twist_stiffness * (y2 * y2 * y2),
         constants.slide_limit,
         constants.roll_limit,
         constants.twist_limit,
@@ -114,10 +115,9 @@ def exceeds_limits(displacements, n, constants):
 
 @formula
 def _slip_factor(size, limit, reset):
-    """Factor that reduces a displacement of this size to its limit, or to 0."""
-    if size <= limit:
-        return 1.0
-    return 0.0 if reset else limit / size
+    """Factor by which slip reduces a displacement: 1 below the limit, else limit/size or, with `reset`, 0."""
+    kept = 0.0 if reset else limit  # one choice after the other, so that no branches remain in the loop over contacts
+    return kept / size if size > limit else 1.0
 
 
 @formula

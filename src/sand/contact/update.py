@@ -217,7 +217,8 @@ def contact_loop(law: ContactLaw, handle_limits: Callable) -> Callable:
         SlipSums
             Contacts that remain flagged, and contacts that slipped with their losses.
         """
-        pending = slipped = slid = rolled = twisted = 0.0
+        pending = slipped = 0
+        slid = rolled = twisted = 0.0
         for k in range(last - first):
             c = first + k
             i, j = contacts.pair[0, c], contacts.pair[1, c]
@@ -238,12 +239,12 @@ def contact_loop(law: ContactLaw, handle_limits: Callable) -> Callable:
             put(contacts.torque1, c, torque1)
             put(contacts.torque2, c, torque2)
             contacts.flag[c] = flag
-            pending += 1.0 if (flag == PENDING_FLAG) & (c < used) else 0.0
-            slipped += 1.0 if flag == SLIPPED_FLAG else 0.0
+            pending += 1 if (flag == PENDING_FLAG) & (c < used) else 0
+            slipped += 1 if flag == SLIPPED_FLAG else 0
             slid += lost[0]
             rolled += lost[1]
             twisted += lost[2]
-        return SlipSums(pending, slipped, slid, rolled, twisted)
+        return SlipSums(float(pending), float(slipped), slid, rolled, twisted)
 
     return update_contacts
 

@@ -1,15 +1,14 @@
-"""Protocols of the forces, and the composition of several forces into one loop."""
+"""Protocols of the forces."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from ..box import Box
 from ..grains import Grains
-from .external.formulas import nothing, together
 from .pair.cutoff import CutoffChoice
-from .pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, combined_sums
+from .pair.loops import LongRangeSums
 
 
 @runtime_checkable
@@ -93,29 +92,3 @@ class LongRangeForce(Force, Protocol):
 
     def energy_scale(self, grains: Grains) -> float:
         """Largest energy of two grains in contact [J]; limits the step."""
-
-
-def compose(forces: Sequence[ExternalForce]) -> tuple[Callable, Any]:
-    """One formula and one nested tuple of parameters for a list of external forces, in order."""
-    formula, numbers = nothing, ()
-    for force in reversed(forces):
-        formula = _together(force.formula, formula)
-        numbers = (force.numbers(), numbers)  # type: ignore[assignment]
-    return formula, numbers
-
-
-def compose_long_range(sums: Sequence[LongRangeSums], numbers: Sequence[Any]) -> tuple[LongRangeSums, Any]:
-    """One set of loops and one nested tuple of parameters for a list of long-range forces, in order."""
-    composed, nested = NO_LONG_RANGE_FORCE, ()
-    for each, own in zip(reversed(sums), reversed(numbers), strict=True):
-        composed = combined_sums(each, composed)
-        nested = (own, nested)  # type: ignore[assignment]
-    return composed, nested
-
-
-_COMPOSED: dict[tuple[Callable, Callable], Callable] = {}
-
-
-def _together(first: Callable, rest: Callable) -> Callable:
-    """`together`, but the same object for the same formulas, so that nothing is compiled twice."""
-    return _COMPOSED.setdefault((first, rest), together(first, rest))

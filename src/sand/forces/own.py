@@ -436,6 +436,6 @@ def _floats(v):
 
 
 def _of_user(wrapper: Callable, function: Callable) -> Callable:
-    """Decorate a wrapper as a formula of the user's module, whose compiled code is not cached on disk."""
+    """Decorate a wrapper as a formula of the user's module."""
     wrapper.__module__ = function.__module__
     return formula(wrapper)

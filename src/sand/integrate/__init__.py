@@ -1,1 +1,1 @@
-"""Integrators, step-size control, and the compiled drivers."""
+"""Integrators, step-size control, the driver, and the stages that it calls."""

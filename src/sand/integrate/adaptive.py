@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..arguments import checked
+from ..compiler.stage import Stage
 from ..errors import FORBID_EXTRA, BadInput, shown
 from ..grains import Grains
 from ..units import is_word, si
-from .adaptive_driver import free_flight_for
+from .adaptive_driver import free_flight
 from .base import register
 from .step_control import StepCriteria
 from .verlet import Verlet
@@ -73,7 +73,7 @@ class Adaptive:
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "adaptive"
-    flight_loop: ClassVar[Callable | None] = staticmethod(free_flight_for)
+    flight: ClassVar[Stage | None] = free_flight
 
     def __post_init__(self) -> None:
         problems: list[str] = []

@@ -1,19 +1,19 @@
 """Integrators: what an integrator consists of, and the registry.
 
 An integrator is a settings class such as `verlet.Verlet` and, if it moves grains in its own way while there are no
-contacts, a loop for that.  During contacts all integrators take steps of velocity Verlet, for which forming, slip and
+contacts, a stage for that.  During contacts all integrators take steps of velocity Verlet, for which forming, slip and
 breaking of contacts are derived.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
+from ..compiler.stage import Stage
 from ..errors import BadInput
 from ..grains import Grains
 
-MEMBERS = ("name", "flight_loop", "parameters", "contact_stepping", "resolved", "flight_limits")
+MEMBERS = ("name", "flight", "parameters", "contact_stepping", "resolved", "flight_limits")
 
 
 @runtime_checkable
@@ -24,13 +24,14 @@ class Integrator(Protocol):
     ----------
     name : str
         `method` of the [stepping] table of case files.
-    flight_loop : Callable or None
-        `flight_loop(spec)` returns the loop that takes one step of grains without contacts, such as
-        `adaptive_driver.free_flight_for`; None for velocity Verlet. Such steps are limited by the skin of the lists.
+    flight : Stage or None
+        The stage that takes one step of grains without contacts, such as `adaptive_driver.free_flight`; None for
+        velocity Verlet. It takes parts of a simulation by name (`parts.PARTS`) and calls the forces by `force_calls`.
+        Such steps are limited by the skin of the lists.
     """
 
     name: ClassVar[str]
-    flight_loop: ClassVar[Callable | None]
+    flight: ClassVar[Stage | None]
 
     def parameters(self) -> dict[str, Any]:
         """Settings in SI units, as in a case file."""
@@ -43,7 +44,7 @@ class Integrator(Protocol):
         """A copy in which every "auto" is a number, from the initial grains and the `step_control.StepCriteria`."""
 
     def flight_limits(self, longest_displacement: float) -> Any:
-        """Run-time numbers of `flight_loop`, after `resolved`; no step may move a grain farther than this [m]."""
+        """Run-time numbers of `flight`, after `resolved`; no step may move a grain farther than this [m]."""
 
 
 INTEGRATORS: dict[str, type] = {}

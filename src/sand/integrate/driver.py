@@ -5,87 +5,120 @@ One step:  choose dt → kick dt/2, drift, rotate dt → check the pair lists �
 contact that forms or breaks ends the cycle.  The driver returns between two cycles, at the requested end or because no
 step is possible, and in the middle of a step (STAGE = 1) if an array is too small; the call after it resumes there, so
 enlarging arrays does not change the result.
+
+The driver is compiled once, for all forces and contact laws: it calls their stages by address (`stages`,
+`force_stages`).  Short loops over grains that do not depend on them are part of the driver.
 """
 
-import functools
-from collections.abc import Callable
+import math
 
-from ..compiler.jit import kernel, loop
+from ..compiler.jit import caller, loop, rare
+from ..compiler.stage import call_stage, has_stage, stage
 from ..contact.events import count_new_contacts
-from ..forces.external.loops import external_loads
-from ..forces.pair.loops import NO_LONG_RANGE_FORCE
-from ..neighbours.skin import consume_skins, invalidate_speeds, reset_skins
-from ..state.state import CONTACTS, CYCLE, LEFT, LONG_RANGE_SUMS, SQUARED_SPEED, SQUARED_SPIN, STAGE, STEP, STEPS, TIME
-from .kernel_spec import KernelSpec, Stop
-from .motion import kick
-from .parallel_loops import large_loops
+from ..contact.update import load_slip_sums, log_slip_sums
+from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
+from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
+from ..state.state import (
+    CONTACTS,
+    CYCLE,
+    INNER_SKIN,
+    LEFT,
+    LONG_RANGE_SKIN,
+    LONG_RANGE_SUMS,
+    OUTSIDE,
+    PAIR_LIST_SKIN,
+    SQUARED_SPEED,
+    SQUARED_SPIN,
+    STAGE,
+    STEP,
+    STEPS,
+    TIME,
+)
+from .force_calls import (
+    add_external_loads,
+    add_pairs_in_contact,
+    subtract_pairs_in_contact,
+    sum_external,
+    sum_pair_forces,
+    update_pairs_in_contact,
+)
+from .force_stages import ENERGY, PAIR_STAGES, RATES, WRAPPING
+from .motion import kick, wrap_all
+from .parts import CYCLE_LENGTH, DT, SINCE, Stop
 from .respa import (
     add_constant_loads,
-    add_extrapolated_loads,
     add_long_range_loads,
     apply_impulse,
-    clear_long_range_loads,
-    contact_pair_loops,
     correct_angular_momentum,
     integrate_displacement,
     update_constant_loads,
 )
-from .step_control import cycle_steps
-from .step_parts import (
-    apply_drag_and_noise,
-    contact_events_loop,
-    drift_with_work_for,
-    lists_loop,
-    no_gas,
-    no_rates,
-    possible_step,
-    rates_loop,
-    remove_broken_contacts,
+from .stages import (
+    CONTACT_PASS,
+    CONTACT_STEP,
+    DAMP,
+    DRIFT,
+    EXPLAIN,
+    EXTRAPOLATE,
+    FIRST_FORCE,
+    FLIGHT,
+    FORM,
+    GAS_KICK,
+    GATHER,
+    GATHER_AND_KICK,
+    INNER_LIST,
+    PAIR_LIST,
+    PREPARE_RATES,
+    REMOVE_BROKEN,
+    SETTLE,
+    SORT,
+    STIFFNESS_WORK,
+    STORE_POSITIONS,
+    VERLET_LIST,
 )
-from .task_queue import join_workers, no_workers
+from .step_control import cycle_steps
+from .step_parts import possible_step
+from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 
 
 @loop
-def _no_loads_within_cycle(grains, long_range, elapsed):
-    """For cycles of one step."""
+def largest_speeds(queue, blocks):
+    """Squares of the largest speed [m²/s²] and spin [1/s²] over blocks of grains."""
+    fastest = fastest_spin = float_bits(0.0)
+    for b in range(blocks):
+        fastest = max(fastest, magnitude_bits(queue.speeds[b, 0]))
+        fastest_spin = max(fastest_spin, magnitude_bits(queue.speeds[b, 1]))
+    return float_from_bits(fastest), float_from_bits(fastest_spin)
 
 
-@loop
-def _no_impulse_at_start(grains, long_range, clock, dt):
-    """Without r-RESPA."""
+@rare
+def sum_rates(clock, scratch, forces, program, table, cycle):
+    """The rates of the Taylor series at the start of a cycle of `cycle` [s]; none for 0."""
+    if cycle > 0.0:
+        scratch[CYCLE_LENGTH] = cycle
+        call_stage(program, PREPARE_RATES, table, 0)
+        for k in range(forces.pair):
+            call_stage(program, FIRST_FORCE + PAIR_STAGES * k + RATES, table, 0)
+    call_stage(program, STORE_POSITIONS, table, 0)
 
 
-@loop
-def _no_impulse_within(grains, long_range, span, clock, dt):
-    """Without r-RESPA."""
+@caller
+def begin_cycle(grains, long_range, clock, scratch, respa, forces, program, table, dt, cycle):
+    """Start a cycle of `cycle` [s] with a step of dt: rates, or the first impulse.
+
+    The kick dt/2 of the first step already contains dt/2 of the long-range loads.
+    """
+    if respa.taylor:
+        sum_rates(clock, scratch, forces, program, table, cycle if cycle > dt else 0.0)
+    clock[CYCLE] = clock[LEFT] = cycle
+    if respa.impulse:
+        update_constant_loads(grains, long_range)
+        if cycle > dt:
+            apply_impulse(grains, long_range, 0.5 * (cycle - dt))
 
 
-@loop
-def _no_impulse_at_end(grains, long_range, span, clock, elapsed, dt):
-    """Without r-RESPA."""
-
-
-@loop
-def _no_impulse_at_early_end(grains, long_range, span, clock, elapsed):
-    """Without r-RESPA."""
-
-
-@loop
-def _impulse_at_start(grains, long_range, clock, dt):
-    """First impulse of a cycle; the kick dt/2 of its first step already contains dt/2 of the long-range loads."""
-    update_constant_loads(grains, long_range)
-    if clock[CYCLE] > dt:
-        apply_impulse(grains, long_range, 0.5 * (clock[CYCLE] - dt))
-
-
-@loop
-def _impulse_within(grains, long_range, span, clock, dt):
-    """Between two steps of a cycle, of clock[STEP] and dt seconds: accumulate the path of the constant force."""
-    integrate_displacement(grains, long_range, span, 0.5 * (clock[STEP] + dt))
-
-
-@loop
-def _impulse_at_end(grains, long_range, span, clock, elapsed, dt):
+@rare
+def impulse_at_end(grains, long_range, span, clock, elapsed, dt):
     """Second impulse: half of the cycle was applied at its start, dt/2 with the last kick."""
     if clock[CYCLE] > dt:
         apply_impulse(grains, long_range, elapsed - 0.5 * clock[CYCLE] - 0.5 * dt)
@@ -93,253 +126,254 @@ def _impulse_at_end(grains, long_range, span, clock, elapsed, dt):
         correct_angular_momentum(grains, long_range, span, elapsed - 0.5 * clock[CYCLE])
 
 
-@loop
-def _impulse_at_early_end(grains, long_range, span, clock, elapsed):
-    """Second impulse between two steps: the last half kick contained the constant loads only."""
-    apply_impulse(grains, long_range, 0.5 * clock[STEP])
-    _impulse_at_end(grains, long_range, span, clock, elapsed, clock[STEP])
+@caller
+def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, queue, program, table, dt):
+    """Half a kick and a drift; logs the work of external forces that depend on time or position.
+
+    Returns the largest displacement [m].
+    """
+    start, end = clock[TIME], clock[TIME] + dt
+    gained = 0.0
+    if external_work.time_dependent:
+        gained += sum_external(scratch, forces, program, table, end, ENERGY)
+        gained -= sum_external(scratch, forces, program, table, start, ENERGY)
+    scratch[DT] = dt
+    blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+    for_each_block(program, DRIFT, table, queue.words, blocks)
+    if external_work.time_dependent:
+        gained += sum_external(scratch, forces, program, table, end, ENERGY)
+        gained -= sum_external(scratch, forces, program, table, start, ENERGY)
+    gained *= 0.5
+    if external_work.position_dependent:
+        gained += sum_external(scratch, forces, program, table, end, WRAPPING)
+        wrap_all(grains, span)
+    lost[OUTSIDE] -= gained
+    return dt * math.sqrt(largest_speeds(queue, blocks)[0])
 
 
-@loop
-def _no_long_range(grains, contacts, long_range, count, parameters):
-    """Without long-range forces."""
+@rare
+def sum_all_pairs(grains, long_range, count, respa, forces, queue, program, table):
+    """Sum the long-range loads and add them to the loads of the grains."""
+    sum_pair_forces(long_range, count, forces, queue, program, table)
+    if respa.impulse and count[CONTACTS] > 0:
+        subtract_pairs_in_contact(forces, program, table)
+    add_long_range_loads(grains, long_range)
 
 
-@loop
-def _no_contact_pairs(grains, contacts, count, span, parameters):
-    """For long-range loads that are not split."""
-
-
-@loop
-def _no_reassignment(grains, contacts, count, long_range, span, parameters):
-    """For long-range loads that are not split."""
-
-
-@loop
-def _no_open_cycle(grains, contacts, long_range, clock, count, parameters):
-    """For cycles of one step."""
-
-
-_IMPULSES = (_impulse_at_start, _impulse_within, _impulse_at_end, _impulse_at_early_end)
-_NO_IMPULSES = (_no_impulse_at_start, _no_impulse_within, _no_impulse_at_end, _no_impulse_at_early_end)
-
-
-@functools.cache
-def loads_loop(spec: KernelSpec) -> Callable:
-    """The loop that sums forces and torques at the end of a step.
+@caller
+def sum_loads(
+    grains, long_range, clock, count, scratch, respa, forces, queue, program, table, due, elapsed
+):  # fmt: skip
+    """Sum forces and torques at the end of a step.
 
     Long-range loads are summed if `due`; within a cycle their constant part or extrapolation replaces them.
     """
-    add_external = external_loads(spec.external)
-    gather_all, long_range_loads = large_loops(spec).gather, large_loops(spec).long_range_loads
-    add_within_cycle = (
-        add_extrapolated_loads if spec.taylor else add_constant_loads if spec.impulse else _no_loads_within_cycle
-    )
-    subtract_contact_pairs = contact_pair_loops(spec.long_range.pair)[1] if spec.split else _no_reassignment
-
-    @loop
-    def sum_long_range(grains, contacts, long_range, count, parameters):
-        clear_long_range_loads(long_range)
-        long_range_loads(grains, contacts, long_range, count, parameters)
-        subtract_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
-        add_long_range_loads(grains, long_range)
-
-    add_long_range = _no_long_range if spec.long_range is NO_LONG_RANGE_FORCE else sum_long_range
-
-    @loop
-    def sum_loads(grains, contacts, long_range, clock, count, parameters, due, elapsed):
-        gather_all(grains, contacts, long_range, count, parameters)
-        add_external(grains, clock[TIME] + clock[STEP], parameters.external)
-        if due:
-            add_long_range(grains, contacts, long_range, count, parameters)
-            count[LONG_RANGE_SUMS] += 1
-        else:
-            add_within_cycle(grains, long_range, elapsed)
-
-    return sum_loads
-
-
-@functools.cache
-def loads_and_kick_loop(spec: KernelSpec) -> Callable:
-    """The loop that sums the loads (`loads_loop`) and applies the second half kick; returns as `motion.kick` does."""
-    sum_loads = loads_loop(spec)
-    gather_and_kick_all = large_loops(spec).gather_and_kick
-
-    @loop
-    def contact_loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed):
+    for_each_block(program, GATHER, table, queue.words, blocks_of(grains.mass.size, GRAINS_PER_BLOCK))
+    add_external_loads(scratch, forces, program, table, clock[TIME] + clock[STEP])
+    if forces.pair == 0:
         count[LONG_RANGE_SUMS] += 1
-        return gather_and_kick_all(grains, contacts, long_range, count, parameters, 0.5 * clock[STEP])
+    elif due:
+        sum_all_pairs(grains, long_range, count, respa, forces, queue, program, table)
+    elif respa.impulse:
+        add_constant_loads(grains, long_range, elapsed)
+    else:
+        scratch[SINCE] = elapsed
+        call_stage(program, EXTRAPOLATE, table, 0)
 
-    @loop
-    def loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed):
-        sum_loads(grains, contacts, long_range, clock, count, parameters, due, elapsed)
-        return kick(grains, 0.5 * clock[STEP])
 
-    return contact_loads_and_kick if spec.contacts_only else loads_and_kick
+@caller
+def loads_and_kick(grains, long_range, clock, count, scratch, respa, forces, queue, program, table, due, elapsed):
+    """Sum the loads and apply the second half kick; returns the squares of the largest speed and spin."""
+    if forces.pair + forces.external == 0:
+        count[LONG_RANGE_SUMS] += 1
+        scratch[DT] = 0.5 * clock[STEP]
+        blocks = blocks_of(grains.mass.size, GRAINS_PER_BLOCK)
+        for_each_block(program, GATHER_AND_KICK, table, queue.words, blocks)
+        return largest_speeds(queue, blocks)
+    sum_loads(grains, long_range, clock, count, scratch, respa, forces, queue, program, table, due, elapsed)
+    return kick(grains, 0.5 * clock[STEP])
 
 
-@functools.cache
-def half_steps_for(spec: KernelSpec) -> tuple[Callable, Callable]:
-    """The two halves of a velocity Verlet step.
+@rare
+def close_cycle(grains, contacts, long_range, clock, count, scratch, span, respa, forces, queue, program, table):
+    """End an unfinished cycle at the present step, so that a stopped run leaves a consistent state."""
+    if clock[LEFT] > 0.0:
+        elapsed = clock[CYCLE] - clock[LEFT]
+        sum_loads(grains, long_range, clock, count, scratch, respa, forces, queue, program, table, True, elapsed)
+        if respa.impulse:  # the last half kick contained the constant loads only
+            apply_impulse(grains, long_range, 0.5 * clock[STEP])
+            impulse_at_end(grains, long_range, span, clock, elapsed, clock[STEP])
+            update_pairs_in_contact(contacts, count, forces, program, table)
+        clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
-    See `verlet_driver_for` for the step of length 0 at the start of a run.
-    """
-    drift_with_work = drift_with_work_for(spec.external, large_loops(spec).drift)
-    sum_loads, loads_and_kick = loads_loop(spec), loads_and_kick_loop(spec)
-    pass_contacts = large_loops(spec).pass_contacts
-    update_lists, update_contacts = lists_loop(spec.law), contact_events_loop(spec.law)
-    set_rates = rates_loop(spec.long_range.rates) if spec.taylor else no_rates
-    add_contact_pairs, _, reassign_contact_pairs = (
-        contact_pair_loops(spec.long_range.pair) if spec.split else (_no_contact_pairs, None, _no_reassignment)
+
+@caller
+def first_half(
+    grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, respa, external_work, criteria, forces,
+    queue, program, table
+):  # fmt: skip
+    """Choose the step, kick dt/2 and drift; no step was taken unless the value of `Stop.NONE` is returned."""
+    dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, span, criteria)
+    if stop != Stop.NONE.value:
+        scratch[DT] = dt
+        if stop != Stop.OVERCOMPRESSED.value:
+            call_stage(program, EXPLAIN, table, stop)
+        close_cycle(grains, contacts, long_range, clock, count, scratch, span, respa, forces, queue, program, table)
+        return stop
+    if clock[LEFT] == 0.0:
+        cycle = dt * cycle_steps(clock, count, respa, dt)
+        begin_cycle(grains, long_range, clock, scratch, respa, forces, program, table, dt, cycle)
+    elif respa.impulse:  # between two steps of clock[STEP] and dt seconds
+        integrate_displacement(grains, long_range, span, 0.5 * (clock[STEP] + dt))
+    displacement = drift_with_work(
+        clock, lost, scratch, span, external_work, forces, grains, queue, program, table, dt
+    )  # fmt: skip
+    consume_skins(pair_list, displacement)
+    clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
+    clock[STEP] = dt
+    count[STAGE] = 1
+    return Stop.NONE.value
+
+
+@caller
+def update_lists(grains, pair_list, long_range, span, settings, search, criteria, program, table):
+    """Rebuild stale lists; returns the value of a `Stop`, and whether the pair list was stale."""
+    stale = settings.on and list_is_stale(
+        grains, pair_list.anchor, span, 0.25 * criteria.pair_gap, pair_list.skin, PAIR_LIST_SKIN
     )
-    impulse_at_start, impulse_within, impulse_at_end, impulse_at_early_end = _IMPULSES if spec.impulse else _NO_IMPULSES
-    apply_gas = apply_drag_and_noise if spec.gas else no_gas
-    speeds_change_between_steps = spec.impulse or spec.gas
+    if search.listed and list_is_stale(
+        grains, long_range.anchor, span, 0.5 * search.margin, pair_list.skin, LONG_RANGE_SKIN
+    ):
+        stop = call_stage(program, VERLET_LIST, table, 0)
+        if stop != Stop.NONE.value:
+            return stop, stale
+    if stale:
+        stop = call_stage(program, PAIR_LIST, table, 0)
+        if stop != Stop.NONE.value:
+            return stop, stale
+    # written so that a skin that is not a number counts as used up
+    if settings.on and (stale or not pair_list.skin[INNER_SKIN] > 0.0):
+        call_stage(program, INNER_LIST, table, 0)
+    return Stop.NONE.value, stale
 
-    @loop
-    def close_cycle(grains, contacts, long_range, clock, count, parameters):
-        """End an unfinished cycle at the present step, so that a stopped run leaves a consistent state."""
-        if clock[LEFT] > 0.0:
-            elapsed = clock[CYCLE] - clock[LEFT]
-            sum_loads(grains, contacts, long_range, clock, count, parameters, True, elapsed)
-            impulse_at_early_end(grains, long_range, parameters.span, clock, elapsed)
-            reassign_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
-            clock[LEFT], clock[CYCLE] = 0.0, elapsed
 
-    close_open_cycle = _no_open_cycle if spec.contacts_only else close_cycle
+@caller
+def update_contacts(count, lost, settings, queue, program, table):
+    """Update all contacts, and slip or break those beyond a limit; returns whether any contact broke."""
+    blocks = blocks_of(count[CONTACTS], CONTACTS_PER_BLOCK)
+    for_each_block(program, CONTACT_PASS, table, queue.words, blocks)
+    pending = False
+    for b in range(blocks):
+        passed = load_slip_sums(queue.passed, b)
+        pending |= passed.pending > 0.0
+        log_slip_sums(count, lost, passed)
+    if settings.follow:
+        call_stage(program, STIFFNESS_WORK, table, 0)
+    broken = pending and call_stage(program, SETTLE, table, 0) == 1
+    if settings.damped:
+        call_stage(program, DAMP, table, 0)
+    return broken
 
-    @loop
-    def first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters):
-        """Choose the step, kick dt/2 and drift; no step was taken unless `Stop.NONE` is returned."""
-        dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, parameters)
-        if stop != Stop.NONE:
-            close_open_cycle(grains, contacts, long_range, clock, count, parameters)
+
+@caller
+def second_half(
+    grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa, criteria,
+    forces, queue, program, table
+):  # fmt: skip
+    """Update lists and contacts, sum the loads, kick dt/2; called again after an array was enlarged."""
+    stop, list_rebuilt = update_lists(
+        grains, pair_list, long_range, span, settings, search, criteria, program, table
+    )  # fmt: skip
+    if stop != Stop.NONE.value:
+        return stop
+    formed = count_new_contacts(grains, pair_list, count, span)
+    if count[CONTACTS] + formed > contacts.pair.shape[1]:
+        return Stop.CONTACTS_FULL.value
+    broken = update_contacts(count, lost, settings, queue, program, table)
+    if formed > 0:
+        call_stage(program, FORM, table, 0)
+        call_stage(program, SORT, table, 0)
+    if formed > 0 or list_rebuilt:
+        call_stage(program, CONTACT_STEP, table, 0)
+    dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
+    due = clock[LEFT] == 0.0 or broken or formed > 0
+    if respa.impulse and count[CONTACTS] > 0:
+        add_pairs_in_contact(forces, program, table)
+    fastest, fastest_spin = loads_and_kick(
+        grains, long_range, clock, count, scratch, respa, forces, queue, program, table, due, elapsed
+    )
+    pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN] = fastest, fastest_spin
+    if due:
+        if respa.impulse:
+            impulse_at_end(grains, long_range, span, clock, elapsed, dt)
+        if respa.impulse and count[CONTACTS] > 0:
+            update_pairs_in_contact(contacts, count, forces, program, table)
+        clock[LEFT], clock[CYCLE] = 0.0, elapsed
+    if broken:
+        call_stage(program, REMOVE_BROKEN, table, 0)
+        call_stage(program, SORT, table, 0)
+        call_stage(program, CONTACT_STEP, table, 0)
+    clock[TIME] += dt
+    count[STEPS] += 1
+    count[STAGE] = 0
+    if due:
+        gas = has_stage(program, GAS_KICK)
+        if gas:
+            call_stage(program, GAS_KICK, table, 0)
+        if gas or respa.impulse:  # speeds changed between steps
+            invalidate_speeds(pair_list)
+    return Stop.NONE.value
+
+
+@caller
+def steps_until(
+    grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa, external_work,
+    criteria, forces, queue, program, table, until, last
+):  # fmt: skip
+    """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`.
+
+    Returns the value of a `Stop`.
+    """
+    reset_skins(pair_list, count)
+    while True:
+        stop = Stop.NONE.value
+        if count[STAGE] == 0:
+            if clock[LEFT] == 0.0:
+                if clock[TIME] >= until:
+                    return Stop.TIME_REACHED.value
+                if count[STEPS] >= last:
+                    return Stop.NONE.value
+            if count[CONTACTS] == 0 and clock[LEFT] == 0.0 and has_stage(program, FLIGHT):
+                stop = call_stage(program, FLIGHT, table, 0)
+                if stop == Stop.NOT_FINITE.value:
+                    call_stage(program, EXPLAIN, table, stop)
+            else:
+                stop = first_half(
+                    grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, respa, external_work,
+                    criteria, forces, queue, program, table
+                )  # fmt: skip
+        if stop == Stop.NONE.value and count[STAGE] == 1:
+            stop = second_half(
+                grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa,
+                criteria, forces, queue, program, table
+            )  # fmt: skip
+        if stop != Stop.NONE.value:
             return stop
-        if clock[LEFT] == 0.0:
-            cycle = dt * cycle_steps(clock, count, parameters.respa, dt)
-            set_rates(grains, contacts, long_range, clock, parameters, cycle if cycle > dt else 0.0)
-            clock[CYCLE] = clock[LEFT] = cycle
-            impulse_at_start(grains, long_range, clock, dt)
-        else:
-            impulse_within(grains, long_range, parameters.span, clock, dt)
-        consume_skins(pair_list, drift_with_work(grains, contacts, long_range, clock, count, lost, parameters, dt))
-        clock[LEFT] = clock[LEFT] - dt if clock[LEFT] > 1.5 * dt else 0.0
-        clock[STEP] = dt
-        count[STAGE] = 1
-        return Stop.NONE
-
-    @loop
-    def second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters):
-        """Update lists and contacts, sum the loads, kick dt/2; called again after an array was enlarged."""
-        stop, list_rebuilt = update_lists(grains, contacts, pair_list, long_range, count, parameters)
-        if stop != Stop.NONE:
-            return stop
-        formed = count_new_contacts(grains, pair_list, count, parameters.span)
-        if count[CONTACTS] + formed > contacts.pair.shape[1]:
-            return Stop.CONTACTS_FULL
-        flagged = pass_contacts(grains, contacts, long_range, clock, count, lost, parameters)
-        broken = update_contacts(
-            grains, contacts, pair_list, clock, count, lost, parameters, list_rebuilt, formed, flagged
-        )
-        dt, elapsed = clock[STEP], clock[CYCLE] - clock[LEFT]
-        due = clock[LEFT] == 0.0 or broken or formed > 0
-        add_contact_pairs(grains, contacts, count, parameters.span, parameters.long_range)
-        fastest, fastest_spin = loads_and_kick(grains, contacts, long_range, clock, count, parameters, due, elapsed)
-        pair_list.skin[SQUARED_SPEED], pair_list.skin[SQUARED_SPIN] = fastest, fastest_spin
-        if due:
-            impulse_at_end(grains, long_range, parameters.span, clock, elapsed, dt)
-            reassign_contact_pairs(grains, contacts, count, long_range, parameters.span, parameters.long_range)
-            clock[LEFT], clock[CYCLE] = 0.0, elapsed
-        if broken:
-            remove_broken_contacts(grains, contacts, pair_list, clock, count, parameters)
-        clock[TIME] += dt
-        count[STEPS] += 1
-        count[STAGE] = 0
-        if due:
-            apply_gas(grains, clock, count, lost, parameters)
-            if speeds_change_between_steps:
-                invalidate_speeds(pair_list)
-        return Stop.NONE
-
-    return first_half, second_half
 
 
-@functools.cache
-def verlet_driver_for(spec: KernelSpec) -> Callable:
-    """Compile the driver `advance` of velocity Verlet for one specification.
+@stage("the time steps")
+def advance(
+    table, program, grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa,
+    external_work, criteria, forces, queue, until, last
+):  # fmt: skip
+    """Take steps, then end the work of the other threads; returns the value of a `Stop`.
 
     A run starts in the middle of a step of length 0 (STAGE 1): its second half builds the lists, finds grains that
     overlap already and sums the loads; its counters and energies are discarded.
     """
-    first_half, second_half = half_steps_for(spec)
-    join = join_workers if spec.queue else no_workers
-
-    @loop
-    def steps_until(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last):
-        """Take steps until the first end of a cycle at or after `until` [s], or step `last`; returns a Stop."""
-        reset_skins(pair_list, count)
-        while True:
-            if count[STAGE] == 0:
-                if clock[LEFT] == 0.0:
-                    if clock[TIME] >= until:
-                        return Stop.TIME_REACHED
-                    if count[STEPS] >= last:
-                        return Stop.NONE
-                stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-                if stop != Stop.NONE:
-                    return stop
-            stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop != Stop.NONE:
-                return stop
-
-    def advance(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last):
-        stop = steps_until(grains, contacts, pair_list, long_range, clock, count, lost, parameters, until, last)
-        join(parameters)
-        return stop
-
-    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the time steps")
-
-
-@functools.cache
-def flight_driver_for(spec: KernelSpec) -> Callable:
-    """Compile the driver `advance` that takes steps of `spec.flight_loop` while there are no contacts.
-
-    Like `verlet_driver_for`, with the arrays of stages.
-    """
-    assert spec.flight_loop is not None
-    first_half, second_half = half_steps_for(spec)
-    free_flight = spec.flight_loop(spec)
-    join = join_workers if spec.queue else no_workers
-
-    @loop
-    def steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
-        """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`; returns a Stop."""
-        reset_skins(pair_list, count)
-        while True:
-            stop = Stop.NONE
-            if count[STAGE] == 0:
-                if clock[LEFT] == 0.0:
-                    if clock[TIME] >= until:
-                        return Stop.TIME_REACHED
-                    if count[STEPS] >= last:
-                        return Stop.NONE
-                if count[CONTACTS] == 0 and clock[LEFT] == 0.0:
-                    stop = free_flight(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters)
-                else:
-                    stop = first_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop == Stop.NONE and count[STAGE] == 1:
-                stop = second_half(grains, contacts, pair_list, long_range, clock, count, lost, parameters)
-            if stop != Stop.NONE:
-                return stop
-
-    def advance(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last):
-        stop = steps_until(grains, contacts, pair_list, long_range, stages, clock, count, lost, parameters, until, last)
-        join(parameters)
-        return stop
-
-    return kernel(advance, cached=spec.keep, nogil=spec.queue, long_vectors=spec.wide, purpose="the time steps")
-
-
-def driver_for(spec: KernelSpec) -> Callable:
-    """The compiled driver `advance` for one specification."""
-    return verlet_driver_for(spec) if spec.flight_loop is None else flight_driver_for(spec)
+    stop = steps_until(
+        grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa,
+        external_work, criteria, forces, queue, program, table, until, last
+    )  # fmt: skip
+    join_workers(queue.words)
+    return stop

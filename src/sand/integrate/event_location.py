@@ -51,9 +51,9 @@ def curve_at(points, part):
 
 
 @loop
-def separation_curve(grains, stages, span, i, j, dt):
+def separation_curve(grains, runge_kutta, span, i, j, dt):
     """Control points [m] of the separation x_i − x_j over the step."""
-    start, rate, last = stages.start, stages.rate, STAGES - 1
+    start, rate, last = runge_kutta.start, runge_kutta.rate, STAGES - 1
     s0 = nearest_image(sub(rows3(start, X, i), rows3(start, X, j)), span)
     moved1, moved2 = (
         sub(load(grains.position, i), rows3(start, X, i)),
@@ -113,10 +113,10 @@ def first_crossing(points, limit):
 
 
 @loop
-def contact_time_of_pair(grains, stages, span, i, j, dt):
+def contact_time_of_pair(grains, runge_kutta, span, i, j, dt):
     """Time of first contact of grains i and j in units of the step; 1 for contact at its end, NEVER for none."""
     reach = grains.radius[i] + grains.radius[j]
-    points = separation_curve(grains, stages, span, i, j, dt)
+    points = separation_curve(grains, runge_kutta, span, i, j, dt)
     if stays_away(points, reach):
         return NEVER
     largest = max(norm(load(grains.position, i)), norm(load(grains.position, j)))
@@ -128,14 +128,14 @@ def contact_time_of_pair(grains, stages, span, i, j, dt):
 
 
 @loop
-def first_contact_time(grains, long_range, stages, parameters, dt):
+def first_contact_time(grains, long_range, runge_kutta, span, search, dt):
     """Time of the first contact of any pair in units of the step; NEVER if there is none.
 
     With a Verlet list only listed pairs can touch: pairs that are not listed were farther apart than the reach, at
     least r1 + r2 plus the margin Δr, and a grain moves by at most Δr/4 between the construction of the list and the
     start of a step, and by at most Δr/4 in the step.
     """
-    listed = parameters.search.listed
+    listed = search.listed
     first = NEVER
     for k in range(grains.mass.size):
         begin, end = (long_range.start[k], long_range.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
@@ -143,5 +143,5 @@ def first_contact_time(grains, long_range, stages, parameters, dt):
         for m in range(begin, end):
             j = long_range.order[long_range.neighbour[m]] if listed else np.uint32(m)
             if j < i:
-                first = min(first, contact_time_of_pair(grains, stages, parameters.span, i, j, dt))
+                first = min(first, contact_time_of_pair(grains, runge_kutta, span, i, j, dt))
     return first

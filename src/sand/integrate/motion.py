@@ -1,7 +1,6 @@
 """Kicks and drifts of velocity Verlet for translation and rotation (Eqs. 28, 29, 31–33, with 1/m and 1/I)."""
 
 import functools
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -93,14 +92,8 @@ def drift_for(magnetic: bool) -> Callable:
     return drift_some
 
 
-@functools.cache
-def kick_and_drift_for(magnetic: bool) -> Callable:
-    """As `drift_for`, for all grains; the loop returns the largest displacement [m]."""
-    drift_some = drift_for(magnetic)
-
-    @loop
-    def kick_and_drift(grains, span, dt):
-        fastest = drift_some(grains, np.uint64(0), np.uint64(grains.mass.size), span, dt)
-        return dt * math.sqrt(float_from_bits(fastest))
-
-    return kick_and_drift
+@loop
+def wrap_all(grains, span):
+    """Wrap all positions into the periodic box."""
+    for i in range(grains.mass.size):
+        put(grains.position, i, nearest_image(load(grains.position, i), span))

@@ -111,6 +111,13 @@ def apply_impulse(grains, long_range, dt):
         accrue(grains.spin, i, scale(dt / grains.inertia[i], torque))
 
 
+@loop
+def mark_every_step(contacts, count):
+    """Record that the pair forces of all contacts act in every step."""
+    for c in range(count[CONTACTS]):
+        contacts.every_step[c] = 1
+
+
 @functools.cache
 def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     """Loops that treat the long-range loads of grains in contact apart from those of all other pairs.
@@ -121,7 +128,7 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     Parameters
     ----------
     pair : Callable
-        `LongRangeSums.pair` of the composed long-range forces.
+        `LongRangeSums.pair` of a long-range force.
 
     Returns
     -------
@@ -130,7 +137,8 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
     subtract_contact_pairs : Callable
         Subtracts them from the long-range loads just summed.
     reassign_contact_pairs : Callable
-        Between two cycles: new contacts (`every_step` 0) leave the long-range loads, broken ones (flag BROKE) return.
+        Between two cycles: new contacts (`every_step` 0) leave the long-range loads, broken ones (flag BROKE) return;
+        `mark_every_step` follows once this was done for all pair forces.
     """
 
     @loop
@@ -166,7 +174,6 @@ def contact_pair_loops(pair: Callable) -> tuple[Callable, Callable, Callable]:
                     accrue(long_range.force, j, scale(-sign, force))
                     accrue(long_range.torque, i, scale(sign, torque1))
                     accrue(long_range.torque, j, scale(sign, torque2))
-                contacts.every_step[c] = 1
 
     return add_contact_pairs, subtract_contact_pairs, reassign_contact_pairs
 

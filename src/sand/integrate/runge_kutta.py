@@ -10,18 +10,16 @@ seven stages is the new state, and its rates are the first of the next step (FSA
 The trajectories of `experiments.scattering` have a Runge–Kutta driver of their own, of order 8 and for two bodies.
 """
 
-import functools
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from ..compiler.jit import formula, loop, rare
-from ..forces.external.loops import external_loads, grain_at
+from ..compiler.jit import caller, formula, loop, rare
 from ..numerics.quaternion import normalised, turned, turning_rate
-from ..numerics.vec import dot, load, load4, put, put4
-from ..state.state import LONG_RANGE_SUMS
-from .respa import add_long_range_loads, clear_long_range_loads
+from ..numerics.vec import load, load4, put, put4
+from .force_calls import add_external_loads, sum_external, sum_pair_forces
+from .force_stages import POWER
+from .respa import add_long_range_loads
 
 STAGES = 7
 TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
@@ -66,25 +64,25 @@ def weighted_rate(rate, weights, stages, row, i):
 
 
 @loop
-def store_start(grains, stages):
+def store_start(grains, runge_kutta):
     """Store the state of all grains at the start of the step."""
     for i in range(grains.mass.size):
         for row in range(3):
-            stages.start[X + row, i] = grains.position[row, i]
-            stages.start[V + row, i] = grains.velocity[row, i]
-            stages.start[W + row, i] = grains.spin[row, i]
+            runge_kutta.start[X + row, i] = grains.position[row, i]
+            runge_kutta.start[V + row, i] = grains.velocity[row, i]
+            runge_kutta.start[W + row, i] = grains.spin[row, i]
         for row in range(4):
-            stages.start[Q + row, i] = grains.orientation[row, i]
+            runge_kutta.start[Q + row, i] = grains.orientation[row, i]
 
 
 @rare
-def set_stage(grains, stages, s, dt):
+def set_stage(grains, runge_kutta, s, dt):
     """Set all grains to stage s of a step of dt seconds; returns the square of the largest displacement [m²].
 
     Stage 0 is the start of the step.
     """
     largest = 0.0
-    start, rate, weights = stages.start, stages.rate, WEIGHTS[s]
+    start, rate, weights = runge_kutta.start, runge_kutta.rate, WEIGHTS[s]
     for i in range(grains.mass.size):
         squared = 0.0
         for row in range(3):
@@ -103,9 +101,9 @@ def set_stage(grains, stages, s, dt):
 
 
 @rare
-def store_rates(grains, stages, s):
+def store_rates(grains, runge_kutta, s):
     """Store the rates of change at stage s, from its loads."""
-    rate = stages.rate
+    rate = runge_kutta.rate
     for i in range(grains.mass.size):
         for row in range(3):
             rate[s, X + row, i] = grains.velocity[row, i]
@@ -124,14 +122,14 @@ def normalise_all(grains):
 
 
 @loop
-def error_ratio(stages, dt, error_limits):
+def error_ratio(runge_kutta, dt, error_limits):
     """Largest ratio of estimated to allowed error of the step, and its grain; infinite if not a number.
 
     The error of an angle is twice that of the rotation parameters.
     """
-    rate = stages.rate
+    rate = runge_kutta.rate
     largest, limiting_grain = 0.0, 0
-    for i in range(stages.start.shape[1]):
+    for i in range(runge_kutta.start.shape[1]):
         x = v = w = q = 0.0
         for row in range(3):
             x += weighted_rate(rate, ERROR, STAGES, X + row, i) ** 2
@@ -148,72 +146,47 @@ def error_ratio(stages, dt, error_limits):
     return largest, limiting_grain
 
 
-@functools.cache
-def stage_loads(external: Callable, long_range_loads: Callable) -> Callable:
-    """The loop that sums all loads of free grains at their present positions."""
-    add_external = external_loads(external)
-
-    @rare
-    def sum_stage(grains, long_range, count, parameters, time):
-        for i in range(grains.mass.size):
-            put(grains.force, i, (0.0, 0.0, 0.0))
-            put(grains.torque, i, (0.0, 0.0, 0.0))
-        add_external(grains, time, parameters.external)
-        clear_long_range_loads(long_range)
-        long_range_loads(grains, long_range, parameters.span, parameters.long_range)
+@rare
+def sum_loads(grains, long_range, count, scratch, forces, queue, program, table, time):
+    """Sum all loads of free grains at their present positions."""
+    for i in range(grains.mass.size):
+        put(grains.force, i, (0.0, 0.0, 0.0))
+        put(grains.torque, i, (0.0, 0.0, 0.0))
+    add_external_loads(scratch, forces, program, table, time)
+    if forces.pair > 0:
+        sum_pair_forces(long_range, count, forces, queue, program, table)
         add_long_range_loads(grains, long_range)
-        count[LONG_RANGE_SUMS] += 1
-
-    return sum_stage
 
 
-@functools.cache
-def external_power(formula_of_grain: Callable) -> Callable:
-    """The loop that sums the power F·v + M·ω [W] of the composed external forces over all grains."""
-
-    @loop
-    def sum_power(grains, time, parameters):
-        total = 0.0
-        for i in range(grains.mass.size):
-            force, torque, _ = formula_of_grain(time, grain_at(grains, i), parameters)
-            total += dot(force, load(grains.velocity, i)) + dot(torque, load(grains.spin, i))
-        return total
-
-    return sum_power
+@caller
+def begin_step(grains, runge_kutta, scratch, external_work, forces, program, table, begin):
+    """Store the state at the start of the step, at the time `begin`, and the rates of stage 0."""
+    store_start(grains, runge_kutta)
+    store_rates(grains, runge_kutta, 0)
+    if external_work.time_dependent:
+        runge_kutta.power[0] = sum_external(scratch, forces, program, table, begin, POWER)
 
 
-@functools.cache
-def trial_step_loops(external: Callable, long_range_loads: Callable) -> tuple[Callable, Callable]:
-    """The loops `begin_step` and `try_step`; the latter computes all stages, or False if a grain moves too far."""
-    sum_stage, power = stage_loads(external, long_range_loads), external_power(external)
-
-    @loop
-    def begin_step(grains, stages, parameters, begin):
-        store_start(grains, stages)
-        store_rates(grains, stages, 0)
-        if parameters.external_work.time_dependent:
-            stages.power[0] = power(grains, begin, parameters.external)
-
-    @loop
-    def try_step(grains, long_range, stages, count, parameters, begin, dt):
-        stride = parameters.flight_limits.stride
-        for s in range(1, STAGES):
-            if not set_stage(grains, stages, s, dt) <= stride * stride:
-                return False
-            time = begin + TIMES[s] * dt
-            sum_stage(grains, long_range, count, parameters, time)
-            store_rates(grains, stages, s)
-            if parameters.external_work.time_dependent:
-                stages.power[s] = power(grains, time, parameters.external)
-        return True
-
-    return begin_step, try_step
+@caller
+def try_step(
+    grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt, stride
+):
+    """Compute all stages of a step; False if a grain moves farther than `stride`."""
+    for s in range(1, STAGES):
+        if not set_stage(grains, runge_kutta, s, dt) <= stride * stride:
+            return False
+        time = begin + TIMES[s] * dt
+        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, time)
+        store_rates(grains, runge_kutta, s)
+        if external_work.time_dependent:
+            runge_kutta.power[s] = sum_external(scratch, forces, program, table, time, POWER)
+    return True
 
 
 @loop
-def work_of(stages, dt):
+def work_of(runge_kutta, dt):
     """Work ∫ P dt [J] of the external forces over the step, of the same order as the step."""
     total = 0.0
     for s in range(STAGES - 1):
-        total += WEIGHTS[STAGES - 1, s] * stages.power[s]
+        total += WEIGHTS[STAGES - 1, s] * runge_kutta.power[s]
     return dt * total

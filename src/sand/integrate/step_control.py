@@ -105,11 +105,10 @@ def grain_step(grains, long_range, start, criteria, i):
 
 
 @loop
-def steps_of_free_grains(grains, long_range, start, count, criteria):
+def steps_of_free_grains(grains, long_range, start, criteria):
     """Largest step [s] and cycle [s] allowed by the motion of all single grains (`grain_step`); 0, 0 if not finite.
 
-    GRAIN1 is set to a grain that is not finite.  `start` (N + 1,) are the row offsets of the contacts of each grain
-    (state.arrays.ContactArrays).
+    `start` (N + 1,) are the row offsets of the contacts of each grain (state.arrays.ContactArrays).
     """
     step = cycle = float_bits(criteria.longest)
     not_finite = 0.0
@@ -119,7 +118,6 @@ def steps_of_free_grains(grains, long_range, start, count, criteria):
         own_step, own_cycle = grain_step(grains, long_range, start, criteria, i)
         step, cycle = min(step, float_bits(own_step)), min(cycle, float_bits(own_cycle))
     if not_finite > 0.0:
-        count[GRAIN1] = first_not_finite(grains)
         return 0.0, 0.0
     return float_from_bits(step), float_from_bits(cycle)
 
@@ -213,7 +211,7 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
     if every_step or count[STEPS] - count[CHECKED] >= CHECK_INTERVAL:
         may_grow = count[STEPS] - count[STEP_INCREASES] >= INCREASE_INTERVAL
         if between_cycles:
-            clock[CALM], cycle = steps_of_free_grains(grains, long_range, start, count, criteria)
+            clock[CALM], cycle = steps_of_free_grains(grains, long_range, start, criteria)
             if not clock[CALM] > 0.0:
                 return 0.0
             clock[LONG_RANGE_LEVEL] = quantise_step(clock[LONG_RANGE_LEVEL], cycle, may_grow)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..arguments import checked
+from ..compiler.stage import Stage
 from ..errors import FORBID_EXTRA, BadInput, did_you_mean
 from ..grains import Grains
 from ..units import is_word, si, whole_number
 from .base import register
-from .kernel_spec import RespaSettings
 
 IMPULSE_PERIODS = 0.48
 """Longest r-RESPA cycle in fastest contact periods; the first resonance of the impulses is at half a period."""
@@ -66,7 +65,7 @@ class Verlet:
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "verlet"
-    flight_loop: ClassVar[Callable | None] = None
+    flight: ClassVar[Stage | None] = None
 
     def __post_init__(self) -> None:
         problems: list[str] = []
@@ -123,7 +122,3 @@ class Verlet:
         if self.far_steps != "auto":
             return int(self.far_steps)
         return max(1, int(IMPULSE_PERIODS * self.steps_per_period)) if self.far == "impulse" else TAYLOR_STEPS
-
-    def respa_settings(self, has_long_range: bool) -> RespaSettings:
-        """Settings of multiple time stepping for the driver; cycles of one step without long-range forces."""
-        return RespaSettings(self.max_cycle_steps if has_long_range else 1, self.far == "taylor-literal")

@@ -1,4 +1,4 @@
-"""Python threads that run a compiled worker kernel next to the driver."""
+"""Python threads that run a stage next to the driver."""
 
 from __future__ import annotations
 
@@ -6,35 +6,35 @@ import os
 import queue
 import threading
 import weakref
-from collections.abc import Callable
 from typing import Any
 
 from ..compiler.jit import COMPILED
+from ..compiler.stage import Stage, Table
 from ..threads import threads
 
 
 class WorkerThreads:
-    """A pool of threads that run one compiled kernel, without the GIL, at the same time.
+    """A pool of threads that run one stage, without the GIL, at the same time.
 
     Threads start on first use and end with the pool.  After a fork the child process starts its own.
 
     Parameters
     ----------
-    kernel : Callable
+    work : Stage
         It processes blocks of a `TaskQueue` until the driver ends the work.
     """
 
-    def __init__(self, kernel: Callable[..., None]):
-        self._kernel, self._process = kernel, os.getpid()
+    def __init__(self, work: Stage):
+        self._work, self._process = work, os.getpid()
         self._inboxes: list[queue.SimpleQueue] = []
         self._finalizer = weakref.finalize(self, _stop_all, self._inboxes)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> WorkerThreads:
-        """A new pool for the same kernel."""
-        return WorkerThreads(self._kernel)
+        """A new pool for the same stage."""
+        return WorkerThreads(self._work)
 
-    def start(self, arguments: tuple[Any, ...]) -> None:
-        """Run the kernel with `arguments` on all threads but the caller's; returns at once."""
+    def start(self, table: Table) -> None:
+        """Run the stage with the parts in a table on all threads but the caller's; returns at once."""
         if not COMPILED:  # without the compiler nothing is atomic
             return
         if self._process != os.getpid():  # threads do not survive a fork
@@ -43,16 +43,17 @@ class WorkerThreads:
         workers = threads() - 1
         while len(self._inboxes) < workers:
             inbox: queue.SimpleQueue = queue.SimpleQueue()
-            threading.Thread(target=_run, args=(inbox, self._kernel), name="sand-worker", daemon=True).start()
+            threading.Thread(target=_run, args=(inbox,), name="sand-worker", daemon=True).start()
             self._inboxes.append(inbox)
+        call = self._work.prepare(table)
         for inbox in self._inboxes[:workers]:
-            inbox.put(arguments)
+            inbox.put(call)
 
 
-def _run(inbox: queue.SimpleQueue, kernel: Callable[..., None]) -> None:
-    while (arguments := inbox.get()) is not None:
-        kernel(*arguments)
-        del arguments  # do not keep the arrays of a finished run alive
+def _run(inbox: queue.SimpleQueue) -> None:
+    while (call := inbox.get()) is not None:
+        call()
+        del call  # do not keep the arrays of a finished run alive
 
 
 def _stop_all(inboxes: list[queue.SimpleQueue]) -> None:

@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..box import nearest_image
-from ..compiler.jit import kernel, loop, rare
+from ..compiler.jit import loop, rare
+from ..compiler.stage import stage
 from ..numerics.simd import SIMD_WIDTH
 from ..numerics.vec import dot, load, put, sub
 from ..state.arrays import CELLS_PER_GRAIN
@@ -175,13 +176,13 @@ def append_range(long_range, sorted_position, span, limit, s, first, last, used)
         return FULL
     for k in range(length):
         separation = nearest_image(sub(own_position, load(sorted_position, first + k)), span)
-        long_range.source[0, k] = dot(separation, separation)
+        long_range.squared_distance[k] = dot(separation, separation)
     if first <= s < last:
-        long_range.source[0, s - first] = math.inf
+        long_range.squared_distance[s - first] = math.inf
     next_entry = np.uint64(used)
     for k in range(length):
         long_range.neighbour[next_entry] = first + k
-        next_entry += np.uint64(long_range.source[0, k] < limit)
+        next_entry += np.uint64(long_range.squared_distance[k] < limit)
     return np.int64(next_entry)
 
 
@@ -223,7 +224,7 @@ def build_grid(long_range, sorted_position, anchor, span, reach):
 def append_neighbours(long_range, sorted_position, grid, span, reach, s, used):
     """Append the sorted indices of all neighbours of s within the reach to `neighbour`, after the first `used` entries.
 
-    The first row of `source` serves as a buffer for squared distances.
+    `squared_distance` serves as a buffer.
 
     Parameters
     ----------
@@ -297,7 +298,7 @@ def build_verlet_list(grains, long_range, count, span, search):
     return 0
 
 
-@kernel
+@stage("the Verlet list")
 def rebuild_verlet_list(long_range, span, reach):
     """Restore the Verlet list of an earlier run from its anchors; returns its length, or FULL."""
     return list_from_anchors(long_range, span, reach)

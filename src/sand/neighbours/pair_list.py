@@ -43,20 +43,31 @@ def gap_below(grains, span, max_gap, i, j):
 @loop
 def candidates(pair_list, long_range, grid, span, search, k):
     """Range of the candidates of the k-th grain: entries of `neighbour`, or grain indices if all pairs are searched."""
-    if search.celled:
-        end = append_neighbours(long_range, pair_list.anchor, grid, span, search.reach, k, 0)
-        return np.int64(0), np.int64(end)
     if search.listed:
         return np.int64(long_range.start[k]), np.int64(long_range.start[k + 1])
     return np.int64(0), np.int64(k)
 
 
-@functools.cache
-def pair_list_loop(law: ContactLaw) -> Callable:
-    """The loop that builds the pair list, for one contact law."""
-    pair_type_of = pair_type_loop(law)
+@loop
+def candidates_from_cells(pair_list, long_range, grid, span, search, k):
+    """As `candidates`, for the k-th grain in the order of cells."""
+    end = append_neighbours(long_range, pair_list.anchor, grid, span, search.reach, k, 0)
+    return np.int64(0), np.int64(end)
 
-    @rare
+
+@loop
+def no_grid(long_range, sorted_position, anchor, span, reach):
+    """Where no cells are used."""
+    return NO_GRID
+
+
+@functools.cache
+def pair_list_loop(law: ContactLaw, celled: bool) -> Callable:
+    """The loop that builds the pair list, for one contact law; `celled`: for searches with cells."""
+    pair_type_of = pair_type_loop(law)
+    find_candidates, make_grid = (candidates_from_cells, build_grid) if celled else (candidates, no_grid)
+
+    @loop
     def build_pair_list(grains, contacts, pair_list, long_range, count, span, max_gap, settings, search):
         """List the pairs with a gap below `max_gap` [m], selected from the Verlet list, from cells, or from all pairs.
 
@@ -68,11 +79,10 @@ def pair_list_loop(law: ContactLaw) -> Callable:
         """
         found, pair_type, capacity = 0, NO_PAIR_TYPE, pair_list.pair.shape[1]
         sorted_indices = search.celled or search.listed
-        grid = NO_GRID
-        if search.celled and settings.on:  # the anchors, set at the end, serve as buffer for positions in sorted order
-            grid = build_grid(long_range, pair_list.anchor, grains.position, span, search.reach)
-        for k in range(grains.mass.size if settings.on else 0):
-            first, last = candidates(pair_list, long_range, grid, span, search, k)
+        # the anchors, set at the end, serve as buffer for positions in sorted order
+        grid = make_grid(long_range, pair_list.anchor, grains.position, span, search.reach)
+        for k in range(grains.mass.size):
+            first, last = find_candidates(pair_list, long_range, grid, span, search, k)
             if last == FULL:
                 pair_list.anchor[0, 0] = math.inf
                 return ROW_FULL

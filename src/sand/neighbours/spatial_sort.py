@@ -71,7 +71,7 @@ def reorder_grains(state: State, rows: np.ndarray) -> None:
     for index in (GRAIN1, GRAIN2):
         if count[index] >= 0:
             count[index] = new_index[count[index]]
-    resort_contacts_by_grain(contacts, count, rows.size)
+    resort_contacts_by_grain(state.grains.arrays, contacts, count)
 
 
 def sort_contacts_and_pairs(state: State) -> None:
@@ -82,7 +82,7 @@ def sort_contacts_and_pairs(state: State) -> None:
         for name, columns in arrays._asdict().items():
             if columns.size and name not in NOT_PER_PAIR and not (state.uniform_contacts and name in UNIFORM_ARRAYS):
                 columns[..., : order.size] = columns[..., order]
-    resort_contacts_by_grain(state.contacts, state.count, len(state.grains))
+    resort_contacts_by_grain(state.grains.arrays, state.contacts, state.count)
 
 
 @checked

@@ -1,26 +1,31 @@
-"""Assembly of the engine: forces, box and settings become kernel specification, step parameters and state."""
+"""Assembly of the engine: forces, box and settings become the components of a program, step parameters and state."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..box import Box
-from ..compiler.jit import is_builtin
 from ..contact.columns import constant_names
-from ..contact.law import is_builtin_law
 from ..contact.model import Contact
 from ..errors import BadInput
-from ..forces.base import ExternalForce, Force, LongRangeForce, compose, compose_long_range
+from ..forces.base import ExternalForce, Force, LongRangeForce
 from ..forces.gas.loops import VACUUM
 from ..forces.gas.model import Gas
-from ..forces.pair.loops import NO_LONG_RANGE_FORCE, LongRangeSums, all_blocks, with_own_buffers
+from ..forces.pair.loops import LongRangeSums, all_blocks
 from ..grains import Grains
 from ..integrate.base import Integrator
-from ..integrate.kernel_spec import ContactParameters, ExternalWork, GasSettings, KernelSpec, StepParameters
+from ..integrate.parts import (
+    ContactParameters,
+    ExternalWork,
+    ForceNumbers,
+    GasSettings,
+    RespaSettings,
+    StepParameters,
+)
+from ..integrate.program import Components
 from ..integrate.step_control import IMPACT_DISPLACEMENT, StepCriteria
-from ..integrate.task_queue import uses_task_queue
 from ..integrate.verlet import Verlet
 from ..material import SILICA
 from ..neighbours.settings import ChosenSearch, Neighbours
@@ -37,7 +42,7 @@ from ..state.arrays import (
     empty_contact_arrays,
     empty_long_range_arrays,
     empty_pair_list,
-    stage_arrays,
+    runge_kutta_arrays,
 )
 from ..state.state import RECORDED, State
 from .checks import check_system
@@ -100,38 +105,43 @@ def build_engine(
     by_type = _forces_by_type(forces, grains)
     pair_gap = float(grains.radius.min())
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
-    flights = stepping.flight_loop is not None
+    flights = stepping.flight is not None
     found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], adaptive_steps=flights)
     listed = [found.search.listed and r is not None for r in cutoffs]
     long_range = _long_range_loops(by_type, grains, box, listed)
     verlet = stepping.contact_stepping
     control = _step_control(grains, verlet, by_type, pair_gap)
     stepping = stepping.resolved(grains, control)
-    external, external_numbers = compose(by_type.external)
-    sums, long_range_numbers = compose_long_range([own for _, own, _ in long_range], [own for _, _, own in long_range])
     parameters = StepParameters(
         box.span,
         _contact_parameters(by_type.contact, grains, verlet),
-        long_range_numbers,
-        external_numbers,
         found.search,
-        verlet.respa_settings(bool(long_range)),
+        _respa_settings(by_type, verlet),
         _external_work(by_type.external, box),
         _gas_settings(by_type.gas, grains, seed),
         control,
         stepping.flight_limits(_longest_displacement(grains, box, found)),
+        ForceNumbers(len(long_range), len(by_type.external)),
     )
-    spec = _kernel_spec(grains, box, by_type, external, sums, stepping)
+    components = Components(
+        (by_type.contact or Contact()).contact_law,
+        [(sums, numbers) for _, sums, numbers in long_range],
+        [(force.formula, force.numbers()) for force in by_type.external],
+        stepping.flight,
+        bool(by_type.gas),
+        bool(grains.body_moment.any()),
+        len(grains) >= WIDE_FROM,
+    )
     wrapped = grains.copy()
     wrapped.arrays.position[...] = box.wrap(grains.position).T
     start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
-    state = _new_state(wrapped, box, parameters, spec, capacity, buffers=listed.count(False))
+    state = _new_state(wrapped, box, parameters, components, capacity, over_all_pairs=not all(listed))
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
     )
-    engine = Engine(state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, spec)
+    engine = Engine(state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components)
     given = add_contacts(engine, by_type.contact, contacts)
     if by_type.contact is not None:
         refuse_overlaps(wrapped, by_type.contact, start, given)
@@ -145,8 +155,7 @@ def _long_range_loops(
     sums = [force.sums(box, own) for force, own in zip(forces.long_range, listed, strict=True)]
     if len(grains) >= WIDE_FROM:
         sums = [own.wide or own for own in sums]
-    numbers = with_own_buffers([force.numbers(grains, box) for force in forces.long_range], listed)
-    return list(zip(forces.long_range, sums, numbers, strict=True))
+    return [(force, own, force.numbers(grains, box)) for force, own in zip(forces.long_range, sums, strict=True)]
 
 
 def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
@@ -158,73 +167,60 @@ def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
     )
 
 
-def _kernel_spec(
-    grains: Grains,
-    box: Box,
-    forces: ForcesByType,
-    external: Callable,
-    sums: LongRangeSums,
-    stepping: Integrator,
-) -> KernelSpec:
-    """Specification from which the driver is compiled."""
-    verlet = stepping.contact_stepping
-    # without contacts, or with cycles of one step, there is neither extrapolation nor a constant force
-    scheme = verlet.far if forces.long_range and forces.contact and verlet.max_cycle_steps > 1 else "every step"
-    if scheme.startswith("taylor") and sums.rates is None:
-        without = [f.name for f in forces.long_range if f.sums(box, False).rates is None]
-        raise BadInput(
-            f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "
-            "lacks; use far = 'impulse' or 'every step'"
-        )
-    law, flight = (forces.contact or Contact()).contact_law, stepping.flight_loop
-    formulas = [*(f.formula for f in forces.external), *([flight] if flight else [])]
-    return KernelSpec(
-        law,
-        external,
-        sums,
-        split=scheme == "impulse",
-        impulse=scheme == "impulse",
-        taylor=scheme.startswith("taylor"),
-        gas=bool(forces.gas),
-        flight_loop=flight,
-        queue=uses_task_queue(len(grains)),
-        keep=is_builtin_law(law) and sums.kept and all(map(is_builtin, formulas)),
-        magnetic=bool(grains.body_moment.any()),
-        wide=len(grains) >= WIDE_FROM,
-    )
+def _respa_settings(forces: ForcesByType, verlet: Verlet) -> RespaSettings:
+    """Multiple time stepping; cycles of one step without long-range forces.
+
+    Without contacts, or with cycles of one step, there is neither extrapolation nor a constant force.
+    """
+    most = verlet.max_cycle_steps if forces.long_range else 1
+    scheme = verlet.far if forces.contact and most > 1 else "every step"
+    taylor = scheme.startswith("taylor")
+    if taylor:
+        without = [f.name for f in forces.long_range if f.sums(Box.open(), False).rates is None]
+        if without:
+            raise BadInput(
+                f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "
+                "lacks; use far = 'impulse' or 'every step'"
+            )
+    return RespaSettings(most, verlet.far == "taylor-literal", scheme == "impulse", taylor)
 
 
 def _new_state(
-    grains: Grains, box: Box, parameters: StepParameters, spec: KernelSpec, capacity: int, *, buffers: int
+    grains: Grains,
+    box: Box,
+    parameters: StepParameters,
+    components: Components,
+    capacity: int,
+    *,
+    over_all_pairs: bool,
 ) -> State:
-    """State with the arrays that the kernels need.
+    """State with the arrays that the stages need.
 
-    `capacity` is that of contacts and pairs, `buffers` the number of long-range forces summed over all pairs.
+    `capacity` is that of contacts and pairs, `over_all_pairs` whether any long-range force is summed over all pairs.
     """
-    count, search, contact = len(grains), parameters.search, parameters.contact
-    uniform_contacts = contact.uniform_contacts
-    channels = len(RECORDED) if contact.damped or contact.follow else ALWAYS_RECORDED
-    blocks = buffers * all_blocks(grains) if spec.long_range is not NO_LONG_RANGE_FORCE else 0
+    count, search, settings = len(grains), parameters.search, parameters.settings
+    uniform_contacts = settings.uniform_contacts
+    channels = len(RECORDED) if settings.damped or settings.follow else ALWAYS_RECORDED
+    pair_forces = [sums for sums, _ in components.pair_forces]
     needed = set(LIST_ARRAYS if search.listed else CELL_ARRAYS if search.celled else ())
-    needed |= set(RESPA_ARRAYS if spec.impulse else ())
-    needed |= set(RATE_ARRAYS if spec.taylor else ())
-    needed |= {"packed_position", "source"} if blocks else set()
-    needed |= set(PACKED_ARRAYS if spec.long_range.packed else ())
-    needed |= set(FORCE_ARRAYS if spec.long_range is not NO_LONG_RANGE_FORCE or spec.flight_loop else ())
+    needed |= set(RESPA_ARRAYS if parameters.respa.impulse else ())
+    needed |= set(RATE_ARRAYS if parameters.respa.taylor else ())
+    needed |= {name for sums in pair_forces for name in sums.arrays}
+    needed |= set(FORCE_ARRAYS if pair_forces or components.flight else ())
     return State(
         grains,
         box,
         empty_contact_arrays(
-            count, capacity, len(constant_names(spec.law)), uniform_contacts=uniform_contacts, channels=channels
+            count, capacity, len(constant_names(components.law)), uniform_contacts=uniform_contacts, channels=channels
         ),
         empty_pair_list(count, capacity, uniform_contacts=uniform_contacts),
         empty_long_range_arrays(
             count,
             NEIGHBOURS_PER_GRAIN * count if search.listed else CELL_NEIGHBOURS if search.celled else 0,
-            blocks,
+            all_blocks(grains) if pair_forces and over_all_pairs else 0,
             unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
-        stages=stage_arrays(count if spec.flight_loop else 0),
+        runge_kutta=runge_kutta_arrays(count if components.flight else 0),
         uniform_contacts=uniform_contacts,
     )
 

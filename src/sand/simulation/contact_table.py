@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.law import ContactLaw
-from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, contacts_kernel
+from ..contact.measure import CONTACT_LOADS, CONTACT_ROWS, CONTACT_VECTORS, contacts_stage
 from ..errors import NoSuchKey, did_you_mean, import_optional, shown
 from ..state.state import CONTACTS, RECORDED, State
 
@@ -44,7 +44,7 @@ class ContactTable(Columns):
         scalars = len(CONTACT_ROWS)
         names = [*(name for name, _, _ in CONTACT_VECTORS), *CONTACT_LOADS]
         rows = np.zeros((scalars + 3 * len(names), used))
-        contacts_kernel(law)(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
+        contacts_stage(law)(state.grains.arrays, contacts, state.count, state.box.span, follow, rows)
         self["pair"], self["formed"] = contacts.pair[:, :used].T.copy(), contacts.formed[:used].copy()
         self.update({name: rows[k] for k, (name, _, _) in enumerate(CONTACT_ROWS)})
         vectors = rows[scalars:].reshape(len(names), 3, used)

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
+from ..compiler.stage import Program, Table
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
+from ..contact.measure import ENERGIES, energies_stage
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.loops import external_energies_for
 from ..forces.pair.loops import long_range_energies_for
 from ..integrate.base import Integrator
-from ..integrate.driver import driver_for
-from ..integrate.kernel_spec import KernelSpec, StepParameters, Stop
+from ..integrate.driver import advance
+from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
+from ..integrate.program import Components, build_program
 from ..integrate.step_control import INCREASE_INTERVAL
-from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, worker_loops
+from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, take_blocks, uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
 from ..neighbours.settings import Neighbours
@@ -52,7 +56,7 @@ class Engine:
     state : State
         The state, with grains in the user's order.
     parameters : StepParameters
-        Constants of the run, as the kernels take them.
+        Settings of the run, as the stages take them.
     warnings : list[str]
         Warnings of the forces about these grains.
     external : Sequence[ExternalForce]
@@ -75,15 +79,26 @@ class Engine:
     search: str
     stepping: Integrator
     neighbours: Neighbours
-    _kernel_spec: KernelSpec
+    _components: Components
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
-    _advance: Callable = field(init=False)
+    _table: Table = field(init=False)
+    _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self._advance = driver_for(self._kernel_spec)
-        if self._kernel_spec.queue:
-            self._workers = WorkerThreads(worker_loops(self._kernel_spec)[1])
+        self._table = Table(PARTS)
+        for name, value in self.parameters._asdict().items():
+            self._table.set(name, value)
+        self._table.set("scratch", np.zeros(SCRATCH))
+        if uses_task_queue(len(self._state.grains)):
+            self._workers = WorkerThreads(take_blocks)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Engine:
+        """A copy with a table of its own."""
+        names = [each.name for each in fields(self) if each.init]
+        other = Engine(*(copy.deepcopy(getattr(self, name), memo) for name in names))
+        other._is_sorted = self._is_sorted
+        return other
 
     @property
     def state(self) -> State:
@@ -104,7 +119,7 @@ class Engine:
     @property
     def law(self) -> ContactLaw:
         """The contact law."""
-        return self._kernel_spec.law
+        return self._components.law
 
     @property
     def time(self) -> float:
@@ -145,24 +160,7 @@ class Engine:
         """Take steps up to a time [s] or a step, in the present order of the arrays; enlarges arrays that overflow."""
         state = self._state
         while True:
-            stages = (state.stages,) if self._kernel_spec.flight_loop else ()
-            arrays = (
-                state.grains.arrays,
-                state.contacts,
-                state.pair_list,
-                state.long_range,
-                *stages,
-                state.clock,
-                state.count,
-                state.lost,
-            )
-            parameters = self._start_workers()
-            try:
-                stop = Stop(self._advance(*arrays, parameters, float(until), int(last)))
-            except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
-                if self._workers is not None:
-                    release_workers(parameters.queue)
-                raise
+            stop = self._call_driver(until, last)
             if stop is Stop.CONTACTS_FULL:
                 state.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
@@ -173,15 +171,31 @@ class Engine:
             else:
                 return stop
 
-    def _start_workers(self) -> StepParameters:
-        """Start worker threads for one call of the driver, where there are any; returns the driver's parameters."""
-        if self._workers is None:
-            return self.parameters
-        state = self._state
-        parameters = self.parameters._replace(queue=new_task_queue(len(state.grains), state.contacts.flag.size))
-        if benefits_from_workers(self._kernel_spec, state.grains.arrays, int(state.count[CONTACTS])):
-            self._workers.start((state.grains.arrays, state.contacts, state.long_range, state.count, parameters))
-        return parameters
+    def _current_table(self, state: State) -> Table:
+        """The table with the present arrays of the state."""
+        self._table.set("grains", state.grains.arrays)
+        for name in ("contacts", "pair_list", "long_range", "runge_kutta", "clock", "count", "lost"):
+            self._table.set(name, getattr(state, name))
+        return self._table
+
+    def _call_driver(self, until: float, last: float) -> Stop:
+        """One call of the driver."""
+        state, table = self._state, self._current_table(self._state)
+        queue = new_task_queue(len(state.grains), state.contacts.flag.size)
+        for name, value in (("queue", queue), ("until", float(until)), ("last", int(last))):
+            table.set(name, value)
+        try:
+            if self._program is None:
+                self._program = build_program(self._components, self.parameters, table)
+                table.set("program", self._program)
+            if self._workers is not None and benefits_from_workers(
+                len(self._components.pair_forces), int(state.count[CONTACTS])
+            ):
+                self._workers.start(table)
+            return Stop(self._program.run(advance, table))
+        except BaseException:  # Ctrl-C while it compiles, an error in a user's formula
+            release_workers(queue)
+            raise
 
     def add_contacts(self, pair: np.ndarray, slide: np.ndarray, roll: np.ndarray, twist: np.ndarray) -> int:
         """Add contacts before the first step; array shapes (C, …).
@@ -196,11 +210,8 @@ class Engine:
             state.grow_contacts(len(pair))
         given = [np.ascontiguousarray(vectors.T, dtype=np.float64) for vectors in (slide, roll, twist)]
         pairs = np.ascontiguousarray(pair.T, dtype=np.uint32)
-        return int(
-            forming_loops(self.law).add_initial(
-                state.grains.arrays, state.contacts, state.count, state.box.span, self.parameters.contact, pairs, *given
-            )
-        )
+        arrays, settings = (state.grains.arrays, state.contacts, state.count), self.parameters.settings
+        return forming_loops(self.law).add_initial(*arrays, state.box.span, settings, pairs, *given)
 
     def begin(self) -> None:
         """Form contacts between grains that touch at the start, with no energy booked, and compute the first loads."""
@@ -221,7 +232,7 @@ class Engine:
             reorder_grains(state, state.order)
             self._is_sorted = True
         elif state.contacts.gather_order.size:
-            resort_contacts_by_grain(state.contacts, state.count, len(state.grains))
+            resort_contacts_by_grain(state.grains.arrays, state.contacts, state.count)
         if self.parameters.search.listed and not self._list_lasts():
             state.long_range.anchor[...] = state.grains.arrays.position
         self._rebuild_list()
@@ -242,17 +253,24 @@ class Engine:
 
     def energies_at_grains(self) -> dict[str, np.ndarray]:
         """Energy [J] of each grain (N,) by force: half of each pair energy, and the energies of per-grain forces."""
-        state = self.state
-        shares = {force.column: np.zeros(len(state.grains)) for force, _, _ in self.long_range}
+        table, state = self._current_table(self.state), self.state
+        shares = {name: np.zeros(len(state.grains)) for name in self._columns()}
         for force, sums, numbers in self.long_range:
-            long_range_energies_for(sums)(
-                state.grains.arrays, state.long_range, self.parameters.span, numbers, shares[force.column]
-            )
+            long_range_energies_for(sums).run(table, (numbers, shares[force.column]))
         for outer in self.external:
-            shares[outer.name] = np.zeros(len(state.grains))
-            fill = external_energies_for(outer.formula)
-            fill(state.grains.arrays, state.time, outer.numbers(), shares[outer.name])
+            external_energies_for(outer.formula).run(table, (outer.numbers(), state.time, shares[outer.name]))
         return shares
+
+    def _columns(self) -> list[str]:
+        """Columns of the forces in the ledger."""
+        return [*(force.column for force, _, _ in self.long_range), *(force.name for force in self.external)]
+
+    def contact_energies(self) -> list[float]:
+        """Energies [J] stored by the contacts, see `contact.measure.ENERGIES`."""
+        found, state = np.zeros(len(ENERGIES)), self.state
+        if state.count[CONTACTS]:
+            energies_stage(self.law).run(self._current_table(state), (found,))
+        return found.tolist()
 
     def force_energies(self) -> dict[str, float]:
         """Total energy [J] of each long-range and per-grain force, by ledger column."""

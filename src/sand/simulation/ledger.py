@@ -5,19 +5,19 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
 from ..analysis.ledger_columns import LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
-from ..contact.law import ContactLaw
-from ..contact.measure import ENERGIES, energies_kernel
+from ..contact.measure import ENERGIES
 from ..errors import BadInput
 from ..grains import Grains
 from ..state.state import BROKEN, CONTACTS, MADE, SLIPPED, State
 
+KINETIC = "translation", "rotation"
+"""Columns of kinetic energies."""
 MAGNETIC = "magnetic"
 """A column that every ledger has, with or without dipoles."""
 RUNAWAY = 0.5
@@ -28,27 +28,23 @@ WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
 
-def log_row(state: State, law: ContactLaw, parameters: Any, forces: dict[str, float]) -> dict[str, float]:
+def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]) -> dict[str, float]:
     """Compute one row of the ledger: energies [J], losses [J], momenta (SI), counts of contacts and clusters.
 
     Parameters
     ----------
-    law : ContactLaw
-        The contact law.
-    parameters : StepParameters
-        Constants of the run, as the driver takes them.
+    of_contacts : Sequence[float]
+        Energies [J] stored by the contacts, see `contact.measure.ENERGIES`.
     forces : dict[str, float]
         Energy [J] of each long-range and per-grain force by column.
     """
-    energies = np.empty(len(ENERGIES))
-    grains = state.grains.arrays
-    energies_kernel(law)(grains, state.contacts, state.count, state.box.span, parameters.contact.follow, energies)
     contacts = int(state.count[CONTACTS])
+    energies = [*map(math.fsum, kinetic_energies(state.grains)), *of_contacts]
     labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
     row: dict[str, float] = {"step": state.steps, "time": state.time}
-    row |= dict(zip(ENERGIES, energies.tolist(), strict=True)) | {MAGNETIC: 0.0} | forces
+    row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
-    row["total"] = math.fsum([*energies.tolist(), *forces.values(), *state.lost.tolist()])
+    row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
         "contacts": contacts,
@@ -62,10 +58,12 @@ def log_row(state: State, law: ContactLaw, parameters: Any, forces: dict[str, fl
     return row
 
 
-def kinetic_energies(grains: Grains) -> np.ndarray:
-    """Kinetic energy ½mv² + ½Iω² of each grain (N,) [J]."""
-    translation = grains.mass * (grains.velocity**2).sum(axis=1)
-    return 0.5 * (translation + grains.inertia * (grains.spin**2).sum(axis=1))
+def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:
+    """Kinetic energies of translation ½mv² and rotation ½Iω² of each grain, (N,) each [J]."""
+    arrays = grains.arrays
+    v, w = arrays.velocity, arrays.spin
+    squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    return 0.5 * arrays.mass * squares[0], 0.5 * arrays.inertia * squares[1]
 
 
 def momenta(grains: Grains) -> list[float]:
@@ -86,10 +84,10 @@ class Ledger(LedgerColumns):
 
     def __init__(self, forces: Sequence[str] = ()):
         others = [name for name in forces if name != MAGNETIC]
-        own = {"step", "time", *ENERGIES, *LOSSES, "total", *MOMENTA, *NUMBERS}
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, *NUMBERS}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
-        super().__init__(("step", "time", *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS))
+        super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS))
 
     def add(self, row: dict[str, float]) -> bool:
         """Append a row; returns False if the ledger already has a row of this step."""

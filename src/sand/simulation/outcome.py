@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from ..integrate.kernel_spec import Stop
+from ..integrate.parts import Stop
 
 
 class Outcome(Enum):

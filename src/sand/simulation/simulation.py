@@ -17,7 +17,7 @@ from ..forces.base import Force
 from ..forces.pair.dipoles import kinetic_temperature
 from ..grains import Grains
 from ..integrate.base import Integrator
-from ..integrate.kernel_spec import Stop
+from ..integrate.parts import Stop
 from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
@@ -167,7 +167,7 @@ class Simulation(ReadOnlySettings):
     def contacts(self) -> ContactTable:
         """Table of the present contacts: displacements, shares of their limits, loads, energies and losses."""
         self._begin()
-        return ContactTable(self.state, self._engine.law, self._engine.parameters.contact.follow)
+        return ContactTable(self.state, self._engine.law, self._engine.parameters.settings.follow)
 
     @property
     def choices(self) -> dict[str, str]:
@@ -223,7 +223,7 @@ class Simulation(ReadOnlySettings):
         elastic = np.zeros(len(grains))
         for side in range(2):
             np.add.at(elastic, contacts["pair"][:, side], half)
-        energies = {"kinetic": kinetic_energies(grains), "contacts": elastic}
+        energies = {"kinetic": np.add(*kinetic_energies(grains)), "contacts": elastic}
         return {"flux_density": flux} | energies | self._engine.energies_at_grains()
 
     @checked
@@ -307,7 +307,7 @@ class Simulation(ReadOnlySettings):
             self._record_output()
 
     def _log_row(self) -> dict[str, float]:
-        return log_row(self.state, self._engine.law, self._engine.parameters, self._engine.force_energies())
+        return log_row(self.state, self._engine.contact_energies(), self._engine.force_energies())
 
     def _record_output(self) -> None:
         """Add a row to the ledger, write it with a frame, and call the observers."""
@@ -353,7 +353,7 @@ class Simulation(ReadOnlySettings):
     def _close(self, outcome: Outcome) -> Result:
         grains = self._engine.limiting_grains() if outcome.is_physics else ()
         if outcome is Outcome.RUNAWAY:
-            grains = tuple(sorted(np.argsort(kinetic_energies(self.grains))[-2:].tolist()))
+            grains = tuple(sorted(np.argsort(np.add(*kinetic_energies(self.grains)))[-2:].tolist()))
         if outcome.is_physics:
             self._record_output()
         ledger = self.ledger.with_row(self._log_row())

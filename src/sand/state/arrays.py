@@ -1,4 +1,4 @@
-"""Arrays of contacts, candidate pairs and long-range forces that kernels read and write, and their allocation."""
+"""Arrays of contacts, candidate pairs and long-range forces that stages read and write, and their allocation."""
 
 from __future__ import annotations
 
@@ -66,7 +66,8 @@ class LongRangeArrays(NamedTuple):
     cell_of: np.ndarray  # (N,) uint32: cell of each grain
     cell_start: np.ndarray  # (M+1,) uint32: first sorted index of each cell
     packed_position: np.ndarray  # (3, V) positions by sorted index [m]; by grain in sums over all pairs
-    source: np.ndarray  # (3, V) moments; (1, P) if no force needs them
+    packed_moment: np.ndarray  # (3, V) moments, likewise
+    squared_distance: np.ndarray  # (V,) squared distances of the candidates of one grain, while a list is built [m²]
     packed_grain: np.ndarray  # (9, N) position, moment, charge, mass, radius by sorted index, for generic pair forces
     force: np.ndarray  # (3, N) long-range forces [N]; (3, 0) if there are none
     torque: np.ndarray  # (3, N) long-range torques [N m]; likewise
@@ -80,7 +81,7 @@ class LongRangeArrays(NamedTuple):
     block_sums: np.ndarray  # (2B, 3, V) forces and flux densities of each of the B blocks of a sum over all pairs
 
 
-class StageArrays(NamedTuple):
+class RungeKuttaArrays(NamedTuple):
     """Buffers for the stages of a Runge–Kutta step; rows are position, velocity, orientation, spin.  Not saved."""
 
     start: np.ndarray  # (13, N) state at the start of the step
@@ -100,13 +101,13 @@ SAVED_LONG_RANGE = (
 )
 """Long-range arrays in a checkpoint; the others follow from them."""
 FORCE_ARRAYS = ("force", "torque")
-CELL_ARRAYS = ("order", "cell_of", "cell_start", "source")
+CELL_ARRAYS = ("order", "cell_of", "cell_start", "squared_distance")
 LIST_ARRAYS = ("anchor", "start", "packed_position", *CELL_ARRAYS)
-PACKED_ARRAYS = ("packed_grain",)
+PACKED_ARRAYS = ("packed_position", "packed_moment", "packed_grain")
 RESPA_ARRAYS = ("constant_force", "constant_torque", "past_position", "path")
 RATE_ARRAYS = ("force_rate", "torque_rate", "past_position", "past_moment")
-"""Long-range arrays needed only with long-range forces, cells, a Verlet list, generic pair forces over a list, r-RESPA
-cycles or Taylor series."""
+"""Long-range arrays needed only with long-range forces, cells, a Verlet list, copies for some pair forces
+(`LongRangeSums.arrays`), r-RESPA cycles or Taylor series."""
 UNIFORM_ARRAYS = ("constants", "step", "break_overlap")
 """Arrays of contacts and candidate pairs with identical columns if all grains are equal."""
 NOT_SAVED = ("inner", "skin", "gather_order")
@@ -141,12 +142,11 @@ def empty_long_range_arrays(
     unused : Collection[str], optional
         Arrays that no kernel of this simulation accesses; they get no columns.
     """
-    vectors = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
+    vectors: dict[str, np.ndarray] = {name: np.zeros((3, grains)) for name in LongRangeArrays._fields}
     vectors["anchor"], vectors["packed_grain"] = np.full((3, grains), np.inf), np.zeros((9, grains))
     v, p = padded_size(grains), max(int(capacity), 16)
-    # without forces, `source` is the buffer for squared distances of neighbours
-    source = np.zeros((1, p) if "force" in unused else (3, v))
-    vectors |= {"packed_position": np.zeros((3, v)), "source": source, "block_sums": np.zeros((2 * blocks, 3, v))}
+    vectors |= {name: np.zeros((3, v)) for name in ("packed_position", "packed_moment")}
+    vectors |= {"squared_distance": np.zeros(v), "block_sums": np.zeros((2 * blocks, 3, v))}
     sizes = {"order": grains, "start": grains + 1, "neighbour": p, "cell_of": grains}
     sizes["cell_start"] = CELLS_PER_GRAIN * grains + 28
     arrays = vectors | {name: np.zeros(size, np.uint32) for name, size in sizes.items()}
@@ -196,9 +196,9 @@ def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = Fals
     return PairList(pair, in_contact, types[0], types[1], anchor, inner, np.full(7, -1.0))
 
 
-def stage_arrays(grains: int) -> StageArrays:
+def runge_kutta_arrays(grains: int) -> RungeKuttaArrays:
     """Allocate the buffers of the Runge–Kutta integrator; `grains` is 0 if it is not used."""
-    return StageArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
+    return RungeKuttaArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
 
 
 def grown(arrays: Any, unchanged: Collection[str], minimum: int) -> Any:

@@ -19,9 +19,9 @@ from .arrays import (
     ContactArrays,
     LongRangeArrays,
     PairList,
-    StageArrays,
+    RungeKuttaArrays,
     grown,
-    stage_arrays,
+    runge_kutta_arrays,
 )
 
 # --- indices of State.clock (float64) ---------------------------------------------------------------
@@ -83,7 +83,7 @@ class State:
     clock: np.ndarray = field(default_factory=lambda: np.zeros(len(CLOCK)))
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
-    stages: StageArrays = field(default_factory=lambda: stage_arrays(0))
+    runge_kutta: RungeKuttaArrays = field(default_factory=lambda: runge_kutta_arrays(0))
     # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
     order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
     # equal radii, masses and materials, so that one set of constants serves all contacts
@@ -91,7 +91,7 @@ class State:
 
     def __post_init__(self) -> None:
         self.grains.arrays = all_aligned(self.grains.arrays)
-        for group in ("contacts", "pair_list", "long_range", "stages"):
+        for group in ("contacts", "pair_list", "long_range", "runge_kutta"):
             setattr(self, group, all_aligned(getattr(self, group)))
 
     @property
@@ -129,10 +129,7 @@ class State:
     def grow_rows(self) -> None:
         """Allocate a longer Verlet list; its content is discarded."""
         capacity = int(GROWTH * self.long_range.neighbour.size) + 1
-        source = self.long_range.source
-        if source.shape == (1, self.long_range.neighbour.size):
-            source = np.zeros((1, capacity))
-        self.long_range = all_aligned(self.long_range._replace(neighbour=np.zeros(capacity, np.uint32), source=source))
+        self.long_range = all_aligned(self.long_range._replace(neighbour=np.zeros(capacity, np.uint32)))
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of the state by name, for a checkpoint; unused columns are omitted."""

@@ -1,6 +1,6 @@
 """Formulas of external forces on single grains: force, torque and energy.
 
-All have the signature `formula(time, grain, parameters)`, so that a list of forces composes to one formula.
+All have the signature `formula(time, grain, parameters)`.
 """
 
 import math
@@ -102,24 +102,6 @@ def uniform_electric(time, grain, parameters):
     """Force q E [N], no torque, energy −q E·x [J], 0 at the origin."""
     force = scale(grain.charge, (parameters.x, parameters.y, parameters.z))
     return force, (0.0, 0.0, 0.0), -dot(force, grain.position)
-
-
-@formula
-def nothing(time, grain, parameters):
-    """No force: the last formula of every composition."""
-    return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
-
-
-def together(first, rest):
-    """The sum of two formulas; its `parameters` are the pair of theirs."""
-
-    @formula
-    def both(time, grain, parameters):
-        force1, torque1, energy1 = first(time, grain, parameters[0])
-        force2, torque2, energy2 = rest(time, grain, parameters[1])
-        return add(force1, force2), add(torque1, torque2), energy1 + energy2
-
-    return both
 
 
 @formula

@@ -1,10 +1,11 @@
-"""Loops of external forces: one composed formula over all grains."""
+"""Loops of external forces: one formula over all grains."""
 
 import functools
 
 from ...box import nearest_image
-from ...compiler.jit import is_builtin, kernel, loop
-from ...numerics.vec import accrue, load, put
+from ...compiler.jit import loop
+from ...compiler.stage import stage
+from ...numerics.vec import accrue, dot, load
 from .formulas import GrainState
 
 
@@ -23,7 +24,7 @@ def grain_at(grains, i):
 
 
 def external_loads(formula_of_grain):
-    """The loop that adds force and torque of a composed formula to the loads of every grain."""
+    """The loop that adds force and torque of a formula to the loads of every grain."""
 
     @loop
     def add_loads(grains, time, parameters):
@@ -36,7 +37,7 @@ def external_loads(formula_of_grain):
 
 
 def external_energy(formula_of_grain):
-    """The loop that sums the energy [J] of a composed formula over all grains."""
+    """The loop that sums the energy [J] of a formula over all grains."""
 
     @loop
     def sum_energy(grains, time, parameters):
@@ -48,30 +49,50 @@ def external_energy(formula_of_grain):
     return sum_energy
 
 
-def external_wrap(formula_of_grain):
-    """The loop that wraps positions into a periodic box; returns the change of external energy [J] by wrapping."""
+def external_power(formula_of_grain):
+    """The loop that sums the power F·v + M·ω [W] of a formula over all grains."""
 
     @loop
-    def wrap(grains, span, time, parameters):
+    def sum_power(grains, time, parameters):
+        total = 0.0
+        for i in range(grains.mass.size):
+            force, torque, _ = formula_of_grain(time, grain_at(grains, i), parameters)
+            total += dot(force, load(grains.velocity, i)) + dot(torque, load(grains.spin, i))
+        return total
+
+    return sum_power
+
+
+def wrapping_work(formula_of_grain):
+    """The loop that sums the change of the energy [J] by wrapping positions into a periodic box; moves no grain."""
+
+    @loop
+    def sum_work(grains, span, time, parameters):
         gained = 0.0
         for i in range(grains.mass.size):
-            position = load(grains.position, i)
-            wrapped = nearest_image(position, span)
-            if wrapped != position:
-                before = formula_of_grain(time, grain_at(grains, i), parameters)[2]
-                put(grains.position, i, wrapped)
-                gained += formula_of_grain(time, grain_at(grains, i), parameters)[2] - before
+            grain = grain_at(grains, i)
+            wrapped = nearest_image(grain.position, span)
+            if wrapped != grain.position:
+                moved = GrainState(
+                    wrapped, grain.velocity, grain.spin, grain.moment, grain.radius, grain.mass, grain.charge
+                )
+                gained += formula_of_grain(time, moved, parameters)[2] - formula_of_grain(time, grain, parameters)[2]
         return gained
 
-    return wrap
+    return sum_work
 
 
 @functools.cache
 def external_energies_for(formula_of_grain):
-    """Compile the loop that sets `shares` (N,) to the energy [J] of each grain by one formula."""
+    """The stage that computes the energy [J] of each grain by one formula.
 
-    def fill_shares(grains, time, parameters, shares):
+    Its parameters are those of the formula, the time [s], and the array of energies (N,).
+    """
+
+    @stage("the energies of external forces")
+    def fill_shares(grains, parameters):
         for i in range(grains.mass.size):
-            shares[i] = formula_of_grain(time, grain_at(grains, i), parameters)[2]
+            parameters[2][i] = formula_of_grain(parameters[1], grain_at(grains, i), parameters[0])[2]
+        return 0
 
-    return kernel(fill_shares, cached=is_builtin(formula_of_grain), purpose="the energies of external forces")
+    return fill_shares

@@ -11,18 +11,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...box import nearest_image
-from ...compiler.jit import LONG_VECTORS, formula, loop
+from ...compiler.jit import formula, loop
+from ...compiler.processor import FAST_512_BIT
 from ...numerics.roots import seeded_inverse_root
 from ...numerics.simd import round_up_to_simd_width
 from ...numerics.vec import accrue, add, cross, dot, load, put, sub
 from .dipole_formulas import pair_load, pair_load_at, pair_load_cut
 from .dipole_rates import pair_rates
-from .loops import ROWS_PER_BLOCK, BlockedSum, LongRangeSums, all_blocks, first_row, listed_blocks
+from .loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
 
 MAX_REMAINDER = 3
 """Remaining pairs of a row up to which scalar arithmetic is faster than a partly filled SIMD vector."""
 DUMMY_DISTANCE = 1.0
 """Distance [m] of the dummy pairs that fill a vector; their loads are multiplied by 0."""
+
+
+COPIES = "packed_position", "packed_moment"
+"""Copies of positions and moments that these loops use."""
 
 
 class DipoleParameters(NamedTuple):
@@ -52,7 +57,7 @@ def pack_moments(grains, long_range, span, parameters):
     for s in range(grains.mass.size):
         i = long_range.order[s]
         put(long_range.packed_position, s, load(grains.position, i))
-        put(long_range.source, s, load(grains.moment, i))
+        put(long_range.packed_moment, s, load(grains.moment, i))
 
 
 @loop
@@ -64,7 +69,7 @@ def listed_rows(grains, long_range, span, parameters, first, last):
     remainder = np.uint64(MAX_REMAINDER)
     for k in range(last - first):
         s = first + k
-        position, moment = load(long_range.packed_position, s), load(long_range.source, s)
+        position, moment = load(long_range.packed_position, s), load(long_range.packed_moment, s)
         force = field = (0.0, 0.0, 0.0)
         begin = np.uint64(long_range.start[s])
         pairs = np.uint64(long_range.start[s + np.uint64(1)]) - begin
@@ -75,7 +80,7 @@ def listed_rows(grains, long_range, span, parameters, first, last):
                 load(long_range.packed_position, t),
                 span,
                 moment,
-                load(long_range.source, t),
+                load(long_range.packed_moment, t),
                 parameters,
                 m < pairs,
             )
@@ -83,14 +88,6 @@ def listed_rows(grains, long_range, span, parameters, first, last):
         i = long_range.order[s]
         accrue(long_range.force, i, force)
         put(grains.field, i, field)
-
-
-@loop
-def listed_loads(grains, long_range, span, parameters):
-    """Loads of all pairs of the Verlet list."""
-    pack_moments(grains, long_range, span, parameters)
-    listed_rows(grains, long_range, span, parameters, np.uint64(0), np.uint64(grains.mass.size))
-    add_torques(grains, long_range, span, parameters)
 
 
 @loop
@@ -208,7 +205,7 @@ def rows_of(pair_loads: Callable) -> Callable:
     def add_rows(long_range, force, field, span, parameters, first, last):
         for k in range(last - first):
             i = first + k
-            position, moment = load(long_range.packed_position, i), load(long_range.source, i)
+            position, moment = load(long_range.packed_position, i), load(long_range.packed_moment, i)
             force_i = field_i = (0.0, 0.0, 0.0)
             for j in range(round_up_to_simd_width(i, remainder)):
                 f, b1, b2, _ = pair_loads(
@@ -216,7 +213,7 @@ def rows_of(pair_loads: Callable) -> Callable:
                     load(long_range.packed_position, j),
                     span,
                     moment,
-                    load(long_range.source, j),
+                    load(long_range.packed_moment, j),
                     parameters,
                     j < i,
                 )
@@ -234,7 +231,7 @@ def copy_moments(grains, long_range, span, parameters):
     """Copy positions and moments to arrays that are padded to whole SIMD vectors."""
     for i in range(grains.mass.size):
         put(long_range.packed_position, i, load(grains.position, i))
-        put(long_range.source, i, load(grains.moment, i))
+        put(long_range.packed_moment, i, load(grains.moment, i))
 
 
 @loop
@@ -262,29 +259,13 @@ def all_pairs(pair_loads: Callable) -> LongRangeSums:
         first, last = first_row(grains, b, all_blocks(grains)), first_row(grains, b + 1, all_blocks(grains))
         add_rows(long_range, force, field, span, parameters, first, last)
 
-    @loop
-    def loads(grains, long_range, span, parameters):
-        copy_moments(grains, long_range, span, parameters)
-        if grains.mass.size <= MAX_REMAINDER:  # rows have no dummy pairs
-            clear_field(grains)
-            last = np.uint64(grains.mass.size)
-            add_rows(long_range, long_range.force, grains.field, span, parameters, np.uint64(0), last)
-            add_torques(grains, long_range, span, parameters)
-            return
-        for b in range(all_blocks(grains)):
-            block(grains, long_range, span, parameters, b)
-        add_block_sums(grains, long_range, span, parameters)
-
-    blocked = BlockedSum(copy_moments, block, add_block_sums, all_blocks)
-    return LongRangeSums(loads, cut_rates, energy_shares, loads_of_pair, blocked)
+    return LongRangeSums(
+        copy_moments, block, add_block_sums, all_blocks, cut_rates, energy_shares, loads_of_pair, arrays=COPIES
+    )
 
 
-ALL_PAIRS = all_pairs(uncut_pair)._replace(wide=all_pairs(uncut_pair_seeded) if LONG_VECTORS else None)
+ALL_PAIRS = all_pairs(uncut_pair)._replace(wide=all_pairs(uncut_pair_seeded) if FAST_512_BIT else None)
 ALL_PAIRS_CUT = all_pairs(cut_pair)
 LISTED_PAIRS = LongRangeSums(
-    listed_loads,
-    listed_rates,
-    energy_shares,
-    loads_of_pair,
-    BlockedSum(pack_moments, listed_block, add_torques, listed_blocks),
+    pack_moments, listed_block, add_torques, listed_blocks, listed_rates, energy_shares, loads_of_pair, arrays=COPIES
 )

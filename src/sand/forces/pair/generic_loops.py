@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...box import nearest_image
-from ...compiler.jit import formula, is_builtin, loop
+from ...compiler.jit import formula, loop
 from ...numerics.vec import accrue, axpy, dot, load, put, scale, sub
 from .dipole_formulas import cut_weight
 from .dipole_rates import cut_curvature
-from .loops import ROWS_PER_BLOCK, BlockedSum, LongRangeSums, all_blocks, first_row, listed_blocks
+from .loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -41,7 +41,6 @@ class PairParameters(NamedTuple):
 
     own: Any  # parameters of the formula
     cutoff: Any  # dipole_formulas.Cutoff
-    buffer: int = 0  # which of the buffers for sums in blocks this force uses; set by `compose_long_range`
 
 
 @loop
@@ -144,13 +143,14 @@ def pair_sums(pair_formula: Callable, rate: Callable | None, torques: bool, list
         return of_pair(separation(grains, span, i, j), pair_grain(grains, i), pair_grain(grains, j), parameters)[3]
 
     make = _listed_loops if listed else _all_pairs_loops
-    loads, energies, blocked = make(of_pair, pair_energy, torques)
+    (begin, block, end, blocks), energies = make(of_pair, pair_energy, torques)
     rates = None if rate is None or torques else _rate_loops(cut_rate(pair_formula, rate), listed)
-    return LongRangeSums(loads, rates, energies, pair, blocked, packed=listed, kept=is_builtin(pair_formula))
+    arrays = ("packed_grain",) if listed else ()
+    return LongRangeSums(begin, block, end, blocks, rates, energies, pair, arrays=arrays)
 
 
-def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tuple[Callable, Callable, BlockedSum]:
-    """Loops over all pairs j < i, each pair once: loads, energies, and loads in blocks of rows i.
+def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tuple[tuple[Callable, ...], Callable]:
+    """Loops over all pairs j < i, each pair once: loads in blocks of rows i, and energies.
 
     Each block adds to two arrays of its own, for forces and torques, which are added up at the end in a fixed order.
     """
@@ -173,17 +173,13 @@ def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) ->
                 accrue(torque, i, torque_i)
 
     @loop
-    def loads(grains, long_range, span, parameters):
-        add_rows(grains, long_range.force, long_range.torque, span, parameters, 0, grains.mass.size)
-
-    @loop
     def begin(grains, long_range, span, parameters):
         """Nothing is copied before the blocks."""
 
     @loop
     def block(grains, long_range, span, parameters, b):
         blocks = all_blocks(grains)
-        k = 2 * (parameters.buffer * blocks + b)
+        k = 2 * b
         force, torque = long_range.block_sums[k], long_range.block_sums[k + 1]
         first, last = np.int64(first_row(grains, b, blocks)), np.int64(first_row(grains, b + 1, blocks))
         for i in range(last):
@@ -196,7 +192,7 @@ def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) ->
     def end(grains, long_range, span, parameters):
         blocks = all_blocks(grains)
         for b in range(blocks):
-            k = 2 * (parameters.buffer * blocks + b)
+            k = 2 * b
             force, torque = long_range.block_sums[k], long_range.block_sums[k + 1]
             for i in range(np.int64(first_row(grains, b + 1, blocks))):
                 accrue(long_range.force, i, load(force, i))
@@ -211,11 +207,11 @@ def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) ->
                 shares[i] += half
                 shares[j] += half
 
-    return loads, energies, BlockedSum(begin, block, end, all_blocks)
+    return (begin, block, end, all_blocks), energies
 
 
-def _listed_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tuple[Callable, Callable, BlockedSum]:
-    """Loops over the rows of the Verlet list, in which each pair occurs twice: loads, energies, and loads in blocks."""
+def _listed_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tuple[tuple[Callable, ...], Callable]:
+    """Loops over the rows of the Verlet list, in which each pair occurs twice: loads in blocks, and energies."""
 
     @loop
     def add_rows(grains, long_range, span, parameters, first, last):
@@ -241,11 +237,6 @@ def _listed_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tu
             pack_grain(long_range.packed_grain, s, grains, long_range.order[s])
 
     @loop
-    def loads(grains, long_range, span, parameters):
-        begin(grains, long_range, span, parameters)
-        add_rows(grains, long_range, span, parameters, 0, grains.mass.size)
-
-    @loop
     def end(grains, long_range, span, parameters):
         """Nothing is left to do after the blocks: each row belongs to one grain."""
 
@@ -261,7 +252,7 @@ def _listed_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tu
             for m in range(long_range.start[s], long_range.start[s + 1]):
                 shares[i] += 0.5 * pair_energy(grains, span, parameters, i, long_range.order[long_range.neighbour[m]])
 
-    return loads, energies, BlockedSum(begin, block, end, listed_blocks)
+    return (begin, block, end, listed_blocks), energies
 
 
 def _rate_loops(rate_of_pair: Callable, listed: bool) -> Callable:

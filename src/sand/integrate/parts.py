@@ -1,0 +1,98 @@
+"""The parts of a simulation that stages take by name (`PARTS`), and the types of its settings.
+
+A stage (`compiler.stage`) is a function whose arguments are names of parts: arrays of the state such as `grains`,
+`contacts` or `clock`, and settings such as `span` or `criteria`.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+PARTS = (
+    # arrays of the state
+    *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clock", "count", "lost"),
+    # settings, fields of StepParameters
+    *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
+    # data of one call of the driver
+    *("program", "queue", "scratch", "until", "last"),
+)
+"""Names of the parts of a simulation; new ones are added at the end of a line, since the order is that of the table."""
+
+# --- indices of the part `scratch` (float64): numbers that stages of one step hand to each other ---------------------
+DT = 0  # length of the step, or of the kick [s]
+LOAD_TIME = 1  # time at which external forces are evaluated [s]
+EXTERNAL = 2  # energy, power or work of external forces, summed over grains [J, W]
+CYCLE_LENGTH = 3  # length of the cycle for which rates are computed [s]; 0 for a single step
+SINCE = 4  # time since the last sum of the long-range forces [s]
+SCRATCH = 5
+
+
+class Stop(IntEnum):
+    """Why the driver returned to Python."""
+
+    NONE = 0  # no reason to stop early: continue, or all steps asked for are done
+    TIME_REACHED = 1
+    CONTACTS_FULL = 2
+    PAIRS_FULL = 3
+    NOT_FINITE = 4
+    NO_STEP = 5
+    TOO_FAST = 6
+    OVERCOMPRESSED = 7
+    SPINS_TOO_FAST = 8
+    LIST_FULL = 9
+
+
+class ContactParameters(NamedTuple):
+    """Run-time parameters of the contact model."""
+
+    on: bool  # False: grains overlap without interaction
+    pairings: Any  # (10, M, M) contact.law.Pairing of each pair of materials
+    reset: bool  # slip: False clamps the displacement at its limit, True resets it
+    follow: bool  # stiffnesses: False for the equilibrium radius a₀, True for the instantaneous contact radius
+    damped: bool  # whether normal motion is damped
+    per_period: float  # steps per fastest contact period
+    uniform_contacts: bool = False  # one set of constants for all contacts, as in State
+
+
+class RespaSettings(NamedTuple):
+    """Multiple time stepping: how often the long-range forces are summed while grains are in contact, and how."""
+
+    max_steps: int  # k_max, largest number of steps in a cycle; 1: summed in every step
+    instantaneous_rates: bool  # Taylor series from the instantaneous v and ω of all grains, not from mean rates
+    impulse: bool = False  # r-RESPA: forces, less a constant part, as impulses; those in contact in every step
+    taylor: bool = False  # extrapolated within a cycle by their first-order Taylor series
+
+
+class ExternalWork(NamedTuple):
+    """Energy changes of the external forces that the driver has to log as work of their sources."""
+
+    time_dependent: bool  # the energy depends explicitly on time
+    position_dependent: bool  # the energy depends on position and jumps when a grain crosses a periodic boundary
+
+
+class GasSettings(NamedTuple):
+    """When and how drag and Brownian kicks are applied."""
+
+    period: float  # target interval between two kicks [s]
+    seed: int
+    gas: Any  # forces.gas.loops.GasParameters
+
+
+class ForceNumbers(NamedTuple):
+    """Numbers of forces in the program of a simulation."""
+
+    pair: int
+    external: int
+
+
+class StepParameters(NamedTuple):
+    """All settings of a simulation for its stages; constant during a run."""
+
+    span: Any  # box.Span, side lengths of the box
+    settings: ContactParameters
+    search: Any  # neighbours.cell_list.Search
+    respa: RespaSettings
+    external_work: ExternalWork
+    gas: GasSettings
+    criteria: Any  # step_control.StepCriteria
+    flight_limits: Any  # of the integrator, such as adaptive.ErrorLimits
+    forces: ForceNumbers

@@ -1,0 +1,101 @@
+"""The program of a simulation: which stages it has, with the parameters of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from ..compiler.stage import Program, Stage, Table
+from ..contact.gather import resort_contacts_by_grain
+from ..contact.law import ContactLaw
+from ..forces.pair.loops import LongRangeSums
+from . import stages
+from .force_stages import (
+    EXTERNAL_STAGES,
+    IN_CONTACT,
+    LOADS,
+    PAIR_STAGES,
+    RATES,
+    REASSIGN,
+    SUM,
+    WORK,
+    external_force_stages,
+    pair_force_stages,
+)
+from .parts import StepParameters
+
+
+class Components(NamedTuple):
+    """What the program of a simulation is made of."""
+
+    law: ContactLaw
+    pair_forces: Sequence[tuple[LongRangeSums, Any]]  # loops and parameters of each
+    external_forces: Sequence[tuple[Callable, Any]]  # formula and parameters of each
+    flight: Stage | None  # takes one step while there are no contacts (base.Integrator); None: velocity Verlet
+    gas: bool  # drag and Brownian kicks
+    magnetic: bool  # some grain has a moment
+    wide: bool  # enough grains for the longest SIMD vectors
+
+
+def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[Stage, Any]]:
+    """The stages that a simulation calls, by number, with their own parameters."""
+    respa, work = parameters.respa, parameters.external_work
+    found: dict[int, Stage] = {
+        stages.DRIFT: stages.drift_stage(given.magnetic, given.wide),
+        stages.EXPLAIN: stages.explain_stop,
+    }
+    if given.pair_forces or given.external_forces:
+        found[stages.GATHER] = stages.gather_stage(given.wide)
+    else:
+        found[stages.GATHER_AND_KICK] = stages.gather_and_kick_stage(given.wide)
+    if parameters.search.listed:
+        found[stages.VERLET_LIST] = stages.verlet_list
+    if parameters.settings.on:
+        found |= _contact_stages(given, parameters)
+    if respa.taylor:
+        found[stages.PREPARE_RATES] = stages.prepare_rates
+        found[stages.STORE_POSITIONS] = stages.store_summation_positions
+        found[stages.EXTRAPOLATE] = stages.extrapolate
+    if given.gas:
+        found[stages.GAS_KICK] = stages.kick_by_gas
+    if given.flight is not None:
+        found[stages.FLIGHT] = given.flight
+    program: dict[int, tuple[Stage, Any]] = {number: (each, ()) for number, each in found.items()}
+    number = stages.FIRST_FORCE
+    needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
+    for sums, own in given.pair_forces:
+        own_stages = pair_force_stages(sums, given.wide)
+        program |= {number + k: (own_stages[k], own) for k in needed}
+        number += PAIR_STAGES
+    needed = {LOADS, *((WORK,) if work.time_dependent or work.position_dependent else ())}
+    for formula, own in given.external_forces:
+        own_stages = external_force_stages(formula)
+        program |= {number + k: (own_stages[k], own) for k in needed}
+        number += EXTERNAL_STAGES
+    return program
+
+
+def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, Stage]:
+    """The stages of contacts by number."""
+    events = stages.contact_event_stages(given.law)
+    found = {
+        stages.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
+        stages.INNER_LIST: stages.inner_list,
+        stages.CONTACT_PASS: stages.contact_pass_stage(given.law, given.wide),
+        stages.SETTLE: events[stages.SETTLE],
+        stages.FORM: events[stages.FORM],
+        stages.SORT: resort_contacts_by_grain,
+        stages.CONTACT_STEP: stages.set_contact_step,
+        stages.REMOVE_BROKEN: stages.remove_broken,
+    }
+    if parameters.settings.follow:
+        found[stages.STIFFNESS_WORK] = events[stages.STIFFNESS_WORK]
+    if parameters.settings.damped:
+        found[stages.DAMP] = events[stages.DAMP]
+    return found
+
+
+def build_program(given: Components, parameters: StepParameters, table: Table) -> Program:
+    """The program of a simulation, for the parts in a table; stages are compiled when they are first called."""
+    size = stages.FIRST_FORCE + PAIR_STAGES * len(given.pair_forces) + EXTERNAL_STAGES * len(given.external_forces)
+    return Program(table, stages_of(given, parameters), size)

@@ -1,0 +1,240 @@
+"""The stages of a step: parts of velocity Verlet that the driver calls by address, block by block or for all grains.
+
+Their numbers are the entries of the program of a simulation (`program.build_program`).  Some depend on the contact law
+and are compiled once for each; those of forces are in `force_stages`.
+"""
+
+import functools
+
+import numpy as np
+
+from ..compiler.stage import Stage, stage
+from ..contact.damping import damping_loops
+from ..contact.events import compact_contacts, forming_loops, settle_loop
+from ..contact.gather import gather
+from ..contact.law import ContactLaw
+from ..contact.update import contact_pass_loop, contact_step, store_slip_sums
+from ..forces.gas.loops import gas_kick
+from ..neighbours.cell_list import FULL, build_verlet_list
+from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
+from ..neighbours.skin import update_safe_speed
+from ..numerics.simd import float_from_bits
+from ..state.state import CONTACTS, CYCLE, GAS, GRAIN1, KICKED, STEP, STEPS, TIME
+from .motion import UNBOUNDED, drift_for, gather_and_kick
+from .parts import CYCLE_LENGTH, DT, SINCE, Stop
+from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions
+from .step_control import find_limiting_grains, first_not_finite
+from .step_parts import first_too_fast
+from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK
+
+# --- numbers of the stages ---------------------------------------------------------------------------------
+DRIFT = 0
+VERLET_LIST = 1
+PAIR_LIST = 2
+INNER_LIST = 3
+CONTACT_PASS = 4
+STIFFNESS_WORK = 5
+SETTLE = 6
+DAMP = 7
+FORM = 8
+SORT = 9
+CONTACT_STEP = 10
+REMOVE_BROKEN = 11
+GATHER = 12
+GATHER_AND_KICK = 13
+PREPARE_RATES = 14
+STORE_POSITIONS = 15
+EXTRAPOLATE = 16
+GAS_KICK = 17
+FLIGHT = 18
+EXPLAIN = 19
+FIRST_FORCE = 20  # from here on the stages of forces, see force_stages
+
+INNER_SKIN_FRACTION = 0.05
+"""Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
+
+
+@functools.cache
+def drift_stage(magnetic: bool, long_vectors: bool) -> Stage:
+    """First half kick and drift of a block of grains; stores the bits of the largest squared speed."""
+    drift_some = drift_for(magnetic)
+
+    @stage("the drift of grains", long_vectors=long_vectors)
+    def drift(grains, span, external_work, queue, scratch, block):
+        first = block * GRAINS_PER_BLOCK
+        last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
+        # positions are wrapped afterwards where the work of crossing a boundary is logged
+        box = UNBOUNDED if external_work.position_dependent else span
+        v = drift_some(grains, np.uint64(first), np.uint64(last), box, scratch[DT])
+        queue.speeds[block, 0] = float_from_bits(v)
+        return 0
+
+    return drift
+
+
+@stage("the Verlet list")
+def verlet_list(grains, long_range, count, span, search):
+    """Rebuild the Verlet list; returns `Stop.LIST_FULL` if the array is too short."""
+    full = build_verlet_list(grains, long_range, count, span, search) == FULL
+    return Stop.LIST_FULL.value if full else Stop.NONE.value
+
+
+@functools.cache
+def pair_list_stage(law: ContactLaw, celled: bool) -> Stage:
+    """Rebuild the pair list of a contact law, with cells or without; returns a `Stop`."""
+    build_pair_list = pair_list_loop(law, celled)
+
+    @stage("the list of contact candidates")
+    def pair_list_of_law(grains, contacts, pair_list, long_range, count, span, settings, search, criteria):
+        found = build_pair_list(
+            grains, contacts, pair_list, long_range, count, span, criteria.pair_gap, settings, search
+        )
+        if found == FULL:
+            return Stop.PAIRS_FULL.value
+        if found == ROW_FULL:
+            return Stop.LIST_FULL.value
+        update_safe_speed(pair_list, count)
+        return Stop.NONE.value
+
+    return pair_list_of_law
+
+
+@stage("the list of pairs that may touch next")
+def inner_list(grains, pair_list, count, span, criteria):
+    """Select the pairs that may touch next from the pair list."""
+    build_inner_list(grains, pair_list, count, span, 2.0 * INNER_SKIN_FRACTION * criteria.pair_gap)
+    return 0
+
+
+@functools.cache
+def contact_pass_stage(law: ContactLaw, long_vectors: bool) -> Stage:
+    """Update of a block of contacts; stores its slip sums."""
+    contact_pass = contact_pass_loop(law)
+
+    @stage("the contact forces", long_vectors=long_vectors)
+    def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):
+        first = block * CONTACTS_PER_BLOCK
+        last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
+        found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, settings, clock[STEP])
+        store_slip_sums(queue.passed, block, found)
+        return 0
+
+    return pass_contacts
+
+
+@functools.cache
+def contact_event_stages(law: ContactLaw) -> dict[int, Stage]:
+    """Stages of contact events by number: work of stiffnesses, slip and breaking, damping, forming."""
+    damping, settle, form_contacts = damping_loops(law), settle_loop(law), forming_loops(law).form
+    damp_contacts, log_stiffness_work = damping.damp, damping.log_stiffness_work
+
+    @stage("the work of changing stiffnesses")
+    def stiffness_work(grains, contacts, clock, count, lost, span):
+        log_stiffness_work(grains, contacts, count, lost, span, clock[STEP])
+        return 0
+
+    @stage("the slip and breaking of contacts")
+    def settle_contacts(grains, contacts, pair_list, clock, count, lost, span, settings):
+        """Slip or break flagged contacts; returns 1 if any contact broke."""
+        return 1 if settle(grains, contacts, pair_list, count, lost, span, settings, clock[STEP]) else 0
+
+    @stage("the damping of contacts")
+    def damp(grains, contacts, clock, count, lost, span):
+        damp_contacts(grains, contacts, count, lost, span, clock[STEP])
+        return 0
+
+    @stage("the forming of contacts")
+    def form(grains, contacts, pair_list, clock, count, lost, span, settings):
+        form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, clock[STEP])
+        return 0
+
+    return {STIFFNESS_WORK: stiffness_work, SETTLE: settle_contacts, DAMP: damp, FORM: form}
+
+
+@stage("the time step of contacts")
+def set_contact_step(grains, contacts, pair_list, clock, count, settings):
+    """Set the longest step that contacts allow."""
+    contact_step(contacts, pair_list, count, grains.mass.size, clock, settings.per_period)
+    return 0
+
+
+@stage("the removal of broken contacts")
+def remove_broken(contacts, count):
+    """Remove broken contacts from the arrays, where they were kept without loads until the end of the step."""
+    compact_contacts(contacts, count)
+    return 0
+
+
+@functools.cache
+def gather_stage(long_vectors: bool) -> Stage:
+    """Sums of the contact loads of a block of grains."""
+
+    @stage("the loads of grains", long_vectors=long_vectors)
+    def gather_loads(grains, contacts, block):
+        first = block * GRAINS_PER_BLOCK
+        last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
+        gather(grains, contacts, np.uint64(first), np.uint64(last))
+        return 0
+
+    return gather_loads
+
+
+@functools.cache
+def gather_and_kick_stage(long_vectors: bool) -> Stage:
+    """Sums of the contact loads of a block of grains, and the second half kick; stores the largest speeds."""
+
+    @stage("the loads and kicks of grains", long_vectors=long_vectors)
+    def gather_loads_and_kick(grains, contacts, queue, scratch, block):
+        first = block * GRAINS_PER_BLOCK
+        last = min(first + GRAINS_PER_BLOCK, grains.mass.size)
+        v, w = gather_and_kick(grains, contacts, np.uint64(first), np.uint64(last), scratch[DT])
+        queue.speeds[block, 0], queue.speeds[block, 1] = float_from_bits(v), float_from_bits(w)
+        return 0
+
+    return gather_loads_and_kick
+
+
+@stage("the rates of Taylor series")
+def prepare_rates(grains, contacts, long_range, clock, span, respa, scratch):
+    """Before the rates of pair forces are summed: mean velocities, and rates of 0."""
+    # a mean over much less than the extrapolated time is dominated by oscillations
+    past = clock[CYCLE] if clock[CYCLE] >= 0.5 * scratch[CYCLE_LENGTH] else 0.0
+    set_mean_velocities(grains, long_range, contacts.start, span, past, respa.instantaneous_rates)
+    clear_rates(long_range)
+    return 0
+
+
+@stage("the rates of Taylor series")
+def store_summation_positions(grains, long_range):
+    """Store positions and moments of this summation."""
+    store_positions(grains, long_range)
+    return 0
+
+
+@stage("the extrapolation of long-range loads")
+def extrapolate(grains, long_range, scratch):
+    """Add the extrapolated long-range loads."""
+    add_extrapolated_loads(grains, long_range, scratch[SINCE])
+    return 0
+
+
+@stage("the drag and noise of the gas")
+def kick_by_gas(grains, clock, count, lost, gas):
+    """Drag and Brownian kicks for the time since the last; at ends of steps or cycles, about once per gas period."""
+    elapsed = clock[TIME] - clock[KICKED]
+    if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= gas.period:
+        lost[GAS] += gas_kick(grains, gas.seed, count[STEPS], elapsed, gas.gas)
+        clock[KICKED] = clock[TIME]
+    return 0
+
+
+@stage("the cause of a stop")
+def explain_stop(grains, contacts, pair_list, long_range, count, span, criteria, scratch, block):
+    """Set GRAIN1 and GRAIN2 to the grains that caused a stop, whose number is the block."""
+    if block == Stop.NO_STEP.value:
+        find_limiting_grains(grains, long_range, contacts.start, pair_list, count, span, criteria)
+    elif block == Stop.NOT_FINITE.value:
+        count[GRAIN1] = first_not_finite(grains)
+    else:
+        count[GRAIN1] = first_too_fast(grains, criteria.pair_gap, scratch[DT], block)
+    return 0

@@ -1,0 +1,13 @@
+"""Tables of parts, with which tests call single stages."""
+
+from typing import Any
+
+from sand.compiler.stage import Table
+
+
+def table_of(**parts: Any) -> Table:
+    """A table of these parts alone."""
+    table = Table(tuple(parts))
+    for name, value in parts.items():
+        table.set(name, value)
+    return table
