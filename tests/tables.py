@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from sand.compiler.stage import Table
+from sand.compiler.table import Table
 
 
 def table_of(**parts: Any) -> Table:

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -399,6 +400,20 @@ def test_code_with_a_formula_of_the_user_is_cached_by_its_source():
     for name in formulas:
         found = digests(jkr.LAW._replace(**{name: formula(lambda *numbers: 0.0)}))
         assert (found == {""}) is (name == "warning"), name
+
+
+def test_code_with_constants_of_the_user_is_cached_by_their_order():
+    """All stages that read constants: a law whose constants have the same names in another order has other digests."""
+    fields = jkr.LAW.constants_type._fields
+    digests = []
+    for names in (fields, fields[::-1], fields):
+        constants = namedtuple("Constants", names, module="users_module")
+        law = jkr.LAW._replace(constants_type=constants)
+        digests.append(
+            [user_code_digest(each.function) for each in (contact_pass_stage(law, False), energies_stage(law))]
+        )
+    assert "" not in digests[0] and digests[0] == digests[2]
+    assert all(one != other for one, other in zip(*digests[:2], strict=True))
 
 
 def test_warnings_name_the_grains_for_which_a_law_is_inaccurate():

@@ -104,7 +104,7 @@ def force(x):
 def test_the_digest_changes_with_the_code_of_the_user(old, new, differs):
     """With the bytecode of a formula or of a function that it calls, and with globals; not with comments.
 
-    None, so that nothing is cached, for an object that cannot be told from its text.
+    None, so that nothing is cached, for an object whose value does not follow from its source.
     """
 
     def digest(text):

@@ -7,7 +7,7 @@ import pytest
 
 import sand
 from sand.compiler.jit import formula, kernel
-from sand.compiler.stage import Program
+from sand.compiler.program import Program
 from sand.forces.pair import dipole_loops as dipoles
 from sand.forces.pair import generic_loops, loops
 from sand.integrate.force_calls import sum_pair_forces

@@ -20,7 +20,8 @@ COMPILE = """
 import json
 import sys
 import numpy as np
-from sand.compiler.stage import Table, stage
+from sand.compiler.stage import stage
+from sand.compiler.table import Table
 
 def doubled(x):
     for i in range(x.size):

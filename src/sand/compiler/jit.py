@@ -206,7 +206,7 @@ def kernel(
     function : callable
         The function.
     cached : bool, optional
-        False to compile it in each process, such as code with formulas of the user that cannot be told by their source.
+        False to compile it in each process.
     nogil : bool, optional
         True for code during which other Python threads may run.
     wrapper : bool, optional

@@ -90,7 +90,7 @@ class FunctionLibrary(KernelLibrary):
 class KernelCompiler(CompilerBase):
     """Compiler for kernels: numba's passes, except passes that have no effect on SAND's code."""
 
-    library: Any = KernelLibrary
+    code_library: Any = KernelLibrary
     passes = (
         untyped.TranslateByteCode,
         untyped.FixupArgs,
@@ -119,7 +119,7 @@ class KernelCompiler(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         """Set up library and passes."""
-        library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        library = self.code_library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
         library.enable_object_caching()
         self.state["library"] = library
         manager = PassManager("sand")
@@ -132,4 +132,4 @@ class KernelCompiler(CompilerBase):
 class FunctionCompiler(KernelCompiler):
     """Compiler for functions that only kernels call."""
 
-    library = FunctionLibrary
+    code_library = FunctionLibrary

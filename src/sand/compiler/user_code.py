@@ -2,7 +2,7 @@
 
 Code with SAND's own formulas is cached by the digest of SAND's sources (`jit`).  A formula of the user is identified by
 its bytecode, its constants and the values of all globals and closure variables that it refers to, in turn.  If one of
-them is an object whose compiled value cannot be told from its text, the code is not cached.
+them is another object, whose compiled value does not follow from its source, the code is not cached.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ __all__ = ["user_code_digest"]
 NUMBERS = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 
-class _CannotTellError(Exception):
-    """The compiled value of an object cannot be told from its text."""
+class _UnknownCodeError(Exception):
+    """An object whose compiled value does not follow from its source."""
 
 
 def user_code_digest(function: Callable) -> str | None:
@@ -36,7 +36,7 @@ def user_code_digest(function: Callable) -> str | None:
     """
     try:
         words = list(_words(function, set()))
-    except _CannotTellError:
+    except _UnknownCodeError:
         return None
     return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16] if words else ""
 
@@ -58,7 +58,7 @@ def _words(value: Any, seen: set[int], user: bool = False) -> Iterator[str]:
     elif isinstance(value, NUMBERS):
         yield from [repr(value)] if user else []
     elif not (isinstance(value, (ModuleType, BuiltinFunctionType, np.ufunc)) or value is Ellipsis):
-        raise _CannotTellError
+        raise _UnknownCodeError
 
 
 def _words_of_function(function: FunctionType, seen: set[int]) -> Iterator[str]:
@@ -69,9 +69,12 @@ def _words_of_function(function: FunctionType, seen: set[int]) -> Iterator[str]:
         for name in _global_names(function.__code__):
             value = function.__globals__.get(name, getattr(builtins, name, None))
             if isinstance(value, ModuleType) and not _is_of_a_package(value.__name__):
-                raise _CannotTellError
+                raise _UnknownCodeError
             yield name
             yield from _words(value, seen, user)
+    elif function.__globals__ is not vars(sys.modules.get(function.__module__, builtins)):  # made by exec
+        for name in _global_names(function.__code__):
+            yield from _words(function.__globals__.get(name, getattr(builtins, name, None)), seen)
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         yield from [name] if user else []
         yield from _words(cell.cell_contents, seen, user)

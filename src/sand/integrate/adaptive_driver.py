@@ -8,7 +8,8 @@ external forces.  A first contact ends the step; the second half of a Verlet ste
 import math
 
 from ..compiler.jit import caller, loop
-from ..compiler.stage import call_stage, has_stage, stage
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import stage
 from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement
 from ..numerics.vec import dot, load
 from ..state.state import (

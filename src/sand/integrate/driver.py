@@ -13,7 +13,8 @@ The driver is compiled once, for all forces and contact laws: it calls their sta
 import math
 
 from ..compiler.jit import caller, loop, rare
-from ..compiler.stage import call_stage, has_stage, stage
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import stage
 from ..contact.events import count_new_contacts
 from ..contact.update import load_slip_sums, log_slip_sums
 from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins

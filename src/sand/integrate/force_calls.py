@@ -1,7 +1,7 @@
 """Loops over the forces of a simulation, each of which is called by address."""
 
 from ..compiler.jit import caller
-from ..compiler.stage import call_stage
+from ..compiler.program import call_stage
 from ..state.state import LONG_RANGE_SUMS
 from .force_stages import (
     BEGIN,

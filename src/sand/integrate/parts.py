@@ -17,7 +17,7 @@ PARTS = (
 )
 """Names of the parts of a simulation; new ones are added at the end of a line, since the order is that of the table."""
 
-# --- indices of the part `scratch` (float64): numbers that stages of one step hand to each other ---------------------
+# --- indices of the part `scratch` (float64): numbers that one stage of a step leaves for another ---------------------
 DT = 0  # length of the step, or of the kick [s]
 LOAD_TIME = 1  # time at which external forces are evaluated [s]
 EXTERNAL = 2  # energy, power or work of external forces, summed over grains [J, W]

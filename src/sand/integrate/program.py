@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from ..compiler.stage import Program, Stage, Table
+from ..compiler.program import Program
+from ..compiler.stage import Stage
+from ..compiler.table import Table
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..forces.pair.loops import LongRangeSums

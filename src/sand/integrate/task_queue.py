@@ -12,7 +12,8 @@ import numpy as np
 
 from ..compiler.atomics import fetch_add, read, write, yield_cpu
 from ..compiler.jit import caller, loop, rare
-from ..compiler.stage import call_stage, stage, stage_fails
+from ..compiler.program import call_stage, stage_fails
+from ..compiler.stage import stage
 from ..forces.pair.loops import PARALLEL_FROM
 from .motion import BLOCK_OF_GRAINS
 

@@ -9,7 +9,8 @@ import weakref
 from typing import Any
 
 from ..compiler.jit import COMPILED
-from ..compiler.stage import Stage, Table
+from ..compiler.stage import Stage
+from ..compiler.table import Table
 from ..threads import threads
 
 

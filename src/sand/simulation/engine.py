@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.stage import Program, Table
+from ..compiler.program import Program
+from ..compiler.table import Table
 from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw

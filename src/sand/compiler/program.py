@@ -1,0 +1,167 @@
+"""The program of a simulation: its stages by number, as compiled code calls them."""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+from .groups import WORD
+from .jit import COMPILED
+from .native_calls import status_and_result
+from .stage import Stage
+from .table import Table, words_of
+
+__all__ = ["Program", "call_stage", "has_stage", "stage_fails"]
+
+_NATIVE = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 4, ctypes.c_int64)
+"""Numba's calling convention of a stage: status, pointers to result and exception, table, parameters, block."""
+
+
+def _first_call(
+    stage: Stage, parameters: Any, table: weakref.ref[Table], entry: np.ndarray, failures: list[BaseException]
+) -> Any:
+    """A function in place of a compiled stage, which compiles it, or loads it from the disk, and calls it."""
+
+    @_NATIVE
+    def compile_and_call(*arguments: Any) -> int:
+        try:
+            address = stage.address(table(), parameters)  # type: ignore[arg-type]
+            status = int(_NATIVE(address)(*arguments))
+            entry[0] = address
+        except BaseException as error:  # Ctrl-C, an error in a formula: passed on by `Program.run`
+            failures.append(error)
+            return FAILED
+        entry[2] = READY  # from here on the status that is returned is valid
+        return status
+
+    return compile_and_call
+
+
+FAILED = -1
+"""Numba's status of a function that has raised a Python exception."""
+NOT_READY, READY = 0, 1
+"""Last number of an entry.  While it is NOT_READY, a Python function is called, whose status may be undefined: a signal
+may raise an exception before its first line, which only the caller of the driver can pass on."""
+
+
+class Program:
+    """The stages of a simulation by number, with the parameters of each, as compiled code calls them.
+
+    A stage is compiled, or loaded from the disk, when it is called for the first time.
+
+    Parameters
+    ----------
+    table : Table
+        The parts of the state.
+    stages : dict[int, tuple[Stage, Any]]
+        Stage and parameters by number; other numbers have no stage.
+    size : int
+        Number of entries.
+    """
+
+    def __init__(self, table: Table, stages: Mapping[int, tuple[Stage, Any]], size: int):
+        self.stages, self.entries, self._failures = dict(stages), np.zeros((size, 3), np.int64), list[BaseException]()
+        self._rows, self._first_calls = list[np.ndarray](), list[Any]()
+        if COMPILED:
+            for number, (stage, parameters) in self.stages.items():
+                entry, row = self.entries[number], np.array([*words_of(parameters), 0], np.int64)
+                first_call = _first_call(stage, parameters, weakref.ref(table), entry, self._failures)
+                entry[:] = ctypes.cast(first_call, ctypes.c_void_p).value, row.ctypes.data, NOT_READY
+                self._rows.append(row)
+                self._first_calls.append(first_call)
+
+    def run(self, stage: Stage, table: Table) -> int:
+        """Call a stage that calls the stages of this program.  Raises what the compilation of one of them raised."""
+        self._failures.clear()
+        try:
+            return stage.run(table)
+        except SystemError as error:
+            if self._failures:
+                raise self._failures[0] from None
+            # a signal has interrupted a first call before that could record the exception
+            raise KeyboardInterrupt from error
+
+
+def has_stage(program: Any, number: int) -> bool:
+    """Whether a program has a stage of this number."""
+    return number in program.stages
+
+
+def call_stage(program: Any, number: int, table: Any, block: int) -> int:
+    """Call a stage of a program; returns its integer.  An exception in it is passed on."""
+    stage, parameters = program.stages[number]
+    return int(stage.in_python(table, parameters, block))
+
+
+def _entry_call(context: Any, builder: Any, signature: Any, given: Any) -> tuple[Any, Any, Any]:
+    """Call a stage of a program; whether the entry is ready afterwards, status, and result."""
+    program, number, table, block = given
+    entries = context.make_array(signature.args[0])(context, builder, program).data
+    first = builder.mul(number, ir.Constant(WORD, 3))
+
+    def word(k: int) -> Any:
+        return builder.load(builder.gep(entries, [builder.add(first, ir.Constant(WORD, k))]))
+
+    status, result = status_and_result(context, builder, word(0), table, word(1), block)
+    return builder.icmp_signed("==", word(2), ir.Constant(WORD, READY)), status, result
+
+
+@intrinsic
+def _call_entry(typing_context: Any, program: Any, number: Any, table: Any, block: Any) -> Any:
+    """Call a stage of a program; an exception is passed on."""
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        ready, status, result = _entry_call(context, builder, signature, given)
+        with cgutils.if_unlikely(builder, builder.not_(ready)):
+            context.call_conv.return_exc(builder)
+        with cgutils.if_unlikely(builder, status.is_error):
+            context.call_conv.return_status_propagate(builder, status)
+        return result
+
+    return types.int64(program, types.int64, table, types.int64), generate
+
+
+@intrinsic
+def _entry_fails(typing_context: Any, program: Any, number: Any, table: Any, block: Any) -> Any:
+    """Call a stage of a program; whether it raised an exception."""
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        ready, status, _ = _entry_call(context, builder, signature, given)
+        return builder.or_(builder.not_(ready), status.is_error)
+
+    return types.boolean(program, types.int64, table, types.int64), generate
+
+
+def stage_fails(program: Any, number: int, table: Any, block: int) -> bool:
+    """Call a stage of a program; returns whether it raised an exception, which is not passed on."""
+    call_stage(program, number, table, block)  # without the compiler there is one thread, which may raise it
+    return False
+
+
+@overload(stage_fails)
+def _compiled_stage_fails(program, number, table, block):
+    def call(program, number, table, block):
+        return _entry_fails(program, number, table, block)
+
+    return call
+
+
+@overload(has_stage)
+def _compiled_has_stage(program, number):
+    return lambda program, number: program[number, 0] != 0
+
+
+@overload(call_stage)
+def _compiled_call_stage(program, number, table, block):
+    def call(program, number, table, block):
+        return _call_entry(program, number, table, block)
+
+    return call

@@ -1,0 +1,220 @@
+"""The table of addresses from which stages read the parts of a simulation, and the types of these parts.
+
+Each part has a row of 64-bit words: numbers, addresses and lengths of arrays.  The table holds the address of each row.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import from_dtype, types
+from numba.core.datamodel import models
+from numba.extending import intrinsic, register_model
+
+from .groups import WORD, Group, array_of
+from .jit import COMPILED
+
+__all__ = ["ANY_TABLE", "BLOCK", "PARAMETERS", "SPECIAL", "TABLE", "Address", "Table", "address_of", "kind_of"]
+__all__ += ["open_parts", "structure_of", "words_of"]
+
+ROW = WORD.as_pointer()
+
+
+class Address(types.Opaque):
+    """Type of the address of a row; `parts` are (index in the table, type), or the type of the only part itself."""
+
+    def __init__(self, parts: Any):
+        self.parts = parts
+        super().__init__(name=f"Address({_described(parts)})")
+
+
+def _described(kind: Any) -> str:
+    """Name of a type that identifies it; numba's names of named tuples lack those of their members."""
+    if isinstance(kind, types.BaseNamedTuple):
+        name = f"{kind.instance_class.__module__}.{kind.instance_class.__qualname__}"
+        return f"{name}({', '.join(f'{n}: {_described(t)}' for n, t in zip(kind.fields, kind.types, strict=True))})"
+    if isinstance(kind, (types.BaseTuple, tuple)):
+        return f"({', '.join(map(_described, kind.types if isinstance(kind, types.BaseTuple) else kind))})"
+    return str(kind)
+
+
+register_model(Address)(models.OpaqueModel)
+
+
+class _Row:
+    """Reader of one row of 64-bit words."""
+
+    def __init__(self, context: Any, builder: Any, pointer: Any):
+        self.context, self.builder, self.pointer, self.at = context, builder, pointer, 0
+
+    def word(self) -> Any:
+        """The next word, as an integer."""
+        self.at += 1
+        return self.builder.load(self.builder.gep(self.pointer, [ir.Constant(WORD, self.at - 1)]))
+
+    def value(self, kind: Any) -> Any:
+        """The next value of a numba type."""
+        context, builder = self.context, self.builder
+        if isinstance(kind, Group):
+            found, start = ir.Constant(context.get_value_type(kind), ir.Undefined), self.at
+            for k, (_, dtype, _) in enumerate(kind.fields):
+                found = builder.insert_value(found, self._pointer(dtype), k)
+            self.at += sum(axes for _, _, axes in kind.fields)
+            return builder.insert_value(found, builder.gep(self.pointer, [ir.Constant(WORD, start)]), len(kind.fields))
+        if isinstance(kind, types.Array):
+            data = self._pointer(kind.dtype)
+            return array_of(context, builder, kind.dtype, data, [self.word() for _ in range(kind.ndim)])
+        if isinstance(kind, types.BaseTuple):
+            return context.make_tuple(builder, kind, [self.value(each) for each in kind.types])
+        if kind == types.float64:
+            return builder.bitcast(self.word(), ir.DoubleType())
+        return builder.trunc(self.word(), context.get_value_type(kind)) if kind == types.boolean else self.word()
+
+    def _pointer(self, dtype: Any) -> Any:
+        return self.builder.inttoptr(self.word(), self.context.get_value_type(types.CPointer(dtype)))
+
+
+TABLE, BLOCK = "table", "block"
+"""Arguments of a stage that are not parts: the table itself, to be passed to `call_stage`, and the block."""
+PARAMETERS = "parameters"
+"""Argument of a stage that is opened from its own parameters."""
+SPECIAL = TABLE, BLOCK, PARAMETERS
+ANY_TABLE = Address("any")
+
+
+@intrinsic
+def open_parts(typing_context: Any, table: Any, parameters: Any, block: Any) -> Any:
+    """All arguments of a stage, as a tuple."""
+    kinds = types.Tuple.from_types([kind for _, kind in table.parts])
+
+    def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        row = builder.bitcast(given[0], ROW)
+        found = []
+        for index, kind in table.parts:
+            if index == TABLE:
+                found.append(given[0])
+            elif index == BLOCK:
+                found.append(given[2])
+            elif index == PARAMETERS:
+                found.append(_Row(context, builder, builder.bitcast(given[1], ROW)).value(kind))
+            else:
+                address = builder.load(builder.gep(row, [ir.Constant(WORD, index)]))
+                found.append(_Row(context, builder, builder.inttoptr(address, ROW)).value(kind))
+        return context.make_tuple(builder, kinds, found)
+
+    return kinds(table, parameters, block), generate
+
+
+def structure_of(value: Any) -> Any:
+    """What the type of a part in compiled code depends on, as a hashable value."""
+    value = getattr(value, "entries", value)  # of a program
+    if isinstance(value, tuple):
+        return type(value), tuple(map(structure_of, value))
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim
+    if not isinstance(value, (bool, np.bool_, int, float, np.number)):
+        raise TypeError(f"a stage takes numbers, arrays and tuples of these, not {type(value).__name__}")
+    return bool if isinstance(value, (bool, np.bool_)) else int if isinstance(value, (int, np.integer)) else float
+
+
+_places: dict[Any, int] = {}
+
+
+def _number_of(place: Any) -> int:
+    """A number for each place of a part, in this process."""
+    return _places.setdefault(place, len(_places))
+
+
+NUMBERS = {bool: types.boolean, int: types.int64, float: types.float64}
+
+
+@cache
+def kind_of(structure: Any) -> Any:
+    """Type in compiled code of a part with a structure: numbers, arrays, tuples, and `Group` for tuples of arrays."""
+    if structure in NUMBERS:
+        return NUMBERS[structure]
+    if isinstance(structure[0], np.dtype):
+        return types.Array(from_dtype(structure[0]), structure[1], "C")
+    python_type, members = structure
+    names = getattr(python_type, "_fields", None)
+    if names and all(isinstance(each, tuple) and isinstance(each[0], np.dtype) for each in members):
+        return Group(tuple((name, from_dtype(dtype), axes) for name, (dtype, axes) in zip(names, members, strict=True)))
+    return types.BaseTuple.from_types([kind_of(each) for each in members], python_type if names else None)
+
+
+def words_of(value: Any) -> list[int]:
+    """The 64-bit words of a value, in the order in which `_Row.value` reads them."""
+    value = getattr(value, "entries", value)  # of a program
+    if isinstance(value, np.ndarray):
+        return [address_of(value), *value.shape]
+    if isinstance(value, tuple):
+        if isinstance(kind_of(structure_of(value)), Group):
+            return [*map(address_of, value), *(length for each in value for length in each.shape)]
+        return [word for each in value for word in words_of(each)]
+    if isinstance(value, (bool, np.bool_, int, np.integer)):
+        return [int(value)]
+    return [int(np.float64(value).view(np.int64))]
+
+
+def address_of(array: np.ndarray) -> int:
+    """Address of the first number of an array, which must be contiguous."""
+    if not array.flags.c_contiguous:
+        raise ValueError("arrays given to a stage must be contiguous")
+    return int(array.__array_interface__["data"][0])
+
+
+class Table:
+    """The parts of the state that stages take, each with the row of words from which compiled code reads it.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of all parts, in the order of the table; the same in all simulations, so that stages can be shared.
+    """
+
+    def __init__(self, names: tuple[str, ...]):
+        self._names = {name: index for index, name in enumerate(names)}
+        self._parts, self._rows = dict[str, Any](), dict[str, np.ndarray]()
+        self._structures, self._keys = dict[str, Any](), dict[str, int]()
+        self._addresses = np.zeros(len(names), np.int64)
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a part; nothing is done if it is the same object as before."""
+        if name in self._parts and self._parts[name] is value:
+            return
+        self._parts[name] = value
+        if COMPILED and value is not None:
+            self._rows[name], self._structures[name] = np.array(words_of(value), np.int64), structure_of(value)
+            self._keys[name] = _number_of(self.place(name))
+            self._addresses[self.index(name)] = address_of(self._rows[name])
+
+    def snapshot(self) -> Table:
+        """A copy that keeps its parts when those of this table are replaced; the arrays are the same."""
+        other = Table(tuple(self._names))
+        other._parts, other._rows = dict(self._parts), dict(self._rows)
+        other._structures, other._keys = dict(self._structures), dict(self._keys)
+        other._addresses[:] = self._addresses
+        return other
+
+    def __getitem__(self, name: str) -> Any:
+        return self._parts[name]
+
+    def index(self, name: str) -> int:
+        """Index of a part in the table."""
+        return self._names[name]
+
+    def place(self, name: str) -> tuple[int, Any]:
+        """Index of a part in the table, and its structure."""
+        return self.index(name), self._structures[name]
+
+    def key(self, name: str) -> int:
+        """A number that is the same for equal places: long tuples are slow to compare."""
+        return self._keys[name]
+
+    @property
+    def address(self) -> int:
+        """Address of the table."""
+        return address_of(self._addresses)
