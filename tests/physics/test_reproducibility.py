@@ -1,5 +1,6 @@
 """Reproducibility: the same bits for any output interval, split, restart, thread count and array size."""
 
+import copy
 import os
 import subprocess
 import sys
@@ -37,6 +38,20 @@ def test_the_frame_interval_changes_no_bit():
         ends.append(state(sim))
     assert sim.state.count[CONTACTS] > 0
     assert ends[0] == ends[1] == ends[2]
+
+
+@pytest.mark.compiled("dipoles", "adaptive")
+@pytest.mark.parametrize("stepping", [sand.Verlet(), sand.Adaptive()], ids=lambda each: each.name)
+def test_a_deep_copy_goes_on_with_the_same_bits(stepping):
+    """A copy made after 200 steps and the original, each run further, are independent and equal to the last bit."""
+    sim = gas_simulation(stepping=stepping)
+    sim.run(steps=200)
+    other = copy.deepcopy(sim)
+    at_copy = state(other)
+    sim.run(steps=100)
+    assert state(other) == at_copy != state(sim)
+    other.run(steps=100)
+    assert state(other) == state(sim)
 
 
 @pytest.mark.compiled("dipoles")

@@ -114,6 +114,10 @@ class Stage:
         self.needs = tuple(inspect.signature(function).parameters)
         self._compiled, self._compiler = dict[Any, Any](), None
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Stage:
+        """The stage itself, which holds no data of a simulation."""
+        return self
+
     def address(self, table: Table, parameters: Any) -> int:
         """Address of the compiled function for the types of these parts; compiles it, or loads it from the disk."""
         own = structure_of(parameters)

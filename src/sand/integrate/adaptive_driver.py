@@ -69,7 +69,7 @@ def refresh_verlet_list(grains, long_range, span, search, program, table):
 
 
 @loop
-def first_trial(grains, contacts, long_range, clock, count, criteria, stride):
+def first_trial(grains, contacts, long_range, clock, criteria, stride):
     """First trial step [s]: proposed by the last step, or Verlet's after a start or a break; 0 if not finite."""
     dt = clock[FLIGHT]
     if not dt > 0.0:
@@ -91,7 +91,7 @@ def adaptive_step(
 ):  # fmt: skip
     """Take one Runge–Kutta step; returns its length [s], whether it ends at a contact, and a Stop."""
     begin, stride = clock[TIME], flight_limits.stride
-    dt = proposed = first_trial(grains, contacts, long_range, clock, count, criteria, stride)
+    dt = proposed = first_trial(grains, contacts, long_range, clock, criteria, stride)
     if not dt > 0.0:
         return 0.0, False, Stop.NOT_FINITE
     begin_step(grains, runge_kutta, scratch, external_work, forces, program, table, begin)

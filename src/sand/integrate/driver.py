@@ -307,8 +307,8 @@ def second_half(
     if due:
         if respa.impulse:
             impulse_at_end(grains, long_range, span, clock, elapsed, dt)
-        if respa.impulse and count[CONTACTS] > 0:
-            update_pairs_in_contact(contacts, count, forces, program, table)
+            if count[CONTACTS] > 0:
+                update_pairs_in_contact(contacts, count, forces, program, table)
         clock[LEFT], clock[CYCLE] = 0.0, elapsed
     if broken:
         call_stage(program, REMOVE_BROKEN, table, 0)

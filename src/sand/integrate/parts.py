@@ -15,7 +15,7 @@ PARTS = (
     # data of one call of the driver
     *("program", "queue", "scratch", "until", "last"),
 )
-"""Names of the parts of a simulation; new ones are added at the end of a line, since the order is that of the table."""
+"""Names of the parts of a simulation, in the order of the table of addresses."""
 
 # --- indices of the part `scratch` (float64): numbers that one stage of a step leaves for another ---------------------
 DT = 0  # length of the step, or of the kick [s]
@@ -58,7 +58,7 @@ class RespaSettings(NamedTuple):
 
     max_steps: int  # k_max, largest number of steps in a cycle; 1: summed in every step
     instantaneous_rates: bool  # Taylor series from the instantaneous v and ω of all grains, not from mean rates
-    impulse: bool = False  # r-RESPA: forces, less a constant part, as impulses; those in contact in every step
+    impulse: bool = False  # r-RESPA: forces, less a constant part, as impulses; between grains in contact in every step
     taylor: bool = False  # extrapolated within a cycle by their first-order Taylor series
 
 
