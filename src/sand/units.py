@@ -169,6 +169,7 @@ def si(
     above: float | None = None,
     least: float | None = None,
     below: float | None = None,
+    most: float | None = None,
 ) -> float:
     """Convert a quantity to one finite SI number.
 
@@ -180,8 +181,8 @@ def si(
         SI unit, for example "m" or "A m^2/kg"; "1" for a pure number.
     name : str
         Name of the argument, for the message.
-    above, least, below : float or None, optional
-        Allowed range: number > above, number ≥ least, number < below.
+    above, least, below, most : float or None, optional
+        Allowed range: number > above, number ≥ least, number < below, number ≤ most.
 
     Returns
     -------
@@ -209,6 +210,8 @@ def si(
         raise BadInput(f"{label} must be at least {least:g}{in_units}")
     if below is not None and not number < below:
         raise BadInput(f"{label} must be below {below:g}{in_units}")
+    if most is not None and not number <= most:
+        raise BadInput(f"{label} must be at most {most:g}{in_units}")
     if unit == "m/s" and below is None and not abs(number) < LIGHT:
         raise BadInput(f"{label} is not below the speed of light, {LIGHT:.4g} m/s")
     if unit == "K" and number > HOTTEST:

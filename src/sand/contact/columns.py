@@ -74,4 +74,4 @@ _PAIRING = ", ".join(f"pairings[{row}, a, b]" for row in range(len(Pairing._fiel
 _SCOPE: dict[str, Any] = {"Pairing": Pairing, "__name__": __name__}
 exec(f"def load_pairing(pairings, a, b):\n    return Pairing({_PAIRING})", _SCOPE)
 load_pairing = loop(_SCOPE["load_pairing"])
-"""Parameters of materials a and b, from the (10, M, M) table."""
+"""Parameters of materials a and b, from the (11, M, M) table."""

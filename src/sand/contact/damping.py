@@ -1,101 +1,386 @@
-"""Damping of contacts, and the work of stiffnesses that follow the contact radius."""
+"""Dashpots of the four modes of a contact, and the thermal noise that belongs to them.
 
-import functools
+A dashpot acts on the relative motion of the two grains alone, so that momentum and angular momentum are conserved:
+
+    U = v1 − v2 − (a1 ω1 + a2 ω2)×n,  a_i = D r_i/(r1 + r2)      relative velocity of the surfaces at the contact
+    f = −c_n (U·n) n − c_s U_t                                   force on grain 1, −f on grain 2
+    τ = −C_r Ω_t − C_t (Ω·n) n,  Ω = ω1 − ω2                     torque on grain 1, −τ on grain 2
+    M1 = −a1 n×f + τ,  M2 = −a2 n×f − τ
+
+M1 + M2 + (x1 − x2)×f = 0 is exact, and the power f·U + τ·Ω is never positive.  With a bath of temperature T each mode
+has a random load of variance 2 k_B T c/dt (fluctuation–dissipation theorem).
+
+The velocities of the second half of a step are those of its middle.  A load at the end of a step depends on the motion
+extrapolated from the middles of this step and the one before, U(t) = U(t − dt/2) + ½ [U(t − dt/2) − U(t − 3dt/2)], and
+the dissipated energy is its work by the trapezoidal rule, as that of all forces in velocity Verlet: the energy balance
+then closes to the order of the integrator.
+"""
+
 import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..box import nearest_image
-from ..compiler.jit import loop, rare
-from ..numerics.vec import accrue, axpy, dot, load, scale, sub
-from ..state.state import BREAKING, CONTACTS, DAMPING, STIFFNESS
-from .columns import column_loops
-from .law import ContactLaw
-from .mechanics import damping_force, displacements_of, scaled_stiffness, stiffness_loss
-from .update import BROKEN_FLAG, displacements_before, loss_row, pose_at, stored_damping_force
+import numpy as np
+
+from ..compiler.jit import formula, loop
+from ..numerics.random import LOW_WORD, WORD_BITS, philox, uniform
+from ..numerics.vec import add, axpy, cross, dot, load, put, scale, sub
+from .losses import DAMPING_ROW, add_damping_energies
+
+VELOCITY, SPIN, FORCE, TORQUE = 0, 3, 6, 9
+"""First rows of U, Ω, f and τ in `ContactArrays.damping`: motion in the middle of the last step, loads at its end."""
+STREAM = np.uint64(0x5A4D0001)
+"""Keeps the random numbers of contacts distinct from those of the gas: it changes the high word of the key."""
+NONE, DASHPOTS, THERMAL = "none", "dashpots", "thermal"
+"""Variants of the contact update: undamped, damped, damped with the noise of a bath."""
 
 
-@loop
-def log_loss(contact_losses, lost, c, channel, energy):
-    """Add an energy [J] dissipated by contact c to the energy table and to the losses (L, C) of the contact.
+class Dashpots(NamedTuple):
+    """Damping coefficients of the four modes of one contact."""
 
-    Breaking has no row in `contact_losses`; neither have damping and stiffness changes where the contact law has none.
+    normal: float  # c_n [kg/s]
+    slide: float  # c_s [kg/s]
+    roll: float  # C_r [N m s]
+    twist: float  # C_t [N m s]
+
+
+class Motion(NamedTuple):
+    """Relative motion of two grains in contact."""
+
+    velocity: tuple  # U [m/s]
+    spin: tuple  # Ω [1/s]
+
+
+class DampingLoad(NamedTuple):
+    """Loads of the dashpots on grain 1; f and −τ act on grain 2 with the opposite sign."""
+
+    force: tuple  # f [N]
+    torque: tuple  # τ [N m]
+
+
+NO_LOAD = DampingLoad((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@formula
+def dashpots_of(contact_radius, constants):
+    """Damping coefficients at a contact radius a [m]: c_n = c + (c/a) a, the others are constants of the contact."""
+    return Dashpots(
+        constants.damping + constants.damping_per_radius * contact_radius,
+        constants.slide_damping,
+        constants.roll_damping,
+        constants.twist_damping,
+    )
+
+
+@formula
+def surface_rotation(spin1, spin2, r1, r2):
+    """Mean spin W = (r1 ω1 + r2 ω2)/(r1 + r2) [1/s], of which W×(x1 − x2) is the part of U due to spins."""
+    return scale(1.0 / (r1 + r2), add(scale(r1, spin1), scale(r2, spin2)))
+
+
+@formula
+def relative_motion(separation, velocity, rolling, spin1, spin2):
+    """U = v1 − v2 − W×(x1 − x2) and Ω, for the vector x1 − x2 [m] and the relative velocity v1 − v2 [m/s].
+
+    a_i n = r_i (x1 − x2)/(r1 + r2); W is that of `surface_rotation`.
     """
-    lost[channel] += energy
-    row = loss_row(channel)
-    if channel != BREAKING and row < contact_losses.shape[0]:
-        contact_losses[row, c] += energy
+    return Motion(sub(velocity, cross(rolling, separation)), sub(spin1, spin2))
+
+
+@formula
+def _two_coefficients(along, across, v, n):
+    """along (v·n) n + across v_t."""
+    return axpy((along - across) * dot(v, n), n, scale(across, v))
+
+
+@formula
+def damping_load(motion, n, dashpots):
+    """Loads f and τ of the dashpots."""
+    return DampingLoad(
+        _two_coefficients(-dashpots.normal, -dashpots.slide, motion.velocity, n),
+        _two_coefficients(-dashpots.twist, -dashpots.roll, motion.spin, n),
+    )
+
+
+@formula
+def unit_deviates(seed, number, id1, id2):
+    """Two vectors of independent uniform deviates with mean 0 and variance 1, for a step and a pair of grains.
+
+    Uniform deviates give the same moments of the motion as normal ones to second order in the step (Dünweg & Paul 1991,
+    Int. J. Mod. Phys. C 2, 817), without logarithms.
+    """
+    seed, number = np.uint64(seed), np.uint64(number)
+    counter = (number & LOW_WORD, number >> WORD_BITS, np.uint64(id1), np.uint64(id2))
+    low, high = seed & LOW_WORD, (seed >> WORD_BITS) ^ STREAM
+    a = philox(counter, (low, high))
+    b = philox(counter, (low, high ^ np.uint64(1)))
+    width = math.sqrt(12.0)
+    u = (width * (uniform(a[0]) - 0.5), width * (uniform(a[1]) - 0.5), width * (uniform(a[2]) - 0.5))
+    w = (width * (uniform(b[0]) - 0.5), width * (uniform(b[1]) - 0.5), width * (uniform(b[2]) - 0.5))
+    return u, w
+
+
+@formula
+def thermal_load(dashpots, n, deviates, thermal_energy, dt):
+    """Random loads of the dashpots in a bath of k_B T [J]: variance 2 k_B T c/dt in each mode; none for dt = 0."""
+    strength = math.sqrt(2.0 * thermal_energy / dt) if dt > 0.0 else 0.0
+    spread = Dashpots(
+        strength * math.sqrt(dashpots.normal),
+        strength * math.sqrt(dashpots.slide),
+        strength * math.sqrt(dashpots.roll),
+        strength * math.sqrt(dashpots.twist),
+    )
+    return DampingLoad(
+        _two_coefficients(spread.normal, spread.slide, deviates[0], n),
+        _two_coefficients(spread.twist, spread.roll, deviates[1], n),
+    )
+
+
+@formula
+def extrapolated(before, now, dt):
+    """Motion half a step after the middle `now` of a step, from the middle of the step before.
+
+    In the step of 0 s at the start of a run, `now` is the present motion.
+    """
+    weight = 0.5 if dt > 0.0 else 0.0
+    return Motion(
+        axpy(weight, sub(now.velocity, before.velocity), now.velocity),
+        axpy(weight, sub(now.spin, before.spin), now.spin),
+    )
+
+
+@formula
+def loads_on_grains(damping, separation, r1, r2):
+    """Force on grain 1 and torques on both grains."""
+    moment = scale(1.0 / (r1 + r2), cross(separation, damping.force))
+    return damping.force, axpy(-r1, moment, damping.torque), axpy(-r2, moment, scale(-1.0, damping.torque))
+
+
+@formula
+def damping_losses(start, end, separation, n, velocity, motion, rolling, dt):
+    """Energies [J] dissipated in a step by the normal, sliding, rolling and twisting dashpots.
+
+    −½ dt [f_start·U_start + f_end·U_end + (τ_start + τ_end)·Ω]: the velocities are those of the middle of the step, and
+    the geometry that of its start, x_start = x − dt (v1 − v2), and of its end.
+
+    Parameters
+    ----------
+    start, end : DampingLoad
+        Loads at the start and at the end of the step.
+    separation, n : tuple
+        x1 − x2 [m] and its direction at the end of the step.
+    velocity : tuple
+        v1 − v2 [m/s].
+    motion : Motion
+        U at the end of the step, and Ω.
+    rolling : tuple
+        W [1/s] of `surface_rotation`.
+    dt : float
+        Length of the step [s].
+    """
+    start_separation = axpy(-dt, velocity, separation)
+    start_velocity = axpy(dt, cross(rolling, velocity), motion.velocity)
+    inverse = 1.0 / dot(separation, separation)
+    normal = inverse * dot(start.force, start_separation) * dot(start_velocity, start_separation)
+    normal += dot(end.force, n) * dot(motion.velocity, n)
+    total = dot(start.force, start_velocity) + dot(end.force, motion.velocity)
+    torque = add(start.torque, end.torque)
+    twist, turning = dot(torque, n) * dot(motion.spin, n), dot(torque, motion.spin)
+    half = -0.5 * dt
+    return half * normal, half * (total - normal), half * (turning - twist), half * twist
 
 
 @loop
-def store_damping_force(contacts, c, force):
-    """Store the damping force [N] of contact c, if the contact law has an array for it (`ContactArrays.damped`)."""
-    if contacts.damped.size > 0:
-        contacts.damped[c] = force
+def load_rows(array, first, c):
+    """Rows first … first + 2 of column c, as a vector."""
+    return array[first, c], array[first + 1, c], array[first + 2, c]
 
 
-class DampingLoops(NamedTuple):
-    """Loops of damping and of changing stiffnesses, for one contact law."""
+@loop
+def store_rows(array, first, c, v):
+    """Set the rows first … first + 2 of column c."""
+    array[first, c] = v[0]
+    array[first + 1, c] = v[1]
+    array[first + 2, c] = v[2]
 
-    add_force: Callable  # (grains, contacts, span, c, dt): damping force of one contact; returns the energy [J]
-    damp: Callable  # (grains, contacts, count, lost, span, dt): all contacts
-    log_stiffness_work: Callable  # likewise
+
+@loop
+def stored_load(contacts, c):
+    """Loads of the dashpots of contact c at the end of the last step."""
+    return DampingLoad(load_rows(contacts.damping, FORCE, c), load_rows(contacts.damping, TORQUE, c))
 
 
-@functools.cache
-def damping_loops(law: ContactLaw) -> DampingLoops:
-    """The loops of damping for one contact law."""
-    constants_at, radius_root, contact_radius = column_loops(law).at, law.radius_root, law.contact_radius
+@loop
+def measured_load(contacts, c):
+    """Loads of the dashpots of contact c; 0 in simulations without damping."""
+    if contacts.damping.shape[1] == 0:
+        return NO_LOAD
+    return stored_load(contacts, c)
 
-    @rare
-    def add_damping_force(grains, contacts, span, c, dt):
-        """Add the damping force to the loads of contact c.
 
-        The force depends on the closing speed at the end of the step, extrapolated with the accelerations at its start.
-        The dissipated energy follows from the trapezoidal rule, as the work of all forces in velocity Verlet, with the
-        stored force of the previous step.
+@loop
+def start_motion(grains, contacts, c, separation):
+    """Set the stored motion of a new contact to that of its grains, and its damping loads to 0."""
+    i, j = contacts.pair[0, c], contacts.pair[1, c]
+    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
+    w1, w2 = load(grains.spin, i), load(grains.spin, j)
+    rolling = surface_rotation(w1, w2, grains.radius[i], grains.radius[j])
+    motion = relative_motion(separation, velocity, rolling, w1, w2)
+    store_rows(contacts.damping, VELOCITY, c, motion.velocity)
+    store_rows(contacts.damping, SPIN, c, motion.spin)
+    store_rows(contacts.damping, FORCE, c, NO_LOAD.force)
+    store_rows(contacts.damping, TORQUE, c, NO_LOAD.torque)
 
-        Returns
-        -------
-        float
-            Energy [J] dissipated in the step.
-        """
-        i, j = contacts.pair[0, c], contacts.pair[1, c]
-        constants = constants_at(contacts, c)
-        separation = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
-        distance = math.sqrt(dot(separation, separation))
-        n = scale(1.0 / distance, separation)
-        relative_velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
-        acceleration1 = scale(1.0 / grains.mass[i], load(grains.force, i))
-        acceleration2 = scale(1.0 / grains.mass[j], load(grains.force, j))
-        closing = -dot(axpy(0.5 * dt, sub(acceleration1, acceleration2), relative_velocity), n)
-        overlap = grains.radius[i] + grains.radius[j] - distance
-        radius = contact_radius(overlap, radius_root(overlap, constants), constants)
-        force = damping_force(radius, closing, constants)
-        accrue(contacts.force, c, scale(force, n))
-        start_separation = axpy(-dt, relative_velocity, separation)
-        start_force = stored_damping_force(contacts, c) / math.sqrt(dot(start_separation, start_separation))
-        store_damping_force(contacts, c, force)
-        return -0.5 * dt * (start_force * dot(start_separation, relative_velocity) + force * dot(n, relative_velocity))
 
-    @rare
-    def damp_contacts(grains, contacts, count, lost, span, dt):
-        """Damp all contacts and log the dissipated energies."""
-        for c in range(count[CONTACTS]):
-            if contacts.flag[c] != BROKEN_FLAG:
-                log_loss(contacts.lost, lost, c, DAMPING, add_damping_force(grains, contacts, span, c, dt))
+@formula
+def _chosen(condition, u, v):
+    """Vector u where the condition holds, else v."""
+    return u[0] if condition else v[0], u[1] if condition else v[1], u[2] if condition else v[2]
 
-    @rare
-    def log_stiffness_work(grains, contacts, count, lost, span, dt):
-        """Log the energy that stiffnesses following a(δ) removed from the springs of all contacts in this step."""
-        for c in range(count[CONTACTS]):
-            constants = constants_at(contacts, c)
-            pose = pose_at(grains, contacts, span, c, contacts.twist[c])
-            r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
-            start = displacements_before(grains, contacts, c, pose, constants, dt)
-            displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
-            at_start = scaled_stiffness(constants, radius_root(start.overlap, constants), True)
-            now = scaled_stiffness(constants, radius_root(displacements.overlap, constants), True)
-            log_loss(contacts.lost, lost, c, STIFFNESS, stiffness_loss(start, displacements, at_start, now))
 
-    return DampingLoops(add_damping_force, damp_contacts, log_stiffness_work)
+@loop
+def _update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt, thermal):
+    """Update and store the dashpots of contact c at the end of a step, and log its losses.
+
+    Parameters
+    ----------
+    radius : float
+        Contact radius [m].
+    loads : tuple
+        Force on grain 1 [N] and torques on both grains [N m] without damping.
+    active : bool
+        False: the stored loads stay those of the start of the step, and nothing is lost.
+    number : int
+        Number of the step, for the noise.
+    thermal : bool
+        Whether the bath adds its noise.
+
+    Returns
+    -------
+    tuple
+        The loads with damping, and the energies [J] dissipated by the four modes.
+    """
+    i, j = contacts.pair[0, c], contacts.pair[1, c]
+    r1, r2 = grains.radius[i], grains.radius[j]
+    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
+    w1, w2 = load(grains.spin, i), load(grains.spin, j)
+    separation = scale(pose.distance, pose.n)
+    rolling = surface_rotation(w1, w2, r1, r2)
+    motion = relative_motion(separation, velocity, rolling, w1, w2)
+    before = Motion(load_rows(contacts.damping, VELOCITY, c), load_rows(contacts.damping, SPIN, c))
+    start = stored_load(contacts, c)
+    dashpots = dashpots_of(radius, constants)
+    end = damping_load(extrapolated(before, motion, dt), pose.n, dashpots)
+    if thermal:
+        deviates = unit_deviates(settings.seed, number, grains.id[i], grains.id[j])
+        noise = thermal_load(dashpots, pose.n, deviates, settings.bath, dt)
+        end = DampingLoad(add(end.force, noise.force), add(end.torque, noise.torque))
+    lost = damping_losses(start, end, separation, pose.n, velocity, motion, rolling, dt)
+    counted = 1.0 if active else 0.0
+    lost = (counted * lost[0], counted * lost[1], counted * lost[2], counted * lost[3])
+    contacts.lost[DAMPING_ROW, c] += lost[0] + lost[1] + lost[2] + lost[3]
+    store_rows(contacts.damping, VELOCITY, c, _chosen(active, motion.velocity, before.velocity))
+    store_rows(contacts.damping, SPIN, c, _chosen(active, motion.spin, before.spin))
+    store_rows(contacts.damping, FORCE, c, _chosen(active, end.force, start.force))
+    store_rows(contacts.damping, TORQUE, c, _chosen(active, end.torque, start.torque))
+    force, torque1, torque2 = loads_on_grains(end, separation, r1, r2)
+    return (add(loads[0], force), add(loads[1], torque1), add(loads[2], torque2)), lost
+
+
+@loop
+def _update_cold(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt):
+    return _update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt, False)
+
+
+@loop
+def _update_thermal(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt):
+    return _update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt, True)
+
+
+@loop
+def _no_update(grains, contacts, c, pose, radius, constants, loads, active, settings, number, dt):
+    return loads, (0.0, 0.0, 0.0, 0.0)
+
+
+@loop
+def _log_break(grains, contacts, lost, c, pose, opening, elapsed, dt):
+    """Log the energies [J] that the dashpots of contact c dissipated in the step in which it broke.
+
+    The loads of the start of the step acted for half a step in the velocity Verlet kick; along n, the impulse of the
+    break extends this to the time until the break, dt − `elapsed`.
+
+    Returns
+    -------
+    float
+        Force [N] of the normal dashpot at the start of the step, on grain 1 along n.
+    """
+    i, j = contacts.pair[0, c], contacts.pair[1, c]
+    velocity = sub(load(grains.velocity, i), load(grains.velocity, j))
+    w1, w2 = load(grains.spin, i), load(grains.spin, j)
+    separation, start = scale(pose.distance, pose.n), stored_load(contacts, c)
+    rolling = surface_rotation(w1, w2, grains.radius[i], grains.radius[j])
+    motion = relative_motion(separation, velocity, rolling, w1, w2)
+    losses = damping_losses(start, NO_LOAD, separation, pose.n, velocity, motion, rolling, dt)
+    normal = dot(start.force, pose.n)
+    losses = (-normal * opening * (dt - elapsed), losses[1], losses[2], losses[3])
+    add_damping_energies(lost, losses)
+    return normal
+
+
+@loop
+def _no_break(grains, contacts, lost, c, pose, opening, elapsed, dt):
+    return 0.0
+
+
+@loop
+def _no_single(grains, contacts, lost, c, pose, radius, constants, settings, number, dt):
+    return
+
+
+@loop
+def _no_touch(grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, number, dt):
+    return 0.0
+
+
+class DampingVariant(NamedTuple):
+    """Functions of the dashpots in one variant of the contact update."""
+
+    update: Callable  # in the pass over contacts, see `_update`
+    single: Callable  # of one contact that the pass has flagged: updates its stored loads
+    at_touch: Callable  # of a new contact; returns the normal impulse [N s] since first touch
+    at_break: Callable  # of a broken contact, see `_log_break`
+
+
+def _variant(update: Callable) -> DampingVariant:
+    @loop
+    def single(grains, contacts, lost, c, pose, radius, constants, settings, number, dt):
+        loads = load(contacts.force, c), load(contacts.torque1, c), load(contacts.torque2, c)
+        loads, dissipated = update(grains, contacts, c, pose, radius, constants, loads, True, settings, number, dt)
+        put(contacts.force, c, loads[0])
+        put(contacts.torque1, c, loads[1])
+        put(contacts.torque2, c, loads[2])
+        add_damping_energies(lost, dissipated)
+
+    @loop
+    def at_touch(grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, number, dt):
+        start_motion(grains, contacts, c, scale(pose.distance, pose.n))
+        loads = load(contacts.force, c), load(contacts.torque1, c), load(contacts.torque2, c)
+        loads, dissipated = update(grains, contacts, c, pose, radius, constants, loads, True, settings, number, dt)
+        impulse = dot(sub(loads[0], load(contacts.force, c)), pose.n) * elapsed
+        put(contacts.force, c, loads[0])
+        put(contacts.torque1, c, loads[1])
+        put(contacts.torque2, c, loads[2])
+        # along n the force acts since first touch, otherwise for half a step in the velocity Verlet kick
+        contacts.lost[DAMPING_ROW, c] += impulse * closing - dissipated[0]
+        add_damping_energies(lost, (impulse * closing, dissipated[1], dissipated[2], dissipated[3]))
+        return impulse
+
+    return DampingVariant(update, single, at_touch, _log_break)
+
+
+VARIANTS = {
+    NONE: DampingVariant(_no_update, _no_single, _no_touch, _no_break),
+    DASHPOTS: _variant(_update_cold),
+    THERMAL: _variant(_update_thermal),
+}
+"""The dashpots in each variant of the contact update."""

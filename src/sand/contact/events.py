@@ -14,23 +14,21 @@ from ..state.state import (
     BREAKING,
     BROKEN,
     CONTACTS,
-    DAMPING,
     FORMING,
     INNER_COUNT,
     INNER_SKIN,
     MADE,
     PAIRS,
-    ROLLING,
-    SLIDING,
     SLIPPED,
+    STEPS,
     TIME,
-    TWISTING,
 )
 from . import tangential
 from .columns import column_loops, uniform_contacts
-from .damping import damping_loops, log_loss, store_damping_force
+from .damping import NONE, VARIANTS
 from .gather import sort_contacts_by_grain
 from .law import ContactLaw
+from .losses import FORMING_ROW, add_slip_energies, add_slip_losses
 from .mechanics import (
     Displacements,
     contact_speed_gain,
@@ -46,16 +44,7 @@ from .update import (
     pose_at,
     single_contact_loop,
     slipped_pose,
-    stored_damping_force,
 )
-
-
-@loop
-def log_slip_losses(contact_losses, lost, c, energies):
-    """Log the energies [J] dissipated by sliding, rolling and twisting of contact c."""
-    log_loss(contact_losses, lost, c, SLIDING, energies[0])
-    log_loss(contact_losses, lost, c, ROLLING, energies[1])
-    log_loss(contact_losses, lost, c, TWISTING, energies[2])
 
 
 @loop
@@ -77,10 +66,11 @@ def mark_separated(pair_list, count, i, j):
 
 
 @functools.cache
-def settle_loop(law: ContactLaw) -> Callable:
-    """The loop that breaks or slips flagged contacts, for one contact law."""
+def settle_loop(law: ContactLaw, damping: str) -> Callable:
+    """The loop that breaks or slips flagged contacts, for one contact law and variant of damping."""
     constants_at, radius_root, at_break = column_loops(law).at, law.radius_root, law.at_break
-    write_loads = single_contact_loop(law)
+    contact_radius, write_loads, damping_loops = law.contact_radius, single_contact_loop(law), VARIANTS[damping]
+    damping_of_break, damp = damping_loops.at_break, damping_loops.single
 
     @rare
     def break_contact(grains, contacts, pair_list, count, lost, c, pose, constants, dt):
@@ -95,16 +85,14 @@ def settle_loop(law: ContactLaw) -> Callable:
         stretched = -constants.break_overlap - overlap
         elapsed = min(stretched / opening, dt) if opening > 0.0 else 0.0
         energy, force = at_break(constants)
-        apply_pair_impulse(grains, i, j, pose.n, (force + stored_damping_force(contacts, c)) * (0.5 * dt - elapsed))
-        log_loss(contacts.lost, lost, c, BREAKING, energy)
-        # the damping force acted until the break: half a step in the velocity Verlet kick, the rest in the impulse
-        log_loss(contacts.lost, lost, c, DAMPING, -stored_damping_force(contacts, c) * opening * (dt - elapsed))
+        lost[BREAKING] += energy
+        force += damping_of_break(grains, contacts, lost, c, pose, opening, elapsed, dt)
+        apply_pair_impulse(grains, i, j, pose.n, force * (0.5 * dt - elapsed))
         count[BROKEN] += 1
         contacts.flag[c] = BROKEN_FLAG
         put(contacts.force, c, (0.0, 0.0, 0.0))
         put(contacts.torque1, c, (0.0, 0.0, 0.0))
         put(contacts.torque2, c, (0.0, 0.0, 0.0))
-        store_damping_force(contacts, c, 0.0)
         mark_separated(pair_list, count, i, j)
 
     @rare
@@ -132,18 +120,23 @@ def settle_loop(law: ContactLaw) -> Callable:
                     zero = (0.0, 0.0, 0.0)
                     unloaded = Displacements(displacements.overlap, zero, zero, 0.0)
                     slid, rolled, twisted = slip_losses(start, displacements, unloaded, present)
-                    log_loss(contacts.lost, lost, c, BREAKING, slid + rolled + twisted)
+                    lost[BREAKING] += slid + rolled + twisted
                     break_contact(grains, contacts, pair_list, count, lost, c, pose, constants, dt)
                     broken = True
                     continue
                 new_pose = slipped_pose(displacements, pose, r1, r2, constants, settings.reset)
                 left = displacements_of(new_pose, displacements.overlap, r1, r2, constants)
-                log_slip_losses(contacts.lost, lost, c, slip_losses(start, displacements, left, present))
+                slipped = slip_losses(start, displacements, left, present)
+                add_slip_losses(contacts.lost, c, slipped)
+                add_slip_energies(lost, slipped)
                 put(contacts.pointer1, c, turned_back(load4(grains.orientation, i), new_pose.n1))
                 put(contacts.pointer2, c, turned_back(load4(grains.orientation, j), new_pose.n2))
                 contacts.twist[c] = left.twist
                 count[SLIPPED] += 1
             write_loads(grains, contacts, span, settings, c)
+            overlap = r1 + r2 - pose.distance
+            radius = contact_radius(overlap, radius_root(overlap, constants), constants)
+            damp(grains, contacts, lost, c, pose, radius, constants, settings, count[STEPS], dt)
         return broken
 
     return update_flagged_contacts
@@ -170,7 +163,9 @@ def compact_contacts(contacts, count):
                     contacts.constants[row, kept] = contacts.constants[row, c]
             for row in range(contacts.lost.shape[0]):
                 contacts.lost[row, kept] = contacts.lost[row, c]
-            store_damping_force(contacts, kept, stored_damping_force(contacts, c))
+            if contacts.damping.shape[1] > 0:
+                for row in range(contacts.damping.shape[0]):
+                    contacts.damping[row, kept] = contacts.damping[row, c]
             contacts.twist[kept] = contacts.twist[c]
             contacts.formed[kept] = contacts.formed[c]
             contacts.flag[kept] = contacts.flag[c]
@@ -215,9 +210,10 @@ class FormingLoops(NamedTuple):
 
 
 @functools.cache
-def forming_loops(law: ContactLaw) -> FormingLoops:
-    """The loops that form contacts, for one contact law."""
-    columns, write_loads, add_damping_force = column_loops(law), single_contact_loop(law), damping_loops(law).add_force
+def forming_loops(law: ContactLaw, damping: str = NONE) -> FormingLoops:
+    """The loops that form contacts, for one contact law and variant of damping."""
+    columns, write_loads = column_loops(law), single_contact_loop(law)
+    contact_radius, damping_of_touch = law.contact_radius, VARIANTS[damping].at_touch
     constants_at, constants_of_pair, store_constants = columns.at, columns.of_pair, columns.store
     radius_root, at_touch = law.radius_root, law.at_touch
     normal_force, normal_energy, normal_stiffness = law.force, law.energy, law.stiffness
@@ -237,7 +233,6 @@ def forming_loops(law: ContactLaw) -> FormingLoops:
         contacts.formed[c] = formed
         contacts.flag[c] = 0
         contacts.every_step[c] = 0
-        store_damping_force(contacts, c, 0.0)
         for row in range(contacts.lost.shape[0]):
             contacts.lost[row, c] = 0.0
         constants = constants_of_pair(grains, settings.pairings, i, j)
@@ -277,15 +272,18 @@ def forming_loops(law: ContactLaw) -> FormingLoops:
             closing = -dot(sub(load(grains.velocity, i), load(grains.velocity, j)), n)
             elapsed = min((radii - distance) / closing, dt) if closing > 0.0 else 0.0
             c = add_contact(grains, contacts, count, span, settings, i, j, clock[TIME] + dt - elapsed)
-            if settings.damped:
-                add_damping_force(grains, contacts, span, c, 0.0)
-                log_loss(contacts.lost, lost, c, DAMPING, stored_damping_force(contacts, c) * closing * elapsed)
+            pose, constants = pose_at(grains, contacts, span, c, 0.0), constants_at(contacts, c)
+            radius = contact_radius(radii - distance, radius_root(radii - distance, constants), constants)
+            impulse = damping_of_touch(
+                grains, contacts, lost, c, pose, radius, constants, closing, elapsed, settings, count[STEPS], dt
+            )
             reduced = grains.mass[i] * grains.mass[j] / (grains.mass[i] + grains.mass[j])
             # the step of 0 s at the start of a run finds grains that overlap already
             gain = speed_gain(radii - distance, closing, reduced, constants_at(contacts, c), dt) if dt > 0.0 else 0.0
-            impulse = stored_damping_force(contacts, c) * elapsed - reduced * gain
-            apply_pair_impulse(grains, i, j, n, impulse - 0.5 * dt * dot(load(contacts.force, c), n))
-            log_loss(contacts.lost, lost, c, FORMING, -at_touch(constants_at(contacts, c)))
+            impulse -= reduced * gain + 0.5 * dt * dot(load(contacts.force, c), n)
+            apply_pair_impulse(grains, i, j, n, impulse)
+            lost[FORMING] -= at_touch(constants)
+            contacts.lost[FORMING_ROW, c] -= at_touch(constants)
             pair_list.in_contact[p] = 1
             count[MADE] += 1
 

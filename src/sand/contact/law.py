@@ -84,6 +84,7 @@ class Pairing(NamedTuple):
     twist_factor: float
     damping: float  # c [kg/s]
     damping_per_radius: float  # c/a [kg/(m s)]
+    damping_ratio: float  # ζ, share of the critical damping of each mode
 
 
 class ContactConstants(NamedTuple):
@@ -98,14 +99,18 @@ class ContactConstants(NamedTuple):
     slide_limit: float  # ζ_c [m]
     roll_limit: float  # ξ_c [m]
     twist_limit: float  # φ_c [rad]
-    damping: float  # c [kg/s], independent of the contact radius
-    damping_per_radius: float  # c/a [kg/(m s)]
+    damping: float  # c [kg/s] of the normal mode, independent of the contact radius
+    damping_per_radius: float  # c/a [kg/(m s)] of the normal mode
+    slide_damping: float  # c_s [kg/s]
+    roll_damping: float  # C_r [N m s]
+    twist_damping: float  # C_t [N m s]
     max_squared_frequency: float  # ω² of the fastest mode of the pair [1/s²]
     normal: Any  # `ContactLaw.constants_type`: constants that only this law has
 
 
-DAMPING_FACTOR = 4.0
-"""Damping counts as a mode of frequency 4 c/m̄, which keeps time steps below the damping time m̄/c."""
+DAMPING_FACTOR = 2.0
+"""A dashpot counts as a mode of frequency 2 c/m̄: with 25 steps per period c dt/m̄ ≤ 1/8, and the damping of `damping` is
+accurate to (c dt/m̄)².  Up to a quarter of critical damping the step is that of the undamped contact."""
 
 
 @functools.cache
@@ -113,7 +118,9 @@ def contact_constants(law: ContactLaw) -> Callable:
     """The formula `(pairing, r1, r2, m1, m2)` → `ContactConstants` of a law.
 
     Radii in m, masses in kg.  `max_squared_frequency` is that of the fastest of the four modes of the free pair, or of
-    the damping.
+    their damping.  A damping ratio ζ gives each mode of stiffness k and effective mass m the coefficient 2ζ√(k m):
+    1/m = 1/m1 + 1/m2 for the normal mode, 7/2 of it for sliding, 1/I1 + 1/I2 for rolling (stiffness k_r R²) and for
+    twisting.
     """
     normal_mode = law.normal_mode
 
@@ -128,13 +135,19 @@ def contact_constants(law: ContactLaw) -> Callable:
         k_r = pairing.roll_factor * tangential.roll_stiffness(pull_off, reduced)
         k_t = pairing.twist_factor * tangential.twist_stiffness(pairing.twist_shear, a0)
         k_n = normal.stiffness
-        damping = pairing.damping + pairing.damping_per_radius * normal.stiff_radius
         # squared frequencies of the four modes of the free pair; I = (2/5) m r². Sliding: r²/I = 5/(2m) adds 5/2 to
         # each 1/m, hence 7/2; rolling (stiffness k_r R²) and twisting: 1/I1 + 1/I2
         inverse_mass = 1.0 / m1 + 1.0 / m2
         inverse_inertia = 2.5 * (1.0 / (m1 * r1 * r1) + 1.0 / (m2 * r2 * r2))
         squared_frequency = max(k_n * inverse_mass, 3.5 * k_s * inverse_mass)
         squared_frequency = max(squared_frequency, max(k_r * reduced * reduced, k_t) * inverse_inertia)
+        share = 2.0 * pairing.damping_ratio
+        c_n = pairing.damping + share * math.sqrt(k_n / inverse_mass)
+        c_s = share * math.sqrt(k_s / (3.5 * inverse_mass))
+        c_r = share * math.sqrt(k_r * reduced * reduced / inverse_inertia)
+        c_t = share * math.sqrt(k_t / inverse_inertia)
+        stiffest = c_n + pairing.damping_per_radius * normal.stiff_radius
+        fastest_decay = max(max(stiffest, 3.5 * c_s) * inverse_mass, max(c_r, c_t) * inverse_inertia)
         return ContactConstants(
             reduced,
             a0,
@@ -146,9 +159,12 @@ def contact_constants(law: ContactLaw) -> Callable:
             tangential.slide_limit(pairing.shear, pairing.twist_shear, a0) if adhesive else reduced,
             pairing.roll_limit,
             tangential.TWIST_LIMIT,
-            pairing.damping,
+            c_n,
             pairing.damping_per_radius,
-            max(squared_frequency, (DAMPING_FACTOR * damping * inverse_mass) ** 2),
+            c_s,
+            c_r,
+            c_t,
+            max(squared_frequency, (DAMPING_FACTOR * fastest_decay) ** 2),
             normal.constants,
         )
 

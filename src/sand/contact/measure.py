@@ -3,12 +3,13 @@
 import functools
 
 from ..compiler.stage import Stage, stage
-from ..numerics.vec import across, axpy, norm
+from ..numerics.vec import across, add, dot, norm, scale
 from ..state.state import CONTACTS
 from .columns import column_loops
+from .damping import loads_on_grains, measured_load
 from .law import ContactLaw
 from .mechanics import contact_load, displacements_of, energies, scaled_stiffness
-from .update import pose_at, stored_damping_force
+from .update import pose_at
 
 ENERGIES = ("normal", "sliding", "rolling", "twisting")
 """Energies [J] of contacts that `measure_energies` computes."""
@@ -89,6 +90,7 @@ def contacts_stage(law: ContactLaw) -> Stage:
             slide, roll = norm(displacements.slide), norm(xi)
             stored = energies(pose, normal_energy(overlap, y, constants), r1, r2, constants)
             normal = normal_force(overlap, y, constants)
+            damping = measured_load(contacts, c)
             out[0, c], out[1, c] = overlap, contact_radius(overlap, y, constants)
             out[2, c], out[3, c], out[4, c] = slide, roll, displacements.twist
             longest = constants.break_overlap if constants.break_overlap > 0.0 else constants.reduced_radius
@@ -96,14 +98,15 @@ def contacts_stage(law: ContactLaw) -> Stage:
             out[6, c] = slide / constants.slide_limit if constants.slide_limit > 0.0 else 0.0
             out[7, c] = roll / constants.roll_limit
             out[8, c] = abs(displacements.twist) / constants.twist_limit
-            out[9, c] = normal + stored_damping_force(contacts, c)
+            out[9, c] = normal + dot(damping.force, pose.n)
             out[10, c] = constants.slide_stiffness * slide
             out[11, c] = constants.reduced_radius * constants.roll_stiffness * roll
             out[12, c] = -constants.twist_stiffness * displacements.twist
             for mode in range(4):
                 out[13 + mode, c] = stored[mode]
             force, torque1, torque2 = contact_load(pose, normal, r1, r2, constants)
-            force = axpy(stored_damping_force(contacts, c), pose.n, force)
+            more, more1, more2 = loads_on_grains(damping, scale(pose.distance, pose.n), r1, r2)
+            force, torque1, torque2 = add(force, more), add(torque1, more1), add(torque2, more2)
             for axis in range(3):
                 out[23 + axis, c], out[26 + axis, c], out[29 + axis, c] = force[axis], torque1[axis], torque2[axis]
                 out[17 + axis, c] = displacements.slide[axis]

@@ -53,15 +53,12 @@ def scaled_stiffness(constants, y, follow):
         constants.twist_limit,
         constants.damping,
         constants.damping_per_radius,
+        constants.slide_damping,
+        constants.roll_damping,
+        constants.twist_damping,
         constants.max_squared_frequency,
         constants.normal,
     )
-
-
-@formula
-def damping_force(contact_radius, closing, constants):
-    """Damping force [N] on grain 1 along n: (c + (c/a) a) dδ/dt, with dδ/dt = `closing` [m/s]."""
-    return (constants.damping + constants.damping_per_radius * contact_radius) * closing
 
 
 @formula

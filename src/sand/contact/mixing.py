@@ -25,6 +25,7 @@ def pairing_between(
     factors: tuple[float, float, float] = (1.0, 1.0, 1.0),
     damping: float = 0.0,
     viscous_time: float = 0.0,
+    damping_ratio: float = 0.0,
 ) -> Pairing:
     """Contact parameters of a pair of materials.
 
@@ -41,9 +42,11 @@ def pairing_between(
     factors : tuple[float, float, float], optional
         Multipliers of k_s, k_r and k_t.
     damping : float, optional
-        Constant damping coefficient c [kg/s].
+        Constant damping coefficient c [kg/s] of the normal mode.
     viscous_time : float, optional
         T_vis [s] of viscoelastic damping, c/a = 2 T_vis E*/(ν1 ν2) (Krijt et al. 2013); 0 for none.
+    damping_ratio : float, optional
+        Share ζ of the critical damping of all four modes; 0 for none.
 
     Returns
     -------
@@ -64,4 +67,5 @@ def pairing_between(
         twist_factor=twist,
         damping=damping,
         damping_per_radius=viscous,
+        damping_ratio=damping_ratio,
     )

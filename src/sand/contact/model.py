@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -21,7 +22,11 @@ from .mixing import MIXING, pairing_between
 
 LIMIT_RULES = ("clamp", "reset")
 STIFFNESS = ("frozen", "dt97")
-DAMPING = ("none", "constant", "viscoelastic")
+DAMPING = ("none", "critical", "constant", "viscoelastic")
+DAMPING_KEYS = {"damping_ratio": "critical", "damping_constant": "constant", "viscous_time": "viscoelastic"}
+"""Parameters of the kinds of damping, and the kind that each belongs to."""
+DEFAULT_DAMPING_RATIO = 0.2
+MAX_DAMPING_RATIO = 5.0
 
 
 @checked
@@ -44,12 +49,19 @@ class Contact:
         Critical rolling displacement ξ_c [m] > 0 of all contacts.  Default: the smaller of the values of the two
         materials.
     damping : str, optional
-        Damping of normal motion: "none", "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al. 2013: F = (2 T_vis
-        E*/ν²) a dδ/dt, with ν1 ν2 in place of ν² for unequal materials).
+        "none", for collisions, whose thresholds damping would move. "critical": dashpots on all four modes, each with a
+        share ζ of its critical damping, c_q = 2ζ √(k_q m_q), for growth, where nothing else removes the vibrations that
+        every touch leaves. Damping of the normal motion alone: "constant" (F = c dδ/dt) or "viscoelastic" (Krijt et al.
+        2013: F = (2 T_vis E*/ν²) a dδ/dt, with ν1 ν2 in place of ν² for unequal materials).
+    damping_ratio : float, optional
+        ζ, above 0, at most 5; for "critical", whose default is 0.2. Steps are shorter above 0.25.
     damping_constant : float or str, optional
-        c [kg/s] ≥ 0, for "constant".
+        c [kg/s] > 0, for "constant".
     viscous_time : float or str, optional
-        T_vis [s] ≥ 0, for "viscoelastic"; the default, 1.25e-11 s, is that of silica.
+        T_vis [s] > 0, for "viscoelastic"; 1.25e-11 s for silica grains of some 0.1 µm.
+    bath_temperature : float or str, optional
+        Temperature T > 0 [K] of the bath behind the dashpots: each has a random load of variance 2 k_B T c/dt, so that
+        vibrations of grains in contact have the mean energy k_B T per mode. Default: no noise, T = 0.
     mixing : str, optional
         γ_eff of unequal materials: "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
     law : str, optional
@@ -69,8 +81,10 @@ class Contact:
     twist_factor: Any = 1.0
     rolling_limit: Any = None
     damping: str = "none"
-    damping_constant: Any = 0.0
-    viscous_time: Any = 1.25e-11
+    damping_ratio: Any = None
+    damping_constant: Any = None
+    viscous_time: Any = None
+    bath_temperature: Any = None
     mixing: str = "geometric"
     law: str = "jkr"
 
@@ -90,22 +104,48 @@ class Contact:
                 given = getattr(self, key)
                 problems.append(f"contact: {key} = {given!r}; {did_you_mean(str(given), allowed)}")
         units = {"slide_factor": "1", "roll_factor": "1", "twist_factor": "1"}
-        units |= {"damping_constant": "kg/s", "viscous_time": "s"}
         for key, unit in units.items():
             try:
                 object.__setattr__(self, key, si(getattr(self, key), unit, f"contact: {key}", least=0.0))
             except BadInput as error:
                 problems += error.problems
-        try:
-            if self.rolling_limit is not None:
-                limit = si(self.rolling_limit, "m", "contact: rolling_limit", above=0.0)
-                object.__setattr__(self, "rolling_limit", limit)
-        except BadInput as error:
-            problems += error.problems
-        if not problems and self.damping == "constant" and self.damping_constant == 0.0:
-            problems.append("contact: damping = 'constant' needs a damping_constant above 0, such as '1e-9 kg/s'")
+        if self.damping == "critical" and self.damping_ratio is None:
+            object.__setattr__(self, "damping_ratio", DEFAULT_DAMPING_RATIO)
+        optional = {"rolling_limit": "m", "damping_constant": "kg/s", "viscous_time": "s", "bath_temperature": "K"}
+        for key, unit in (optional | {"damping_ratio": "1"}).items():
+            try:
+                if getattr(self, key) is not None:
+                    most = MAX_DAMPING_RATIO if key == "damping_ratio" else math.inf
+                    object.__setattr__(self, key, si(getattr(self, key), unit, f"contact: {key}", above=0.0, most=most))
+            except BadInput as error:
+                problems += error.problems
+        problems += self._damping_problems()
         if problems:
             raise BadInput(problems)
+
+    def _damping_problems(self) -> list[str]:
+        """Parameters of damping that are missing, or that belong to another kind of damping."""
+        if self.damping not in DAMPING:
+            return []
+        problems = [
+            f"contact: {key} is given, but damping = {self.damping!r} does not use it; remove it, or set "
+            f"damping = {kind!r}"
+            for key, kind in DAMPING_KEYS.items()
+            if getattr(self, key) is not None and self.damping != kind
+        ]
+        if self.damping == "constant" and self.damping_constant is None:
+            problems.append("contact: damping = 'constant' needs a damping_constant above 0, such as '1e-9 kg/s'")
+        if self.damping == "viscoelastic" and self.viscous_time is None:
+            problems.append(
+                "contact: damping = 'viscoelastic' needs a viscous_time above 0, such as '1.25e-11 s' for silica; "
+                "it depends on the material and the size of the grains"
+            )
+        if self.damping == "none" and self.bath_temperature is not None:
+            problems.append(
+                "contact: bath_temperature needs damping, which exchanges energy with the bath; "
+                "set damping = 'critical'"
+            )
+        return problems
 
     def parameters(self) -> dict[str, Any]:
         """Settings in SI units; settings that are None are omitted."""
@@ -124,12 +164,13 @@ class Contact:
             mixing=self.mixing,
             rolling_limit=self.rolling_limit,
             factors=(self.slide_factor, self.roll_factor, self.twist_factor),
-            damping=self.damping_constant if self.damping == "constant" else 0.0,
-            viscous_time=self.viscous_time if self.damping == "viscoelastic" else 0.0,
+            damping=self.damping_constant or 0.0,
+            viscous_time=self.viscous_time or 0.0,
+            damping_ratio=self.damping_ratio or 0.0,
         )
 
     def pairings(self, materials: Sequence[Material]) -> np.ndarray:
-        """Table (10, M, M) of `Pairing` for every two materials."""
+        """Table (11, M, M) of `Pairing` for every two materials."""
         table = [[self.pairing(a, b) for b in materials] for a in materials]
         return np.ascontiguousarray(np.moveaxis(np.array(table, dtype=np.float64), -1, 0))
 

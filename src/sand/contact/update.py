@@ -24,10 +24,16 @@ from ..numerics.quaternion import turned, turned_back, turned_by
 from ..numerics.simd import round_up_to_simd_width
 from ..numerics.vec import across, axpy, dot, load, load4, put, scale, sub
 from ..state.arrays import BLOCK as CONTACTS_PER_BLOCK
-from ..state.state import BREAKING, CONTACT_STEP, CONTACTS, ROLLING, SLIDING, SLIPPED, TWISTING
+from ..state.state import (
+    CONTACT_STEP,
+    CONTACTS,
+    SLIPPED,
+)
 from . import tangential
 from .columns import FASTEST_MODE, column_loops, uniform_contacts
+from .damping import NONE, VARIANTS
 from .law import ContactLaw
+from .losses import add_damping_energies, add_slip_energies, add_slip_losses
 from .mechanics import (
     Pose,
     after_slip,
@@ -51,7 +57,7 @@ the pass over contacts.
 """
 
 
-class SlipSums(NamedTuple):
+class ContactSums(NamedTuple):
     """Counts and energy losses of a pass over contacts."""
 
     pending: float  # contacts to be handled one by one
@@ -59,12 +65,10 @@ class SlipSums(NamedTuple):
     slid: float  # energies [J] dissipated by sliding, rolling and twisting
     rolled: float
     twisted: float
-
-
-@loop
-def stored_damping_force(contacts, c):
-    """Damping force [N] stored for contact c, on grain 1 along n; 0 without damping."""
-    return contacts.damped[c] if contacts.damped.size > 0 else 0.0
+    damped_normal: float  # energies [J] dissipated by the dashpots of the four modes
+    damped_sliding: float
+    damped_rolling: float
+    damped_twisting: float
 
 
 @loop
@@ -131,20 +135,6 @@ def _select(condition, u, v):
 
 
 @formula
-def loss_row(channel):
-    """Row of `ContactArrays.lost` for a loss channel other than breaking, which has no row."""
-    return channel - 1 if channel > BREAKING else channel
-
-
-@loop
-def _add_to_contact_losses(losses, c, slid, rolled, twisted):
-    """Add energies [J] dissipated by contact c to its losses."""
-    losses[loss_row(SLIDING), c] += slid
-    losses[loss_row(ROLLING), c] += rolled
-    losses[loss_row(TWISTING), c] += twisted
-
-
-@formula
 def slipped_pose(displacements, pose, r1, r2, constants, reset):
     """Pose after slip: the pointers and the twist represent the displacements of `mechanics.after_slip`."""
     target = after_slip(displacements, pose.n, constants, reset)
@@ -182,17 +172,21 @@ def _slip_contact(grains, contacts, c, pose, displacements, constants, present, 
     lost = _select(slips, lost, (0.0, 0.0, 0.0))
     put(contacts.pointer1, c, _select(slips, body1, pointer1))
     put(contacts.pointer2, c, _select(slips, body2, pointer2))
-    _add_to_contact_losses(contacts.lost, c, lost[0], lost[1], lost[2])
+    add_slip_losses(contacts.lost, c, lost)
     return new_pose, lost, PENDING_FLAG if needs_event else SLIPPED_FLAG if slips else 0
 
 
 @functools.cache
-def contact_loop(law: ContactLaw, handle_limits: Callable) -> Callable:
-    """The loop that updates a range of contacts, for a contact law and one of `_flag_contact`, `_slip_contact`."""
+def contact_loop(law: ContactLaw, handle_limits: Callable, damping: str = NONE) -> Callable:
+    """The loop that updates a range of contacts, for a contact law, a rule for limits and a variant of damping.
+
+    The rule is `_flag_contact` or `_slip_contact`, the variant a key of `damping.VARIANTS`.
+    """
     load_constants, radius_root, normal_force = column_loops(law).load, law.fast_radius_root, law.force
+    contact_radius, damp = law.contact_radius, VARIANTS[damping].update
 
     @loop
-    def update_contacts(grains, contacts, first, last, used, column, span, settings, dt):
+    def update_contacts(grains, contacts, first, last, used, column, span, settings, number, dt):
         """Update twist, loads and flag of the contacts first … last − 1.  The loop has no branches, so it vectorises.
 
         Parameters
@@ -209,16 +203,19 @@ def contact_loop(law: ContactLaw, handle_limits: Callable) -> Callable:
             The box.
         settings : ContactParameters
             Settings of the contact model.
+        number : int
+            Number of the step, for the noise of damping.
         dt : float
             Time step [s].
 
         Returns
         -------
-        SlipSums
+        ContactSums
             Contacts that remain flagged, and contacts that slipped with their losses.
         """
         pending = slipped = 0
         slid = rolled = twisted = 0.0
+        damped1 = damped2 = damped3 = damped4 = 0.0
         for k in range(last - first):
             c = first + k
             i, j = contacts.pair[0, c], contacts.pair[1, c]
@@ -233,18 +230,27 @@ def contact_loop(law: ContactLaw, handle_limits: Callable) -> Callable:
                 grains, contacts, c, pose, displacements, constants, present, valid, settings, dt
             )
             normal = normal_force(overlap, y, constants)
-            force, torque1, torque2 = contact_load(pose, normal, r1, r2, present)
+            # a flagged contact is damped by events.settle_loop; padding columns hold no grains
+            active = (flag != PENDING_FLAG) & (c < used)
+            loads, dissipated = damp(
+                grains, contacts, c, pose, contact_radius(overlap, y, constants), constants,
+                contact_load(pose, normal, r1, r2, present), active, settings, number, dt
+            )  # fmt: skip
+            damped1 += dissipated[0]
+            damped2 += dissipated[1]
+            damped3 += dissipated[2]
+            damped4 += dissipated[3]
             contacts.twist[c] = pose.twist
-            put(contacts.force, c, force)
-            put(contacts.torque1, c, torque1)
-            put(contacts.torque2, c, torque2)
+            put(contacts.force, c, loads[0])
+            put(contacts.torque1, c, loads[1])
+            put(contacts.torque2, c, loads[2])
             contacts.flag[c] = flag
             pending += 1 if (flag == PENDING_FLAG) & (c < used) else 0
             slipped += 1 if flag == SLIPPED_FLAG else 0
             slid += lost[0]
             rolled += lost[1]
             twisted += lost[2]
-        return SlipSums(float(pending), float(slipped), slid, rolled, twisted)
+        return ContactSums(float(pending), float(slipped), slid, rolled, twisted, damped1, damped2, damped3, damped4)
 
     return update_contacts
 
@@ -260,18 +266,20 @@ def padded_contact_count(contacts, number):
 
 
 @functools.cache
-def contact_pass_loop(law: ContactLaw) -> Callable:
-    """The pass over a range of contacts, block by block, for one contact law."""
-    flag_contacts, slip_contacts = contact_loop(law, _flag_contact), contact_loop(law, _slip_contact)
+def contact_pass_loop(law: ContactLaw, damping: str) -> Callable:
+    """The pass over a range of contacts, block by block, for one contact law and variant of damping."""
+    flag_contacts = contact_loop(law, _flag_contact, damping)
+    slip_contacts = contact_loop(law, _slip_contact, damping)
 
     @loop
-    def contact_pass(grains, contacts, first, last, span, settings, dt):
+    def contact_pass(grains, contacts, first, last, span, settings, number, dt):
         """Update the contacts first … last − 1 (uint64); arguments and result as for `contact_loop`.
 
         With stiffnesses that follow a(δ) all contacts beyond a limit stay flagged: the work of the stiffness change
         must be logged before they slip.
         """
         pending = slipped = slid = rolled = twisted = 0.0
+        damped1 = damped2 = damped3 = damped4 = 0.0
         for b in range((last - first + BLOCK - np.uint64(1)) // BLOCK):
             begin = first + b * BLOCK
             end = begin + BLOCK if begin + BLOCK < last else last
@@ -280,44 +288,52 @@ def contact_pass_loop(law: ContactLaw) -> Callable:
             for k in range(end - begin):
                 slipped_before += 1.0 if contacts.flag[begin + k] > 0 else 0.0
             if slipped_before > SLIP_FRACTION * (end - begin) and not settings.follow:
-                part = slip_contacts(grains, contacts, begin, end, end, column, span, settings, dt)
-                pending += part.pending
+                part = slip_contacts(grains, contacts, begin, end, end, column, span, settings, number, dt)
                 slipped += part.slipped
                 slid += part.slid
                 rolled += part.rolled
                 twisted += part.twisted
             else:
                 padded = padded_contact_count(contacts, end)
-                part = flag_contacts(grains, contacts, begin, padded, end, column, span, settings, dt)
-                pending += part.pending
-        return SlipSums(pending, slipped, slid, rolled, twisted)
+                part = flag_contacts(grains, contacts, begin, padded, end, column, span, settings, number, dt)
+            pending += part.pending
+            damped1 += part.damped_normal
+            damped2 += part.damped_sliding
+            damped3 += part.damped_rolling
+            damped4 += part.damped_twisting
+        return ContactSums(pending, slipped, slid, rolled, twisted, damped1, damped2, damped3, damped4)
 
     return contact_pass
 
 
 @loop
-def log_slip_sums(count, lost, sums):
+def log_contact_sums(count, lost, sums):
     """Add slip events and losses of a pass to the counters and to the energy table."""
     count[SLIPPED] += int(sums.slipped)
-    lost[SLIDING] += sums.slid
-    lost[ROLLING] += sums.rolled
-    lost[TWISTING] += sums.twisted
+    add_slip_energies(lost, (sums.slid, sums.rolled, sums.twisted))
+    add_damping_energies(lost, (sums.damped_normal, sums.damped_sliding, sums.damped_rolling, sums.damped_twisting))
 
 
 @loop
-def store_slip_sums(rows, b, sums):
-    """Store the sums of a pass in row b of a (B, ≥ 5) array."""
+def store_contact_sums(rows, b, sums):
+    """Store the sums of a pass in row b of a (B, ≥ 9) array."""
     rows[b, 0] = sums.pending
     rows[b, 1] = sums.slipped
     rows[b, 2] = sums.slid
     rows[b, 3] = sums.rolled
     rows[b, 4] = sums.twisted
+    rows[b, 5] = sums.damped_normal
+    rows[b, 6] = sums.damped_sliding
+    rows[b, 7] = sums.damped_rolling
+    rows[b, 8] = sums.damped_twisting
 
 
 @loop
-def load_slip_sums(rows, b):
-    """Sums stored in row b by `store_slip_sums`."""
-    return SlipSums(rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4])
+def load_contact_sums(rows, b):
+    """Sums stored in row b by `store_contact_sums`."""
+    return ContactSums(
+        rows[b, 0], rows[b, 1], rows[b, 2], rows[b, 3], rows[b, 4], rows[b, 5], rows[b, 6], rows[b, 7], rows[b, 8]
+    )
 
 
 @functools.cache

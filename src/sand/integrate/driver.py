@@ -16,7 +16,7 @@ from ..compiler.jit import caller, loop, rare
 from ..compiler.program import call_stage, has_stage
 from ..compiler.stage import stage
 from ..contact.events import count_new_contacts
-from ..contact.update import load_slip_sums, log_slip_sums
+from ..contact.update import load_contact_sums, log_contact_sums
 from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..state.state import (
@@ -57,7 +57,6 @@ from .respa import (
 from .stages import (
     CONTACT_PASS,
     CONTACT_STEP,
-    DAMP,
     DRIFT,
     EXPLAIN,
     EXTRAPOLATE,
@@ -265,15 +264,12 @@ def update_contacts(count, lost, settings, queue, program, table):
     for_each_block(program, CONTACT_PASS, table, queue.words, blocks)
     pending = False
     for b in range(blocks):
-        passed = load_slip_sums(queue.passed, b)
+        passed = load_contact_sums(queue.passed, b)
         pending |= passed.pending > 0.0
-        log_slip_sums(count, lost, passed)
+        log_contact_sums(count, lost, passed)
     if settings.follow:
         call_stage(program, STIFFNESS_WORK, table, 0)
-    broken = pending and call_stage(program, SETTLE, table, 0) == 1
-    if settings.damped:
-        call_stage(program, DAMP, table, 0)
-    return broken
+    return pending and call_stage(program, SETTLE, table, 0) == 1
 
 
 @caller

@@ -45,10 +45,12 @@ class ContactParameters(NamedTuple):
     """Run-time parameters of the contact model."""
 
     on: bool  # False: grains overlap without interaction
-    pairings: Any  # (10, M, M) contact.law.Pairing of each pair of materials
+    pairings: Any  # (11, M, M) contact.law.Pairing of each pair of materials
     reset: bool  # slip: False clamps the displacement at its limit, True resets it
     follow: bool  # stiffnesses: False for the equilibrium radius a₀, True for the instantaneous contact radius
-    damped: bool  # whether normal motion is damped
+    damped: bool  # whether contacts have dashpots
+    bath: float  # k_B T [J] of their thermal noise; 0: none
+    seed: int  # of the noise
     per_period: float  # steps per fastest contact period
     uniform_contacts: bool = False  # one set of constants for all contacts, as in State
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from ..compiler.program import Program
 from ..compiler.stage import Stage
 from ..compiler.table import Table
+from ..contact.damping import DASHPOTS, NONE, THERMAL
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..forces.pair.loops import LongRangeSums
@@ -24,7 +25,7 @@ from .force_stages import (
     external_force_stages,
     pair_force_stages,
 )
-from .parts import StepParameters
+from .parts import ContactParameters, StepParameters
 
 
 class Components(NamedTuple):
@@ -77,13 +78,21 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
     return program
 
 
+def variant_of(settings: ContactParameters) -> str:
+    """Variant of the contact update: undamped, damped, or damped with thermal noise."""
+    if not settings.damped:
+        return NONE
+    return THERMAL if settings.bath > 0.0 else DASHPOTS
+
+
 def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, Stage]:
     """The stages of contacts by number."""
-    events = stages.contact_event_stages(given.law)
+    damping = variant_of(parameters.settings)
+    events = stages.contact_event_stages(given.law, damping)
     found = {
         stages.PAIR_LIST: stages.pair_list_stage(given.law, parameters.search.celled),
         stages.INNER_LIST: stages.inner_list,
-        stages.CONTACT_PASS: stages.contact_pass_stage(given.law, given.wide),
+        stages.CONTACT_PASS: stages.contact_pass_stage(given.law, damping, given.wide),
         stages.SETTLE: events[stages.SETTLE],
         stages.FORM: events[stages.FORM],
         stages.SORT: resort_contacts_by_grain,
@@ -92,8 +101,6 @@ def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, 
     }
     if parameters.settings.follow:
         found[stages.STIFFNESS_WORK] = events[stages.STIFFNESS_WORK]
-    if parameters.settings.damped:
-        found[stages.DAMP] = events[stages.DAMP]
     return found
 
 

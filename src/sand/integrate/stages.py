@@ -9,11 +9,11 @@ import functools
 import numpy as np
 
 from ..compiler.stage import Stage, stage
-from ..contact.damping import damping_loops
 from ..contact.events import compact_contacts, forming_loops, settle_loop
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
-from ..contact.update import contact_pass_loop, contact_step, store_slip_sums
+from ..contact.stiffness_work import stiffness_work_loop
+from ..contact.update import contact_pass_loop, contact_step, store_contact_sums
 from ..forces.gas.loops import gas_kick
 from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
@@ -35,20 +35,19 @@ INNER_LIST = 3
 CONTACT_PASS = 4
 STIFFNESS_WORK = 5
 SETTLE = 6
-DAMP = 7
-FORM = 8
-SORT = 9
-CONTACT_STEP = 10
-REMOVE_BROKEN = 11
-GATHER = 12
-GATHER_AND_KICK = 13
-PREPARE_RATES = 14
-STORE_POSITIONS = 15
-EXTRAPOLATE = 16
-GAS_KICK = 17
-FLIGHT = 18
-EXPLAIN = 19
-FIRST_FORCE = 20  # from here on the stages of forces, see force_stages
+FORM = 7
+SORT = 8
+CONTACT_STEP = 9
+REMOVE_BROKEN = 10
+GATHER = 11
+GATHER_AND_KICK = 12
+PREPARE_RATES = 13
+STORE_POSITIONS = 14
+EXTRAPOLATE = 15
+GAS_KICK = 16
+FLIGHT = 17
+EXPLAIN = 18
+FIRST_FORCE = 19  # from here on the stages of forces, see force_stages
 
 INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
@@ -107,26 +106,28 @@ def inner_list(grains, pair_list, count, span, criteria):
 
 
 @functools.cache
-def contact_pass_stage(law: ContactLaw, long_vectors: bool) -> Stage:
-    """Update of a block of contacts; stores its slip sums."""
-    contact_pass = contact_pass_loop(law)
+def contact_pass_stage(law: ContactLaw, damping: str, long_vectors: bool) -> Stage:
+    """Update of a block of contacts; stores its sums."""
+    contact_pass = contact_pass_loop(law, damping)
 
     @stage("the contact forces", long_vectors=long_vectors)
     def pass_contacts(grains, contacts, clock, count, span, settings, queue, block):
         first = block * CONTACTS_PER_BLOCK
         last = min(first + CONTACTS_PER_BLOCK, count[CONTACTS])
-        found = contact_pass(grains, contacts, np.uint64(first), np.uint64(last), span, settings, clock[STEP])
-        store_slip_sums(queue.passed, block, found)
+        found = contact_pass(
+            grains, contacts, np.uint64(first), np.uint64(last), span, settings, count[STEPS], clock[STEP]
+        )
+        store_contact_sums(queue.passed, block, found)
         return 0
 
     return pass_contacts
 
 
 @functools.cache
-def contact_event_stages(law: ContactLaw) -> dict[int, Stage]:
-    """Stages of contact events by number: work of stiffnesses, slip and breaking, damping, forming."""
-    damping, settle, form_contacts = damping_loops(law), settle_loop(law), forming_loops(law).form
-    damp_contacts, log_stiffness_work = damping.damp, damping.log_stiffness_work
+def contact_event_stages(law: ContactLaw, damping: str) -> dict[int, Stage]:
+    """Stages of contact events by number: work of stiffnesses, slip and breaking, forming."""
+    settle, form_contacts = settle_loop(law, damping), forming_loops(law, damping).form
+    log_stiffness_work = stiffness_work_loop(law)
 
     @stage("the work of changing stiffnesses")
     def stiffness_work(grains, contacts, clock, count, lost, span):
@@ -138,17 +139,12 @@ def contact_event_stages(law: ContactLaw) -> dict[int, Stage]:
         """Slip or break flagged contacts; returns 1 if any contact broke."""
         return 1 if settle(grains, contacts, pair_list, count, lost, span, settings, clock[STEP]) else 0
 
-    @stage("the damping of contacts")
-    def damp(grains, contacts, clock, count, lost, span):
-        damp_contacts(grains, contacts, count, lost, span, clock[STEP])
-        return 0
-
     @stage("the forming of contacts")
     def form(grains, contacts, pair_list, clock, count, lost, span, settings):
         form_contacts(grains, contacts, pair_list, count, lost, clock, span, settings, clock[STEP])
         return 0
 
-    return {STIFFNESS_WORK: stiffness_work, SETTLE: settle_contacts, DAMP: damp, FORM: form}
+    return {STIFFNESS_WORK: stiffness_work, SETTLE: settle_contacts, FORM: form}
 
 
 @stage("the time step of contacts")

@@ -51,13 +51,13 @@ class TaskQueue(NamedTuple):
     """Data of the blocks of one call of the driver, besides the state."""
 
     words: Any  # (24,) int64: task word and counters
-    passed: Any  # (B, 8) float64: slip sums of each block of contacts, contact.update
+    passed: Any  # (B, 16) float64: sums of each block of contacts, contact.update
     speeds: Any  # (G, 2) float64: largest squares of speed [m²/s²] and spin [1/s²] in each block of grains
 
 
 def new_task_queue(grains: int, contacts: int) -> TaskQueue:
     """An empty queue for a number of grains and a capacity of contacts."""
-    passed = np.zeros((contacts // CONTACTS_PER_BLOCK + 1, 8))
+    passed = np.zeros((contacts // CONTACTS_PER_BLOCK + 1, 16))
     speeds = np.zeros((grains // GRAINS_PER_BLOCK + 1, 2))
     words = np.zeros(QUEUE_LENGTH, np.int64)
     words[SHARED] = uses_task_queue(grains)

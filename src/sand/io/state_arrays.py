@@ -45,7 +45,7 @@ STORED = {
     **{f"contacts/{name}": ArraySpec("f8", ("C",)) for name in ("twist", "formed")},
     "contacts/constants": ArraySpec("f8", (None, (1, "C"))),
     "contacts/lost": ArraySpec("f8", ((4, 6), "C")),
-    "contacts/damped": ArraySpec("f8", ((0, "C"),)),
+    "contacts/damping": ArraySpec("f8", (12, (0, "C"))),
     "contacts/flag": ArraySpec("u1", ("C",), "any"),
     "contacts/every_step": ArraySpec("u1", ("C",), "boolean"),
     "contacts/side": ArraySpec("u4", ("2C",), "order"),

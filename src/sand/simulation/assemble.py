@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..box import Box
+from ..constants import BOLTZMANN
 from ..contact.columns import constant_names
 from ..contact.model import Contact
 from ..errors import BadInput
@@ -90,7 +91,7 @@ def build_engine(
     Parameters
     ----------
     seed : int, optional
-        Seed of the random gas kicks.
+        Seed of the random kicks of gas and bath.
     fresh : bool, optional
         Whether this is a new start, whose overlaps are checked; a resumed run may be in the middle of an impact.
     contacts : StrainedContacts or None, optional
@@ -114,7 +115,7 @@ def build_engine(
     stepping = stepping.resolved(grains, control)
     parameters = StepParameters(
         box.span,
-        _contact_parameters(by_type.contact, grains, verlet),
+        _contact_parameters(by_type.contact, grains, verlet, seed),
         found.search,
         _respa_settings(by_type, verlet),
         _external_work(by_type.external, box),
@@ -211,7 +212,12 @@ def _new_state(
         grains,
         box,
         empty_contact_arrays(
-            count, capacity, len(constant_names(components.law)), uniform_contacts=uniform_contacts, channels=channels
+            count,
+            capacity,
+            len(constant_names(components.law)),
+            uniform_contacts=uniform_contacts,
+            channels=channels,
+            damped=settings.damped,
         ),
         empty_pair_list(count, capacity, uniform_contacts=uniform_contacts),
         empty_long_range_arrays(
@@ -272,7 +278,7 @@ def sound_crossing(grains: Grains, number: int) -> float:
     return radius * math.sqrt(material.density / material.young_modulus)
 
 
-def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verlet) -> ContactParameters:
+def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verlet, seed: int) -> ContactParameters:
     law = contact or Contact()
     # without a Contact no grains touch, and materials may lack the constants of contacts
     pairings = law.pairings(grains.materials if contact else (SILICA,) * len(grains.materials))
@@ -282,6 +288,8 @@ def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verle
         reset=law.slip == "reset",
         follow=law.stiffness == "dt97",
         damped=law.damping != "none",
+        bath=0.0 if law.bath_temperature is None else BOLTZMANN * law.bath_temperature,
+        seed=seed,
         per_period=stepping.steps_per_period,
         uniform_contacts=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
     )

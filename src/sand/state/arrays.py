@@ -13,6 +13,10 @@ ALWAYS_RECORDED = 4
 """Loss channels recorded per contact with every contact law; the others only with damping or variable stiffnesses."""
 
 
+DAMPING_ROWS = 12
+"""Rows of `ContactArrays.damping`: relative velocity and spin of the last step, force and torque of the dashpots."""
+
+
 class ContactArrays(NamedTuple):
     """Contacts, one column each; the first count[CONTACTS] columns are in use.
 
@@ -26,8 +30,8 @@ class ContactArrays(NamedTuple):
     twist: np.ndarray  # (C,) φ [rad]
     formed: np.ndarray  # (C,) time of formation [s]; the start time for initial contacts
     constants: np.ndarray  # (K, C) constants of the contact law; (K, BLOCK) identical columns if they are uniform
-    lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 channels of state.RECORDED
-    damped: np.ndarray  # (C,) damping force in the last step [N], along n on grain 1; (0,) if L = 4
+    lost: np.ndarray  # (L, C) energy dissipated so far [J], the first 4 or all 6 losses of state.RECORDED
+    damping: np.ndarray  # (12, C) motion and loads of the dashpots, rows of contact.damping; (12, 0) without damping
     force: np.ndarray  # (3, C) force on grain 1 [N]
     torque1: np.ndarray  # (3, C) [N m]
     torque2: np.ndarray  # (3, C) [N m]
@@ -154,7 +158,13 @@ def empty_long_range_arrays(
 
 
 def empty_contact_arrays(
-    grains: int, capacity: int, constant_count: int, *, uniform_contacts: bool = False, channels: int = 6
+    grains: int,
+    capacity: int,
+    constant_count: int,
+    *,
+    uniform_contacts: bool = False,
+    channels: int = 6,
+    damped: bool = False,
 ) -> ContactArrays:
     """Allocate contact arrays.
 
@@ -170,10 +180,12 @@ def empty_contact_arrays(
         Whether one set of constants serves all contacts.
     channels : int, optional
         Number of loss channels recorded per contact.
+    damped : bool, optional
+        Whether contacts have dashpots.
     """
     c = padded_size(max(int(capacity), 16))
     vectors = {k: np.zeros((3, c)) for k in ("pointer1", "pointer2", "force", "torque1", "torque2")}
-    numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damped": np.zeros(c if channels > ALWAYS_RECORDED else 0)}
+    numbers = {"twist": np.zeros(c), "formed": np.zeros(c), "damping": np.zeros((DAMPING_ROWS, c if damped else 0))}
     return ContactArrays(
         pair=np.zeros((2, c), np.uint32),
         constants=np.zeros((constant_count, BLOCK if uniform_contacts else c)),

@@ -64,11 +64,13 @@ COUNT = (
 LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, SQUARED_SPEED, SQUARED_SPIN, SAFE_SPEED, INNER_COUNT = range(7)
 
 # --- indices of State.lost (float64): energy dissipated or transferred, per channel [J] ---------------------
-FORMING, BREAKING, SLIDING, ROLLING, TWISTING, DAMPING, STIFFNESS, GAS, OUTSIDE = range(9)
-LOST_IN_CONTACTS = ("forming", "breaking", "sliding", "rolling", "twisting", "damping", "stiffness")
-LOST = (*LOST_IN_CONTACTS, "gas", "outside")
-RECORDED = tuple(name for name in LOST_IN_CONTACTS if name != "breaking")
-"""Loss channels recorded per contact, in this order; an existing contact has lost nothing by breaking."""
+FORMING, BREAKING, SLIDING, ROLLING, TWISTING = range(5)
+DAMPING_NORMAL, DAMPING_SLIDING, DAMPING_ROLLING, DAMPING_TWISTING, STIFFNESS, GAS, OUTSIDE = range(5, 12)
+DAMPING = ("damping_normal", "damping_sliding", "damping_rolling", "damping_twisting")
+LOST = ("forming", "breaking", "sliding", "rolling", "twisting", *DAMPING, "stiffness", "gas", "outside")
+RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
+"""Losses recorded per contact, in this order: damping of all modes together, and nothing by breaking, after which a
+contact does not exist."""
 
 
 @dataclass
@@ -163,7 +165,7 @@ class State:
             _copy_into(getattr(self.grains.arrays, name), saved, f"grains/{name}")
         for group in ("contacts", "pair_list"):
             for name, array in getattr(self, group)._asdict().items():
-                if name in NOT_SAVED or (name == "damped" and not array.size):
+                if name in NOT_SAVED or (name == "damping" and not array.size):
                     continue
                 key, n = f"{group}/{name}", self._columns(group, name)
                 if name in self._uniform_arrays() and key in saved:  # one column is stored for all

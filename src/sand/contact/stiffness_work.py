@@ -1,0 +1,35 @@
+"""The work of stiffnesses that follow the contact radius."""
+
+import functools
+from collections.abc import Callable
+
+from ..compiler.jit import rare
+from ..state.state import CONTACTS, STIFFNESS
+from .columns import column_loops
+from .law import ContactLaw
+from .losses import STIFFNESS_ROW
+from .mechanics import displacements_of, scaled_stiffness, stiffness_loss
+from .update import displacements_before, pose_at
+
+
+@functools.cache
+def stiffness_work_loop(law: ContactLaw) -> Callable:
+    """The loop that logs the work of changing stiffnesses, for one contact law."""
+    constants_at, radius_root = column_loops(law).at, law.radius_root
+
+    @rare
+    def log_stiffness_work(grains, contacts, count, lost, span, dt):
+        """Log the energy that stiffnesses following a(δ) removed from the springs of all contacts in this step."""
+        for c in range(count[CONTACTS]):
+            constants = constants_at(contacts, c)
+            pose = pose_at(grains, contacts, span, c, contacts.twist[c])
+            r1, r2 = grains.radius[contacts.pair[0, c]], grains.radius[contacts.pair[1, c]]
+            start = displacements_before(grains, contacts, c, pose, constants, dt)
+            displacements = displacements_of(pose, r1 + r2 - pose.distance, r1, r2, constants)
+            at_start = scaled_stiffness(constants, radius_root(start.overlap, constants), True)
+            now = scaled_stiffness(constants, radius_root(displacements.overlap, constants), True)
+            energy = stiffness_loss(start, displacements, at_start, now)
+            lost[STIFFNESS] += energy
+            contacts.lost[STIFFNESS_ROW, c] += energy
+
+    return log_stiffness_work
