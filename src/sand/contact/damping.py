@@ -157,18 +157,19 @@ def loads_on_grains(damping, separation, r1, r2):
 
 
 @formula
-def damping_losses(start, end, separation, n, velocity, motion, rolling, dt):
+def damping_losses(start, end, n, velocity, motion, rolling, dt):
     """Energies [J] dissipated in a step by the normal, sliding, rolling and twisting dashpots.
 
     −½ dt [f_start·U_start + f_end·U_end + (τ_start + τ_end)·Ω]: the velocities are those of the middle of the step, and
-    the geometry that of its start, x_start = x − dt (v1 − v2), and of its end.
+    U_start = U_end + dt W×(v1 − v2) has the separation at the start.  The sum is exact; the parts of the start that are
+    normal and twisting are taken along n at the end.
 
     Parameters
     ----------
     start, end : DampingLoad
         Loads at the start and at the end of the step.
-    separation, n : tuple
-        x1 − x2 [m] and its direction at the end of the step.
+    n : tuple
+        Direction of x1 − x2 at the end of the step.
     velocity : tuple
         v1 − v2 [m/s].
     motion : Motion
@@ -178,16 +179,11 @@ def damping_losses(start, end, separation, n, velocity, motion, rolling, dt):
     dt : float
         Length of the step [s].
     """
-    start_separation = axpy(-dt, velocity, separation)
-    start_velocity = axpy(dt, cross(rolling, velocity), motion.velocity)
-    inverse = 1.0 / dot(separation, separation)
-    normal = inverse * dot(start.force, start_separation) * dot(start_velocity, start_separation)
-    normal += dot(end.force, n) * dot(motion.velocity, n)
-    total = dot(start.force, start_velocity) + dot(end.force, motion.velocity)
-    torque = add(start.torque, end.torque)
-    twist, turning = dot(torque, n) * dot(motion.spin, n), dot(torque, motion.spin)
-    half = -0.5 * dt
-    return half * normal, half * (total - normal), half * (turning - twist), half * twist
+    half, force, torque = -0.5 * dt, add(start.force, end.force), add(start.torque, end.torque)
+    normal = half * dot(force, n) * dot(motion.velocity, n)
+    twist = half * dot(torque, n) * dot(motion.spin, n)
+    both = half * (dot(force, motion.velocity) + dt * dot(start.force, cross(rolling, velocity)))
+    return normal, both - normal, half * dot(torque, motion.spin) - twist, twist
 
 
 @loop
@@ -275,7 +271,7 @@ def _update(grains, contacts, c, pose, radius, constants, loads, active, setting
         deviates = unit_deviates(settings.seed, number, grains.id[i], grains.id[j])
         noise = thermal_load(dashpots, pose.n, deviates, settings.bath, dt)
         end = DampingLoad(add(end.force, noise.force), add(end.torque, noise.torque))
-    lost = damping_losses(start, end, separation, pose.n, velocity, motion, rolling, dt)
+    lost = damping_losses(start, end, pose.n, velocity, motion, rolling, dt)
     counted = 1.0 if active else 0.0
     lost = (counted * lost[0], counted * lost[1], counted * lost[2], counted * lost[3])
     contacts.lost[DAMPING_ROW, c] += lost[0] + lost[1] + lost[2] + lost[3]
@@ -320,7 +316,7 @@ def _log_break(grains, contacts, lost, c, pose, opening, elapsed, dt):
     separation, start = scale(pose.distance, pose.n), stored_load(contacts, c)
     rolling = surface_rotation(w1, w2, grains.radius[i], grains.radius[j])
     motion = relative_motion(separation, velocity, rolling, w1, w2)
-    losses = damping_losses(start, NO_LOAD, separation, pose.n, velocity, motion, rolling, dt)
+    losses = damping_losses(start, NO_LOAD, pose.n, velocity, motion, rolling, dt)
     normal = dot(start.force, pose.n)
     losses = (-normal * opening * (dt - elapsed), losses[1], losses[2], losses[3])
     add_damping_energies(lost, losses)
