@@ -272,8 +272,8 @@ def _update(grains, contacts, c, pose, radius, constants, loads, active, setting
         noise = thermal_load(dashpots, pose.n, deviates, settings.bath, dt)
         end = DampingLoad(add(end.force, noise.force), add(end.torque, noise.torque))
     lost = damping_losses(start, end, pose.n, velocity, motion, rolling, dt)
-    counted = 1.0 if active else 0.0
-    lost = (counted * lost[0], counted * lost[1], counted * lost[2], counted * lost[3])
+    first, others = _chosen(active, lost[:3], (0.0, 0.0, 0.0)), lost[3] if active else 0.0
+    lost = (first[0], first[1], first[2], others)
     contacts.lost[DAMPING_ROW, c] += lost[0] + lost[1] + lost[2] + lost[3]
     store_rows(contacts.damping, VELOCITY, c, _chosen(active, motion.velocity, before.velocity))
     store_rows(contacts.damping, SPIN, c, _chosen(active, motion.spin, before.spin))
