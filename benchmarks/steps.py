@@ -31,7 +31,7 @@ def touched_bytes(sim: sand.Simulation) -> float:
     idle = (
         "formed",
         "lost",
-        "damped",
+        "damping",
         "every_step",
         "start",
         "gather_order",

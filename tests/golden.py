@@ -184,7 +184,7 @@ def collide(folder: Path) -> dict[str, Any]:
         '[target]\nkind = "bpca"\ngrains = 8\nradius = "0.1 um"\nmaterial = "silica"\n'
         '[projectile]\nkind = "bcca"\ngrains = 4\nradius = "0.1 um"\nmaterial = "silica"\n'
         '[impact]\nspeed = "3 m/s"\nimpact_parameter = "0.3 b"\nturn = true\nseeds = [1, 2]\n'
-        '[forces.contact]\ndamping = "viscoelastic"\n',
+        '[forces.contact]\ndamping = "viscoelastic"\nviscous_time = "1.25e-11 s"\n',
         "utf-8",
     )
     command("collide", folder / "c.toml", "--out", folder / "c", "--workers", "1")

@@ -13,6 +13,7 @@ import sand
 from sand.compiler.jit import formula
 from sand.compiler.user_code import user_code_digest
 from sand.contact import jkr, mechanics, tangential
+from sand.contact.damping import NONE
 from sand.contact.law import LAWS, ContactLaw, contact_constants, register
 from sand.contact.measure import contacts_stage, energies_stage
 from sand.contact.model import Contact
@@ -391,7 +392,11 @@ def test_code_with_a_formula_of_the_user_is_cached_by_its_source():
     """
 
     def digests(law):
-        stages = [contact_pass_stage(law, False), *contact_event_stages(law).values(), pair_list_stage(law, False)]
+        stages = [
+            contact_pass_stage(law, NONE, False),
+            *contact_event_stages(law, NONE).values(),
+            pair_list_stage(law, False),
+        ]
         return {user_code_digest(stage.function) for stage in [*stages, energies_stage(law), contacts_stage(law)]}
 
     assert all(digests(law) == {""} for law in LAWS.values())

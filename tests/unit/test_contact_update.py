@@ -8,6 +8,7 @@ import pytest
 from sand.box import Box
 from sand.compiler.jit import kernel
 from sand.contact.columns import column_loops, constant_names
+from sand.contact.damping import NONE
 from sand.contact.events import settle_loop
 from sand.contact.jkr import LAW as JKR
 from sand.contact.law import contact_constants
@@ -22,7 +23,7 @@ from sand.contact.update import (
     contact_loop,
     contact_pass_loop,
     displacements_before,
-    log_slip_sums,
+    log_contact_sums,
     pose_at,
     twist_increment,
 )
@@ -39,13 +40,13 @@ PAIRS = 403
 """Contacts of a test: several full blocks, and a remainder that is no full SIMD vector."""
 STEP = 1e-11
 STATE = ("pointer1", "pointer2", "twist", "force", "torque1", "torque2", "lost")
-contact_pass, update_flagged_contacts = contact_pass_loop(JKR), settle_loop(JKR)
+contact_pass, update_flagged_contacts = contact_pass_loop(JKR, NONE), settle_loop(JKR, NONE)
 flag_contacts, columns = contact_loop(JKR, _flag_contact), column_loops(JKR)
 
 
 def _pass_and_update(grains, contacts, near, count, lost, span, law, dt):
-    passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, dt)
-    log_slip_sums(count, lost, passed)
+    passed = contact_pass(grains, contacts, np.uint64(0), np.uint64(count[CONTACTS]), span, law, 0, dt)
+    log_contact_sums(count, lost, passed)
     update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
     return passed.pending
 
@@ -56,7 +57,7 @@ pass_and_update = kernel(_pass_and_update, cached=False)
 def update_flagged_only(grains, contacts, near, count, lost, span, law, dt):
     """Reference: a pass that only flags contacts beyond a limit, then the update of each flagged contact."""
     used = np.uint64(count[CONTACTS])
-    flag_contacts(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, dt)
+    flag_contacts(grains, contacts, np.uint64(0), used, used, np.uint64(0), span, law, 0, dt)
     update_flagged_contacts(grains, contacts, near, count, lost, span, law, dt)
 
 
@@ -107,7 +108,7 @@ def random_contacts(material, box, seed=1):
 
 
 def parameters_for(reset=False, follow=False):
-    return ContactParameters(True, np.zeros((10, 1, 1)), reset, follow, False, 25.0)
+    return ContactParameters(True, np.zeros((11, 1, 1)), reset, follow, False, 0.0, 0, 25.0)
 
 
 OPTIONS = {

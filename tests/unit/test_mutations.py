@@ -168,6 +168,7 @@ seeds = [1, 2]
 
 [forces.contact]
 damping = "viscoelastic"
+viscous_time = "1.25e-11 s"
 """
 SCATTERING = """
 [projectile]

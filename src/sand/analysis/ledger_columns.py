@@ -8,9 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ..errors import NoSuchKey, did_you_mean, shown
-from ..state.state import LOST
+from ..state.state import DAMPING, LOST
 
 LOSSES = tuple(f"lost_{name}" for name in LOST)
+DAMPED = tuple(f"lost_{name}" for name in DAMPING)
+ALWAYS_LOST = ("lost_forming", "lost_breaking", "lost_sliding", "lost_rolling", "lost_twisting")
 ROUNDING = 4.0 * np.finfo(float).eps
 """Relative change of the total energy that is attributed to rounding. Bodies at rest of up to 64,000 grains change by
 one unit in the last place."""
@@ -19,10 +21,11 @@ one unit in the last place."""
 def dissipated_in(row: Mapping[str, float]) -> float:
     """Energy dissipated up to a row of the ledger [J], contact formation included.
 
-    Work of stiffness changes and of external fields is excluded; the gas counts if it took more energy than it gave.
+    Work of stiffness changes and of external fields is excluded; the gas and the bath of damping count if they took more
+    energy than they gave.
     """
-    channels = [name for name in LOSSES if name not in ("lost_stiffness", "lost_gas", "lost_outside")]
-    return math.fsum([*(row[name] for name in channels), max(row["lost_gas"], 0.0)])
+    damped = math.fsum(row[name] for name in DAMPED)
+    return math.fsum([*(row[name] for name in ALWAYS_LOST), max(damped, 0.0), max(row["lost_gas"], 0.0)])
 
 
 class LedgerColumns:
@@ -80,4 +83,5 @@ class LedgerColumns:
         """
         largest = max((row["translation"] + row["rotation"] for row in self.rows), default=0.0)
         scale = self.dissipated + largest
-        return self._change() / scale if scale > 0.0 else 0.0
+        # written so that energies that are not numbers give no drift of 0
+        return 0.0 if scale <= 0.0 else self._change() / scale

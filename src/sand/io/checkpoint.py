@@ -38,8 +38,8 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 6
-"""Version of the file format; other versions are refused. Versions before 6 were never released."""
+VERSION = 7
+"""Version of the file format; other versions are refused. Versions before 7 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
 _META = "meta.json"

@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, Symmetrica
 
 from ..analysis.ledger_columns import LOSSES
 from ..constants import BOLTZMANN
-from ..state.state import LOST
+from ..state.state import DAMPING, LOST
 from .style import (
     BLUE,
     GREEN,
@@ -28,7 +28,11 @@ from .style import (
 
 KINETIC = ("translation", "rotation")
 ELASTIC = ("normal", "sliding", "rolling", "twisting")
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, ORANGE, YELLOW, TEXT_COLOUR, MUTED)
+LOSS_CHANNELS = {name: (f"lost_{name}",) for name in LOST if name not in DAMPING} | {
+    "damping": tuple(f"lost_{name}" for name in DAMPING)
+}
+"""Ledger columns of each loss channel of the figures; damping of the four modes of a contact is drawn together."""
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, YELLOW, TEXT_COLOUR, MUTED, ORANGE)
 EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
 COUNTS = {"contacts": ("contacts", BLUE), "made": ("formed so far", GREEN), "broken": ("broken so far", RED)}
@@ -85,7 +89,7 @@ def energies(ledger: Any) -> dict[str, np.ndarray]:
 
 def losses(ledger: Any) -> dict[str, np.ndarray]:
     """Cumulative energy loss of each channel [J]."""
-    return {name: column(ledger, f"lost_{name}") for name in LOST}
+    return {name: column(ledger, *names) for name, names in LOSS_CHANNELS.items()}
 
 
 def energies_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
@@ -102,7 +106,7 @@ def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
     The channels stiffness, gas and external may be negative; their magnitude is drawn.
     """
     sizes = {name: np.abs(values) for name, values in losses(ledger).items()}
-    colour = dict(zip(LOST, LOSS_COLOURS, strict=True))
+    colour = dict(zip(LOSS_CHANNELS, LOSS_COLOURS, strict=True))
     return {name: (np.where(size > 0.0, size, np.nan), colour[name]) for name, size in sizes.items()}
 
 
