@@ -67,6 +67,8 @@ class MaterialSection(Section):
     poisson_ratio: Any = None
     rolling_limit: Any = None
     specific_moment: Any = None
+    anisotropy: Any = None
+    exchange_stiffness: Any = None
 
     def build(self, name: str) -> Material:
         """Build the material.  Raises BadInput for missing or impossible numbers."""

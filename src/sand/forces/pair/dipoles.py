@@ -62,7 +62,8 @@ class Dipoles(CutoffForce):
         if capture == 0.0:
             return CutoffChoice(largest, f"{half}, no grain has a magnetic moment")
         if capture >= largest:
-            return CutoffChoice(largest, f"{half}, less than {full}")
+            limit = f"{half}, limited by the box: less than {full}, so captures from farther away are missed"
+            return CutoffChoice(largest, f"{limit}; use a larger box, or periodic = 'ewald'")
         if shortest >= largest:
             return CutoffChoice(largest, f"{half}, less than two grain diameters")
         if capture < shortest:
