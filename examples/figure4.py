@@ -20,17 +20,11 @@ warnings.filterwarnings("ignore", message="contacts of iron")
 
 POSITIONS = np.linspace(-1.1, 0.3, 29)
 RESET = sand.Contact(slip="reset")  # as in the paper: displacements beyond the critical value are reset to zero
+DAMPED = sand.Contact(damping="viscoelastic", viscous_time="1.25e-11 s")
 CASES = (
     ("20 nm iron, reset", sand.IRON, "10 nm", RESET, range(100, 320, 20), 100),
     ("20 nm iron, clamp", sand.IRON, "10 nm", sand.Contact(), range(100, 320, 20), 100),
-    (
-        "0.2 um silica, damped",
-        sand.SILICA,
-        "0.1 um",
-        sand.Contact(damping="viscoelastic", viscous_time="1.25e-11 s"),
-        (8, 16, 24, 32),
-        25,
-    ),
+    ("0.2 um silica, damped", sand.SILICA, "0.1 um", DAMPED, (8, 16, 24, 32), 25),
     ("0.2 um ice, clamp", sand.ICE, "0.1 um", sand.Contact(), (5, 8, 10, 12, 14, 16, 20, 25), 25),
 )
 

@@ -189,6 +189,7 @@ def _no_physics_warnings() -> Iterator[None]:
     """Ignore warnings about hot, overlapping and small iron grains; tests of these warnings catch them."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="contacts of .* grains")
+        warnings.filterwarnings("ignore", message="moments of .* grains")
         warnings.filterwarnings("ignore", message=r"temperature = .* no material is solid")
         warnings.filterwarnings("ignore", message=r"grains .* overlap by .* there is no sand\.Contact")
         yield

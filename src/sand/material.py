@@ -17,8 +17,12 @@ _RANGES: dict[str, tuple[str, dict[str, float]]] = {
     "poisson_ratio": ("1", {"above": -1.0}),
     "rolling_limit": ("m", {"above": 0.0}),
     "specific_moment": ("A m^2/kg", {"least": 0.0}),
+    "anisotropy": ("J/m^3", {"above": 0.0}),
+    "exchange_stiffness": ("J/m", {"above": 0.0}),
 }
 """Unit and lower limit of each number."""
+OPTIONAL = ("surface_energy", "anisotropy", "exchange_stiffness")
+"""Numbers that may be None, for unknown."""
 
 
 @checked
@@ -42,7 +46,12 @@ class Material:
     rolling_limit : float or str, optional
         Critical rolling displacement ξ_c [m] > 0, 10 Å by default (Dominik & Nübold 2002, A.5).
     specific_moment : float or str, optional
-        Magnetic moment per mass [A m²/kg] ≥ 0.
+        Magnetic moment per mass [A m²/kg] ≥ 0, at saturation.
+    anisotropy : float or str, optional
+        Effective uniaxial magnetic anisotropy K [J/m³] > 0. No force depends on it or on the next one: with both SAND
+        reports where moments fixed in the grains are no good model (`sand.theory.magnetic_limits`).
+    exchange_stiffness : float or str, optional
+        Exchange stiffness A [J/m] > 0.
 
     Raises
     ------
@@ -57,12 +66,14 @@ class Material:
     poisson_ratio: Any
     rolling_limit: Any = "10 angstrom"
     specific_moment: Any = 0.0
+    anisotropy: Any = None
+    exchange_stiffness: Any = None
 
     def __post_init__(self) -> None:
         problems: list[str] = []
         for key, (unit, limit) in _RANGES.items():
             value = getattr(self, key)
-            if key == "surface_energy" and value is None:
+            if key in OPTIONAL and value is None:
                 continue
             try:
                 number = si(value, unit, f"{self.name}: {key}", **limit)
@@ -98,10 +109,14 @@ GRAPHITE = Material("graphite", 2200.0, 0.075, 10.0e9, 0.32)
 """Graphite (DT97)."""
 FORSTERITE = Material("forsterite", 3210.0, 0.07, 204.0e9, 0.24)
 """Forsterite."""
-IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, specific_moment=200.0)
-"""Iron (DT97), 200 A m²/kg as in the paper."""
-MAGNETITE = Material("magnetite", 5200.0, None, 230.0e9, 0.26, specific_moment=92.0)
-"""Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`."""
+IRON = Material("iron", 7874.0, 3.0, 210.0e9, 0.27, specific_moment=200.0, anisotropy=4.8e4, exchange_stiffness=2e-11)
+"""Iron (DT97), 200 A m²/kg as in the paper. K (first cubic constant) and A at room temperature are recalled from the
+literature: check them before you rely on the limits that follow."""
+MAGNETITE = Material(
+    "magnetite", 5200.0, None, 230.0e9, 0.26, specific_moment=92.0, anisotropy=1.1e4, exchange_stiffness=1.2e-11
+)
+"""Magnetite at saturation, without a surface energy; set one with `MAGNETITE.but(surface_energy=…)`. K (magnitude of
+the first cubic constant) and A at room temperature are recalled from the literature, as for iron."""
 
 PRESETS = {m.name: m for m in (ICE, SILICA, GRAPHITE, FORSTERITE, IRON, MAGNETITE)}
 PRESETS["quartz"] = SILICA.but(name="quartz")

@@ -28,6 +28,8 @@ EXAMPLES = {
     "rad/s": "1e7 rad/s",
     "kg/m^3": "2650 kg/m^3",
     "J/m^2": "25 mJ/m^2",
+    "J/m^3": "48 kJ/m^3",
+    "J/m": "2e-11 J/m",
     "Pa": "54 GPa",
     "T": "1 mT",
     "A m^2": "6.6e-18 A m^2",

@@ -14,7 +14,7 @@ from sand.compiler.jit import formula
 from sand.compiler.user_code import user_code_digest
 from sand.contact import jkr, mechanics, tangential
 from sand.contact.damping import NONE
-from sand.contact.law import LAWS, ContactLaw, contact_constants, register
+from sand.contact.law import LAWS, ContactLaw, contact_constants, register, ringing_energy
 from sand.contact.measure import contacts_stage, energies_stage
 from sand.contact.model import Contact
 from sand.errors import BadInput
@@ -419,6 +419,20 @@ def test_code_with_constants_of_the_user_is_cached_by_their_order():
         )
     assert "" not in digests[0] and digests[0] == digests[2]
     assert all(one != other for one, other in zip(*digests[:2], strict=True))
+
+
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_the_energy_of_ringing_is_the_work_from_touch_to_rest(name):
+    """U(0) − U(δ0) = −∫ F dδ from first touch to equilibrium; Gauss–Legendre with 40 points, smooth integrand in √δ."""
+    law, (r1, r2, c) = LAWS[name], contact_of(0.5, law=name)
+    pairing = Contact().pairing(SILICA, ICE)
+    rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    root = 0.5 * (nodes + 1.0)  # δ = δ0 u², dδ = 2 δ0 u du
+    overlaps = [rest * u * u for u in root]
+    forces = np.array([law.force(d, law.radius_root(d, c), c) for d in overlaps])
+    work = -float(np.sum(0.5 * weights * 2.0 * rest * root * forces))
+    assert ringing_energy(law, pairing, r1, r2) == pytest.approx(work, rel=1e-9, abs=0.0)
 
 
 def test_warnings_name_the_grains_for_which_a_law_is_inaccurate():

@@ -85,6 +85,7 @@ def problems_of(content):
         ({"grains__material": "unobtainium"}, ["unknown material 'unobtainium'", "allowed: ice, silica"]),
         ({"grains__kind": "gass"}, ["grains.kind", "'gass'", "'gas'"]),
         ({"grains__spins": "kT"}, ["grains.spins", "did you mean 'kT/2'?"]),
+        ({"grains__exact_temperature": "no"}, ["grains.exact_temperature", "'no'", "boolean"]),
         ({"forces__contact__slip": "clmp"}, ["forces.contact", "did you mean 'clamp'?"]),
         ({"stepping__method": "verlett"}, ["stepping", "did you mean 'verlet'?"]),
         ({"materials__mine__densty": 1.0}, ["materials.mine.densty", "did you mean 'density'?"]),
@@ -235,6 +236,16 @@ def test_case_and_script_are_the_same_physics():
         simulation.run(steps=3000)
     assert from_case.time == from_script.time > 0.0
     assert same_bits(from_case, from_script)
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_velocities_of_a_case_are_scaled_or_drawn(exact):
+    """`exact_temperature` of a case file is that of `sand.setup.gas`; the run's folder keeps it."""
+    case = check_case(changed(grains__exact_temperature=exact), "some.toml")
+    given = {"radius": "10 nm", "material": "iron", "moment": "200 A m^2/kg", "temperature": "300 K", "seed": 4}
+    grains = sand.setup.gas(8, "400 nm", exact_temperature=exact, **given)
+    assert (simulation_of(case, None).grains.velocity == grains.velocity).all()
+    assert case.grains.recipe()["exact_temperature"] is exact
 
 
 def test_an_empty_name_of_a_material_is_refused():

@@ -50,6 +50,57 @@ def test_spin_options():
     assert not none.spin.any()
 
 
+@pytest.mark.parametrize("number", [2, 3, 100])
+@pytest.mark.parametrize("kelvin", [100.0, 300.0])
+def test_the_temperature_is_exact(number, kelvin):
+    """Σ m v²/2 = (3/2)(N − 1) kT with Σ m v = 0, Σ I ω²/2 = N kT/2 or (3/2) N kT, for unequal masses.
+
+    Two sums of N terms and a square root leave errors of a few units in the last place, 1e-14 with a wide margin. The
+    kinetic temperature of a simulation counts the same 3 (N − 1) degrees of freedom.
+    """
+    radius = np.linspace(5e-9, 12e-9, number)
+    for spins, share in (("kT/2", 0.5), ("equipartition", 1.5)):
+        grains = gas(number, "2 um", seed=number, **ARGS | {"radius": radius, "temperature": kelvin, "spins": spins})
+        translation = 0.5 * (grains.mass * (grains.velocity**2).sum(axis=1)).sum()
+        rotation = 0.5 * (grains.inertia * (grains.spin**2).sum(axis=1)).sum()
+        assert translation == pytest.approx(1.5 * (number - 1) * BOLTZMANN * kelvin, rel=1e-14, abs=0.0)
+        assert rotation == pytest.approx(share * number * BOLTZMANN * kelvin, rel=1e-14, abs=0.0)
+        momentum = (grains.mass[:, None] * grains.velocity).sum(axis=0)
+        assert np.abs(momentum).max() < 1e-12 * (grains.mass[:, None] * np.abs(grains.velocity)).sum()
+        assert sand.Simulation(grains, box="2 um").temperature == pytest.approx(kelvin, rel=1e-13, abs=0.0)
+
+
+def test_random_draws_scatter_about_the_temperature():
+    """Canonical draws: 2K/kT is χ² with 3(N − 1) degrees of freedom, 2E_rot/(kT/3) with 3N; mean and variance.
+
+    Over 400 seeds the mean of χ²/n has the standard error √(2/400n), its variance 2/n the relative error √(2/400), for
+    n ≥ 27 to 10 %; limits of four standard errors. Directions are those of the scaled gas.
+    """
+    number, seeds = 10, 400
+    given = ARGS | {"exact_temperature": False}
+    drawn = [gas(number, "1 um", seed=s, **given) for s in range(seeds)]
+    for name, weight, scale, freedom in (("velocity", "mass", 1.0, 27), ("spin", "inertia", 1.0 / 3.0, 30)):
+        energies = [(getattr(g, weight)[:, None] * getattr(g, name) ** 2).sum() for g in drawn]
+        ratio = np.array(energies) / (scale * BOLTZMANN * 100.0 * freedom)
+        assert ratio.mean() == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (freedom * seeds)))
+        assert ratio.var() == pytest.approx(2.0 / freedom, rel=4.0 * np.sqrt(2.0 / seeds) * 1.1)
+    exact = gas(number, "1 um", seed=0, **ARGS)
+    for name in ("velocity", "spin"):
+        factors = getattr(exact, name) / getattr(drawn[0], name)
+        assert factors == pytest.approx(factors[0, 0], rel=1e-14, abs=0.0)
+        assert abs(factors[0, 0] - 1.0) > 1e-3
+
+
+def test_a_single_grain_is_at_rest_and_its_spin_is_drawn():
+    """One grain without momentum has no velocity to scale; its spin is the random draw, with either option.
+
+    v − (m v)/m is 0 to rounding, 1e-16 of the thermal speed of 0.2 m/s.
+    """
+    exact, drawn = (gas(1, "1 um", seed=4, exact_temperature=e, **ARGS) for e in (True, False))
+    assert np.abs(exact.velocity).max() < 1e-15
+    assert (exact.spin == drawn.spin).all() and exact.spin.any()
+
+
 def test_the_seed_determines_the_grains():
     """Bit for bit; another seed gives other grains; another temperature the same positions (separate streams)."""
     box = sand.Box.periodic("1 um")
@@ -71,6 +122,7 @@ def test_the_seed_determines_the_grains():
         ({"spins": "kt"}, "spins = 'kt'"),
         ({"temperature": "-3 K"}, "at least 0 K"),
         ({"seed": -1}, "seed = -1"),
+        ({"exact_temperature": "yes"}, "exact_temperature = 'yes' must be True or False"),
     ],
 )
 def test_bad_input(changes, message):

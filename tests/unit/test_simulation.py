@@ -110,8 +110,10 @@ def test_the_cutoff_is_stated_with_its_reason():
     assert "open box" in sand.Simulation(hot, [sand.Dipoles()]).choices["dipoles cut-off"]
     small = sand.Simulation(hot, [sand.Dipoles()], box="0.2 um").choices["dipoles cut-off"]
     assert small.startswith("74.07 nm (smooth, half the box / 1.35")  # 0.5 × 200 nm / 1.35
+    for part in ("limited by the box: less than 1.5 b_max = ", "a larger box, or periodic = 'ewald'"):
+        assert part in small
     large = sand.Simulation(hot, [sand.Dipoles()], box="1 mm").choices["dipoles cut-off"]
-    assert "1.5 b_max" in large
+    assert "1.5 b_max" in large and "limited" not in large
 
 
 def test_the_automatic_cutoff_reaches_beyond_the_grains():

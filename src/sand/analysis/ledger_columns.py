@@ -21,8 +21,8 @@ one unit in the last place."""
 def dissipated_in(row: Mapping[str, float]) -> float:
     """Energy dissipated up to a row of the ledger [J], contact formation included.
 
-    Work of stiffness changes and of external fields is excluded; the gas and the bath of damping count if they took more
-    energy than they gave.
+    Work of stiffness changes and of external fields is excluded; the gas and the bath of damping count if they took
+    more energy than they gave.
     """
     damped = math.fsum(row[name] for name in DAMPED)
     return math.fsum([*(row[name] for name in ALWAYS_LOST), max(damped, 0.0), max(row["lost_gas"], 0.0)])

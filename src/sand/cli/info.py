@@ -155,8 +155,17 @@ def describe_case(path: Path) -> Description:
         simulation = simulation_of(case, None)
     end = math.inf if case.run.until is None else case.run.until
     steps = math.inf if case.run.steps is None else case.run.steps
-    content = {"kind": "case", "case": case_of(simulation, end, steps), "choices": simulation.choices}
-    return "a valid case", report.opening(simulation, end, steps, Path(case.run.out or path.stem)), content
+    limits = _limits(simulation)
+    content = {"kind": "case", "case": case_of(simulation, end, steps), "choices": simulation.choices, "limits": limits}
+    rows = report.opening(simulation, end, steps, Path(case.run.out or path.stem))
+    return "a valid case", [*rows, *limits.items()], content
+
+
+def _limits(simulation: Any) -> dict[str, str]:
+    """Limits of the model for the grains and forces of a simulation, by label."""
+    from ..simulation.limits import limit_rows
+
+    return limit_rows(simulation.grains, simulation.forces, simulation.box)
 
 
 def _collision_case(path: Path, start: tuple[str, str]) -> Description:
@@ -178,8 +187,9 @@ def _growth_case(path: Path, start: tuple[str, str]) -> Description:
     content, seeds = read_growth(path)
     with report.naming(path):
         simulation = simulation_of(check_case(content, ""), None)
-    rows = [("boxes", f"{len(seeds or [])} of {len(simulation.grains)} grains"), start]
-    return "a valid growth case", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}}
+    limits = _limits(simulation)
+    rows = [("boxes", f"{len(seeds or [])} of {len(simulation.grains)} grains"), *limits.items(), start]
+    return "a valid growth case", rows, {"kind": "growth case", "case": {**content, "seeds": seeds}, "limits": limits}
 
 
 def _scattering_case(path: Path, start: tuple[str, str]) -> Description:

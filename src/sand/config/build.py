@@ -24,7 +24,7 @@ from ..setup.checks import check_body
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
 from ..simulation.simulation import Simulation
-from .case import Case, check_case
+from .case import THERMAL, Case, check_case
 
 TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
 """Suffixes of text files with a body; all other files are read as trajectories."""
@@ -94,7 +94,7 @@ def _of_gas(case: Case) -> Start:
     section, library = case.grains, case.materials_by_name()
     if not isinstance(section.material, str):
         raise BadInput("grains.material of a gas must be one name")
-    given = {name: getattr(section, name) for name in ("radius", "moment", "charge", "temperature", "spins")}
+    given = {name: getattr(section, name) for name in ("radius", "moment", "charge", *THERMAL)}
     material, box = library[section.material], case.box.periodic
     grains = gas(section.number, box, material=material, seed=case.run.seed, **given)  # type: ignore[arg-type]
     return Start(grains, None, as_box(box), "")

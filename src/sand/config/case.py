@@ -67,6 +67,8 @@ class MaterialSection(Section):
     poisson_ratio: Any = None
     rolling_limit: Any = None
     specific_moment: Any = None
+    anisotropy: Any = None
+    exchange_stiffness: Any = None
 
     def build(self, name: str) -> Material:
         """Build the material.  Raises BadInput for missing or impossible numbers."""
@@ -98,6 +100,8 @@ class GrainsSection(Section):
     """Temperature of velocities and spins [K]."""
     spins: word(SPINS) = "kT/2"  # type: ignore[valid-type]
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
+    exact_temperature: Annotated[bool, Field(strict=True)] = True
+    """Whether velocities and spins are scaled to exactly this temperature; otherwise they are random draws."""
     file: PathName | None = None
     """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
@@ -125,9 +129,11 @@ class GrainsSection(Section):
         return self.model_dump(exclude_none=True, exclude=set(foreign))
 
 
+THERMAL = ("temperature", "spins", "exact_temperature")
+"""Keys of velocities and spins, which a file gives itself."""
 GRAINS_KEYS: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
     "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame", "length")),
-    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "temperature", "spins")),
+    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", *THERMAL)),
     "given": ({"number": "125"}, ("file", "frame", "length")),
 }
 """By kind: required keys, each with an example, and keys that do not apply."""

@@ -169,3 +169,13 @@ def contact_constants(law: ContactLaw) -> Callable:
         )
 
     return constants_of_pair
+
+
+def ringing_energy(law: ContactLaw, pairing: Pairing, r1: float, r2: float) -> float:
+    """Energy U(0) − U(δ₀) [J] that a touch at zero speed leaves in the vibration of an undamped contact.
+
+    0.607082 F_c δ_c for JKR; radii [m].
+    """
+    c = contact_constants(law)(pairing, r1, r2, 1.0, 1.0)
+    rest = law.normal_mode(pairing.surface_energy, pairing.modulus, c.reduced_radius).rest_overlap
+    return float(law.at_touch(c) - law.energy(rest, law.radius_root(rest, c), c))

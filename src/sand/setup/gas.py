@@ -46,6 +46,7 @@ def gas(
     charge: Any = None,
     temperature: Any = "0 K",
     spins: str = "kT/2",
+    exact_temperature: bool = True,
     seed: int = 0,
 ) -> Grains:
     """Thermal gas of grains at random positions without overlaps, with random moments.
@@ -71,6 +72,11 @@ def gas(
     spins : str, optional
         Mean rotational energy per grain: "kT/2" as in Dominik & Nübold (2002), section 3; "equipartition", (3/2) kT;
         "none".
+    exact_temperature : bool, optional
+        True: velocities and spins are scaled, each by one factor, so that the translational energy is (3/2)(N − 1) kT
+        and the rotational energy N times that of `spins`. False: random draws of the canonical ensemble, whose
+        energies scatter by a fraction of about √(2/3N). A single grain is at rest, as its momentum is zero, and its
+        spin is not scaled.
     seed : int, optional
         Seed of the random numbers. Positions, velocities, spins and moments use separate streams.
 
@@ -97,6 +103,9 @@ def gas(
     velocity = streams[1].normal(size=(number, 3)) * np.sqrt(BOLTZMANN * kelvin / mass)
     velocity -= (mass * velocity).sum(axis=0) / mass.sum()
     spin = streams[2].normal(size=(number, 3)) * np.sqrt(SPINS[spins] * BOLTZMANN * kelvin / inertia)
+    if exact_temperature and number > 1:
+        velocity *= _factor_to(1.5 * (number - 1) * BOLTZMANN * kelvin, mass, velocity)
+        spin *= _factor_to(1.5 * number * SPINS[spins] * BOLTZMANN * kelvin, inertia, spin)
     moments = None
     if (vector := vector_for_all(moment)) is not None:
         moments = np.tile(vector, (number, 1))
@@ -110,6 +119,12 @@ def directions(count: int, rng: np.random.Generator) -> np.ndarray:
     """Isotropic unit vectors (count, 3)."""
     v = rng.normal(size=(count, 3))
     return v / np.linalg.norm(v, axis=1)[:, None]
+
+
+def _factor_to(energy: float, inertia: np.ndarray, rate: np.ndarray) -> float:
+    """Factor of velocities (or spins) (N, 3) that gives them this kinetic energy [J]; masses or moments of inertia."""
+    present = 0.5 * float((inertia * rate**2).sum())
+    return math.sqrt(energy / present) if present > 0.0 else 1.0
 
 
 def _refuse_hot(grains: Grains, kelvin: float) -> None:

@@ -12,6 +12,7 @@ from ..errors import BadInput
 from ..forces.base import Force, LongRangeForce
 from ..grains import Grains
 from ..units import format_quantity
+from .limits import limit_warnings
 
 POSITION_TOLERANCE = 1e-3
 """Distance beyond a periodic box, in box sides, at which positions are still wrapped (single-precision frames)."""
@@ -60,8 +61,8 @@ def check_system(grains: Grains, forces: Sequence[Force], box: Box, *, fresh: bo
 
 
 def _start_warnings(grains: Grains, forces: Sequence[Force], box: Box) -> list[str]:
-    """Warnings about very large grains, and about overlaps without a contact law."""
-    warnings = []
+    """Warnings about limits of the model, very large grains, and overlaps without a contact law."""
+    warnings = limit_warnings(grains, forces, box)
     contact = any(isinstance(force, Contact) for force in forces)
     largest = int(np.argmax(grains.radius))
     if contact and grains.radius[largest] > LARGEST_RADIUS:

@@ -27,10 +27,12 @@ from .magnetic import (
     reduced_mass,
     thermal_speed,
 )
+from .magnetic_limits import MagneticLimits, magnetic_limits
 
 __all__ = [
     "ContactNumbers",
     "Exponents",
+    "MagneticLimits",
     "aggregate_moment",
     "alignment_exponent",
     "alignment_time",
@@ -48,6 +50,7 @@ __all__ = [
     "interaction_radius",
     "kinetics",
     "lowest_energy",
+    "magnetic_limits",
     "mean_size",
     "potential_parameter",
     "reduced_mass",

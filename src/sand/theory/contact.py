@@ -38,6 +38,8 @@ class ContactNumbers:
         Energy to break a contact at equilibrium, 1.542585 F_c δ_c [J].
     cycle_energy : float
         Energy dissipated in forming at δ = 0 and breaking at −δ_c, 0.935503 F_c δ_c [J].
+    ringing_energy : float
+        Energy that a touch at zero speed leaves in the vibration of an undamped contact, 0.607082 F_c δ_c [J].
     normal_stiffness, slide_stiffness, roll_stiffness : float
         k_n, k_s, k_r [N/m].
     twist_stiffness : float
@@ -57,7 +59,8 @@ class ContactNumbers:
         Oscillation periods of the free pair [s].
     sticking_speed : float
         Largest relative speed of a head-on impact without damping after which grains stick [m/s]:
-        m̄v²/2 = cycle_energy, for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2).
+        m̄v²/2 = cycle_energy, for equal spheres 1.6394 (γ/R)^(5/6) E*^(−1/3) ρ^(−1/2). Thornton & Ning (1998) have the
+        same energy, 7.09 (Γ⁵R⁴/E*²)^(1/3) with Γ = 2γ; DT97 have the prefactor 1.07 instead of 1.6394.
     """
 
     reduced_radius: float
@@ -69,6 +72,7 @@ class ContactNumbers:
     pull_off_overlap: float
     break_energy: float
     cycle_energy: float
+    ringing_energy: float
     normal_stiffness: float
     slide_stiffness: float
     roll_stiffness: float
@@ -176,6 +180,7 @@ def contact(
         rest_overlap=jkr.rest_overlap(c.rest_radius, c.reduced_radius),
         break_energy=unit * (at[jkr.ROOT_AT_BREAK] - at[1.0]),
         cycle_energy=cycle,
+        ringing_energy=unit * (at[jkr.ROOT_AT_TOUCH] - at[1.0]),
         normal_stiffness=k_n,
         slide_force=c.slide_stiffness * c.slide_limit,
         roll_moment=c.roll_stiffness * c.reduced_radius * c.roll_limit,

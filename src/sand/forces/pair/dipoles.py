@@ -62,7 +62,8 @@ class Dipoles(CutoffForce):
         if capture == 0.0:
             return CutoffChoice(largest, f"{half}, no grain has a magnetic moment")
         if capture >= largest:
-            return CutoffChoice(largest, f"{half}, less than {full}")
+            limit = f"{half}, limited by the box: less than {full}, so captures from farther away are missed"
+            return CutoffChoice(largest, f"{limit}; use a larger box, or periodic = 'ewald'")
         if shortest >= largest:
             return CutoffChoice(largest, f"{half}, less than two grain diameters")
         if capture < shortest:
@@ -104,8 +105,11 @@ def thermal_capture(grains: Grains) -> float:
 
 
 def kinetic_temperature(grains: Grains) -> float:
-    """T [K] from the mean translational energy (3/2) k_B T per grain in the centre-of-mass frame."""
+    """T [K] from the translational energy (3/2) (N − 1) k_B T of N grains in the centre-of-mass frame; 0 for one grain.
+
+    The momentum is zero in this frame, so that 3 (N − 1) degrees of freedom are left.
+    """
     mass = grains.mass
     drift = (mass[:, None] * grains.velocity).sum(axis=0) / mass.sum()
     energy = 0.5 * (mass * ((grains.velocity - drift) ** 2).sum(axis=1)).sum()
-    return float(2.0 * energy / (3.0 * len(grains) * BOLTZMANN))
+    return float(2.0 * energy / (3.0 * max(len(grains) - 1, 1) * BOLTZMANN))
