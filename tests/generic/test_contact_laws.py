@@ -415,7 +415,7 @@ def test_code_with_constants_of_the_user_is_cached_by_their_order():
         constants = namedtuple("Constants", names, module="users_module")
         law = jkr.LAW._replace(constants_type=constants)
         digests.append(
-            [user_code_digest(each.function) for each in (contact_pass_stage(law, False), energies_stage(law))]
+            [user_code_digest(each.function) for each in (contact_pass_stage(law, NONE, False), energies_stage(law))]
         )
     assert "" not in digests[0] and digests[0] == digests[2]
     assert all(one != other for one, other in zip(*digests[:2], strict=True))

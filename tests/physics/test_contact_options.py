@@ -8,7 +8,7 @@ import pytest
 import sand
 from sand.contact.law import LAWS, contact_constants
 from sand.contact.mixing import MIXING
-from sand.state.state import LOST, RECORDED
+from sand.state.state import DAMPING, LOST, RECORDED
 
 from .setups import random_aggregate, rest_distance
 
@@ -95,11 +95,12 @@ def test_losses_per_contact_add_up_to_the_ledger():
     """The sum over contacts that never broke equals the ledger's columns, to rounding."""
     rng = np.random.default_rng(8)
     grains = random_aggregate(10, 4, radii=(5e-8, 1e-7), velocity=0.1 * rng.normal(size=(10, 3)))
-    sim = sand.Simulation(grains, [sand.Contact(damping="constant", damping_constant="1e-10 kg/s")])
+    sim = sand.Simulation(grains, [sand.Contact(damping="critical", damping_ratio=0.01)])
     sim.run(until="60 ns")
     assert sim.ledger["broken"][-1] == 0
     lost = dict(zip(LOST, sim.state.lost, strict=True))
     assert lost["forming"] > 0.0 or lost["rolling"] > 0.0
+    lost["damping"] = sum(lost.pop(name) for name in DAMPING)
     for name in RECORDED:
         assert sim.contacts[f"lost_{name}"].sum() == pytest.approx(lost.pop(name), rel=1e-9, abs=1e-30)
     assert not any(lost.values())
@@ -170,6 +171,13 @@ def test_contact_time_without_adhesion_is_that_of_hertz():
         ({"roll_factor": -1}, "roll_factor = -1 must be at least 0"),
         ({"rolling_limit": "1 kg"}, "rolling_limit = '1 kg' is not a quantity in m"),
         ({"damping": "constant"}, "needs a damping_constant above 0"),
+        ({"damping": "viscoelastic"}, "needs a viscous_time above 0"),
+        ({"damping": "critical", "damping_ratio": -0.1}, "damping_ratio = -0.1 must be above 0"),
+        ({"damping": "critical", "damping_ratio": 5.1}, "damping_ratio = 5.1 must be at most 5"),
+        ({"damping_ratio": 0.2}, "damping_ratio is given, but damping = 'none' does not use it"),
+        ({"damping": "critical", "viscous_time": "1 ps"}, "viscous_time is given, but damping = 'critical'"),
+        ({"bath_temperature": "100 K"}, "bath_temperature needs damping"),
+        ({"damping": "critical", "bath_temperature": "0 K"}, "bath_temperature = '0 K' must be above 0 K"),
         ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not a quantity in kg/s"),
     ],
 )
