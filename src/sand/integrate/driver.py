@@ -21,6 +21,7 @@ from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, r
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..state.state import (
     CONTACTS,
+    CORRECTED,
     CYCLE,
     INNER_SKIN,
     LEFT,
@@ -123,7 +124,7 @@ def impulse_at_end(grains, long_range, span, clock, elapsed, dt):
     if clock[CYCLE] > dt:
         apply_impulse(grains, long_range, elapsed - 0.5 * clock[CYCLE] - 0.5 * dt)
         integrate_displacement(grains, long_range, span, 0.5 * dt)
-        correct_angular_momentum(grains, long_range, span, elapsed - 0.5 * clock[CYCLE])
+        clock[CORRECTED] += correct_angular_momentum(grains, long_range, span, elapsed - 0.5 * clock[CYCLE])
 
 
 @caller

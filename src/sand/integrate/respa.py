@@ -8,6 +8,7 @@ Loads are forces and torques; both are treated in the same way.  See docs/physic
 """
 
 import functools
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -86,11 +87,19 @@ def correct_angular_momentum(grains, long_range, span, weight):
     cycle acts at x_{n+1}.  The excess angular momentum is
 
         (∫(x − x_n) dt − w (x_{n+1} − x_n)) × F̄
+
+    Returns
+    -------
+    float
+        Sum of the magnitudes of the corrections of all grains [J s].
     """
+    corrected = 0.0
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
         excess = cross(axpy(-weight, moved, load(long_range.path, i)), load(long_range.constant_force, i))
         accrue(grains.spin, i, scale(-1.0 / grains.inertia[i], excess))
+        corrected += math.sqrt(dot(excess, excess))
+    return corrected
 
 
 @loop

@@ -14,7 +14,7 @@ from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
 from ..errors import BadInput
 from ..grains import Grains
-from ..state.state import BROKEN, CONTACTS, MADE, SLIPPED, State
+from ..state.state import BROKEN, CONTACTS, CORRECTED, MADE, SLIPPED, State
 
 KINETIC = "translation", "rotation"
 """Columns of kinetic energies."""
@@ -23,6 +23,8 @@ MAGNETIC = "magnetic"
 RUNAWAY = 0.5
 """Change of the total energy, relative to all present energies and all dissipation, at which a run is stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
+CORRECTION = "angular_momentum_corrected"
+"""Column of the corrections that keep the angular momentum constant over r-RESPA cycles, their magnitudes summed."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
 WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 """Columns of whole numbers."""
@@ -47,6 +49,7 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
     row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist()])
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
+        CORRECTION: float(state.clock[CORRECTED]),
         "contacts": contacts,
         "made": int(state.count[MADE]),
         "moved": int(state.count[SLIPPED]),
@@ -84,10 +87,11 @@ class Ledger(LedgerColumns):
 
     def __init__(self, forces: Sequence[str] = ()):
         others = [name for name in forces if name != MAGNETIC]
-        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, *NUMBERS}
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, *NUMBERS}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
-        super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *LOSSES, "total", *MOMENTA, *NUMBERS))
+        of_state = (*LOSSES, "total", *MOMENTA, CORRECTION, *NUMBERS)
+        super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
         """Append a row; returns False if the ledger already has a row of this step."""
@@ -129,7 +133,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, *MOMENTA, *NUMBERS}
+        others = {"total", "step", "time", *LOSSES, *MOMENTA, CORRECTION, *NUMBERS}
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN

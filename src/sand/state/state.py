@@ -24,7 +24,7 @@ from .arrays import (
     runge_kutta_arrays,
 )
 
-# --- indices of State.clock (float64) ---------------------------------------------------------------
+# --- indices of State.clock (float64): times, and one sum over cycles -------------------------------
 TIME = 0  # simulated time [s]
 STEP = 1  # present time step [s]
 LEVEL = 2  # longest step allowed by free grains and closing pairs, quantised to a power of two [s]
@@ -35,7 +35,8 @@ LONG_RANGE_LEVEL = 6  # longest cycle allowed by long-range forces, quantised [s
 CALM = 7  # longest step allowed by free grains [s]
 KICKED = 8  # time of the last kick by the gas [s]
 FLIGHT = 9  # next step of the adaptive integrator [s]
-CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight")
+CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
+CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight", "corrected")
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
