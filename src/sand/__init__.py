@@ -35,6 +35,7 @@ _MODULES = {
     "pair_force": "forces.own",
     "Verlet": "integrate.verlet",
     "Adaptive": "integrate.adaptive",
+    "ForestRuth": "integrate.forest_ruth",
     "Neighbours": "neighbours.settings",
     "Simulation": "simulation.simulation",
     "resume": "config.build",
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
     from .grains import Grains as Grains
     from .integrate.adaptive import Adaptive as Adaptive
+    from .integrate.forest_ruth import ForestRuth as ForestRuth
     from .integrate.verlet import Verlet as Verlet
     from .material import FORSTERITE as FORSTERITE
     from .material import GRAPHITE as GRAPHITE

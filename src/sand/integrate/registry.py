@@ -6,6 +6,7 @@ from typing import Any
 
 from ..errors import BadInput, shown
 from . import adaptive as adaptive
+from . import forest_ruth as forest_ruth
 from . import verlet as verlet
 from .base import INTEGRATORS, Integrator
 
