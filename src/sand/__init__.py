@@ -8,7 +8,8 @@ from __future__ import annotations
 import importlib
 
 from .entry_points import register
-from .forces import BUILT_IN
+from .forces import BUILT_IN as FORCES
+from .integrate import BUILT_IN as INTEGRATORS
 from .version import __version__
 
 register()
@@ -30,12 +31,10 @@ _MODULES = {
     "BadInput": "errors",
     "FilesFailed": "errors",
     "Interrupted": "errors",
-    **BUILT_IN,
+    **FORCES,
     "external_force": "forces.own",
     "pair_force": "forces.own",
-    "Verlet": "integrate.verlet",
-    "Adaptive": "integrate.adaptive",
-    "ForestRuth": "integrate.forest_ruth",
+    **INTEGRATORS,
     "Neighbours": "neighbours.settings",
     "Simulation": "simulation.simulation",
     "resume": "config.build",
