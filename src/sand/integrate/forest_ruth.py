@@ -69,8 +69,9 @@ TIMES = np.cumsum(DRIFTS)
 """Times at the ends of the drifts, in units of the step; between 0 and 1."""
 ERROR = 0.05
 """Relative energy error of a step as long as the time scale of the motion, extrapolated from short steps (h⁴)."""
-HOLD_STEPS = 128
-"""Steps in none of which the present step was needed, before it is doubled: more than a period of a bound pair has."""
+HOLD = 30.0
+"""Time without need of the present step before it is doubled, in shortest time scales: more than the period of a bound
+pair, 9 in a circular orbit and 15 with an eccentricity of 0.28."""
 
 
 class FlightLimits(NamedTuple):
@@ -156,7 +157,8 @@ def choose_free_step(grains, long_range, clock, count, span, search, criteria, l
         return limits.fixed if wanted > 0.0 else 0.0
     if wanted < 2.0 * level:
         count[NEEDED] = count[STEPS]
-    return quantise_step(level, wanted, level == 0.0 or count[STEPS] - count[NEEDED] >= HOLD_STEPS)
+    held = (count[STEPS] - count[NEEDED]) * limits.part
+    return quantise_step(level, wanted, level == 0.0 or held >= HOLD)
 
 
 @rare
