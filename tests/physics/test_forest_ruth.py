@@ -154,6 +154,32 @@ def test_grazing_contact_within_a_long_step():
 
 
 @pytest.mark.compiled("adaptive")
+@pytest.mark.parametrize(("part", "made"), [(1 - 1e-3, 1), (1 + 1e-3, 0)])
+def test_grazing_contact_on_a_curved_path(part, made):
+    """Kepler ellipse with the pericentre r_p = part (r1 + r2) in the middle of a step: contact only for part < 1.
+
+    From the apocentre r with r v²/(k/m_reduced) = 2 r_p/(r + r_p), e = 0.6. The grains overlap for half a step, at no
+    end of a step; the errors of r_p and of the interpolated path are below 1e-4, those of h⁴ for 101 steps per period.
+    """
+    far, near, k = 8 * R, part * 2 * R, 1e-26
+    mass, charge = sand.Grains([[0, 0, 0]], R, sand.IRON).mass[0], math.sqrt(k / COULOMB)
+    speed = math.sqrt(2 * near / (far + near) * k / (far * mass / 2))
+    grains = sand.Grains(
+        [[0, 0, 0], [far, 0, 0]],
+        R,
+        sand.IRON,
+        charge=[charge, -charge],
+        velocity=[[0, speed / 2, 0], [0, -speed / 2, 0]],
+    )
+    period = 2 * math.pi * math.sqrt(((far + near) / 2) ** 3 * (mass / 2) / k)
+    sim = sand.Simulation(grains, [sand.Contact(), sand.Charges()], stepping=sand.ForestRuth(step=period / 101))
+    sim.run(until=0.55 * period)
+    assert sim.state.count[MADE] == made
+    if made:
+        assert sim.state.contacts.formed[0] == pytest.approx(period / 2, rel=0.01)
+
+
+@pytest.mark.compiled("adaptive")
 def test_first_contact_is_that_of_adaptive():
     """Attracting dipoles: the time of contact is that of Adaptive to 1e-6; few steps are repeated."""
     formed = []
