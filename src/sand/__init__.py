@@ -8,7 +8,8 @@ from __future__ import annotations
 import importlib
 
 from .entry_points import register
-from .forces import BUILT_IN
+from .forces import BUILT_IN as FORCES
+from .integrate import BUILT_IN as INTEGRATORS
 from .version import __version__
 
 register()
@@ -30,11 +31,10 @@ _MODULES = {
     "BadInput": "errors",
     "FilesFailed": "errors",
     "Interrupted": "errors",
-    **BUILT_IN,
+    **FORCES,
     "external_force": "forces.own",
     "pair_force": "forces.own",
-    "Verlet": "integrate.verlet",
-    "Adaptive": "integrate.adaptive",
+    **INTEGRATORS,
     "Neighbours": "neighbours.settings",
     "Simulation": "simulation.simulation",
     "resume": "config.build",
@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     from .forces.pair.screened_charges import ScreenedCharges as ScreenedCharges
     from .grains import Grains as Grains
     from .integrate.adaptive import Adaptive as Adaptive
+    from .integrate.forest_ruth import ForestRuth as ForestRuth
     from .integrate.verlet import Verlet as Verlet
     from .material import FORSTERITE as FORSTERITE
     from .material import GRAPHITE as GRAPHITE

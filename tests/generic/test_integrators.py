@@ -62,7 +62,7 @@ def flyby(stepping, **end):
     position = np.array([[-2e-7, 0, 1.2e-7], [2e-7, 0, -1.2e-7]])
     velocity = np.array([[0.5, 0, 0], [-0.5, 0, 0]])
     grains = sand.Grains(position, 1e-8, sand.IRON, velocity=velocity, moment=[[0, 0, 2e-18], [0, 2e-18, 0]])
-    cutoff = None if stepping.name == "adaptive" else "1 um"
+    cutoff = "1 um" if stepping.flight is None else None
     sim = sand.Simulation(grains, [sand.Contact(), sand.Dipoles(cutoff=cutoff)], stepping=stepping, frame_every="1 s")
     sim.run(**(end or {"until": 8e-7}))
     return sim
@@ -73,7 +73,8 @@ def flyby(stepping, **end):
 def test_the_default_settings_conserve_energy_and_momentum(name):
     """Fly-by of two magnetic grains: energy to 1e-6 of the kinetic energy, momentum to rounding (1e-13).
 
-    The default errors are 1e-8 |U_min| per step (Verlet, oscillating) and 1e-9 of the natural scales (adaptive).
+    The default errors are 1e-8 |U_min| per step (Verlet, oscillating), 1e-9 of the natural scales (adaptive) and 1e-8
+    of the interaction energy (Forest–Ruth).
     """
     sim = flyby(INTEGRATORS[name]())
     first, last = sim.ledger["total"][0], sim.ledger["total"][-1]
@@ -83,15 +84,27 @@ def test_the_default_settings_conserve_energy_and_momentum(name):
     assert len(sim.contacts["pair"]) == 0 and sim.time >= 8e-7
 
 
-@pytest.mark.compiled("dipoles")
-def test_verlet_is_of_second_order():
-    """Halving a fixed step reduces the error of the separation after a fly-by by 2² ± 20 %; reference: step/16."""
+FIXED_STEPS = {"verlet": (2, 8e-9), "forest-ruth": (4, 3.2e-8)}
+"""Order, and a step [s], of the integrators with a fixed step; the order of others is tested by their tolerance."""
+
+
+@pytest.mark.compiled("dipoles", "adaptive")
+@pytest.mark.parametrize("name", FIXED_STEPS)
+def test_order_of_convergence(name):
+    """Halving a fixed step reduces the error of the separation after a fly-by by 2^p ± 20 %; reference: step/16."""
+    order, step = FIXED_STEPS[name]
 
     def separation(parts):
-        sim = flyby(sand.Verlet(step=8e-9 / parts), steps=100 * parts)
+        sim = flyby(INTEGRATORS[name](step=step / parts), steps=round(8e-7 / step) * parts)
         return sim.grains.position[0] - sim.grains.position[1]
 
     best = separation(16)
     coarse, fine = (np.linalg.norm(separation(parts) - best) for parts in (1, 2))
-    # the reference has an error of 1/256 of the coarse one: expected ratio (1 - 1/256)/(1/4 - 1/256)
-    assert math.log2(coarse / fine) == pytest.approx(math.log2((1 - 1 / 256) / (1 / 4 - 1 / 256)), abs=0.3)
+    # the reference has an error of 1/16^p of the coarse one: expected ratio (1 - 1/16^p)/(1/2^p - 1/16^p)
+    expected = math.log2((1 - 16.0**-order) / (2.0**-order - 16.0**-order))
+    assert math.log2(coarse / fine) == pytest.approx(expected, abs=0.3)
+
+
+def test_every_integrator_with_a_fixed_step_has_an_order():
+    """The table above names them all."""
+    assert set(FIXED_STEPS) == {name for name, each in INTEGRATORS.items() if "step" in each().parameters()}

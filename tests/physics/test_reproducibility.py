@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.integrate.registry import INTEGRATORS
 from sand.state.state import BROKEN, CONTACTS, CYCLE, LISTED, LONG_RANGE_SUMS, SLIPPED
 from sand.threads import set_threads
 
@@ -41,7 +42,7 @@ def test_the_frame_interval_changes_no_bit():
 
 
 @pytest.mark.compiled("dipoles", "adaptive")
-@pytest.mark.parametrize("stepping", [sand.Verlet(), sand.Adaptive()], ids=lambda each: each.name)
+@pytest.mark.parametrize("stepping", [each() for each in INTEGRATORS.values()], ids=lambda each: each.name)
 def test_a_deep_copy_goes_on_with_the_same_bits(stepping):
     """A copy made after 200 steps and the original, each run further, are independent and equal to the last bit."""
     sim = gas_simulation(stepping=stepping)
@@ -174,6 +175,7 @@ import sys, warnings; warnings.simplefilter("ignore")
 import numpy as np
 from tests.physics.setups import random_aggregate
 import sand
+from sand.integrate.registry import INTEGRATORS
 fast = 8.0 * np.random.default_rng(3).normal(size=(5, 3))
 grains = random_aggregate(5, 7, radii=(5e-9, 1e-8), moment="300 A m^2/kg", velocity=fast)
 field = sand.Field("1 mT", shape="ramp", final="1 mT", end="1 s")

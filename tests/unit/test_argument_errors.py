@@ -94,7 +94,10 @@ SIMULATIONS = [
     ("sand.Simulation(grains, 'contact')", "forces = 'contact'; give a list such as [sand.Contact()]"),
     ("sand.Simulation(grains, 7)", "forces = 7; give a list such as [sand.Contact()]"),
     ("sand.Simulation(grains, ['contact'])", "'contact' is not a force"),
-    ("sand.Simulation(grains, stepping='verlet')", "stepping = 'verlet'; give sand.Verlet(…) or sand.Adaptive(…)"),
+    (
+        "sand.Simulation(grains, stepping='verlet')",
+        "stepping = 'verlet'; give sand.Verlet(…) or sand.Adaptive(…) or sand.ForestRuth(…)",
+    ),
     ("sand.Simulation(grains, stepping=sand.Verlet)", "stepping = sand.Verlet is a class; write sand.Verlet(…)"),
     ("sand.Simulation(grains, neighbours='cells')", "neighbours = 'cells'; give sand.Neighbours(…)"),
     ("sand.Simulation(grains, box='big')", "box length x = 'big' is not a quantity in m"),

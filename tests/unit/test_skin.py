@@ -35,6 +35,7 @@ CASES = {
     "contacts, listed": {"margin": "5 nm"},
     "cycles and gas": {"forces": (sand.Contact(), sand.Dipoles(), sand.Gas("3e4 K", pressure="1 bar"))},
     "flights": {"stepping": sand.Adaptive()},
+    "steps of fourth order": {"stepping": sand.ForestRuth()},
 }
 
 
@@ -43,7 +44,7 @@ CASES = {
 def test_rebuilds_do_not_depend_on_driver_calls(way):
     """Every call of the driver checks all grains: 600 calls of one step and one call of 600 give the same bits.
 
-    Contacts form and break, and r-RESPA cycles, gas kicks or adaptive steps are active.
+    Contacts form and break, and r-RESPA cycles, gas kicks or steps of another integrator are active.
     """
     once, often = dense_gas(**CASES[way]), dense_gas(**CASES[way])
     once.run(steps=600)

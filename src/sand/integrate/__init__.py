@@ -1,1 +1,8 @@
 """Integrators, step-size control, the driver, and the stages that it calls."""
+
+BUILT_IN = {
+    "Verlet": "integrate.verlet",
+    "Adaptive": "integrate.adaptive",
+    "ForestRuth": "integrate.forest_ruth",
+}
+"""Names in `sand` of the integrators, and their modules; a line here registers an integrator (`registry`)."""

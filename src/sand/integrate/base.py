@@ -25,7 +25,7 @@ class Integrator(Protocol):
     name : str
         `method` of the [stepping] table of case files.
     flight : Stage or None
-        The stage that takes one step of grains without contacts, such as `adaptive_driver.free_flight`; None for
+        The stage that takes one step of grains without contacts, such as `forest_ruth.symplectic_flight`; None for
         velocity Verlet. It takes parts of a simulation by name (`parts.PARTS`) and calls the forces by `force_calls`.
         Such steps are limited by the skin of the lists.
     """

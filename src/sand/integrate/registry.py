@@ -1,12 +1,12 @@
-"""All integrators of SAND, registered by their import here: one line for each."""
+"""The registry of integrators: case files and the tests of all integrators follow it."""
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 from ..errors import BadInput, shown
-from . import adaptive as adaptive
-from . import verlet as verlet
+from . import BUILT_IN
 from .base import INTEGRATORS, Integrator
 
 
@@ -18,3 +18,8 @@ def checked_integrator(value: Any) -> Integrator:
         choices = " or ".join(f"{shown(each)}(…)" for each in INTEGRATORS.values())
         raise BadInput(f"stepping = {shown(value)}; give {choices}")
     return value
+
+
+for _class, _module in BUILT_IN.items():
+    _name = getattr(importlib.import_module(f"sand.{_module}"), _class).name  # registered by this import or before
+    INTEGRATORS[_name] = INTEGRATORS.pop(_name)  # in the order of the table

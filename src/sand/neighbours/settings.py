@@ -20,7 +20,7 @@ ORDERS = ("auto", "curve", "as given")
 MARGIN = 0.1
 """Skin of the Verlet list relative to the cut-off, Δr/r_c; the paper uses 0.3–0.4."""
 ADAPTIVE_MARGIN = 0.35
-"""The same for adaptive (Runge–Kutta) steps, whose length the skin limits."""
+"""The same for integrators with steps of their own without contacts (`Adaptive`), whose length the skin limits."""
 LIST_FROM = 64
 """Fewest grains for which "auto" uses cells or a Verlet list."""
 LIST_UP_TO = 0.4

@@ -154,8 +154,6 @@ def _long_range_loops(
 ) -> list[tuple[LongRangeForce, LongRangeSums, Any]]:
     """Long-range forces with their loops and numbers."""
     sums = [force.sums(box, own) for force, own in zip(forces.long_range, listed, strict=True)]
-    if len(grains) >= WIDE_FROM:
-        sums = [own.wide or own for own in sums]
     return [(force, own, force.numbers(grains, box)) for force, own in zip(forces.long_range, sums, strict=True)]
 
 

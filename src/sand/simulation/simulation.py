@@ -59,7 +59,7 @@ class Simulation(ReadOnlySettings):
     box : Box or float or str, optional
         A box, or the side length of a periodic cube; open by default.
     stepping : Integrator or None, optional
-        Integrator: `sand.Verlet()`, the default, or `sand.Adaptive()`.
+        Integrator: `sand.Verlet()`, the default, `sand.Adaptive()` or `sand.ForestRuth()`.
     neighbours : Neighbours or None, optional
         Settings of the neighbour search, `sand.Neighbours()` by default.
     seed : int or None, optional

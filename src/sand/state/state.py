@@ -34,9 +34,9 @@ LEFT = 5  # part of the cycle that remains [s]; 0 between cycles
 LONG_RANGE_LEVEL = 6  # longest cycle allowed by long-range forces, quantised [s]
 CALM = 7  # longest step allowed by free grains [s]
 KICKED = 8  # time of the last kick by the gas [s]
-FLIGHT = 9  # next step of the adaptive integrator [s]
+FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
+CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight")
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
-CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight", "corrected")
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
@@ -53,7 +53,7 @@ LISTED = 10  # builds of the Verlet list
 LONG_RANGE_SUMS = 11  # summations of long-range forces
 CHECKED = 12  # step at which the time step was last chosen
 STEP_INCREASES = 13  # step at which the time step was last allowed to increase
-REJECTED = 14  # rejected steps of the adaptive integrator
+REJECTED = 14  # rejected steps without contacts, of integrators other than Verlet
 NEEDED = 15  # step at which a time step as short as LEVEL was last needed
 ORDERED = 16  # step of the last spatial sort
 COUNT = (

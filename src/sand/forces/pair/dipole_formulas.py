@@ -7,7 +7,6 @@ import math
 from typing import NamedTuple
 
 from ...compiler.jit import formula
-from ...numerics.roots import exact_inverse_root
 from ...numerics.vec import add, axpy, dot, scale, sub
 
 
@@ -43,12 +42,7 @@ def pair_load(apart, moment1, moment2, k):
     F1 = (3k/r⁵) [ (μ1·r) μ2 + (μ2·r) μ1 + (μ1·μ2 − 5 (μ1·r)(μ2·r)/r²) r ],  r = x1 − x2
     B1 = k [ 3 r (μ2·r)/r⁵ − μ2/r³ ]
     """
-    return pair_load_at(apart, exact_inverse_root(dot(apart, apart)), moment1, moment2, k)
-
-
-@formula
-def pair_load_at(apart, inverse, moment1, moment2, k):
-    """`pair_load` for known `inverse` = 1/r [1/m]."""
+    inverse = 1.0 / math.sqrt(dot(apart, apart))
     inverse2, along1, along2, both, product = invariants(apart, inverse, moment1, moment2)
     inverse3 = k * inverse2 * inverse
     three = 3.0 * inverse3 * inverse2
@@ -72,7 +66,7 @@ def pair_load_cut(apart, moment1, moment2, k, cutoff):
     F = S F_dipole − U ∇S and B → S B.  Torques and r×F still cancel, since ∇S is parallel to r.
     """
     weight, slope = cut_weight(dot(apart, apart), cutoff)
-    inverse = exact_inverse_root(dot(apart, apart))
+    inverse = 1.0 / math.sqrt(dot(apart, apart))
     inverse2, along1, along2, both, product = invariants(apart, inverse, moment1, moment2)
     uncut3 = k * inverse2 * inverse
     energy = uncut3 * (both - 3.0 * product)

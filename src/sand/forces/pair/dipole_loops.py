@@ -12,11 +12,9 @@ import numpy as np
 
 from ...box import nearest_image
 from ...compiler.jit import formula, loop
-from ...compiler.processor import FAST_512_BIT
-from ...numerics.roots import seeded_inverse_root
 from ...numerics.simd import round_up_to_simd_width
-from ...numerics.vec import accrue, add, cross, dot, load, put, sub
-from .dipole_formulas import pair_load, pair_load_at, pair_load_cut
+from ...numerics.vec import accrue, add, cross, load, put, sub
+from .dipole_formulas import pair_load, pair_load_cut
 from .dipole_rates import pair_rates
 from .loops import ROWS_PER_BLOCK, LongRangeSums, all_blocks, first_row, listed_blocks
 
@@ -180,13 +178,6 @@ def uncut_pair(position1, position2, span, moment1, moment2, parameters, real):
 
 
 @loop
-def uncut_pair_seeded(position1, position2, span, moment1, moment2, parameters, real):
-    """As `uncut_pair`, with 1/r from `seeded_inverse_root`, which is faster in long SIMD vectors."""
-    apart = separation_if(real, sub(position1, position2))
-    return pair_load_at(apart, seeded_inverse_root(dot(apart, apart)), moment1, moment2, parameters.k if real else 0.0)
-
-
-@loop
 def cut_pair(position1, position2, span, moment1, moment2, parameters, real):
     """As `uncut_pair`, with nearest images and a cut-off."""
     apart, k = separation_if(real, nearest_image(sub(position1, position2), span)), parameters.k if real else 0.0
@@ -264,7 +255,7 @@ def all_pairs(pair_loads: Callable) -> LongRangeSums:
     )
 
 
-ALL_PAIRS = all_pairs(uncut_pair)._replace(wide=all_pairs(uncut_pair_seeded) if FAST_512_BIT else None)
+ALL_PAIRS = all_pairs(uncut_pair)
 ALL_PAIRS_CUT = all_pairs(cut_pair)
 LISTED_PAIRS = LongRangeSums(
     pack_moments, listed_block, add_torques, listed_blocks, listed_rates, energy_shares, loads_of_pair, arrays=COPIES

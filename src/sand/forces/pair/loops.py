@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,7 +51,6 @@ class LongRangeSums(NamedTuple):
     rates: Callable | None  # adds to long_range.force_rate and torque_rate; None: no Taylor series of this force
     energies: Callable  # (…, shares): adds half the energy of each pair to shares (N,) of both grains
     pair: Callable  # (grains, span, parameters, i, j): force on i, torques on i and on j, of one pair
-    wide: Any = None  # LongRangeSums that are faster with the longest SIMD vectors; None: these
     arrays: tuple = ()  # names of the copies in long_range that the loops use, see state.arrays.PACKED_ARRAYS
 
 

@@ -1,0 +1,382 @@
+"""Symplectic integrator of fourth order for grains without contacts; velocity Verlet during contacts.
+
+Omelyan, I. P., Mryglod, I. M. & Folk, R. 2002, Comput. Phys. Commun. 146, 188: position-extended Forest–Ruth-like
+scheme.  One step of h seconds has five drifts and four kicks, with torques, spins and orientations as with forces,
+velocities and positions, and each kick at the time that the drifts before it have reached:
+
+    x += ξhv,  v += (1−2λ)hF/2m,  x += χhv,  v += λhF/m,  x += (1−2(χ+ξ))hv,  v += λhF/m,  x += χhv,
+    v += (1−2λ)hF/2m,  x += ξhv
+
+A drift turns a grain by the angle ω dt about its spin.  For spheres this is the exact motion without loads, so the
+scheme is symplectic: with equal steps the energy error is bounded.  λ and χ are negative, but all kicks are at times
+between the two ends of the step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ..arguments import checked
+from ..box import nearest_image
+from ..compiler.jit import caller, loop, rare
+from ..compiler.program import call_stage, has_stage
+from ..compiler.stage import Stage, stage
+from ..errors import FORBID_EXTRA, BadInput, shown
+from ..forces.external.formulas import stiffness_of_field
+from ..grains import Grains
+from ..neighbours.skin import invalidate_skins, invalidate_speeds
+from ..numerics.quaternion import turn, turned
+from ..numerics.vec import axpy, dot, load, load4, norm, put, put4, scale, sub
+from ..state.state import (
+    CHECKED,
+    CYCLE,
+    FLIGHT,
+    LEFT,
+    LONG_RANGE_SUMS,
+    NEEDED,
+    OUTSIDE,
+    REJECTED,
+    STAGE,
+    STEP,
+    STEP_INCREASES,
+    STEPS,
+    TIME,
+)
+from ..units import is_word, si
+from .adaptive_driver import MAX_ATTEMPTS, STRIDE_FRACTION, refresh_verlet_list
+from .base import register
+from .event_location import NEVER, first_contact_time
+from .force_calls import sum_external
+from .force_stages import ENERGY, POWER, WRAPPING
+from .motion import kick, wrap_all
+from .parts import Stop
+from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads
+from .stages import EXPLAIN, GAS_KICK
+from .step_control import INCREASE_INTERVAL, StepCriteria, quantise_step
+from .step_parts import MAX_TURN
+from .verlet import Verlet
+
+XI, LAMBDA, CHI = 0.1786178958448091, -0.2123418310626054, -0.06626458266981849
+DRIFTS = np.array([XI, CHI, 1.0 - 2.0 * (CHI + XI), CHI, XI])
+"""Lengths of the drifts, in units of the step."""
+KICKS = np.array([0.5 - LAMBDA, LAMBDA, LAMBDA, 0.5 - LAMBDA])
+"""Lengths of the kicks, in units of the step."""
+TIMES = np.cumsum(DRIFTS)
+"""Times at the ends of the drifts, in units of the step; between 0 and 1."""
+ERROR = 0.05
+"""Relative energy error of a step as long as the time scale of the motion, extrapolated from short steps (h⁴)."""
+HOLD = 30.0
+"""Time without need of the present step before it is doubled, in shortest time scales: more than the period of a bound
+pair, 9 in a circular orbit and 15 with an eccentricity of 0.28."""
+
+
+class FlightLimits(NamedTuple):
+    """Limits of a step without contacts."""
+
+    fixed: float  # step of the user [s]; 0: automatic
+    part: float  # largest step in units of the shortest time scale of the motion
+    stride: float  # largest displacement of a grain in one step [m]
+
+
+@loop
+def turning_rate_of(grains, criteria, i):
+    """Square of the rate [1/s²] at which the loads of grain i change by its rotation: ω² + M/I + μB/I; 0 for none."""
+    moment, torque, w = load(grains.moment, i), load(grains.torque, i), load(grains.spin, i)
+    size, inertia = norm(moment), grains.inertia[i]
+    if size == 0.0 and dot(torque, torque) == 0.0:
+        return 0.0
+    by_field = stiffness_of_field(moment, load(grains.field, i), inertia) + size * criteria.outer_field / inertia
+    return dot(w, w) + norm(torque) / inertia + by_field
+
+
+@loop
+def approach_rate(grains, span, i, j):
+    """Square of the rate [1/s²] at which the force between grains i and j changes: (v/d)² + a/d.
+
+    v is their relative velocity, a their relative acceleration and d the distance of their centres.
+    """
+    apart = norm(nearest_image(sub(load(grains.position, i), load(grains.position, j)), span))
+    v = norm(sub(load(grains.velocity, i), load(grains.velocity, j)))
+    a = norm(
+        sub(scale(1.0 / grains.mass[i], load(grains.force, i)), scale(1.0 / grains.mass[j], load(grains.force, j)))
+    )
+    return (v / apart) ** 2 + a / apart
+
+
+@loop
+def fastest_approach(grains, long_range, span, search):
+    """Largest `approach_rate` [1/s²] over all pairs, or over those of the Verlet list."""
+    listed = search.listed
+    largest = 0.0
+    for k in range(grains.mass.size):
+        begin, end = (long_range.start[k], long_range.start[k + 1]) if listed else (np.uint32(0), np.uint32(k))
+        i = long_range.order[k] if listed else np.uint32(k)
+        for m in range(begin, end):
+            j = long_range.order[long_range.neighbour[m]] if listed else np.uint32(m)
+            if j < i:
+                largest = max(largest, approach_rate(grains, span, i, j))
+    return largest
+
+
+@loop
+def longest_free_step(grains, long_range, span, search, criteria, limits, forces):
+    """Longest step [s] that the motion allows; 0 if the state is not finite.
+
+    Positions, spins and loads change on the time scale τ = 1/√(largest rate of any pair or grain); `limits.part` of it
+    is allowed.  Such rates follow from loads and velocities alone, whatever the force.
+    """
+    rate = fastest = fastest_spin = 0.0
+    finite = True
+    for i in range(grains.mass.size):
+        v, w = load(grains.velocity, i), load(grains.spin, i)
+        finite = finite and dot(v, v) < math.inf and dot(w, w) < math.inf
+        fastest, fastest_spin = max(fastest, dot(v, v)), max(fastest_spin, dot(w, w))
+        rate = max(rate, turning_rate_of(grains, criteria, i))
+    if forces.pair > 0:
+        rate = max(rate, fastest_approach(grains, long_range, span, search))
+    if not finite or not rate < math.inf:
+        return 0.0
+    step = criteria.longest
+    step = min(step, limits.part / math.sqrt(rate)) if rate > 0.0 else step
+    step = min(step, MAX_TURN / math.sqrt(fastest_spin)) if fastest_spin > 0.0 else step
+    return min(step, STRIDE_FRACTION * limits.stride / math.sqrt(fastest)) if fastest > 0.0 else step
+
+
+@loop
+def choose_free_step(grains, long_range, clock, count, span, search, criteria, limits, forces):
+    """The next step [s], a power of two of a second, or that of the user; 0 if the state is not finite.
+
+    A change of the step changes the energy, so a step that a periodic motion needs once per period is kept.
+    """
+    wanted, level = longest_free_step(grains, long_range, span, search, criteria, limits, forces), clock[FLIGHT]
+    if not wanted > 0.0 or limits.fixed > 0.0:
+        return limits.fixed if wanted > 0.0 else 0.0
+    if wanted < 2.0 * level:
+        count[NEEDED] = count[STEPS]
+    held = (count[STEPS] - count[NEEDED]) * limits.part
+    return quantise_step(level, wanted, level == 0.0 or held >= HOLD)
+
+
+@rare
+def drift_all(grains, runge_kutta, dt):
+    """x += v dt; orientations and moments turned by ω dt.  Returns the largest squared displacement in a step [m²]."""
+    largest = 0.0
+    for i in range(grains.mass.size):
+        x = axpy(dt, load(grains.velocity, i), load(grains.position, i))
+        q = turn(load4(grains.orientation, i), scale(dt, load(grains.spin, i)))
+        put(grains.position, i, x)
+        put4(grains.orientation, i, q)
+        put(grains.moment, i, turned(q, load(grains.body_moment, i)))
+        moved = sub(x, rows3(runge_kutta.start, X, i))
+        # written so that a displacement that is not a number counts as infinite
+        largest = largest if dot(moved, moved) <= largest else dot(moved, moved)
+        largest = largest if largest < math.inf else math.inf
+    return largest
+
+
+@caller
+def try_free_step(
+    grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt, stride
+):
+    """Drifts and kicks of one step; returns whether no grain moved farther than `stride`, and the work on grains [J].
+
+    The work of time-dependent external forces in a kick of τ seconds is τ (F·v + M·ω), with the mean of v and ω before
+    and after it: the exact change of the kinetic energy by these forces.
+    """
+    work = 0.0
+    for k in range(KICKS.size):
+        if not drift_all(grains, runge_kutta, DRIFTS[k] * dt) <= stride * stride:
+            return False, 0.0
+        time = begin + TIMES[k] * dt
+        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, time)
+        power = 0.0
+        if external_work.time_dependent:
+            power += sum_external(scratch, forces, program, table, time, POWER)
+        kick(grains, KICKS[k] * dt)
+        if external_work.time_dependent:
+            power += sum_external(scratch, forces, program, table, time, POWER)
+        work += 0.5 * KICKS[k] * dt * power
+    return drift_all(grains, runge_kutta, DRIFTS[KICKS.size] * dt) <= stride * stride, work
+
+
+@loop
+def store_paths(grains, runge_kutta, dt):
+    """Store velocities and accelerations at both ends of the step, from which `first_contact_time` interpolates.
+
+    The accelerations are those of the polynomial of degree 3 through the positions and velocities at both ends, whose
+    error is of fourth order in the step, like that of the step: the polynomial of degree 5 is then the same.
+    """
+    first, last = runge_kutta.rate[0], runge_kutta.rate[STAGES - 1]
+    for i in range(grains.mass.size):
+        for row in range(3):
+            v0, v1 = runge_kutta.start[V + row, i], grains.velocity[row, i]
+            mean = (grains.position[row, i] - runge_kutta.start[X + row, i]) / dt
+            first[X + row, i], last[X + row, i] = v0, v1
+            first[V + row, i] = (6.0 * mean - 4.0 * v0 - 2.0 * v1) / dt
+            last[V + row, i] = (2.0 * v0 + 4.0 * v1 - 6.0 * mean) / dt
+
+
+@caller
+def step_to_contact(
+    grains, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work, flight_limits,
+    forces, queue, program, table
+):  # fmt: skip
+    """Take one step; returns its length [s], whether it ends at a contact, the work on grains [J], and a Stop.
+
+    A step in which a grain moves too far is repeated with half its length, a step in which two grains touch from its
+    start up to the first contact.  Pairs that are not listed cannot touch, because at no kick, and so nowhere in the
+    step, a grain is farther than the stride from its start (see `first_contact_time`).
+    """
+    begin, dt, stride = clock[TIME], clock[FLIGHT], flight_limits.stride
+    store_start(grains, runge_kutta)
+    attempts = 0
+    while True:
+        if attempts == 0 and begin + dt == begin:
+            sum_loads(grains, long_range, count, scratch, forces, queue, program, table, begin)
+            return 0.0, False, 0.0, Stop.NO_STEP
+        possible, work = try_free_step(
+            grains, long_range, runge_kutta, count, scratch, external_work, forces, queue, program, table, begin, dt,
+            stride
+        )  # fmt: skip
+        contact_time = NEVER
+        if possible and settings.on:
+            store_paths(grains, runge_kutta, dt)
+            contact_time = first_contact_time(grains, long_range, runge_kutta, span, search, dt)
+        if possible and (contact_time >= 1.0 or attempts == MAX_ATTEMPTS):
+            return dt, contact_time <= 1.0, work, Stop.NONE
+        set_stage(grains, runge_kutta, 0, 0.0)
+        if possible:
+            dt *= contact_time
+            attempts += 1
+        else:
+            count[REJECTED] += 1
+            dt *= 0.5
+            attempts = 0
+
+
+@stage("the steps of fourth order")
+def symplectic_flight(
+    table, program, grains, contacts, pair_list, long_range, runge_kutta, clock, count, lost, span, settings, search,
+    external_work, criteria, flight_limits, forces, queue, scratch, until, last
+):  # fmt: skip
+    """Take one step and log the work of external forces; returns a `Stop`."""
+    stop = refresh_verlet_list(grains, long_range, span, search, program, table)
+    if stop != Stop.NONE.value:
+        return stop
+    if not clock[FLIGHT] > 0.0:
+        clock[FLIGHT] = choose_free_step(
+            grains, long_range, clock, count, span, search, criteria, flight_limits, forces
+        )
+    if not clock[FLIGHT] > 0.0:
+        return Stop.NOT_FINITE.value
+    before = 0.0
+    if external_work.time_dependent:
+        before = sum_external(scratch, forces, program, table, clock[TIME], ENERGY)
+    dt, in_contact, work, reason = step_to_contact(
+        grains, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work, flight_limits,
+        forces, queue, program, table
+    )  # fmt: skip
+    if reason != Stop.NONE:
+        call_stage(program, EXPLAIN, table, reason.value)
+        return reason.value
+    invalidate_speeds(pair_list)
+    invalidate_skins(pair_list)
+    clock[TIME] += dt
+    if external_work.time_dependent:
+        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], ENERGY) - before + work
+    if external_work.position_dependent:
+        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], WRAPPING)
+    wrap_all(grains, span)
+    clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
+    if in_contact:
+        # the second half of a step of 0 s follows, with new lists, new loads and a new choice of the step
+        pair_list.anchor[0, 0] = math.inf
+        clock[FLIGHT] = 0.0
+        count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
+        count[STAGE] = 1
+        return Stop.NONE.value
+    clock[STEP] = dt
+    count[STEPS] += 1
+    # with the loads of the last kick, so that the steps do not depend on output
+    clock[FLIGHT] = choose_free_step(grains, long_range, clock, count, span, search, criteria, flight_limits, forces)
+    if not clock[FLIGHT] > 0.0:
+        return Stop.NOT_FINITE.value
+    if clock[TIME] >= until or count[STEPS] >= last:  # output needs loads at the present positions; steps do not
+        sums = count[LONG_RANGE_SUMS]
+        sum_loads(grains, long_range, count, scratch, forces, queue, program, table, clock[TIME])
+        count[LONG_RANGE_SUMS] = sums
+    if has_stage(program, GAS_KICK):
+        call_stage(program, GAS_KICK, table, 0)
+    return Stop.NONE.value
+
+
+@register
+@checked
+@dataclass(frozen=True)
+class ForestRuth:
+    """Symplectic scheme of fourth order while there are no contacts, velocity Verlet otherwise.
+
+    The position-extended Forest–Ruth-like scheme of Omelyan, Mryglod & Folk (2002): four sums of the forces per step;
+    momentum and angular momentum are conserved to rounding, the energy error is bounded as long as steps are equal. A
+    step ends at the first contact of two grains.
+
+    Parameters
+    ----------
+    accuracy : float, optional
+        Allowed relative error of the interaction energy in a step, above 0, below 1. The step is (accuracy/C)^(1/4) τ,
+        C a constant of the scheme and 1/τ² the largest of (v/d)² + a/d of all pairs, with relative velocity v,
+        relative acceleration a and distance d, and of ω² + M/I + μB/I of all grains. Steps are powers of two of a
+        second.
+    step : float or str, optional
+        A fixed step without contacts [s], or "auto". It is divided by powers of two where a grain would move farther
+        than neighbour lists allow.
+    contact_stepping : Verlet, optional
+        Integrator while grains are in contact; in a case file a table of its keys.
+
+    Raises
+    ------
+    BadInput
+        If a parameter is out of range.
+    """
+
+    accuracy: Any = 1e-8
+    step: Any = "auto"
+    contact_stepping: Verlet = field(default_factory=Verlet)
+
+    __pydantic_config__ = FORBID_EXTRA
+    name: ClassVar[str] = "forest-ruth"
+    flight: ClassVar[Stage | None] = symplectic_flight
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        for key, unit, below in (("accuracy", "1", 1.0), ("step", "s", math.inf)):
+            if key == "step" and is_word(self.step, "auto"):
+                continue
+            try:
+                value = si(getattr(self, key), unit, f"stepping: {key}", above=0.0, below=below)
+                object.__setattr__(self, key, value)
+            except BadInput as error:
+                problems.extend(error.problems)
+        if not isinstance(self.contact_stepping, Verlet):
+            problems.append(f"stepping: contact_stepping = {shown(self.contact_stepping)}; give sand.Verlet(…)")
+        if problems:
+            raise BadInput(problems)
+
+    def parameters(self) -> dict[str, Any]:
+        """Settings in SI units, as in a case file."""
+        contact_stepping = {k: v for k, v in self.contact_stepping.parameters().items() if k != "method"}
+        own = {"accuracy": self.accuracy, "step": self.step}
+        return {"method": self.name, **own, "contact_stepping": contact_stepping}
+
+    def resolved(self, grains: Grains, criteria: StepCriteria) -> ForestRuth:
+        """These settings: the driver chooses the automatic step."""
+        return self
+
+    def flight_limits(self, longest_displacement: float) -> FlightLimits:
+        """Limits for the driver, with the largest displacement in one step [m]."""
+        fixed = 0.0 if self.step == "auto" else self.step
+        return FlightLimits(fixed, (self.accuracy / ERROR) ** 0.25, longest_displacement)
