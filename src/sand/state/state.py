@@ -35,8 +35,11 @@ LONG_RANGE_LEVEL = 6  # longest cycle allowed by long-range forces, quantised [s
 CALM = 7  # longest step allowed by free grains [s]
 KICKED = 8  # time of the last kick by the gas [s]
 FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
-CLOCK = ("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight")
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
+CLOCK = (
+    *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
+    "corrected",
+)
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
 STEPS = 0  # steps taken
