@@ -22,7 +22,7 @@ from ...constants import MAGNETIC
 from ...errors import BadInput
 from ...numerics.simd import padded_size
 from .ewald_fit import fitted
-from .ewald_loops import WORK_ROWS, EwaldParameters, Waves
+from .ewald_loops import Buffers, EwaldParameters, Waves
 from .loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
 
 DEGREES = {5e-2: 8, 1e-3: 12, 1e-4: 16, 1e-6: 24, 1e-8: 32}
@@ -31,8 +31,8 @@ PRODUCTS = tuple(round(0.1 * k, 1) for k in range(16, 64))
 """Values of α r_c that are compared."""
 RADII = 1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1
 """Values of r_c, in units of half the shortest side, that are compared."""
-PAIR_COST, LISTED_COST, WAVE_COST = 1.0, 1.6, 0.3
-"""Relative costs of a pair, of an entry of the Verlet list, and of a wave vector of one grain."""
+PAIR_COST, LISTED_COST, WAVE_COST = 1.0, 1.2, 0.16
+"""Relative costs of a pair, of an entry of the Verlet list, and of a wave vector of one grain; 1 is 8 ns (Zen 3)."""
 LIST_FROM, LIST_REACH, LIST_UP_TO = 64, 1.1, 0.38
 """Conditions for a Verlet list, as in `neighbours.settings`: grains, reach in units of r_c, fraction within reach."""
 LARGEST_SPACING = 0.8
@@ -208,6 +208,7 @@ def ewald_parameters(choice: EwaldChoice, box: Box, count: int, vacuum: bool) ->
     """Parameters of the loops, with buffers for `count` grains."""
     lengths, volume = sides(box), box.volume
     radius, alpha = choice.radius, choice.alpha
+    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
     coefficients = tuple(c / radius**3 for c in fitted(choice.product, choice.degree).coefficients)
     return EwaldParameters(
         MAGNETIC,
@@ -216,7 +217,8 @@ def ewald_parameters(choice: EwaldChoice, box: Box, count: int, vacuum: bool) ->
         coefficients,
         own_field(alpha, choice.waves, volume),
         -4.0 * math.pi * MAGNETIC / (3.0 * volume) if vacuum else 0.0,
-        _waves(lengths, choice, count),
+        _waves(lengths, choice, count, blocks),
+        Buffers(*(np.zeros((blocks, padded_size(count))) for _ in Buffers._fields)),
     )
 
 
@@ -226,7 +228,7 @@ def sides(box: Box) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _waves(lengths: tuple[float, float, float], choice: EwaldChoice, count: int) -> Waves:
+def _waves(lengths: tuple[float, float, float], choice: EwaldChoice, count: int, blocks: int) -> Waves:
     """Wave vectors in columns of equal n_x and n_y, which have n_z = 0, ±1, … up to q_max."""
     vectors = half_of_vectors(lengths, choice.largest)
     vectors = vectors[vectors[:, 2] >= 0]
@@ -238,19 +240,16 @@ def _waves(lengths: tuple[float, float, float], choice: EwaldChoice, count: int)
     with np.errstate(divide="ignore"):
         weight = 8.0 * math.pi * MAGNETIC / math.prod(lengths) * np.exp(-square / (4.0 * choice.alpha**2)) / square
     weight[square == 0.0] = 0.0
-    twice = (vectors[:, 2] == 0) | (vectors[:, :2] == 0).all(axis=1)
-    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
+    twice = (vectors[:, :2] == 0).all(axis=1)
     ends = np.append(0, np.cumsum(numbers))
     block = np.searchsorted(ends, np.linspace(0, ends[-1], blocks + 1).round())
-    v = padded_size(count)
-    phase = np.zeros((3, max(int(np.abs(vectors).max()), 1) + 1, 2, v))
-    phase[:, :, 0] = 1.0
+    cosine, sine = np.zeros((2, 3, max(int(np.abs(vectors).max()), 1) + 1, padded_size(count)))
+    cosine[:, 0] = 1.0
     return Waves(
         np.ascontiguousarray(np.stack([*pairs.T, numbers, first]), np.int64),
         np.where(twice, 0.5, 1.0) * weight,
         block.astype(np.int64),
-        phase,
-        np.zeros((3, v)),
-        np.zeros((blocks, WORK_ROWS, v)),
-        np.zeros((blocks, 6, v)),
+        cosine.copy(),
+        sine.copy(),
+        np.zeros((3, padded_size(count))),
     )
