@@ -11,6 +11,7 @@ from scipy.special import erfc
 import sand
 from sand.constants import MAGNETIC
 from sand.errors import BadInput
+from sand.forces.pair.dipole_formulas import pair_load
 from sand.forces.pair.ewald import DEGREES, half_of_vectors
 from sand.forces.pair.ewald_fit import fitted, screened, smeared
 
@@ -274,6 +275,18 @@ def test_the_accuracy_asked_for_is_reached(kind, accuracy):
         mean_square = (moment**2).sum(axis=1).mean()
         typical = math.sqrt(6) * MAGNETIC * mean_square * (4 * math.pi * 40 / 3 / sides.prod()) ** (4 / 3)
         assert 0.2 < error / (chosen.force_error * typical) < 1.5  # the prediction
+
+
+def test_loads_of_grains_in_contact():
+    """The loads that act in every step of a cycle: F, M1, M2 of two bare dipoles at their nearest images."""
+    grains = sand.Grains([[0.49e-6, 0, 0], [-0.495e-6, 2e-9, 0]], 1e-9, sand.IRON, moment=[[1, 2, 3], [-2, 1, 0.5]])
+    box, force = sand.Box.periodic("1 um"), sand.Dipoles(periodic="ewald")
+    for listed in (False, True):
+        found = force.sums(box, listed).pair(grains.arrays, box.span, force.numbers(grains, box), 0, 1)
+        own, field1, field2, _ = pair_load((-15e-9, -2e-9, 0.0), *grains.moment, MAGNETIC)
+        torques = np.cross(grains.moment[0], field1), np.cross(grains.moment[1], field2)
+        for ours, expected in zip(found, (own, *torques), strict=True):
+            assert ours == pytest.approx(np.array(expected), rel=1e-7, abs=1e-9 * np.linalg.norm(expected))
 
 
 @pytest.mark.compiled("dipoles")
