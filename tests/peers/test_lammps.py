@@ -1,4 +1,4 @@
-"""LAMMPS' `granular` JKR, an independent program, for overlaps that both laws cover.
+"""LAMMPS, an independent program: its `granular` JKR for overlaps that both laws cover, and its Ewald sum of dipoles.
 
 LAMMPS breaks contacts at the force minimum and has no force below first contact without a history, so δ ≥ 0.
 The extra `interop` installs the wheel; without it the test is skipped.
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import sand
+from sand.constants import MAGNETIC
 from sand.contact import jkr
 from sand.theory import contact
 
@@ -27,6 +28,60 @@ def start():
         return lammps.lammps(cmdargs=["-screen", "none", "-log", "none"])
     except OSError as error:
         pytest.skip(f"LAMMPS cannot be loaded: {error}")
+
+
+def lammps_dipole_loads(position, moment, sides, cutoff, accuracy):
+    """Forces and torques (N, 3) in units kμ²/a⁴ and kμ²/a³, of `ewald/dipole` (tin foil)."""
+    program = start()
+    half = 0.5 * np.array(sides)
+    bounds = " ".join(f"{-h} {h}" for h in half)
+    program.commands_string(
+        f"""
+        units lj
+        atom_style hybrid sphere dipole
+        atom_modify map array
+        boundary p p p
+        newton off
+        region all block {bounds}
+        create_box 1 all
+        """
+    )
+    for k, (x, mu) in enumerate(zip(position, moment, strict=True)):
+        program.command("create_atoms 1 single " + " ".join(f"{v:.17g}" for v in x))
+        program.command(f"set atom {k + 1} dipole " + " ".join(f"{v:.17g}" for v in mu))
+    program.commands_string(
+        f"""
+        set group all diameter 0.01 density 1
+        pair_style lj/cut/dipole/long {cutoff}
+        pair_coeff * * 0.0 0.01
+        kspace_style ewald/dipole {accuracy}
+        neighbor 0.05 bin
+        fix 1 all nve/sphere update dipole
+        run 0 post no
+        """
+    )
+    count = len(position)
+    order = np.argsort(program.numpy.extract_atom("id")[:count])
+    found = [program.numpy.extract_atom(name)[:count][order].copy() for name in ("f", "torque")]
+    program.close()
+    return found
+
+
+@pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.0, 1.3, 1.1)], ids=["cube", "unequal sides"])
+def test_ewald_sum_of_dipoles(sides):
+    """30 dipoles at random, tin foil: forces and torques of both programs agree to 1e-5 of their rms.
+
+    Lengths in µm, moments in 4e-18 A m²; LAMMPS is asked for 1e-7, SAND for 1e-6.
+    """
+    rng = np.random.default_rng(3)
+    position, moment = (rng.random((30, 3)) - 0.5) * sides, rng.normal(size=(30, 3))
+    theirs = lammps_dipole_loads(position, moment, sides, 0.45, 1e-7)
+    grains = sand.Grains(1e-6 * position, 1e-10, sand.IRON, moment=4e-18 * moment)
+    forces = [sand.Dipoles(periodic="ewald", accuracy=1e-6)]
+    ours = sand.Simulation(grains, forces, box=tuple(1e-6 * side for side in sides)).loads()
+    unit = MAGNETIC * 4e-18**2 / 1e-18
+    for found, expected in ((ours["force"] * 1e-6 / unit, theirs[0]), (ours["torque"] / unit, theirs[1])):
+        assert np.abs(found - expected).max() < 1e-5 * np.sqrt((expected**2).mean())
 
 
 def lammps_force(material, radius, overlaps):

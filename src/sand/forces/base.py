@@ -81,6 +81,9 @@ class LongRangeForce(Force, Protocol):
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """Its cut-off, with the reason."""
 
+    def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
+        """Settings as in `parameters`, with automatic ones as chosen for these grains: a resumed run uses the same."""
+
     def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """Its loops: over the pairs of the Verlet list if `listed`, else over all pairs."""
 

@@ -30,10 +30,10 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
     }
     forces = {}
     for force in simulation.forces:
-        forces[force.name] = dict(force.parameters())
-        if isinstance(force, LongRangeForce):
-            radius = force.choose(simulation.start, simulation.box).radius
-            forces[force.name]["cutoff"] = "none" if radius is None else radius
+        long_range = isinstance(force, LongRangeForce)
+        forces[force.name] = dict(
+            force.resolved(simulation.start, simulation.box) if long_range else force.parameters()
+        )
     lengths = ["open" if v is None else v for v in simulation.box.lengths]
     return {
         "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},

@@ -72,6 +72,11 @@ class CutoffForce:
         given = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return given | {"cutoff": "none" if self.cutoff is None else self.cutoff}
 
+    def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
+        """Settings in SI units with the cut-off as a number or "none", for a run that is resumed."""
+        radius = self.choose(grains, box).radius
+        return self.parameters() | {"cutoff": "none" if radius is None else radius}
+
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """The cut-off radius, with the reason.
 

@@ -59,44 +59,6 @@ def pack_moments(grains, long_range, span, parameters):
 
 
 @loop
-def listed_rows(grains, long_range, span, parameters, first, last):
-    """Loads of the list rows first…last − 1 (uint64), with nearest images and a cut-off.
-
-    Rows are extended to whole SIMD vectors with dummy pairs, unless few pairs remain.
-    """
-    remainder = np.uint64(MAX_REMAINDER)
-    for k in range(last - first):
-        s = first + k
-        position, moment = load(long_range.packed_position, s), load(long_range.packed_moment, s)
-        force = field = (0.0, 0.0, 0.0)
-        begin = np.uint64(long_range.start[s])
-        pairs = np.uint64(long_range.start[s + np.uint64(1)]) - begin
-        for m in range(round_up_to_simd_width(pairs, remainder)):
-            t = long_range.neighbour[begin + m]
-            f, b, _, _ = cut_pair(
-                position,
-                load(long_range.packed_position, t),
-                span,
-                moment,
-                load(long_range.packed_moment, t),
-                parameters,
-                m < pairs,
-            )
-            force, field = add(force, f), add(field, b)
-        i = long_range.order[s]
-        accrue(long_range.force, i, force)
-        put(grains.field, i, field)
-
-
-@loop
-def listed_block(grains, long_range, span, parameters, b):
-    """Loads of block b of list rows."""
-    first = b * ROWS_PER_BLOCK
-    last = min(first + ROWS_PER_BLOCK, grains.mass.size)
-    listed_rows(grains, long_range, span, parameters, np.uint64(first), np.uint64(last))
-
-
-@loop
 def rates_of_pair(grains, long_range, span, parameters, i, j):
     """Rates of the force on i, of the flux density at i due to j, and of that at j due to i."""
     apart = nearest_image(sub(load(grains.position, i), load(grains.position, j)), span)
@@ -185,6 +147,47 @@ def cut_pair(position1, position2, span, moment1, moment2, parameters, real):
 
 
 @functools.cache
+def listed_block_of(pair_loads: Callable) -> Callable:
+    """The loop over a block of list rows; each row is the sum over the neighbours of one grain.
+
+    Rows are extended to whole SIMD vectors with dummy pairs, unless few pairs remain.
+    """
+    remainder = np.uint64(MAX_REMAINDER)
+
+    @loop
+    def add_rows(grains, long_range, span, parameters, first, last):
+        for k in range(last - first):
+            s = first + k
+            position, moment = load(long_range.packed_position, s), load(long_range.packed_moment, s)
+            force = field = (0.0, 0.0, 0.0)
+            begin = np.uint64(long_range.start[s])
+            pairs = np.uint64(long_range.start[s + np.uint64(1)]) - begin
+            for m in range(round_up_to_simd_width(pairs, remainder)):
+                t = long_range.neighbour[begin + m]
+                f, b, _, _ = pair_loads(
+                    position,
+                    load(long_range.packed_position, t),
+                    span,
+                    moment,
+                    load(long_range.packed_moment, t),
+                    parameters,
+                    m < pairs,
+                )
+                force, field = add(force, f), add(field, b)
+            i = long_range.order[s]
+            accrue(long_range.force, i, force)
+            put(grains.field, i, field)
+
+    @loop
+    def block(grains, long_range, span, parameters, b):
+        first = b * ROWS_PER_BLOCK
+        last = min(first + ROWS_PER_BLOCK, grains.mass.size)
+        add_rows(grains, long_range, span, parameters, np.uint64(first), np.uint64(last))
+
+    return block
+
+
+@functools.cache
 def rows_of(pair_loads: Callable) -> Callable:
     """The loop over the rows first…last − 1 (uint64) of the triangle of all pairs j < i, each pair once.
 
@@ -226,19 +229,26 @@ def copy_moments(grains, long_range, span, parameters):
 
 
 @loop
-def add_block_sums(grains, long_range, span, parameters):
-    """Add up forces and flux densities of all blocks, and the torques."""
+def add_blocks(grains, long_range, span, parameters):
+    """Add up forces and flux densities of all blocks."""
     clear_field(grains)
     for b in range(all_blocks(grains)):
         force, field = long_range.block_sums[2 * b], long_range.block_sums[2 * b + 1]
         for i in range(first_row(grains, b + 1, all_blocks(grains))):
             accrue(long_range.force, i, load(force, i))
             accrue(grains.field, i, load(field, i))
+
+
+@loop
+def add_blocks_and_torques(grains, long_range, span, parameters):
+    """Add up forces and flux densities of all blocks, and the torques."""
+    add_blocks(grains, long_range, span, parameters)
     add_torques(grains, long_range, span, parameters)
 
 
-def all_pairs(pair_loads: Callable) -> LongRangeSums:
-    """The loops over all pairs, for one formula of the pair loads."""
+@functools.cache
+def all_pairs_block_of(pair_loads: Callable) -> Callable:
+    """The loop over a block of the triangle of all pairs, which adds to two arrays of its own."""
     add_rows = rows_of(pair_loads)
 
     @loop
@@ -250,13 +260,26 @@ def all_pairs(pair_loads: Callable) -> LongRangeSums:
         first, last = first_row(grains, b, all_blocks(grains)), first_row(grains, b + 1, all_blocks(grains))
         add_rows(long_range, force, field, span, parameters, first, last)
 
+    return block
+
+
+def all_pairs(pair_loads: Callable) -> LongRangeSums:
+    """The loops over all pairs, for one formula of the pair loads."""
+    block = all_pairs_block_of(pair_loads)
     return LongRangeSums(
-        copy_moments, block, add_block_sums, all_blocks, cut_rates, energy_shares, loads_of_pair, arrays=COPIES
+        copy_moments, block, add_blocks_and_torques, all_blocks, cut_rates, energy_shares, loads_of_pair, arrays=COPIES
     )
 
 
 ALL_PAIRS = all_pairs(uncut_pair)
 ALL_PAIRS_CUT = all_pairs(cut_pair)
 LISTED_PAIRS = LongRangeSums(
-    pack_moments, listed_block, add_torques, listed_blocks, listed_rates, energy_shares, loads_of_pair, arrays=COPIES
+    pack_moments,
+    listed_block_of(cut_pair),
+    add_torques,
+    listed_blocks,
+    listed_rates,
+    energy_shares,
+    loads_of_pair,
+    arrays=COPIES,
 )
