@@ -173,9 +173,7 @@ def test_correction_of_the_angular_momentum_falls_with_the_square_of_the_cycle()
     1e-4 of a radius and add 6 %.  The angular momentum itself stays constant to rounding, far below the correction.
     """
     distance = rest_distance(sand.IRON, 1e-8, 1e-8)
-    position = np.array(
-        [[0, 0, 0], [distance, 0, 0], [6e-8, 3e-8, 0], [0, 8e-8, 0], [1e-9, 8e-8 + distance, 0]], float
-    )
+    position = np.array([[0, 0, 0], [distance, 0, 0], [6e-8, 3e-8, 0], [0, 8e-8, 0], [1e-9, 8e-8 + distance, 0]], float)
     direction = np.random.default_rng(1).normal(size=(5, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     corrected = {}

@@ -101,14 +101,20 @@ def unwrapped(position: np.ndarray, pairs: np.ndarray, box: Box) -> np.ndarray:
     ndarray
         Positions; the lowest grain of each cluster keeps its image.
     """
-    count = len(position)
+    count, pairs = len(position), np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+    whole = np.array(position, dtype=np.float64)
+    apart = whole[pairs[:, 1]] - whole[pairs[:, 0]]
+    crosses = (box.nearest(apart) != apart).any(axis=1)
+    if not crosses.any():
+        return whole
+    labels = cluster_labels(count, pairs)
+    divided = np.isin(labels, labels[pairs[crosses, 0]])  # grains of clusters that cross a boundary
     neighbours: list[list[int]] = [[] for _ in range(count)]
-    for a, b in np.asarray(pairs, dtype=np.int64).reshape(-1, 2).tolist():
+    for a, b in pairs[divided[pairs[:, 0]]].tolist():
         neighbours[a].append(b)
         neighbours[b].append(a)
-    whole = np.array(position, dtype=np.float64)
     seen = np.zeros(count, dtype=bool)
-    for start in range(count):
+    for start in np.flatnonzero(divided).tolist():
         if seen[start]:
             continue
         seen[start] = True

@@ -17,7 +17,7 @@ from ..box import Box
 from ..io.run_folder import replace_file
 from .panels import draw_balance, draw_clusters, draw_energies, draw_losses, draw_time, energy_unit, time_unit
 from .render.scene import Scene, draw_largest, draw_scene, largest_clusters, make_scene, view_window
-from .style import MUTED, format_number, format_si, panel_letter, plot_style
+from .style import MUTED, RED, format_number, format_si, panel_letter, plot_style
 
 if TYPE_CHECKING:
     from ..simulation.simulation import Simulation
@@ -82,6 +82,9 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
     if simulation.temperature > 0.0:
         facts.append(f"$T_0$ = {format_number(simulation.temperature)} K")
     figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
+    for k, note in enumerate(simulation.notes()):
+        brief = note.split(";")[0]
+        figure.text(_MARGIN, 0.905 - 0.021 * k, f"Note: {brief}.", size=7.5, color=RED, va="center")
 
 
 def headline(grains: Any, box: Box, time: float) -> str:

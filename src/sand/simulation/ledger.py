@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..analysis.clusters import cluster_labels, cluster_sizes, mean_cluster_size
+from ..analysis.internal_motion import internal_kinetic_energy
 from ..analysis.ledger_columns import LOSSES, LedgerColumns, dissipated_in
 from ..constants import BOLTZMANN
 from ..contact.measure import ENERGIES
@@ -23,6 +24,8 @@ MAGNETIC = "magnetic"
 RUNAWAY = 0.5
 """Change of the total energy, relative to all present energies and all dissipation, at which a run is stopped."""
 MOMENTA = tuple(f"{kind}_{axis}" for kind in ("momentum", "angular_momentum") for axis in "xyz")
+INTERNAL = "internal"
+"""Column of the kinetic energy of clusters beyond their rigid motion; a part of the kinetic energies."""
 CORRECTION = "angular_momentum_corrected"
 """Column of the corrections that keep the angular momentum constant over r-RESPA cycles, their magnitudes summed."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
@@ -41,8 +44,9 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
         Energy [J] of each long-range and per-grain force by column.
     """
     contacts = int(state.count[CONTACTS])
+    pairs = state.contacts.pair[:, :contacts].T
     energies = [*map(math.fsum, kinetic_energies(state.grains)), *of_contacts]
-    labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
+    labels = cluster_labels(len(state.grains), pairs)
     row: dict[str, float] = {"step": state.steps, "time": state.time}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
@@ -50,6 +54,7 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
     row |= dict(zip(MOMENTA, momenta(state.grains), strict=True))
     row |= {
         CORRECTION: float(state.clock[CORRECTED]),
+        INTERNAL: math.fsum(internal_kinetic_energy(state.grains, pairs, state.box)[0]),
         "contacts": contacts,
         "made": int(state.count[MADE]),
         "moved": int(state.count[SLIPPED]),
@@ -87,10 +92,10 @@ class Ledger(LedgerColumns):
 
     def __init__(self, forces: Sequence[str] = ()):
         others = [name for name in forces if name != MAGNETIC]
-        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, *NUMBERS}
+        own = {"step", "time", *KINETIC, *ENERGIES, *LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS}
         if taken := [name for name in others if name in own]:
             raise BadInput(f"forces: '{taken[0]}' is a column of the ledger; give this force another name")
-        of_state = (*LOSSES, "total", *MOMENTA, CORRECTION, *NUMBERS)
+        of_state = (*LOSSES, "total", *MOMENTA, CORRECTION, INTERNAL, *NUMBERS)
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
@@ -133,7 +138,7 @@ class Ledger(LedgerColumns):
         """
         if not self.rows:
             return False
-        others = {"total", "step", "time", *LOSSES, *MOMENTA, CORRECTION, *NUMBERS}
+        others = {"total", "step", "time", *LOSSES, *MOMENTA, CORRECTION, INTERNAL, *NUMBERS}
         energies = math.fsum(abs(row[name]) for name in self.columns if name not in others)
         change = abs(row["total"] - self.rows[0]["total"])
         # this form is also true for NaN

@@ -222,6 +222,7 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
         "drift": result.drift,
         "drift_per_kT": ledger.drift_per_kT(simulation.temperature, len(simulation.grains)),
         "temperature_at_start": simulation.temperature,
+        "notes": simulation.notes(),
         "seed": simulation.seed,
         "choices": simulation.choices,
         "wall_seconds": simulation.wall_seconds,

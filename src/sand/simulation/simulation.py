@@ -35,6 +35,7 @@ from .run_writer import RunWriter
 from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
 from .stop import SHORTEST_DURATION, stop_criteria
+from .vibration import vibration_notes
 
 RETURN_EVERY = 0.1
 """Approximate wall time [s] between two returns of the compiled driver to Python, for signals and output."""
@@ -120,6 +121,7 @@ class Simulation(ReadOnlySettings):
         self._wall_seconds: float = 0.0  # of earlier calls of `run`
         self._began_at: float | None = None  # start of the present call of `run` (monotonic clock)
         self._has_begun = restart is not None
+        self._notes_shown = 0  # number of notes that were shown as warnings
         self._failure = ""  # why the simulation cannot continue
         if restart is not None:
             arrays, meta = restart
@@ -128,6 +130,7 @@ class Simulation(ReadOnlySettings):
             self._choices_at_start = meta.get("choices", {})
             if "ledger" in arrays:  # a state without a ledger starts a new one
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
+                self._notes_shown = len(self.notes())
         for text in self._engine.warnings:
             warn(text)
         self._built = True
@@ -300,6 +303,10 @@ class Simulation(ReadOnlySettings):
         self._begin()
         return DISPLAYS["figure"](self)
 
+    def notes(self) -> list[str]:
+        """What the run so far says about its own set-up: contacts that vibrate, contacts that broke; one text each."""
+        return vibration_notes(self.ledger.rows, self.temperature, len(self.start))
+
     def _begin(self) -> None:
         if not self._has_begun:
             self._engine.begin()
@@ -314,6 +321,10 @@ class Simulation(ReadOnlySettings):
         row = self._log_row()
         if not self.ledger.add(row):
             return
+        notes = self.notes()
+        for text in notes[self._notes_shown :]:
+            warn(text)
+        self._notes_shown = max(self._notes_shown, len(notes))
         if self.writer:
             self.writer.write(self, row)
         for observer in self.observers:

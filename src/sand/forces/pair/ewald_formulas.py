@@ -11,10 +11,10 @@ of an energy that is continuous at r_c with its first derivatives, whatever the 
 """
 
 import functools
+import math
 from collections.abc import Callable
 
 from ...compiler.jit import formula
-from ...numerics.roots import exact_inverse_root
 from ...numerics.vec import dot
 from .dipole_formulas import invariants, loads_of
 
@@ -62,7 +62,7 @@ def real_part(degree: int) -> Callable:
     @formula
     def pair_loads(apart, moment1, moment2, k, stretch, coefficients):
         square = dot(apart, apart)
-        inverse = exact_inverse_root(square)
+        inverse = 1.0 / math.sqrt(square)
         inverse2, along1, along2, both, _ = invariants(apart, inverse, moment1, moment2)
         p, p1, p2 = smooth(min(square * stretch - 1.0, 1.0), coefficients)
         inverse3 = inverse2 * inverse

@@ -1,0 +1,46 @@
+"""Notes on runs whose contacts vibrate far above the temperature of the grains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..constants import BOLTZMANN
+from ..units import format_quantity
+
+HOT = 100.0
+"""Internal kinetic energy per grain, in k_B T of the grains at the start, from which a run says so."""
+
+
+def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: int) -> list[str]:
+    """What the ledger says about vibrations of contacts, one sentence for each finding.
+
+    Parameters
+    ----------
+    rows : Sequence[dict[str, Any]]
+        Rows of the ledger.
+    temperature : float
+        Temperature T₀ of the grains at the start [K]; at 0 nothing is compared with it.
+    grains : int
+        Number of grains.
+
+    Returns
+    -------
+    list of str
+        Internal kinetic energy above 100 k_B T₀ per grain; contacts broken in a run that began with free grains.
+    """
+    notes = []
+    share = grains * BOLTZMANN * temperature
+    advice = "damping = 'critical' in [forces.contact] (sand.Contact) removes the vibrations that every touch leaves"
+    if share > 0.0 and (hot := next((row for row in rows if row["internal"] > HOT * share), None)) is not None:
+        most = max(row["internal"] for row in rows) / share
+        notes.append(
+            f"grains in contact vibrate: from {format_quantity(hot['time'], 's')} on their internal kinetic energy "
+            f"exceeds {HOT:g} k_B T₀ per grain, {most:.3g} at most; {advice}"
+        )
+    if rows and rows[0]["clusters"] == grains > 1 and rows[-1]["broken"] > 0:
+        notes.append(
+            f"{rows[-1]['broken']} contact{'s' * (rows[-1]['broken'] > 1)} of growing aggregates broke; unless fast "
+            f"impacts broke them, they vibrate too strongly: {advice}"
+        )
+    return notes
