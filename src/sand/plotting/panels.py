@@ -111,16 +111,21 @@ def losses_drawn(ledger: Any) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def draw_clusters(axes: Axes, ledger: Any, time: AxisUnit) -> None:
-    """Draw the mean cluster size S (Eq. 17), the largest cluster and the number of clusters, all from 1 to N."""
+    """Draw the mean cluster size S (Eq. 17) and the largest cluster; on the right axis the number of clusters."""
     t = ledger["time"] / time.size
     style = _markers(t)
-    axes.plot(t, ledger["clusters"], color=MUTED, linewidth=1.0, label="number of clusters", **style)
-    axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest (grains)", **style)
-    axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$ (grains)", **style)
-    top = max(float(ledger[name].max()) for name in ("clusters", "largest_cluster", "mean_cluster_size"))
-    axes.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)), ylabel="number")
-    _log_ticks(axes, plain=True)
-    legend_above(axes)
+    right = axes.twinx()
+    right.plot(t, ledger["clusters"], color=MUTED, linewidth=1.0, label="clusters (right axis)", **style)
+    axes.plot(t, ledger["largest_cluster"], color=SKY, label="largest", **style)
+    axes.plot(t, ledger["mean_cluster_size"], color=BLUE, linewidth=1.9, label="mean size $S$", **style)
+    sizes = max(float(ledger[name].max()) for name in ("largest_cluster", "mean_cluster_size"))
+    for own, top in ((axes, sizes), (right, float(ledger["clusters"].max()))):
+        own.set(yscale="log", ylim=(0.85, max(1.25 * top, 4.0)))
+        _log_ticks(own, plain=True)
+    axes.set_ylabel("size (grains)")
+    right.tick_params(axis="y", pad=1.0, labelcolor=MUTED, labelsize=7)
+    lines = [*axes.get_lines(), *right.get_lines()]
+    legend_above(axes, lines)
 
 
 def draw_energies(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> None:
@@ -189,8 +194,8 @@ def draw_balance(axes: Axes, ledger: Any, time: AxisUnit, unit: AxisUnit) -> Non
     axes.set(ylim=(-half, half), ylabel=f"Δ ({unit.name})")
     axes.yaxis.set_major_locator(MaxNLocator(3, symmetric=True))
     axes.yaxis.set_major_formatter(_tick_label)
-    drift = f"relative drift {format_number(ledger.drift)}" if np.isfinite(ledger.drift) else "not finite at the end"
-    text = f"change of the total energy: {drift}"
+    drift = f"{format_number(ledger.drift)} of the energy dissipated and kinetic"
+    text = f"energy error: {drift if np.isfinite(ledger.drift) else 'not finite at the end'}"
     axes.text(1.0, 1.03, text, transform=axes.transAxes, ha="right", va="bottom", size=7.5)
 
 

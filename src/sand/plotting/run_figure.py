@@ -84,7 +84,7 @@ def _draw_header(figure: Figure, simulation: Simulation) -> None:
     figure.text(_MARGIN, 0.931, "  ·  ".join(facts), size=8.5, color=MUTED, va="center")
     for k, note in enumerate(simulation.notes()):
         brief = note.split(";")[0]
-        figure.text(_MARGIN, 0.905 - 0.021 * k, f"Note: {brief}.", size=7.5, color=RED, va="center")
+        figure.text(_MARGIN, 0.911 - 0.019 * k, f"Note: {brief}.", size=7.0, color=RED, va="center")
 
 
 def headline(grains: Any, box: Box, time: float) -> str:

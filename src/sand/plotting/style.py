@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#0072B2",
@@ -114,12 +117,14 @@ def format_number(value: float) -> str:
     return rf"{digits}$\times 10^{{{int(exponent)}}}$"
 
 
-def legend_above(axes: Axes) -> None:
-    """Draw the legend as one row above the axes, where it covers no data."""
+def legend_above(axes: Axes, lines: Sequence[Line2D] = ()) -> None:
+    """Draw the legend of the axes, or of these lines, as one row above the axes, where it covers no data."""
+    handles: list[Any] = list(lines) or axes.get_legend_handles_labels()[0]
     axes.legend(
+        handles=handles,
         loc="lower right",
         bbox_to_anchor=(1.01, 0.97),
-        ncols=max(len(axes.get_legend_handles_labels()[1]), 1),
+        ncols=max(len(handles), 1),
         borderpad=0.1,
         handlelength=1.3,
         handletextpad=0.5,
