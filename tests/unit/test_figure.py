@@ -41,6 +41,7 @@ def run_of(position, radius=1e-8, pairs=(), box=None, rows=({},), temperature=0.
         contacts={"pair": np.array(pairs, dtype=np.uint32).reshape(-1, 2)},
         ledger=ledger,
         temperature=temperature,
+        notes=list,
         time=ledger.rows[-1]["time"] if rows else 0.0,
     )
 
@@ -101,9 +102,9 @@ def texts(figure):
 @pytest.mark.slow
 def test_clusters_drawn_are_the_ledgers(run_with_clusters, figure):
     """S, the largest cluster and the number of clusters are the ledger's columns over its times."""
-    drawn = lines(figure.axes[0])
-    columns = {"mean size $S$ (grains)": "mean_cluster_size", "largest (grains)": "largest_cluster"}
-    for label, column in {**columns, "number of clusters": "clusters"}.items():
+    drawn = lines(figure.axes[0]) | lines(figure.axes[4])
+    columns = {"mean size $S$": "mean_cluster_size", "largest": "largest_cluster"}
+    for label, column in {**columns, "clusters (right axis)": "clusters"}.items():
         np.testing.assert_allclose(drawn[label][0], run_with_clusters.ledger["time"] / 1e-9)
         np.testing.assert_array_equal(drawn[label][1], run_with_clusters.ledger[column])
 
@@ -146,7 +147,7 @@ def test_balance_is_the_change_of_the_total(run_with_clusters, figure):
 
 def test_every_curve_is_within_the_axis_limits(figure):
     """No limit of an axis cuts off a curve of energies or clusters."""
-    for axes in figure.axes[:2]:
+    for axes in (*figure.axes[:2], figure.axes[4]):
         low, high = axes.get_ylim()
         for _, y in lines(axes).values():
             assert low <= np.min(y) and np.max(y) <= high
@@ -272,7 +273,7 @@ def test_largest_clusters_are_moved_as_rigid_bodies(run_with_clusters):
 
 def test_scale_bar_has_the_stated_length(figure):
     """The bar's length in data coordinates (metres) equals its label."""
-    axes = figure.axes[4]
+    axes = figure.axes[5]
     (bar,) = [line for line in axes.get_lines() if line.get_gid() == "scale"]
     length = float(np.ptp(bar.get_xdata()))
     assert format_si(length, "m") in [text.get_text() for text in axes.texts]
@@ -281,10 +282,10 @@ def test_scale_bar_has_the_stated_length(figure):
 @pytest.mark.slow
 def test_box_has_twelve_edges(figure):
     """A periodic box is drawn; open space is not."""
-    edges = [line for line in figure.axes[4].get_lines() if line.get_gid() == "box"]
+    edges = [line for line in figure.axes[5].get_lines() if line.get_gid() == "box"]
     assert len(edges) == 12
     alone = run_figure(run_of([[0.0, 0.0, 0.0]]))
-    assert not [line for line in alone.axes[4].get_lines() if line.get_gid() == "box"]
+    assert not [line for line in alone.axes[5].get_lines() if line.get_gid() == "box"]
 
 
 # --- unusual runs ------------------------------------------------------------------------------------
@@ -331,7 +332,7 @@ def test_grains_with_nan_positions_are_omitted():
     figure = run_figure(run)
     assert "left out: 1" in texts(figure)
     run.grains.arrays.position[0, 0] = np.inf
-    assert len(run_figure(run).axes) == 4
+    assert len(run_figure(run).axes) == 5
 
 
 @pytest.mark.slow

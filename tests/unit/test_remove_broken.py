@@ -19,7 +19,7 @@ def test_each_column_moves_with_its_contact(broken):
     There is room for more contacts, constants and losses are per contact, and damping is on, so that every array is
     covered.  The loop runs as plain Python.
     """
-    contacts = empty_contact_arrays(9, 20, 15, channels=6)
+    contacts = empty_contact_arrays(9, 20, 15, channels=6, damped=True)
     rng, count = np.random.default_rng(4), np.zeros(len(COUNT), np.int64)
     count[CONTACTS] = 7
     for name in set(ContactArrays._fields) - BY_GRAIN:
