@@ -100,6 +100,27 @@ def contact_step(kind: str, count: int, quick: bool, calm: bool = False) -> dict
     )
 
 
+def damped_step(bath: str | None, quick: bool) -> dict[str, Any]:
+    """Steps of a loose aggregate with dashpots on all modes, with or without thermal noise, beside undamped ones.
+
+    The dashpots take at most a fifth of a step, with noise as long as the rest; the length of a step is the same.
+    """
+    grains, rounds = worlds.shaken(worlds.loose(1000), speed=worlds.SLOW), 3 if quick else 5
+    contacts, runs = [sand.Contact(damping="critical", bath_temperature=bath), sand.Contact()], []
+    for contact in contacts:
+        sim = sand.Simulation(grains, [contact], stepping=worlds.stepping("loose"))
+        sim.run(steps=WARM_UP)
+        runs.append(replayed(sim, GRAIN_STEPS // 1000 // (2 if quick else 1)))
+    return row(
+        f"damped contacts, loose, 1000 grains{', thermal' if bath else ''}",
+        in_turns(*runs, rounds),
+        "ns per contact",
+        scale=1e9 / len(sim.contacts["pair"]),
+        of="undamped contacts",
+        ratio_asked=1 / 2 if bath else 1 / 1.2,
+    )
+
+
 def dipole_step(quick: bool) -> dict[str, Any]:
     """Dipoles of all pairs in a whole step.
 
@@ -166,6 +187,8 @@ def all_rows(quick: bool) -> Iterator[dict[str, Any]]:
             yield contact_step(kind, count, quick)
             if kind == "loose" and count <= 10_000:
                 yield contact_step(kind, count, quick, calm=True)
+    yield damped_step(None, quick)
+    yield damped_step("300 K", quick)
     yield dipole_step(quick)
     for far, asked in FAR.items():
         for count in asked:
