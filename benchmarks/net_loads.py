@@ -36,8 +36,8 @@ def net_loads(frame: sand.Frame, **settings: object) -> tuple[np.ndarray, np.nda
     force, torque, centre = (np.zeros((count, 3)) for _ in range(3))
     np.add.at(centre, labels, grains.mass[:, None] * whole)
     centre /= np.bincount(labels, grains.mass)[:, None]
-    np.add.at(force, labels, loads.force)
-    np.add.at(torque, labels, loads.torque + np.cross(whole - centre[labels], loads.force))
+    np.add.at(force, labels, loads["force"])
+    np.add.at(torque, labels, loads["torque"] + np.cross(whole - centre[labels], loads["force"]))
     return force[sizes > 1], torque[sizes > 1]
 
 
