@@ -178,6 +178,8 @@ def test_contact_time_without_adhesion_is_that_of_hertz():
         ({"damping": "critical", "viscous_time": "1 ps"}, "viscous_time is given, but damping = 'critical'"),
         ({"bath_temperature": "100 K"}, "bath_temperature needs damping"),
         ({"damping": "critical", "bath_temperature": "0 K"}, "bath_temperature = '0 K' must be above 0 K"),
+        ({"settling_time": 0.0}, "settling_time = 0.0 must be above 0 s"),
+        ({"settling_time": "5 nm"}, "settling_time = '5 nm' is not a quantity in s"),
         ({"damping_constant": "1 m"}, "damping_constant = '1 m' is not a quantity in kg/s"),
     ],
 )

@@ -62,6 +62,11 @@ class Contact:
     bath_temperature : float or str, optional
         Temperature T > 0 [K] of the bath behind the dashpots: each has a random load of variance 2 k_B T c/dt, so that
         vibrations of grains in contact have the mean energy k_B T per mode. Default: no noise, T = 0.
+    settling_time : float or str, optional
+        τ [s] > 0: the motion of grains relative to the rigid motion of their cluster decays as e^(−t/τ), at the same
+        rate for all modes, whereas dashpots hardly damp slow collective ones. Momentum and angular momentum of every
+        cluster are kept; slow restructuring is slowed down as well. Energy removed: `lost_settling`. No noise belongs
+        to it: with a bath, contacts are colder than T. Default: none.
     mixing : str, optional
         γ_eff of unequal materials: "geometric" √(γ1γ2), "harmonic" 2γ1γ2/(γ1+γ2), or "smaller".
     law : str, optional
@@ -85,6 +90,7 @@ class Contact:
     damping_constant: Any = None
     viscous_time: Any = None
     bath_temperature: Any = None
+    settling_time: Any = None
     mixing: str = "geometric"
     law: str = "jkr"
 
@@ -112,6 +118,7 @@ class Contact:
         if self.damping == "critical" and self.damping_ratio is None:
             object.__setattr__(self, "damping_ratio", DEFAULT_DAMPING_RATIO)
         optional = {"rolling_limit": "m", "damping_constant": "kg/s", "viscous_time": "s", "bath_temperature": "K"}
+        optional["settling_time"] = "s"
         for key, unit in (optional | {"damping_ratio": "1"}).items():
             try:
                 if getattr(self, key) is not None:

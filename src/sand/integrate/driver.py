@@ -72,6 +72,7 @@ from .stages import (
     PREPARE_RATES,
     REMOVE_BROKEN,
     SETTLE,
+    SETTLE_CLUSTERS,
     SORT,
     STIFFNESS_WORK,
     STORE_POSITIONS,
@@ -315,10 +316,12 @@ def second_half(
     count[STEPS] += 1
     count[STAGE] = 0
     if due:
-        gas = has_stage(program, GAS_KICK)
+        gas, settling = has_stage(program, GAS_KICK), has_stage(program, SETTLE_CLUSTERS)
         if gas:
             call_stage(program, GAS_KICK, table, 0)
-        if gas or respa.impulse:  # speeds changed between steps
+        if settling:
+            call_stage(program, SETTLE_CLUSTERS, table, 0)
+        if gas or settling or respa.impulse:  # speeds changed between steps
             invalidate_speeds(pair_list)
     return Stop.NONE.value
 

@@ -4,12 +4,13 @@ A stage (`compiler.stage`) is a function whose arguments are names of parts: arr
 `contacts` or `clock`, and settings such as `span` or `criteria`.
 """
 
+import math
 from enum import IntEnum
 from typing import Any, NamedTuple
 
 PARTS = (
     # arrays of the state
-    *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clock", "count", "lost"),
+    *("grains", "contacts", "pair_list", "long_range", "runge_kutta", "clusters", "clock", "count", "lost"),
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
     # data of one call of the driver
@@ -52,6 +53,7 @@ class ContactParameters(NamedTuple):
     bath: float  # k_B T [J] of their thermal noise; 0: none
     seed: int  # of the noise
     per_period: float  # steps per fastest contact period
+    settling_time: float = math.inf  # τ [s] of the motion relative to the rigid motion of a cluster; inf: undamped
     uniform_contacts: bool = False  # one set of constants for all contacts, as in State
 
 

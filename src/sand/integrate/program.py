@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -101,6 +102,8 @@ def _contact_stages(given: Components, parameters: StepParameters) -> dict[int, 
     }
     if parameters.settings.follow:
         found[stages.STIFFNESS_WORK] = events[stages.STIFFNESS_WORK]
+    if parameters.settings.settling_time < math.inf:
+        found[stages.SETTLE_CLUSTERS] = stages.settle
     return found
 
 

@@ -5,6 +5,7 @@ and are compiled once for each; those of forces are in `force_stages`.
 """
 
 import functools
+import math
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..compiler.stage import Stage, stage
 from ..contact.events import compact_contacts, forming_loops, settle_loop
 from ..contact.gather import gather
 from ..contact.law import ContactLaw
+from ..contact.settling import PERIOD_FRACTION, settle_clusters
 from ..contact.stiffness_work import stiffness_work_loop
 from ..contact.update import contact_pass_loop, contact_step, store_contact_sums
 from ..forces.gas.loops import gas_kick
@@ -19,7 +21,7 @@ from ..neighbours.cell_list import FULL, build_verlet_list
 from ..neighbours.pair_list import ROW_FULL, build_inner_list, pair_list_loop
 from ..neighbours.skin import update_safe_speed
 from ..numerics.simd import float_from_bits
-from ..state.state import CONTACTS, CYCLE, GAS, GRAIN1, KICKED, STEP, STEPS, TIME
+from ..state.state import CONTACTS, CYCLE, GAS, GRAIN1, KICKED, SETTLED, SETTLING, STEP, STEPS, TIME
 from .motion import UNBOUNDED, drift_for, gather_and_kick
 from .parts import CYCLE_LENGTH, DT, SINCE, Stop
 from .respa import add_extrapolated_loads, clear_rates, set_mean_velocities, store_positions
@@ -47,7 +49,8 @@ EXTRAPOLATE = 15
 GAS_KICK = 16
 FLIGHT = 17
 EXPLAIN = 18
-FIRST_FORCE = 19  # from here on the stages of forces, see force_stages
+SETTLE_CLUSTERS = 19
+FIRST_FORCE = 20  # from here on the stages of forces, see force_stages
 
 INNER_SKIN_FRACTION = 0.05
 """Displacement, in units of the largest gap of the pair list, after which the inner list of candidates is rebuilt."""
@@ -221,6 +224,17 @@ def kick_by_gas(grains, clock, count, lost, gas):
     if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= gas.period:
         lost[GAS] += gas_kick(grains, gas.seed, count[STEPS], elapsed, gas.gas)
         clock[KICKED] = clock[TIME]
+    return 0
+
+
+@stage("the settling of clusters")
+def settle(grains, contacts, clusters, clock, lost, span, settings):
+    """Settling of clusters for the time since the last; at ends of steps or cycles, about every τ/20."""
+    elapsed = clock[TIME] - clock[SETTLED]
+    if elapsed + 0.5 * max(clock[STEP], clock[CYCLE]) >= PERIOD_FRACTION * settings.settling_time:
+        part = -math.expm1(-elapsed / settings.settling_time)
+        lost[SETTLING] += settle_clusters(grains, contacts, clusters, span, clock[SETTLED], part)
+        clock[SETTLED] = clock[TIME]
     return 0
 
 

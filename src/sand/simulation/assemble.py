@@ -40,6 +40,7 @@ from ..state.arrays import (
     PACKED_ARRAYS,
     RATE_ARRAYS,
     RESPA_ARRAYS,
+    cluster_arrays,
     empty_contact_arrays,
     empty_long_range_arrays,
     empty_pair_list,
@@ -225,6 +226,7 @@ def _new_state(
             unused={*FORCE_ARRAYS, *LIST_ARRAYS, *PACKED_ARRAYS, *RESPA_ARRAYS, *RATE_ARRAYS} - needed,
         ),
         runge_kutta=runge_kutta_arrays(count if components.flight else 0),
+        clusters=cluster_arrays(count if settings.settling_time < math.inf else 0),
         uniform_contacts=uniform_contacts,
     )
 
@@ -289,5 +291,6 @@ def _contact_parameters(contact: Contact | None, grains: Grains, stepping: Verle
         bath=0.0 if law.bath_temperature is None else BOLTZMANN * law.bath_temperature,
         seed=seed,
         per_period=stepping.steps_per_period,
+        settling_time=math.inf if law.settling_time is None else law.settling_time,
         uniform_contacts=all(own.min() == own.max() for own in (grains.material, grains.radius, grains.mass)),
     )

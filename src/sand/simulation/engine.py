@@ -175,7 +175,7 @@ class Engine:
     def _current_table(self, state: State) -> Table:
         """The table with the present arrays of the state."""
         self._table.set("grains", state.grains.arrays)
-        for name in ("contacts", "pair_list", "long_range", "runge_kutta", "clock", "count", "lost"):
+        for name in ("contacts", "pair_list", "long_range", "runge_kutta", "clusters", "clock", "count", "lost"):
             self._table.set(name, getattr(state, name))
         return self._table
 

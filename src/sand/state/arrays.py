@@ -93,6 +93,14 @@ class RungeKuttaArrays(NamedTuple):
     power: np.ndarray  # (7,) power of the external forces at each stage [W]
 
 
+class ClusterArrays(NamedTuple):
+    """Memory for the settling of clusters, one at a time.  Not saved."""
+
+    member: np.ndarray  # (N,) uint32: grains of the cluster
+    listed: np.ndarray  # (N,) uint8: 1 for grains whose cluster has been listed
+    offset: np.ndarray  # (3, N) vectors from the first grain, then from the centre of mass [m]
+
+
 SAVED_LONG_RANGE = (
     "anchor",
     "force",
@@ -211,6 +219,11 @@ def empty_pair_list(grains: int, capacity: int, *, uniform_contacts: bool = Fals
 def runge_kutta_arrays(grains: int) -> RungeKuttaArrays:
     """Allocate the buffers of the Runge–Kutta integrator; `grains` is 0 if it is not used."""
     return RungeKuttaArrays(np.zeros((13, grains)), np.zeros((7, 13, grains)), np.zeros(7))
+
+
+def cluster_arrays(grains: int) -> ClusterArrays:
+    """Allocate the memory for the settling of clusters; `grains` is 0 without it."""
+    return ClusterArrays(np.zeros(grains, np.uint32), np.zeros(grains, np.uint8), np.zeros((3, grains)))
 
 
 def grown(arrays: Any, unchanged: Collection[str], minimum: int) -> Any:

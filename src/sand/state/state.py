@@ -16,10 +16,12 @@ from .arrays import (
     NOT_SAVED,
     SAVED_LONG_RANGE,
     UNIFORM_ARRAYS,
+    ClusterArrays,
     ContactArrays,
     LongRangeArrays,
     PairList,
     RungeKuttaArrays,
+    cluster_arrays,
     grown,
     runge_kutta_arrays,
 )
@@ -36,9 +38,10 @@ CALM = 7  # longest step allowed by free grains [s]
 KICKED = 8  # time of the last kick by the gas [s]
 FLIGHT = 9  # next step without contacts [s], of integrators other than Verlet
 CORRECTED = 10  # magnitudes of all corrections of spins by r-RESPA, summed [J s]
+SETTLED = 11  # time at which settling was last applied to clusters [s]
 CLOCK = (
     *("time", "step", "level", "contact_step", "cycle", "left", "long_range_level", "calm", "kicked", "flight"),
-    "corrected",
+    *("corrected", "settled"),
 )
 
 # --- indices of State.count (int64) -----------------------------------------------------------------
@@ -69,9 +72,9 @@ LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, SQUARED_SPEED, SQUARED_SPIN, SAFE_S
 
 # --- indices of State.lost (float64): energy dissipated or transferred, per channel [J] ---------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING = range(5)
-DAMPING_NORMAL, DAMPING_SLIDING, DAMPING_ROLLING, DAMPING_TWISTING, STIFFNESS, GAS, OUTSIDE = range(5, 12)
+DAMPING_NORMAL, DAMPING_SLIDING, DAMPING_ROLLING, DAMPING_TWISTING, STIFFNESS, SETTLING, GAS, OUTSIDE = range(5, 13)
 DAMPING = ("damping_normal", "damping_sliding", "damping_rolling", "damping_twisting")
-LOST = ("forming", "breaking", "sliding", "rolling", "twisting", *DAMPING, "stiffness", "gas", "outside")
+LOST = ("forming", "breaking", "sliding", "rolling", "twisting", *DAMPING, "stiffness", "settling", "gas", "outside")
 RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
 """Losses recorded per contact, in this order: damping of all modes together, and nothing by breaking, after which a
 contact does not exist."""
@@ -90,6 +93,7 @@ class State:
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
     runge_kutta: RungeKuttaArrays = field(default_factory=lambda: runge_kutta_arrays(0))
+    clusters: ClusterArrays = field(default_factory=lambda: cluster_arrays(0))
     # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
     order: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
     # equal radii, masses and materials, so that one set of constants serves all contacts
@@ -97,7 +101,7 @@ class State:
 
     def __post_init__(self) -> None:
         self.grains.arrays = all_aligned(self.grains.arrays)
-        for group in ("contacts", "pair_list", "long_range", "runge_kutta"):
+        for group in ("contacts", "pair_list", "long_range", "runge_kutta", "clusters"):
             setattr(self, group, all_aligned(getattr(self, group)))
 
     @property
