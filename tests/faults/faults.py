@@ -90,7 +90,7 @@ FAULTS = (
           "accrue(force, j, (-f[0], -f[1], -f[2]))", "accrue(force, j, f)",
           "physics/test_magnetic_dynamics.py::test_loads_against_brute_force_with_images"),
     Fault("a forming contact is given a whole kick", "factor 2", "loop", "contact/events.py",
-          "impulse - 0.5 * dt * dot(load(contacts.force, c), n)", "impulse - dt * dot(load(contacts.force, c), n)",
+          "gain + 0.5 * dt * dot(load(contacts.force, c), n)", "gain + dt * dot(load(contacts.force, c), n)",
           "physics/test_conservation.py::test_contact_formation_conserves_the_modified_energy_of_verlet"),
     Fault("half the velocity at the start of the interpolation", "factor 2", "loop", "integrate/event_location.py",
           "v0 = scale(dt / 5.0, ", "v0 = scale(dt / 10.0, ",
