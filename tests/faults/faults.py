@@ -79,6 +79,12 @@ FAULTS = (
           "slide = dot(add(start.slide, left.slide), sub(end.slide, left.slide))",
           "slide = dot(start.slide, sub(end.slide, left.slide))",
           "generic/test_contact_laws.py::test_dissipation_of_slip"),
+    Fault("work at the start of a step with the separation at its end", "sign", "formula", "contact/damping.py",
+          "+ dt * dot(start.force, cross(rolling, velocity))", "- dt * dot(start.force, cross(rolling, velocity))",
+          "physics/test_damping.py::test_losses_of_a_step_are_the_work_of_velocity_verlet"),
+    Fault("half the variance of thermal loads", "factor 2", "formula", "contact/damping.py",
+          "math.sqrt(2.0 * thermal_energy / dt)", "math.sqrt(thermal_energy / dt)",
+          "physics/test_damping.py::test_covariance_of_the_thermal_loads"),
     # loops
     Fault("the row of cells beyond a wall ends one cell early", "off by one", "loop", "neighbours/cell_list.py",
           "(0, high - nx + 1)", "(0, high - nx)",
@@ -102,6 +108,9 @@ FAULTS = (
     Fault("after a break the others keep the wrong twist", "lost row", "loop", "contact/events.py",
           "contacts.twist[kept] = contacts.twist[c]", "contacts.twist[kept] = contacts.twist[kept]",
           "unit/test_remove_broken.py::test_each_column_moves_with_its_contact"),
+    Fault("a dashpot acts for half a step, whenever the grains touched", "factor 2", "loop", "contact/damping.py",
+          "(contacts.force, c)), pose.n) * elapsed", "(contacts.force, c)), pose.n) * 0.5 * dt",
+          "physics/test_damping.py::test_the_times_of_touch_and_break_are_resolved"),
     # settings and units
     Fault("tesla with 1/s instead of 1/s²", "forgotten unit", "settings", "units.py",
           '"T": (0, 0, 1, -2, -1, 0)', '"T": (0, 0, 1, -1, -1, 0)',

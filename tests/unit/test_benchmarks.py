@@ -1,5 +1,6 @@
 """The table of `python -m benchmarks`: complete rows and correct verdicts. No time is limited here."""
 
+import csv
 import itertools
 import json
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 import sand
 
 table = pytest.importorskip("benchmarks.table", reason="benchmarks are not beside the tests")
-from benchmarks import decks, main_job, pieces, scaling, steps, timing, worlds  # noqa: E402
+from benchmarks import decks, main_job, pieces, scaling, settling, steps, timing, worlds  # noqa: E402
 from benchmarks.compare import median_interval  # noqa: E402
 
 
@@ -129,3 +130,43 @@ def test_bytes_per_step_of_a_contact():
     constants = 0 if sim.state.uniform_contacts else 8 * sim.state.contacts.constants.shape[0]
     side = sim.state.contacts.side.nbytes / sim.state.contacts.side.size
     assert steps.touched_bytes(sim) == pytest.approx(54 * (137 + side + constants) + 27 * per_grain)
+
+
+@pytest.mark.parametrize("count", [16, 32])
+def test_slowest_bending_of_a_chain_is_that_of_a_beam(count):
+    """Free beam: Ω = 4.730² √(B/μ)/(n d)², B = k_r R² d, μ = m/d; γ = ζ Ω²/ω_r, ω_r of rolling.
+
+    Sliding and the rotation of grains shorten the beam's frequency, and n grains are a beam of n d only to 1/n²: 2 %.
+    """
+    value, _ = settling.slowest_bending(count)
+    numbers = sand.theory.contact("iron", 1e-8)
+    mass, distance = sand.IRON.density * 4 / 3 * np.pi * 1e-24, 2e-8 - numbers.rest_overlap
+    bending = numbers.roll_stiffness * numbers.reduced_radius**2
+    expected = 4.73004**2 / count**2 / distance * np.sqrt(bending / mass)
+    assert value.imag == pytest.approx(expected, rel=0.02)
+    assert -value.real == pytest.approx(0.2 * abs(value) ** 2 * numbers.roll_period / (2 * np.pi), rel=0.01)
+
+
+def test_the_table_of_decay_times_is_that_of_the_linear_modes():
+    """docs/physics/settling.csv has the periods and decay times of the linear modes; simulations agree to 2 %."""
+    with settling.TABLE.open(encoding="utf-8", newline="") as file:
+        head, *rows = list(csv.reader(file))
+    assert head == list(settling.COLUMNS) and [int(row[0]) for row in rows] == list(settling.LENGTHS)
+    for row in rows:
+        value, _ = settling.slowest_bending(int(row[0]))
+        expected = 2e9 * np.pi / value.imag, -1e9 / value.real, -0.5e9 / value.real
+        assert [float(text) for text in row[1:4]] == pytest.approx(expected, rel=5e-3)
+        assert float(row[4]) == pytest.approx(expected[2], rel=0.02)
+
+
+@pytest.mark.filterwarnings("ignore:contacts of iron")
+@pytest.mark.compiled("contacts")
+@pytest.mark.parametrize("count", [4, 8])
+def test_bending_of_a_damped_chain_decays_as_its_linear_mode(count):
+    """Energy of a simulated chain that starts in its slowest mode: exp(−2γ t) of the eigenvalue −γ + iΩ, 1 %.
+
+    Velocity Verlet changes Ω by (Ω dt)²/24 < 1e-4, hence γ ∝ Ω² by 2e-4; the energy falls twice a period, by ζ Ω/ω_r
+    about a straight line, and the fit extends over whole periods.
+    """
+    value, shape = settling.slowest_bending(count)
+    assert settling.simulated_decay(count, value, shape) == pytest.approx(-0.5 / value.real, rel=0.01)

@@ -106,15 +106,17 @@ def damping_load(motion, n, dashpots):
 def unit_deviates(seed, number, id1, id2):
     """Two vectors of independent uniform deviates with mean 0 and variance 1, for a step and a pair of grains.
 
-    Uniform deviates give the same moments of the motion as normal ones to second order in the step (Dünweg & Paul 1991,
-    Int. J. Mod. Phys. C 2, 817), without logarithms.
+    They change sign with the order of the grains, as the loads on grain 1 do: spatial sorting can exchange the grains
+    of a contact.  Uniform deviates give the same moments of the motion as normal ones to second order in the step
+    (Dünweg & Paul 1991, Int. J. Mod. Phys. C 2, 817), without logarithms.
     """
     seed, number = np.uint64(seed), np.uint64(number)
-    counter = (number & LOW_WORD, number >> WORD_BITS, np.uint64(id1), np.uint64(id2))
+    id1, id2 = np.uint64(id1), np.uint64(id2)
+    counter = (number & LOW_WORD, number >> WORD_BITS, id1 if id1 < id2 else id2, id2 if id1 < id2 else id1)
     low, high = seed & LOW_WORD, (seed >> WORD_BITS) ^ STREAM
     a = philox(counter, (low, high))
     b = philox(counter, (low, high ^ np.uint64(1)))
-    width = math.sqrt(12.0)
+    width = math.sqrt(12.0) if id1 < id2 else -math.sqrt(12.0)
     u = (width * (uniform(a[0]) - 0.5), width * (uniform(a[1]) - 0.5), width * (uniform(a[2]) - 0.5))
     w = (width * (uniform(b[0]) - 0.5), width * (uniform(b[1]) - 0.5), width * (uniform(b[2]) - 0.5))
     return u, w
