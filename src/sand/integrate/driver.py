@@ -152,7 +152,7 @@ def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, q
     return dt * math.sqrt(largest_speeds(queue, blocks)[0])
 
 
-@rare
+@caller
 def sum_all_pairs(grains, long_range, count, respa, forces, queue, program, table):
     """Sum the long-range loads and add them to the loads of the grains."""
     sum_pair_forces(long_range, count, forces, queue, program, table)
@@ -267,7 +267,8 @@ def update_contacts(count, lost, settings, queue, program, table):
     for b in range(blocks):
         passed = load_slip_sums(queue.passed, b)
         pending |= passed.pending > 0.0
-        log_slip_sums(count, lost, passed)
+        if passed.slipped > 0.0:
+            log_slip_sums(count, lost, passed)
     if settings.follow:
         call_stage(program, STIFFNESS_WORK, table, 0)
     broken = pending and call_stage(program, SETTLE, table, 0) == 1

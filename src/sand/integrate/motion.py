@@ -6,7 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..box import Span, nearest_image
-from ..compiler.jit import loop
+from ..compiler.jit import loop, separate
+from ..compiler.stage import arrays_do_not_overlap
 from ..contact.gather import BLOCK, gather
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
@@ -38,9 +39,10 @@ def kick_some(grains, first, last, dt):
     return fastest, fastest_spin
 
 
-@loop
+@separate
 def kick(grains, dt):
     """Kick all grains; returns the squares of the largest speed [m²/s²] and spin [1/s²]."""
+    arrays_do_not_overlap()
     fastest, fastest_spin = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
     return float_from_bits(fastest), float_from_bits(fastest_spin)
 
