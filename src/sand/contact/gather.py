@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ..compiler.jit import formula, loop, rare
+from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
 from ..numerics.vec import add, load, put, sub
 from ..state.arrays import GATHER_CLASSES
@@ -24,7 +24,7 @@ DENSE_FROM = 3
 many contacts, so that sorting brings nothing."""
 
 
-@formula
+@loop
 def _gather_at(grains, contacts, g):
     """Set force and torque of grain g to the sums over its contacts."""
     force = torque = (0.0, 0.0, 0.0)

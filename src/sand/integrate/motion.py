@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..box import Span, nearest_image
-from ..compiler.jit import loop, separate
-from ..compiler.stage import arrays_do_not_overlap
+from ..compiler.jit import formula, loop
 from ..contact.gather import BLOCK, gather
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
@@ -19,7 +18,7 @@ BLOCK_OF_GRAINS = np.uint64(4 * BLOCK)
 """Grains gathered before they are kicked: whole blocks of `contact.gather`, whose forces stay in the L1 cache."""
 
 
-@loop
+@formula  # not a `loop`: where the driver calls it in a loop, LLVM would forget that arrays do not overlap
 def kicked(grains, i, dt):
     """Apply v += F dt/m, ω += M dt/I to grain i; returns the new velocity and spin."""
     v = axpy(dt / grains.mass[i], load(grains.force, i), load(grains.velocity, i))
@@ -39,10 +38,9 @@ def kick_some(grains, first, last, dt):
     return fastest, fastest_spin
 
 
-@separate
+@loop
 def kick(grains, dt):
     """Kick all grains; returns the squares of the largest speed [m²/s²] and spin [1/s²]."""
-    arrays_do_not_overlap()
     fastest, fastest_spin = kick_some(grains, np.uint64(0), np.uint64(grains.mass.size), dt)
     return float_from_bits(fastest), float_from_bits(fastest_spin)
 

@@ -13,8 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..box import nearest_image
-from ..compiler.jit import loop, separate
-from ..compiler.stage import arrays_do_not_overlap
+from ..compiler.jit import loop
 from ..contact.update import BROKEN_FLAG, padded_contact_count
 from ..numerics.vec import accrue, axpy, cross, dot, load, put, scale, sub
 from ..state.state import CONTACTS
@@ -44,13 +43,12 @@ def add_long_range_loads(grains, long_range):
         accrue(grains.torque, i, load(long_range.torque, i))
 
 
-@separate
+@loop
 def add_constant_loads(grains, long_range, since):
     """Add the constant part of the long-range loads, which acts in every step.
 
     A constant load can be split off without error, and impulses of the remainder excite a cluster at rest much less.
     """
-    arrays_do_not_overlap()
     for i in range(grains.mass.size):
         accrue(grains.force, i, load(long_range.constant_force, i))
         accrue(grains.torque, i, load(long_range.constant_torque, i))
@@ -71,10 +69,9 @@ def update_constant_loads(grains, long_range):
         put(long_range.path, i, (0.0, 0.0, 0.0))
 
 
-@separate
+@loop
 def integrate_displacement(grains, long_range, span, weight):
     """Accumulate ∫(x − x_n) dt, x_n at the start of the cycle, where the constant force acts for `weight` seconds."""
-    arrays_do_not_overlap()
     for i in range(grains.mass.size):
         moved = nearest_image(sub(load(grains.position, i), load(long_range.past_position, i)), span)
         accrue(long_range.path, i, scale(weight, moved))
