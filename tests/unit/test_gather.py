@@ -52,7 +52,7 @@ def random_contacts(per_grain, count=GRAINS):
 
 
 @pytest.mark.compiled("small")
-@pytest.mark.parametrize(("per_grain", "count"), [(1.0, GRAINS), (4.0, GRAINS), (1.0, 500)])
+@pytest.mark.parametrize(("per_grain", "count"), [(1.0, GRAINS), (4.0, GRAINS), (1.0, 500), (0.2, GRAINS), (0.2, 500)])
 def test_sums_are_those_of_brute_force(per_grain, count):
     """F = Σ ±f, M = Σ torque of each end; at most about 30 terms of 1e-9, rounded to 1e-16 each: 1e-23."""
     grains, contacts, pair = random_contacts(per_grain, count)

@@ -86,7 +86,8 @@ def test_notes_on_vibration_and_breaking():
     assert "from 2 ns on" in text and "500 at most" in text and "damping = 'critical'" in text
     (text,) = vibration_notes([row(), row(broken=2, clusters=4)], 100.0, 10)
     assert text.startswith("2 contacts of growing aggregates broke")
-    assert vibration_notes([row(clusters=3), row(broken=2, clusters=4)], 100.0, 10) == []  # a collision
+    collision = [row(clusters=3), row(500.0 * share, broken=2, clusters=4)]
+    assert vibration_notes(collision, 100.0, 10) == []
 
 
 @pytest.mark.compiled("contacts")

@@ -39,17 +39,26 @@ class KernelLibrary(JITCodeLibrary):
 
     def finalize(self) -> None:
         """Link, optimise and generate machine code."""
+        # callees before their callers: LLVM inlines functions in this order, and keeps the promise that the arrays of a
+        # function do not overlap only if these are read or written in the function itself, not in functions it calls
         called: dict[Any, None] = {}
-        pending: list[Any] = list(self._linking_libraries)  # type: ignore[has-type]
-        while pending:
-            library = pending.pop(0)
+
+        def collect(library: Any) -> None:
             if library not in called:
+                for callee in library._linking_libraries if isinstance(library, FunctionLibrary) else ():  # type: ignore[has-type]
+                    collect(callee)
                 called[library] = None
-                pending += library._linking_libraries if isinstance(library, FunctionLibrary) else []  # type: ignore[has-type]
+
+        for library in self._linking_libraries:  # type: ignore[has-type]
+            collect(library)
         own = {function.name for function in self._final_module.functions if not function.is_declaration}
         for library in called:
             if isinstance(library, FunctionLibrary):
-                self._final_module.link_in(library.own_module(), preserve=True)
+                module = library.own_module().clone()
+                for function in module.functions:
+                    if not function.is_declaration:
+                        function.linkage = "weak_odr"  # it is linked although its caller is not there yet
+                self._final_module.link_in(module)
         for function in self._final_module.functions:
             if function.name not in own and not function.is_declaration:
                 function.linkage = "internal"  # unused arguments and functions can be removed

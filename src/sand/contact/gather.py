@@ -7,6 +7,8 @@ sorted by contact count.
 
 import math
 
+import numpy as np
+
 from ..compiler.jit import loop, rare
 from ..compiler.stage import stage
 from ..numerics.vec import add, load, put, sub
@@ -26,7 +28,8 @@ many contacts, so that sorting brings nothing."""
 def _gather_at(grains, contacts, g):
     """Set force and torque of grain g to the sums over its contacts."""
     force = torque = (0.0, 0.0, 0.0)
-    for s in range(contacts.start[g], contacts.start[g + 1]):
+    # an unsigned index cannot count from the end, which need not be checked
+    for s in range(contacts.start[g], contacts.start[g + np.uint64(1)]):
         c = contacts.side[s] >> 1
         if contacts.side[s] & 1:
             force = sub(force, load(contacts.force, c))
@@ -46,12 +49,34 @@ def gather_in_index_order(grains, contacts, first, last):
 
 
 @loop
+def gather_few(grains, contacts, first, last):
+    """`gather` where most grains have no contacts: all loads are set to 0 in a loop that vectorises, few are summed."""
+    for k in range(last - first):
+        put(grains.force, first + k, (0.0, 0.0, 0.0))
+        put(grains.torque, first + k, (0.0, 0.0, 0.0))
+    begin = contacts.start[first]
+    for k in range(last - first):
+        end = contacts.start[first + k + np.uint64(1)]
+        if end > begin:
+            _gather_at(grains, contacts, first + k)
+        begin = end
+
+
+@loop
+def _has_few_contacts(contacts, first, last):
+    """Whether at least half of the grains first … last − 1 (uint64) have no contacts, by the number of contacts."""
+    return 2 * (int(contacts.start[last]) - int(contacts.start[first])) < int(last - first)
+
+
+@loop
 def gather(grains, contacts, first, last):
     """Set force and torque of the grains first … last − 1 (uint64) to the sums over their contacts, in a fixed order.
 
     `first` and `last` are multiples of BLOCK, except where `last` is the number of grains.
     """
-    if contacts.gather_order.size > 0:
+    if _has_few_contacts(contacts, first, last):
+        gather_few(grains, contacts, first, last)
+    elif contacts.gather_order.size > 0:
         for k in range(last - first):
             _gather_at(grains, contacts, contacts.gather_order[first + k])
     else:

@@ -153,7 +153,7 @@ def drift_with_work(clock, lost, scratch, span, external_work, forces, grains, q
     return dt * math.sqrt(largest_speeds(queue, blocks)[0])
 
 
-@rare
+@caller
 def sum_all_pairs(grains, long_range, count, respa, forces, queue, program, table):
     """Sum the long-range loads and add them to the loads of the grains."""
     sum_pair_forces(long_range, count, forces, queue, program, table)
@@ -268,7 +268,8 @@ def update_contacts(count, lost, settings, queue, program, table):
     for b in range(blocks):
         passed = load_contact_sums(queue.passed, b)
         pending |= passed.pending > 0.0
-        log_contact_sums(count, lost, passed)
+        if settings.damped or passed.slipped > 0.0:
+            log_contact_sums(count, lost, passed)
     if settings.follow:
         call_stage(program, STIFFNESS_WORK, table, 0)
     return pending and call_stage(program, SETTLE, table, 0) == 1

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..box import Span, nearest_image
-from ..compiler.jit import loop
+from ..compiler.jit import formula, loop
 from ..contact.gather import BLOCK, gather
 from ..numerics.quaternion import turn, turned
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
@@ -18,7 +18,7 @@ BLOCK_OF_GRAINS = np.uint64(4 * BLOCK)
 """Grains gathered before they are kicked: whole blocks of `contact.gather`, whose forces stay in the L1 cache."""
 
 
-@loop
+@formula  # not a `loop`: where the driver calls it in a loop, LLVM would forget that arrays do not overlap
 def kicked(grains, i, dt):
     """Apply v += F dt/m, ω += M dt/I to grain i; returns the new velocity and spin."""
     v = axpy(dt / grains.mass[i], load(grains.force, i), load(grains.velocity, i))

@@ -1,4 +1,4 @@
-"""Notes on runs whose contacts vibrate far above the temperature of the grains."""
+"""Notes on growth runs whose contacts vibrate far above the temperature of the grains."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ HOT = 100.0
 
 
 def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: int) -> list[str]:
-    """What the ledger says about vibrations of contacts, one sentence for each finding.
+    """What the ledger says about vibrations of contacts in a run that began with free grains; one text per finding.
+
+    Collisions of aggregates, in which contacts are meant to vibrate and to break, have no notes.
 
     Parameters
     ----------
@@ -27,9 +29,11 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
     Returns
     -------
     list of str
-        Internal kinetic energy above 100 k_B T₀ per grain; contacts broken in a run that began with free grains.
+        Internal kinetic energy above 100 k_B T₀ per grain; broken contacts.
     """
-    notes = []
+    notes: list[str] = []
+    if not rows or rows[0]["clusters"] < grains:
+        return notes
     share = grains * BOLTZMANN * temperature
     advice = "damping = 'critical' in [forces.contact] (sand.Contact) removes the vibrations that every touch leaves"
     if share > 0.0 and (hot := next((row for row in rows if row["internal"] > HOT * share), None)) is not None:
@@ -38,7 +42,7 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
             f"grains in contact vibrate: from {format_quantity(hot['time'], 's')} on their internal kinetic energy "
             f"exceeds {HOT:g} k_B T₀ per grain, {most:.3g} at most; {advice}"
         )
-    if rows and rows[0]["clusters"] == grains > 1 and rows[-1]["broken"] > 0:
+    if rows[-1]["broken"] > 0:
         notes.append(
             f"{rows[-1]['broken']} contact{'s' * (rows[-1]['broken'] > 1)} of growing aggregates broke; unless fast "
             f"impacts broke them, they vibrate too strongly: {advice}"
