@@ -76,18 +76,23 @@ def row(internal=0.0, broken=0, clusters=10, time=0.0):
     return {"internal": internal, "broken": broken, "clusters": clusters, "time": time}
 
 
+def notes(rows, temperature=100.0, damped=False):
+    return vibration_notes(rows, temperature, 10, damped=damped)
+
+
 def test_notes_on_vibration_and_breaking():
     """Above 100 k_B T₀ per grain; a broken contact of a run that began with free grains; nothing otherwise."""
     share = 10 * BOLTZMANN * 100.0
-    assert vibration_notes([], 100.0, 10) == []
-    assert vibration_notes([row(), row(99.0 * share, time=1e-9)], 100.0, 10) == []
-    assert vibration_notes([row(), row(1e9 * share)], 0.0, 10) == []  # no temperature to compare with
-    (text,) = vibration_notes([row(), row(101.0 * share, time=2e-9), row(500.0 * share, time=3e-9)], 100.0, 10)
+    assert notes([]) == {}
+    assert notes([row(), row(99.0 * share, time=1e-9)]) == {}
+    assert notes([row(), row(1e9 * share)], 0.0) == {}  # no temperature to compare with
+    text = notes([row(), row(101.0 * share, time=2e-9), row(500.0 * share, time=3e-9)])["vibration"]
     assert "from 2 ns on" in text and "500 at most" in text and "damping = 'critical'" in text
-    (text,) = vibration_notes([row(), row(broken=2, clusters=4)], 100.0, 10)
+    assert "damped already" in notes([row(), row(101.0 * share)], damped=True)["vibration"]
+    text = notes([row(), row(broken=2, clusters=4)])["breaking"]
     assert text.startswith("2 contacts of growing aggregates broke")
     collision = [row(clusters=3), row(500.0 * share, broken=2, clusters=4)]
-    assert vibration_notes(collision, 100.0, 10) == []
+    assert notes(collision) == {}
 
 
 @pytest.mark.compiled("contacts")

@@ -63,8 +63,8 @@ class Contact:
         Temperature T > 0 [K] of the bath behind the dashpots: each has a random load of variance 2 k_B T c/dt, so that
         vibrations of grains in contact have the mean energy k_B T per mode. Default: no noise, T = 0.
     settling_time : float or str, optional
-        τ [s] > 0: the motion of grains relative to the rigid motion of their cluster decays as e^(−t/τ), at the same
-        rate for all modes, whereas dashpots hardly damp slow collective ones. Momentum and angular momentum of every
+        τ [s] > 0: velocities of grains relative to the rigid motion of their cluster are multiplied by e^(−t/τ). The
+        energy of modes with ω > 1/2τ decays as e^(−t/τ), whereas dashpots hardly damp slow collective modes. Momentum and angular momentum of every
         cluster are kept; slow restructuring is slowed down as well. Energy removed: `lost_settling`. No noise belongs
         to it: with a bath, contacts are colder than T. Default: none.
     mixing : str, optional
@@ -208,10 +208,13 @@ class Contact:
             ]
         if problems:
             raise BadInput(problems)
+        cold = []
+        if self.settling_time is not None and self.bath_temperature is not None:
+            cold = ["contact: settling_time has no noise, so that contacts become colder than bath_temperature"]
         of_material = [grains.radius[grains.material == k] for k in range(len(grains.materials))]
         # JKR is least accurate for the smallest grains, DMT for the largest
         extremes = [sorted({float(radius.min()), float(radius.max())}) for radius in of_material]
-        return [
+        return cold + [
             text
             for k, a in enumerate(grains.materials)
             for j in range(k + 1)

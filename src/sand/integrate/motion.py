@@ -18,7 +18,7 @@ BLOCK_OF_GRAINS = np.uint64(4 * BLOCK)
 """Grains gathered before they are kicked: whole blocks of `contact.gather`, whose forces stay in the L1 cache."""
 
 
-@formula  # not a `loop`: where the driver calls it in a loop, LLVM would forget that arrays do not overlap
+@formula  # not a `loop`: where the driver calls it in a loop, LLVM loses the information that arrays do not overlap
 def kicked(grains, i, dt):
     """Apply v += F dt/m, ω += M dt/I to grain i; returns the new velocity and spin."""
     v = axpy(dt / grains.mass[i], load(grains.force, i), load(grains.velocity, i))

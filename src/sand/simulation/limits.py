@@ -28,14 +28,15 @@ COLD = 1e-6
 
 
 def bath_temperature(grains: Grains, forces: Sequence[Force], box: Box) -> float:
-    """Temperature [K] of a gas with Brownian motion, else of grains that move like a thermal gas; 0 if there is none.
+    """Highest temperature [K] of a gas with Brownian motion, a bath of contacts, and grains; 0 if there is none.
 
     Velocities are taken as thermal in a box that is periodic on all axes: in open space they are those of bodies that
     collide. Above `MELTED` they are no temperature of a solid either, but follow from forces.
     """
-    for force in forces:
-        if isinstance(force, Gas) and force.brownian:
-            return float(force.temperature)
+    given = [float(force.temperature) for force in forces if isinstance(force, Gas) and force.brownian]
+    given += [float(force.bath_temperature or 0.0) for force in _contacts(forces)]
+    if any(given):
+        return max(given)
     thermal = kinetic_temperature(grains) if all(side is not None for side in box.lengths) else 0.0
     return thermal if thermal <= MELTED else 0.0
 
@@ -82,7 +83,11 @@ def _ringing(contact: Contact, grains: Grains, kind: int, kelvin: float) -> str:
     if energy == 0.0:  # no adhesion
         return ""
     thermal = f", {energy / (BOLTZMANN * kelvin):.3g} kT at {kelvin:.4g} K" if kelvin > 0.0 else ""
-    kept = "nothing removes it: choose a damping" if contact.damping == "none" else f"damping: {contact.damping}"
+    kept = f"damping: {contact.damping}"
+    if contact.damping == "none":
+        kept = "nothing removes it: for growth choose a damping"
+        if contact.settling_time is not None:
+            kept = f"settling time: {format_quantity(contact.settling_time, 's')}"
     hot = f"{energy / BOLTZMANN:.2g} K"
     return f"a touch of {material.name} grains leaves {energy:.3g} J ({hot}{thermal}) in vibration; {kept}"
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arguments import checked
 from ..box import as_box
+from ..contact.model import Contact
 from ..errors import BadInput, FilesFailed, Interrupted, warn
 from ..forces.base import Force
 from ..forces.pair.dipoles import kinetic_temperature
@@ -121,7 +122,7 @@ class Simulation(ReadOnlySettings):
         self._wall_seconds: float = 0.0  # of earlier calls of `run`
         self._began_at: float | None = None  # start of the present call of `run` (monotonic clock)
         self._has_begun = restart is not None
-        self._notes_shown = 0  # number of notes that were shown as warnings
+        self._notes_shown: set[str] = set()  # kinds of notes that were shown as warnings
         self._failure = ""  # why the simulation cannot continue
         if restart is not None:
             arrays, meta = restart
@@ -130,7 +131,7 @@ class Simulation(ReadOnlySettings):
             self._choices_at_start = meta.get("choices", {})
             if "ledger" in arrays:  # a state without a ledger starts a new one
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
-                self._notes_shown = len(self.notes())
+                self._notes_shown = set(self._notes(self.ledger.rows))
         for text in self._engine.warnings:
             warn(text)
         self._built = True
@@ -305,7 +306,11 @@ class Simulation(ReadOnlySettings):
 
     def notes(self) -> list[str]:
         """What the run so far says about its own set-up: contacts that vibrate, contacts that broke; one text each."""
-        return vibration_notes(self.ledger.rows, self.temperature, len(self.start))
+        return list(self._notes(self.ledger.rows).values())
+
+    def _notes(self, rows: Sequence[dict[str, float]]) -> dict[str, str]:
+        damped = any(isinstance(force, Contact) and force.damping != "none" for force in self.forces)
+        return vibration_notes(rows, self.temperature, len(self.start), damped=damped)
 
     def _begin(self) -> None:
         if not self._has_begun:
@@ -321,10 +326,10 @@ class Simulation(ReadOnlySettings):
         row = self._log_row()
         if not self.ledger.add(row):
             return
-        notes = self.notes()
-        for text in notes[self._notes_shown :]:
-            warn(text)
-        self._notes_shown = max(self._notes_shown, len(notes))
+        for kind, text in self._notes([self.ledger.rows[0], row]).items():
+            if kind not in self._notes_shown:
+                warn(text)
+                self._notes_shown.add(kind)
         if self.writer:
             self.writer.write(self, row)
         for observer in self.observers:

@@ -12,8 +12,8 @@ HOT = 100.0
 """Internal kinetic energy per grain, in k_B T of the grains at the start, from which a run says so."""
 
 
-def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: int) -> list[str]:
-    """What the ledger says about vibrations of contacts in a run that began with free grains; one text per finding.
+def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: int, *, damped: bool) -> dict[str, str]:
+    """What the ledger says about vibrations of contacts in a run that began with free grains, by the kind of finding.
 
     Collisions of aggregates, in which contacts are meant to vibrate and to break, have no notes.
 
@@ -25,26 +25,27 @@ def vibration_notes(rows: Sequence[dict[str, Any]], temperature: float, grains: 
         Temperature T₀ of the grains at the start [K]; at 0 nothing is compared with it.
     grains : int
         Number of grains.
+    damped : bool
+        Whether contacts are damped, for the advice.
 
     Returns
     -------
-    list of str
-        Internal kinetic energy above 100 k_B T₀ per grain; broken contacts.
+    dict of str to str
+        "vibration": internal kinetic energy above 100 k_B T₀ per grain; "breaking": contacts that broke.
     """
-    notes: list[str] = []
+    notes: dict[str, str] = {}
     if not rows or rows[0]["clusters"] < grains:
         return notes
     share = grains * BOLTZMANN * temperature
     advice = "damping = 'critical' in [forces.contact] (sand.Contact) removes the vibrations that every touch leaves"
+    if damped:
+        advice = "contacts are damped already: fast impacts cause this, or the damping is too weak"
     if share > 0.0 and (hot := next((row for row in rows if row["internal"] > HOT * share), None)) is not None:
         most = max(row["internal"] for row in rows) / share
-        notes.append(
+        notes["vibration"] = (
             f"grains in contact vibrate: from {format_quantity(hot['time'], 's')} on their internal kinetic energy "
             f"exceeds {HOT:g} k_B T₀ per grain, {most:.3g} at most; {advice}"
         )
-    if rows[-1]["broken"] > 0:
-        notes.append(
-            f"{rows[-1]['broken']} contact{'s' * (rows[-1]['broken'] > 1)} of growing aggregates broke; unless fast "
-            f"impacts broke them, they vibrate too strongly: {advice}"
-        )
+    if broken := rows[-1]["broken"]:
+        notes["breaking"] = f"{broken} contact{'s' * (broken > 1)} of growing aggregates broke; {advice}"
     return notes

@@ -60,7 +60,7 @@ LONG_RANGE_SUMS = 11  # summations of long-range forces
 CHECKED = 12  # step at which the time step was last chosen
 STEP_INCREASES = 13  # step at which the time step was last allowed to increase
 REJECTED = 14  # rejected steps without contacts, of integrators other than Verlet
-NEEDED = 15  # step at which a time step as short as LEVEL was last needed
+NEEDED = 15  # step at which a time step as short as LEVEL, or FLIGHT of ForestRuth, was last needed
 ORDERED = 16  # step of the last spatial sort
 COUNT = (
     *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),

@@ -148,6 +148,11 @@ def choose_ewald(
                 waves = _waves_needed(product / radius, spacing, volume, limits)
                 cost = _cost_of_pairs(count, radius, volume) + WAVE_COST * count * waves
                 found.append((cost, -radius, product, waves))
+    if not found:
+        raise BadInput(
+            f"dipoles: periodic = 'ewald' with accuracy = {accuracy:g} is not possible in this box; "
+            "give a larger accuracy, such as 1e-3"
+        )
     _, radius, product, waves = min(found)
     if waves >= MOST_WAVES:
         raise BadInput(

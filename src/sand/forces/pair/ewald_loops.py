@@ -4,7 +4,7 @@ The real part is summed by the pair loops of `dipole_loops`.  The reciprocal par
 
     U = (2πk/V) Σ exp(−q²/4α²)/q² |S(q)|²,  S(q) = Σ_j (μ_j·q) exp(i q·x_j),  q = 2π (n_x/L_x, n_y/L_y, n_z/L_z) ≠ 0
 
-Half of the vectors suffice, since S(−q) = −S*(q).  They are summed in columns of equal n_x and n_y ≥ 0 … with n_z and
+Half of the vectors suffice, since S(−q) = −S*(q).  They are summed in columns of equal n_x ≥ 0 and n_y, with n_z and
 −n_z together.  Within a column exp(i q·x) = w exp(±i q_z z), and with weights G = (8πk/V) exp(−q²/4α²)/q²
 
     B_j = −Re w_j (q_x V_0, q_y V_0, V_1),  F_j = Im w_j [(μ_x q_x + μ_y q_y) (q_x V_0, q_y V_0, V_1)
