@@ -28,7 +28,7 @@ COLD = 1e-6
 
 
 def bath_temperature(grains: Grains, forces: Sequence[Force], box: Box) -> float:
-    """Highest temperature [K] of a gas with Brownian motion, a bath of contacts, and grains; 0 if there is none.
+    """Temperature [K] of a Brownian gas or of the bath of contacts, the higher one, else of the grains; 0 without any.
 
     Velocities are taken as thermal in a box that is periodic on all axes: in open space they are those of bodies that
     collide. Above `MELTED` they are no temperature of a solid either, but follow from forces.
