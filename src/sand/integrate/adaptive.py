@@ -10,11 +10,11 @@ import numpy as np
 
 from ..arguments import checked
 from ..compiler.stage import Stage
-from ..errors import FORBID_EXTRA, BadInput, shown
+from ..errors import FORBID_EXTRA
 from ..grains import Grains
-from ..units import is_word, si
 from .adaptive_driver import free_flight
 from .base import register
+from .flight import FlightSettings
 from .step_control import StepCriteria
 from .verlet import Verlet
 
@@ -35,7 +35,7 @@ class ErrorLimits(NamedTuple):
 @register
 @checked
 @dataclass(frozen=True)
-class Adaptive:
+class Adaptive(FlightSettings):
     """Dormand–Prince Runge–Kutta pair 5(4) with error control while there are no contacts, velocity Verlet otherwise.
 
     A step is repeated with a shorter length if the error of any quantity of any grain exceeds its limit, and ends at
@@ -73,28 +73,8 @@ class Adaptive:
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "adaptive"
+    UNITS: ClassVar[dict[str, str]] = {"tolerance": "1", **ERRORS}
     flight: ClassVar[Stage | None] = free_flight
-
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        for key, unit in {"tolerance": "1", **ERRORS}.items():
-            if key != "tolerance" and is_word(getattr(self, key), "auto"):
-                continue
-            bounds = {"below": 1.0 if key == "tolerance" else math.inf}
-            try:
-                object.__setattr__(self, key, si(getattr(self, key), unit, f"stepping: {key}", above=0.0, **bounds))
-            except BadInput as error:
-                problems.extend(error.problems)
-        if not isinstance(self.contact_stepping, Verlet):
-            problems.append(f"stepping: contact_stepping = {shown(self.contact_stepping)}; give sand.Verlet(…)")
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        contact_stepping = {k: v for k, v in self.contact_stepping.parameters().items() if k != "method"}
-        own = {key: getattr(self, key) for key in ("tolerance", *ERRORS)}
-        return {"method": self.name, **own, "contact_stepping": contact_stepping}
 
     def resolved(self, grains: Grains, criteria: StepCriteria) -> Adaptive:
         """A copy in which every "auto" is replaced by a number, from the initial grains."""

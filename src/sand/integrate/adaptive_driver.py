@@ -10,27 +10,19 @@ import math
 from ..compiler.jit import caller, loop
 from ..compiler.program import call_stage, has_stage
 from ..compiler.stage import stage
-from ..neighbours.skin import invalidate_skins, invalidate_speeds, largest_displacement
+from ..neighbours.skin import largest_displacement
 from ..numerics.vec import dot, load
 from ..state.state import (
-    CHECKED,
-    CYCLE,
     FLIGHT,
     GRAIN1,
     GRAIN2,
-    LEFT,
-    OUTSIDE,
     REJECTED,
-    STAGE,
-    STEP,
-    STEP_INCREASES,
-    STEPS,
     TIME,
 )
 from .event_location import NEVER, first_contact_time
+from .flight import finish_flight_step
 from .force_calls import sum_external
-from .force_stages import ENERGY, WRAPPING
-from .motion import wrap_all
+from .force_stages import ENERGY
 from .parts import Stop
 from .runge_kutta import (
     GROW,
@@ -44,7 +36,7 @@ from .runge_kutta import (
     work_of,
 )
 from .stages import GAS_KICK, VERLET_LIST
-from .step_control import INCREASE_INTERVAL, steps_of_free_grains
+from .step_control import steps_of_free_grains
 
 ORDER = 5.0
 """The error of a step is proportional to this power of its length."""
@@ -142,27 +134,15 @@ def free_flight(
     if reason != Stop.NONE:
         return reason.value
     normalise_all(grains)
-    invalidate_speeds(pair_list)
-    invalidate_skins(pair_list)
-    clock[TIME] += dt
-    if external_work.time_dependent:
-        after = sum_external(scratch, forces, program, table, clock[TIME], ENERGY)
-        lost[OUTSIDE] -= after - before + work_of(runge_kutta, dt)
-    if external_work.position_dependent:
-        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], WRAPPING)
-    wrap_all(grains, span)
+    work = work_of(runge_kutta, dt) if external_work.time_dependent else 0.0
+    finish_flight_step(
+        grains, pair_list, clock, count, lost, scratch, span, external_work, forces, program, table, dt, in_contact,
+        before, work
+    )  # fmt: skip
     if external_work.position_dependent:
         sum_loads(grains, long_range, count, scratch, forces, queue, program, table, clock[TIME])
-    clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
     if in_contact:
-        # the second half of a step of 0 s follows, with new lists and a new choice of the step
-        pair_list.anchor[0, 0] = math.inf
-        clock[FLIGHT] = 0.0
-        count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
-        count[STAGE] = 1
         return Stop.NONE.value
-    clock[STEP] = dt
-    count[STEPS] += 1
     if has_stage(program, GAS_KICK):
         call_stage(program, GAS_KICK, table, 0)
     return Stop.NONE.value

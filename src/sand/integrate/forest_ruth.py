@@ -25,38 +25,30 @@ from ..box import nearest_image
 from ..compiler.jit import caller, loop, rare
 from ..compiler.program import call_stage, has_stage
 from ..compiler.stage import Stage, stage
-from ..errors import FORBID_EXTRA, BadInput, shown
+from ..errors import FORBID_EXTRA
 from ..forces.external.formulas import stiffness_of_field
 from ..grains import Grains
-from ..neighbours.skin import invalidate_skins, invalidate_speeds
 from ..numerics.quaternion import turn, turned
 from ..numerics.vec import axpy, dot, load, load4, norm, put, put4, scale, sub
 from ..state.state import (
-    CHECKED,
-    CYCLE,
     FLIGHT,
-    LEFT,
     LONG_RANGE_SUMS,
     NEEDED,
-    OUTSIDE,
     REJECTED,
-    STAGE,
-    STEP,
-    STEP_INCREASES,
     STEPS,
     TIME,
 )
-from ..units import is_word, si
 from .adaptive_driver import MAX_ATTEMPTS, STRIDE_FRACTION, refresh_verlet_list
 from .base import register
 from .event_location import NEVER, first_contact_time
+from .flight import FlightSettings, finish_flight_step
 from .force_calls import sum_external
-from .force_stages import ENERGY, POWER, WRAPPING
-from .motion import kick, wrap_all
+from .force_stages import ENERGY, POWER
+from .motion import kick
 from .parts import Stop
 from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads
 from .stages import EXPLAIN, GAS_KICK
-from .step_control import INCREASE_INTERVAL, StepCriteria, quantise_step
+from .step_control import StepCriteria, quantise_step
 from .step_parts import MAX_TURN
 from .verlet import Verlet
 
@@ -283,24 +275,12 @@ def symplectic_flight(
     if reason != Stop.NONE:
         call_stage(program, EXPLAIN, table, reason.value)
         return reason.value
-    invalidate_speeds(pair_list)
-    invalidate_skins(pair_list)
-    clock[TIME] += dt
-    if external_work.time_dependent:
-        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], ENERGY) - before + work
-    if external_work.position_dependent:
-        lost[OUTSIDE] -= sum_external(scratch, forces, program, table, clock[TIME], WRAPPING)
-    wrap_all(grains, span)
-    clock[STEP] = clock[CYCLE] = clock[LEFT] = 0.0
+    finish_flight_step(
+        grains, pair_list, clock, count, lost, scratch, span, external_work, forces, program, table, dt, in_contact,
+        before, work
+    )  # fmt: skip
     if in_contact:
-        # the second half of a step of 0 s follows, with new lists, new loads and a new choice of the step
-        pair_list.anchor[0, 0] = math.inf
-        clock[FLIGHT] = 0.0
-        count[CHECKED] = count[STEP_INCREASES] = count[STEPS] - INCREASE_INTERVAL
-        count[STAGE] = 1
         return Stop.NONE.value
-    clock[STEP] = dt
-    count[STEPS] += 1
     # with the loads of the last kick, so that the steps do not depend on output
     clock[FLIGHT] = choose_free_step(grains, long_range, clock, count, span, search, criteria, flight_limits, forces)
     if not clock[FLIGHT] > 0.0:
@@ -317,7 +297,7 @@ def symplectic_flight(
 @register
 @checked
 @dataclass(frozen=True)
-class ForestRuth:
+class ForestRuth(FlightSettings):
     """Symplectic scheme of fourth order while there are no contacts, velocity Verlet otherwise.
 
     The position-extended Forest–Ruth-like scheme of Omelyan, Mryglod & Folk (2002): four sums of the forces per step;
@@ -349,28 +329,8 @@ class ForestRuth:
 
     __pydantic_config__ = FORBID_EXTRA
     name: ClassVar[str] = "forest-ruth"
+    UNITS: ClassVar[dict[str, str]] = {"accuracy": "1", "step": "s"}
     flight: ClassVar[Stage | None] = symplectic_flight
-
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        for key, unit, below in (("accuracy", "1", 1.0), ("step", "s", math.inf)):
-            if key == "step" and is_word(self.step, "auto"):
-                continue
-            try:
-                value = si(getattr(self, key), unit, f"stepping: {key}", above=0.0, below=below)
-                object.__setattr__(self, key, value)
-            except BadInput as error:
-                problems.extend(error.problems)
-        if not isinstance(self.contact_stepping, Verlet):
-            problems.append(f"stepping: contact_stepping = {shown(self.contact_stepping)}; give sand.Verlet(…)")
-        if problems:
-            raise BadInput(problems)
-
-    def parameters(self) -> dict[str, Any]:
-        """Settings in SI units, as in a case file."""
-        contact_stepping = {k: v for k, v in self.contact_stepping.parameters().items() if k != "method"}
-        own = {"accuracy": self.accuracy, "step": self.step}
-        return {"method": self.name, **own, "contact_stepping": contact_stepping}
 
     def resolved(self, grains: Grains, criteria: StepCriteria) -> ForestRuth:
         """These settings: the driver chooses the automatic step."""
