@@ -2,9 +2,10 @@
 
 One step:  choose dt → kick dt/2, drift, rotate dt → check the pair lists → update contacts: slip, break, form → forces
 (contacts, long-range, external) → kick dt/2.  Long-range forces are summed once per cycle of one or more steps; a
-contact that forms or breaks ends the cycle.  The driver returns between two cycles, at the requested end or because no
-step is possible, and in the middle of a step (STAGE = 1) if an array is too small; the call after it resumes there, so
-enlarging arrays does not change the result.
+contact that forms or breaks ends the cycle.  The driver returns between two cycles: at the requested end, because no
+step is possible, or after a contact formed or broke, if a cut-off follows the clusters.  It returns in the middle of a
+step (STAGE = 1) if an array is too small; the call after it resumes there, so enlarging arrays does not change the
+result.
 
 The driver is compiled once, for all forces and contact laws: it calls their stages by address (`stages`,
 `force_stages`).  Short loops over grains that do not depend on them are part of the driver.
@@ -20,6 +21,8 @@ from ..contact.update import load_contact_sums, log_contact_sums
 from ..neighbours.skin import consume_skins, invalidate_speeds, list_is_stale, reset_skins
 from ..numerics.simd import float_bits, float_from_bits, magnitude_bits
 from ..state.state import (
+    BROKEN,
+    COMPARED,
     CONTACTS,
     CORRECTED,
     CYCLE,
@@ -27,6 +30,7 @@ from ..state.state import (
     LEFT,
     LONG_RANGE_SKIN,
     LONG_RANGE_SUMS,
+    MADE,
     OUTSIDE,
     PAIR_LIST_SKIN,
     SQUARED_SPEED,
@@ -341,6 +345,9 @@ def steps_until(
         stop = Stop.NONE.value
         if count[STAGE] == 0:
             if clock[LEFT] == 0.0:
+                # before all other returns, so that no output lies between the step and the new cut-off
+                if count[COMPARED] >= 0 and count[COMPARED] != count[MADE] + count[BROKEN]:
+                    return Stop.CLUSTERS_CHANGED.value
                 if clock[TIME] >= until:
                     return Stop.TIME_REACHED.value
                 if count[STEPS] >= last:

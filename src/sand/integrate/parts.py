@@ -40,6 +40,7 @@ class Stop(IntEnum):
     OVERCOMPRESSED = 7
     SPINS_TOO_FAST = 8
     LIST_FULL = 9
+    CLUSTERS_CHANGED = 10  # a contact has formed or broken: the cut-off may have to follow
 
 
 class ContactParameters(NamedTuple):

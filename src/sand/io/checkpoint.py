@@ -8,6 +8,7 @@ A checkpoint is a NumPy archive of plain arrays without pickles, replaced atomic
 | clock | time and step [s], remaining length of the r-RESPA cycle [s], …; meta.json names all entries |
 | count | numbers of steps, contacts, candidate pairs, contacts formed and broken, slip events; builds of the lists |
 | lost | energy lost per channel [J] |
+| cutoff | the cut-off of dipoles that follows the largest clusters, and the choice; meta.json names all entries |
 | ledger | all rows so far, (K, columns of ledger.csv) |
 | grains/… | every quantity of a grain, (N,) or (3, N), SI, and indices of materials |
 | contacts/… | pairs, pointers in body frames, twist, time of formation, constants, losses, loads, contacts per grain |
@@ -38,8 +39,8 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 7
-"""Version of the file format; other versions are refused. Versions before 7 were never released."""
+VERSION = 8
+"""Version of the file format; other versions are refused. Versions before 8 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
 _META = "meta.json"

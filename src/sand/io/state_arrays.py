@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import BadInput
 from ..schema import FIELDS
 from ..state.arrays import SAVED_LONG_RANGE
-from ..state.state import CLOCK, CONTACTS, COUNT, GRAIN1, GRAIN2, LOST, PAIRS, STAGE, STEPS, TIME
+from ..state.state import CLOCK, CONTACTS, COUNT, CUTOFF, GRAIN1, GRAIN2, LOST, PAIRS, STAGE, STEPS, TIME
 
 
 class ArraySpec(NamedTuple):
@@ -31,6 +31,7 @@ STORED = {
     "clock": ArraySpec("f8", (len(CLOCK),), "no nan"),
     "count": ArraySpec("i8", (len(COUNT),), "any"),
     "lost": ArraySpec("f8", (len(LOST),)),
+    "cutoff": ArraySpec("f8", (len(CUTOFF),), "not below 0"),
     "order": ArraySpec("u4", ("N",), "order", required=False),
     "ledger": ArraySpec("f8", (None, None)),
     **{f"grains/{field.name}": ArraySpec("f8", ("N",) if field.width == 1 else (field.width, "N")) for field in FIELDS},
@@ -174,6 +175,7 @@ RULES: dict[str, Callable[[np.ndarray, Any], str]] = {
     "finite": _each(np.isfinite, "finite"),
     # infinities are steps without a limit, and reference positions before the first list
     "no nan": _each(lambda array: ~np.isnan(array), "a number"),
+    "not below 0": _each(lambda array: array >= 0.0, "a number of at least 0"),
     "above 0": _each(lambda array: np.isfinite(array) & (array > 0.0), "finite and above 0"),
     "boolean": _each(lambda array: array <= 1, "0 or 1"),
     "grains": _pairs,

@@ -15,6 +15,7 @@ from .style import (
     BLUE,
     BROWN,
     GREEN,
+    INDIGO,
     MUTED,
     ORANGE,
     PURPLE,
@@ -33,14 +34,14 @@ LOSS_CHANNELS = {name: (f"lost_{name}",) for name in LOST if name not in DAMPING
     "damping": tuple(f"lost_{name}" for name in DAMPING)
 }
 """Ledger columns of each loss channel of the figures; damping of the four modes of a contact is drawn together."""
-LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, YELLOW, BROWN, TEXT_COLOUR, MUTED, ORANGE)
+LOSS_COLOURS = (RED, SKY, BLUE, GREEN, PURPLE, YELLOW, BROWN, TEXT_COLOUR, MUTED, INDIGO, ORANGE)
 EXTERNAL_COLOURS = (ORANGE, PURPLE, SKY, YELLOW)
 ENERGY_COLOURS = {"kinetic": BLUE, "contacts": RED, "magnetic": GREEN}
 COUNTS = {"contacts": ("contacts", BLUE), "made": ("formed so far", GREEN), "broken": ("broken so far", RED)}
 """Ledger columns of contact numbers, with label and colour."""
-CHANNEL_LABELS = {"outside": "external"}
+CHANNEL_LABELS = {"outside": "external", "cutoff_changed": "cut-off"}
 """Labels of loss channels that differ from the name of the ledger column."""
-OPTIONAL_CHANNELS = ("damping", "stiffness", "settling", "gas", "outside")
+OPTIONAL_CHANNELS = ("damping", "stiffness", "settling", "gas", "outside", "cutoff_changed")
 """Loss channels of forces and options that are off by default; not listed as zero in the figure."""
 
 DECADES = 6

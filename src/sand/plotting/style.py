@@ -22,8 +22,8 @@ BLUE, RED, GREEN, PURPLE, ORANGE, SKY, YELLOW = (
     "#D9C400",
 )
 """After Okabe & Ito (2008): distinct for colour-blind readers."""
-BROWN = "#8A4B08"
-"""A further colour of lines."""
+BROWN, INDIGO = "#8A4B08", "#4B4FA8"
+"""Further colours of lines."""
 LARGEST_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, YELLOW)
 """Colours of the largest clusters, largest first."""
 OTHER_COLOURS = ("#8C6BB1", "#A6761D", "#66A182", "#6F8FB8", "#C58B8B", "#9A9A4A", "#5E9EA0")
@@ -42,6 +42,7 @@ ON_DARK = {
     SKY: "#8FD0F2",
     YELLOW: "#E8DA4F",
     BROWN: "#C98B4E",
+    INDIGO: "#8F93E0",
     TEXT_COLOUR: TEXT_ON_DARK,
     MUTED: MUTED_ON_DARK,
 }

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..box import Box
 from ..constants import BOLTZMANN
 from ..contact.columns import constant_names
@@ -46,8 +48,9 @@ from ..state.arrays import (
     empty_pair_list,
     runge_kutta_arrays,
 )
-from ..state.state import RECORDED, State
+from ..state.state import COMPARED, CUT_RADIUS, RECORDED, State
 from .checks import check_system
+from .cluster_cutoff import follow_clusters
 from .engine import Engine
 from .initial_contacts import NO_OVERLAPS, add_contacts, overlapping_pairs, refuse_overlaps
 
@@ -86,6 +89,7 @@ def build_engine(
     *,
     fresh: bool = True,
     contacts: StrainedContacts | None = None,
+    cutoff: np.ndarray | None = None,
 ) -> Engine:
     """Check that grains, forces, box and settings fit together, and build the engine.
 
@@ -97,6 +101,8 @@ def build_engine(
         Whether this is a new start, whose overlaps are checked; a resumed run may be in the middle of an impact.
     contacts : StrainedContacts or None, optional
         Contacts present from the start, with their displacements.
+    cutoff : ndarray or None, optional
+        `State.cutoff` of the checkpoint from which the run continues.
 
     Raises
     ------
@@ -106,11 +112,20 @@ def build_engine(
     warnings = check_system(grains, forces, box, fresh=fresh)
     by_type = _forces_by_type(forces, grains)
     pair_gap = float(grains.radius.min())
+    wrapped = grains.copy()
+    wrapped.arrays.position[...] = box.wrap(grains.position).T
+    start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
+    follower = follow_clusters(by_type.long_range, grains, box, start.pair, contacts, cutoff)
     cutoffs = [f.choose(grains, box).radius for f in by_type.long_range]
+    if follower is not None:
+        cutoffs[follower.index] = float(follower.values[CUT_RADIUS])
     flights = stepping.flight is not None
     found = neighbours.choose(grains, box, pair_gap, [r for r in cutoffs if r is not None], adaptive_steps=flights)
     listed = [found.search.listed and r is not None for r in cutoffs]
     long_range = _long_range_loops(by_type, grains, box, listed)
+    if follower is not None:
+        force, sums, _ = long_range[follower.index]
+        long_range[follower.index] = force, sums, follower.force.numbers_at(cutoffs[follower.index])
     verlet = stepping.contact_stepping
     control = _step_control(grains, verlet, by_type, pair_gap)
     stepping = stepping.resolved(grains, control)
@@ -134,16 +149,18 @@ def build_engine(
         bool(grains.body_moment.any()),
         len(grains) >= WIDE_FROM,
     )
-    wrapped = grains.copy()
-    wrapped.arrays.position[...] = box.wrap(grains.position).T
-    start = overlapping_pairs(wrapped, box) if by_type.contact is not None and fresh else NO_OVERLAPS
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
     state = _new_state(wrapped, box, parameters, components, capacity, over_all_pairs=not all(listed))
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
     )
-    engine = Engine(state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components)
+    state.count[COMPARED] = -1 if follower is None else 0
+    if follower is not None:
+        state.cutoff[:] = follower.values
+    engine = Engine(
+        state, parameters, warnings, by_type.external, long_range, search, stepping, chosen, components, follower
+    )
     given = add_contacts(engine, by_type.contact, contacts)
     if by_type.contact is not None:
         refuse_overlaps(wrapped, by_type.contact, start, given)

@@ -16,13 +16,16 @@ from ..contact.events import forming_loops
 from ..contact.gather import resort_contacts_by_grain
 from ..contact.law import ContactLaw
 from ..contact.measure import ENERGIES, energies_stage
+from ..errors import warn
 from ..forces.base import ExternalForce, LongRangeForce
 from ..forces.external.loops import external_energies_for
 from ..forces.pair.loops import long_range_energies_for
 from ..integrate.base import Integrator
 from ..integrate.driver import advance
+from ..integrate.force_stages import SUM, WHOLE, pair_force_stages
 from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.program import Components, build_program
+from ..integrate.respa import clear_long_range_loads
 from ..integrate.step_control import INCREASE_INTERVAL
 from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, take_blocks, uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
@@ -31,9 +34,13 @@ from ..neighbours.settings import Neighbours
 from ..neighbours.spatial_sort import SORT_INTERVAL, inverse, reorder_grains, sort_contacts_and_pairs, spatial_order
 from ..state.arrays import OVER_ALLOCATION
 from ..state.state import (
+    BROKEN,
     CHECKED,
+    COMPARED,
     CONTACT_STEP,
     CONTACTS,
+    CUT_RADIUS,
+    CUTOFF_CHANGED,
     GRAIN1,
     GRAIN2,
     LONG_RANGE_SUMS,
@@ -46,6 +53,7 @@ from ..state.state import (
     STEPS,
     State,
 )
+from .cluster_cutoff import ClusterCutoff
 
 
 @dataclass
@@ -70,6 +78,8 @@ class Engine:
         The integrator, with all automatic settings resolved.
     neighbours : Neighbours
         Settings of the neighbour search, with all automatic settings resolved; a resumed run keeps those of its start.
+    cutoff : ClusterCutoff or None
+        The cut-off that follows the clusters, if there is one.
     """
 
     _state: State
@@ -81,6 +91,7 @@ class Engine:
     stepping: Integrator
     neighbours: Neighbours
     _components: Components
+    cutoff: ClusterCutoff | None = None
     _is_sorted: bool = field(init=False, default=False)  # are the arrays in Morton order now?
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
@@ -169,8 +180,62 @@ class Engine:
                 state.grow_pairs(int(OVER_ALLOCATION * found))
             elif stop is Stop.LIST_FULL:
                 state.grow_rows()
+            elif stop is Stop.CLUSTERS_CHANGED:
+                self._compare_clusters()
             else:
                 return stop
+
+    def _compare_clusters(self) -> None:
+        """After a contact formed or broke: choose the cut-off that follows the clusters anew, if they have grown."""
+        assert self.cutoff is not None
+        state, before = self._state, float(self._state.cutoff[CUT_RADIUS])
+        state.count[COMPARED] = state.count[MADE] + state.count[BROKEN]
+        radius = self.cutoff.update(state)
+        if radius is not None:
+            self._change_cutoff(self.cutoff.index, radius)
+            warn(self.cutoff.message(state, before))
+
+    def _change_cutoff(self, k: int, radius: float) -> None:
+        """Use another cut-off [m] for the dipoles, long-range force k: their loops, the reach of lists, loads, energy.
+
+        Loads change by the difference of two sums, so that the next step starts with the present ones; grains in
+        contact are within both cut-offs, and their share of the loads (r-RESPA) stays. Lists keep their skin.
+        """
+        state, search = self._state, self.parameters.search
+        energy, loads = self._pair_energy(k), self._pair_loads(k)
+        changed: list[tuple[Any, Any, Any]] = list(self.long_range)
+        force, sums, _ = changed[k]
+        changed[k] = force, sums, force.numbers_at(radius)
+        self.long_range = changed
+        self._components = self._components._replace(pair_forces=[own[1:] for own in self.long_range])
+        search = search._replace(reach=max(search.reach, radius + search.margin))
+        self.parameters = self.parameters._replace(search=search)
+        self._table.set("search", search)
+        self._program = None
+        self._rebuild_list()
+        force_change, torque_change = self._pair_loads(k) - loads
+        for arrays in (state.grains.arrays, state.long_range):
+            arrays.force[...] += force_change
+            arrays.torque[...] += torque_change
+        state.lost[CUTOFF_CHANGED] += energy - self._pair_energy(k)
+
+    def _pair_loads(self, k: int) -> np.ndarray:
+        """Forces and torques (2, 3, N) of long-range force k; the loads of the state stay as they are."""
+        (_, sums, numbers), own = self.long_range[k], self._state.long_range
+        kept = own.force.copy(), own.torque.copy()
+        clear_long_range_loads(own)
+        stage = pair_force_stages(sums, self._components.wide)[SUM]
+        stage.run(self._current_table(self._state), numbers, WHOLE)
+        found = np.array([own.force, own.torque])
+        own.force[...], own.torque[...] = kept
+        return found
+
+    def _pair_energy(self, k: int) -> float:
+        """Energy [J] of long-range force k."""
+        _, sums, numbers = self.long_range[k]
+        shares = np.zeros(len(self._state.grains))
+        long_range_energies_for(sums).run(self._current_table(self._state), (numbers, shares))
+        return math.fsum(shares)
 
     def _current_table(self, state: State) -> Table:
         """The table with the present arrays of the state."""
@@ -222,6 +287,7 @@ class Engine:
         state.clock[CONTACT_STEP] = math.inf
         self._drive(-math.inf, 1)
         state.count[STEPS] = state.count[MADE] = state.count[SLIPPED] = state.count[LONG_RANGE_SUMS] = 0
+        state.count[COMPARED] = min(state.count[COMPARED], 0)
         state.lost[:] = 0.0
         state.contacts.lost[:] = 0.0
 
@@ -229,6 +295,8 @@ class Engine:
         """Restore a saved state; quantities that a checkpoint does not hold are recomputed."""
         state = self.state
         state.from_arrays(saved)
+        if self.cutoff is None:
+            state.count[COMPARED] = -1
         if state.order.size:  # the order of the lists depends on it
             reorder_grains(state, state.order)
             self._is_sorted = True

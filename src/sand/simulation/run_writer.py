@@ -19,7 +19,7 @@ from ..io.ledger_table import LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
 from ..io.run_folder import make_folder, plain, read_json, write_json, write_toml
 from ..io.trajectory import TrajectoryWriter
-from ..state.state import CLOCK, COUNT, LOST, STAGE
+from ..state.state import CLOCK, COUNT, CUTOFF, LOST, STAGE
 from ..version import __version__
 from .displays import DISPLAYS
 from .ledger import Ledger
@@ -165,6 +165,7 @@ class RunWriter:
             "clock": CLOCK,
             "count": COUNT,
             "lost": LOST,
+            "cutoff": CUTOFF,
         }
         if simulation.is_sound:
             arrays = {**simulation.state.to_arrays(), "ledger": simulation.ledger.to_array()}

@@ -112,7 +112,8 @@ class Simulation(ReadOnlySettings):
         self.start = grains.copy()
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
-        self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts)
+        saved = None if restart is None else restart[0].get("cutoff")
+        self._engine = build_engine(*parts, fresh=restart is None, contacts=contacts, cutoff=saved)
         self.stepping, self.neighbours = self._engine.stepping, self._engine.neighbours
         self.temperature = kinetic_temperature(grains)
         self.ledger = Ledger(
@@ -176,17 +177,23 @@ class Simulation(ReadOnlySettings):
     @property
     def choices(self) -> dict[str, str]:
         """Automatic choices with their reasons: boundary, cut-offs and neighbour search."""
+        follower = self._engine.cutoff
+        now = "" if follower is None else follower.present(self._engine.state)
+        present = {"dipoles cut-off now": now} if now else {}
         if self._choices_at_start:
-            return self._choices_at_start
+            return self._choices_at_start | present
         choices = {"start": self.origin} if self.origin else {}
         choices["boundary"] = self.box.describe()
         for force in self.forces:
             choose = getattr(force, "choose", None)
             if choose is not None:
-                radius, reason = choose(self.start, self.box)
+                if follower is not None and force is follower.force:
+                    radius, reason = follower.at_start
+                else:
+                    radius, reason = choose(self.start, self.box)
                 length = "none" if radius is None else format_quantity(radius, "m")
                 choices[f"{force.name} cut-off"] = f"{length} ({reason})"
-        return choices | {"neighbours": self._engine.search}
+        return choices | {"neighbours": self._engine.search} | present
 
     def loads(self) -> dict[str, Any]:
         """Compute the present loads without taking a step.
@@ -305,8 +312,13 @@ class Simulation(ReadOnlySettings):
         return DISPLAYS["figure"](self)
 
     def notes(self) -> list[str]:
-        """What the run so far says about its own set-up: contacts that vibrate, contacts that broke; one text each."""
-        return list(self._notes(self.ledger.rows).values())
+        """What the run so far says about its own set-up, one text each.
+
+        Contacts that vibrate, contacts that broke, and a cut-off of dipoles that half the box came to limit.
+        """
+        follower = self._engine.cutoff
+        limited = "" if follower is None else follower.note(self.state)
+        return [*self._notes(self.ledger.rows).values(), *([limited] if limited else [])]
 
     def _notes(self, rows: Sequence[dict[str, float]]) -> dict[str, str]:
         damped = any(isinstance(force, Contact) and force.damping != "none" for force in self.forces)

@@ -62,10 +62,20 @@ STEP_INCREASES = 13  # step at which the time step was last allowed to increase
 REJECTED = 14  # rejected steps without contacts, of integrators other than Verlet
 NEEDED = 15  # step at which a time step as short as LEVEL, or FLIGHT of ForestRuth, was last needed
 ORDERED = 16  # step of the last spatial sort
+COMPARED = 17  # contacts formed and broken when the cut-off was last compared with the clusters; −1: it is fixed
 COUNT = (
     *("steps", "stage", "contacts", "pairs", "made", "broken", "slipped", "rebuilt", "grain1", "grain2", "listed"),
-    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered"),
+    *("long_range_sums", "checked", "step_increases", "rejected", "needed", "ordered", "compared"),
 )
+
+# --- indices of State.cutoff (float64): the cut-off of dipoles that follows the largest clusters -----------------
+CUT_RADIUS = 0  # cut-off [m]; 0 without such a cut-off
+CUT_CAPTURE = 1  # capture radius b_max of the two clusters for which it was chosen [m]
+CUT_TEMPERATURE = 2  # temperature of the clusters' translation at the start [K]
+CUT_TIME = 3  # time of the choice [s]
+CUT_FIRST, CUT_SECOND = 4, 5  # grains of the two clusters
+CUT_LIMITED = 6  # time of the first choice during the run that half the box limited [s]; infinite if none
+CUTOFF = ("radius", "capture", "temperature", "time", "first", "second", "limited")
 
 # --- indices of PairList.skin (float64), see neighbours.skin ------------------------------------------------
 LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, SQUARED_SPEED, SQUARED_SPIN, SAFE_SPEED, INNER_COUNT = range(7)
@@ -73,8 +83,12 @@ LONG_RANGE_SKIN, PAIR_LIST_SKIN, INNER_SKIN, SQUARED_SPEED, SQUARED_SPIN, SAFE_S
 # --- indices of State.lost (float64): energy dissipated or transferred, per channel [J] ---------------------
 FORMING, BREAKING, SLIDING, ROLLING, TWISTING = range(5)
 DAMPING_NORMAL, DAMPING_SLIDING, DAMPING_ROLLING, DAMPING_TWISTING, STIFFNESS, SETTLING, GAS, OUTSIDE = range(5, 13)
+CUTOFF_CHANGED = 13
 DAMPING = ("damping_normal", "damping_sliding", "damping_rolling", "damping_twisting")
-LOST = ("forming", "breaking", "sliding", "rolling", "twisting", *DAMPING, "stiffness", "settling", "gas", "outside")
+LOST = (
+    *("forming", "breaking", "sliding", "rolling", "twisting", *DAMPING, "stiffness", "settling", "gas", "outside"),
+    "cutoff_changed",
+)
 RECORDED = ("forming", "sliding", "rolling", "twisting", "damping", "stiffness")
 """Losses recorded per contact, in this order: damping of all modes together, and nothing by breaking, after which a
 contact does not exist."""
@@ -92,6 +106,7 @@ class State:
     clock: np.ndarray = field(default_factory=lambda: np.zeros(len(CLOCK)))
     count: np.ndarray = field(default_factory=lambda: np.zeros(len(COUNT), np.int64))
     lost: np.ndarray = field(default_factory=lambda: np.zeros(len(LOST)))
+    cutoff: np.ndarray = field(default_factory=lambda: np.zeros(len(CUTOFF)))
     runge_kutta: RungeKuttaArrays = field(default_factory=lambda: runge_kutta_arrays(0))
     clusters: ClusterArrays = field(default_factory=lambda: cluster_arrays(0))
     # user's index of each grain in memory, with spatial sorting (neighbours.spatial_sort)
@@ -143,7 +158,7 @@ class State:
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """All arrays of the state by name, for a checkpoint; unused columns are omitted."""
-        out = {"clock": self.clock, "count": self.count, "lost": self.lost}
+        out = {"clock": self.clock, "count": self.count, "lost": self.lost, "cutoff": self.cutoff}
         out |= {f"grains/{k}": v for k, v in self.grains.arrays._asdict().items()}
         for group in ("contacts", "pair_list"):
             for name, array in getattr(self, group)._asdict().items():
@@ -160,7 +175,7 @@ class State:
         BadInput
             If an array is missing or has another shape.
         """
-        for name in ("clock", "count", "lost"):
+        for name in ("clock", "count", "lost", "cutoff"):
             _copy_into(getattr(self, name), saved, name)
         if "order" in saved:
             self.order = np.zeros(len(self.grains), np.uint32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,21 @@ CAPTURE_RADII = 1.5
 """Automatic cut-off in a large box, in units of the capture radius b_max at thermal speed."""
 
 
+class CapturingPair(NamedTuple):
+    """The two bodies with the largest moments, and how far from each other they capture."""
+
+    capture: float  # b_max [m] at thermal speed; 0 with fewer than two moments, infinite at rest
+    first: int  # grains of each; 0 with fewer than two moments
+    second: int
+
+    def __str__(self) -> str:
+        if max(self.first, self.second) == 1:
+            return "single grains"
+        if min(self.first, self.second) == 1:
+            return f"a cluster of {max(self.first, self.second)} grains and a single grain"
+        return f"clusters of {self.first} and {self.second} grains"
+
+
 @checked
 @dataclass(frozen=True)
 class Dipoles(CutoffForce):
@@ -41,8 +56,12 @@ class Dipoles(CutoffForce):
     ----------
     cutoff : float, str or None, optional
         "auto", None (no cut-off: all pairs in an open box, nearest images in a periodic one), or a length [m]. "auto"
-        is None in an open box. In a periodic one it is 1.5 b_max(v_th), but at least two diameters of the largest
-        grain and at most (L/2)/1.35.
+        is None in an open box. In a periodic one it is 1.5 b_max of the two clusters with the largest moments, at
+        thermal speed, but at least two diameters of the largest grain and at most (L/2)/1.35. A cluster is a group of
+        grains connected by contacts, or a single grain. The cut-off grows during a run: it is chosen anew when b_max
+        has grown by 10 %. Clusters are compared after each step in which a contact formed or broke. The temperature is
+        that of the clusters' translation at the start. The change of the energy is logged as `lost_cutoff_changed`. A
+        cut-off that is given as a length stays the same.
     cut : str, optional
         "smooth": the interaction is switched off over the outer fifth of the cut-off radius, which conserves energy;
         or "sharp", as in the paper: the energy jumps each time a pair crosses the radius.
@@ -132,19 +151,32 @@ class Dipoles(CutoffForce):
         return choose_ewald(sides(box), len(grains), dipoles, self.accuracy, least)
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
-        """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box."""
-        return self.parameters() if self.periodic == "ewald" else super().resolved(grains, box)
+        """Settings; a cut-off in an open box as "none".
+
+        An Ewald sum follows from grains and box, and a cut-off that follows the clusters from the state.
+        """
+        own = self.periodic == "ewald" or self.follows_clusters(box)
+        return self.parameters() if own else super().resolved(grains, box)
+
+    def follows_clusters(self, box: Box) -> bool:
+        """Whether the cut-off is chosen anew during a run."""
+        return self.cutoff == "auto" and self.periodic != "ewald" and not box.is_open
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
-        """The thermal capture radius, at least two grain diameters, at most `largest`; none in an open box."""
+        """The cut-off for single grains; none in an open box."""
         if math.isinf(largest):
             return super().automatic(grains, largest)
-        capture = CAPTURE_RADII * thermal_capture(grains)
+        return self.for_pair(capturing_pair(grains, None, kinetic_temperature(grains)), grains, largest)
+
+    def for_pair(self, pair: CapturingPair, grains: Grains, largest: float) -> CutoffChoice:
+        """1.5 capture radii of a pair of clusters, at least two diameters of the largest grain, at most `largest`."""
+        capture = CAPTURE_RADII * pair.capture
         shortest = 4.0 * float(grains.radius.max())
         full = f"{CAPTURE_RADII} b_max = {format_quantity(capture, 'm')}"
         half = f"{self.cut}, half the box / {HALF_BOX_RATIO}"
         if capture == 0.0:
-            return CutoffChoice(largest, f"{half}, no grain has a magnetic moment")
+            few = "only one cluster has" if self.acts_on(grains) else "no grain has"
+            return CutoffChoice(largest, f"{half}, {few} a magnetic moment")
         if capture >= largest:
             limit = f"{half}, limited by the box: less than {full}, so captures from farther away are missed"
             return CutoffChoice(largest, f"{limit}; use a larger box, or periodic = 'ewald'")
@@ -152,7 +184,7 @@ class Dipoles(CutoffForce):
             return CutoffChoice(largest, f"{half}, less than two grain diameters")
         if capture < shortest:
             return CutoffChoice(shortest, f"{self.cut}, two grain diameters, more than {full}")
-        return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max at the grains' thermal speed")
+        return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max of {pair} at thermal speed")
 
     def sums(self, box: Box, listed: bool) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
@@ -166,7 +198,11 @@ class Dipoles(CutoffForce):
         """Parameters of the loops."""
         if self.periodic == "ewald":
             return ewald_parameters(self.ewald(grains, box), box, len(grains), self.boundary == "vacuum")
-        return DipoleParameters(MAGNETIC, cutoff_for(self.choose(grains, box).radius, self.cut))
+        return self.numbers_at(self.choose(grains, box).radius)
+
+    def numbers_at(self, radius: float | None) -> DipoleParameters:
+        """Parameters of the loops for a cut-off radius [m], without an Ewald sum."""
+        return DipoleParameters(MAGNETIC, cutoff_for(radius, self.cut))
 
     def acts_on(self, grains: Grains) -> bool:
         """Whether any grain has a moment."""
@@ -181,23 +217,49 @@ class Dipoles(CutoffForce):
         return contact_energy(size[strongest], size[strongest], 2.0 * grains.radius[strongest], MAGNETIC)
 
 
-def thermal_capture(grains: Grains) -> float:
-    """Capture radius b_max [m] (Eq. 13) of the mean moment at the thermal speed √(kT/m); infinite at rest."""
-    temperature = kinetic_temperature(grains)
-    mass = float(grains.mass.mean())
-    moment = float(np.linalg.norm(grains.moment, axis=1).mean())
+def capturing_pair(grains: Grains, labels: np.ndarray | None, temperature: float) -> CapturingPair:
+    """The two clusters with the largest moments |Σμ|, and b_max (Eq. 13) at their thermal speed.
+
+    Parameters
+    ----------
+    grains : Grains
+        The grains.
+    labels : ndarray or None
+        Cluster of each grain (N,), 0…K−1; None: grains without contacts.
+    temperature : float
+        T [K] of the translation of clusters. The speed √(kT/2m̄), m̄ the reduced mass, is √(kT/m) for equal masses m.
+    """
+    mass, moment, number = _bodies(grains, labels, grains.moment)
+    size = np.linalg.norm(moment, axis=1)
+    if np.count_nonzero(size) < 2:
+        return CapturingPair(0.0, 0, 0)
+    a, b = np.argsort(-size, kind="stable")[:2]
+    first, second = int(number[a]), int(number[b])
     if temperature == 0.0:
-        return math.inf
-    speed = math.sqrt(BOLTZMANN * temperature / mass)
-    return float(capture_radius(moment, moment, 0.5 * mass, speed, MAGNETIC))
+        return CapturingPair(math.inf, first, second)
+    reduced = mass[a] * mass[b] / (mass[a] + mass[b])
+    speed = math.sqrt(BOLTZMANN * temperature / (2.0 * reduced))
+    return CapturingPair(float(capture_radius(size[a], size[b], reduced, speed, MAGNETIC)), first, second)
 
 
-def kinetic_temperature(grains: Grains) -> float:
+def _bodies(
+    grains: Grains, labels: np.ndarray | None, vectors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass [kg], sum of vectors (K, 3) and number of grains of each cluster, or of each grain if `labels` is None."""
+    if labels is None:
+        return grains.mass, vectors, np.ones(len(grains), int)
+    sums = np.column_stack([np.bincount(labels, vectors[:, axis]) for axis in range(3)])
+    return np.bincount(labels, grains.mass), sums, np.bincount(labels)
+
+
+def kinetic_temperature(grains: Grains, labels: np.ndarray | None = None) -> float:
     """T [K] from the translational energy (3/2) (N − 1) k_B T of N grains in the centre-of-mass frame; 0 for one grain.
 
-    The momentum is zero in this frame, so that 3 (N − 1) degrees of freedom are left.
+    The momentum is zero in this frame, so that 3 (N − 1) degrees of freedom are left. With `labels` (N,), the cluster
+    of each grain, it is that of the translation of the clusters.
     """
-    mass = grains.mass
-    drift = (mass[:, None] * grains.velocity).sum(axis=0) / mass.sum()
-    energy = 0.5 * (mass * ((grains.velocity - drift) ** 2).sum(axis=1)).sum()
-    return float(2.0 * energy / (3.0 * max(len(grains) - 1, 1) * BOLTZMANN))
+    mass, momentum, _ = _bodies(grains, labels, grains.mass[:, None] * grains.velocity)
+    velocity = grains.velocity if labels is None else momentum / mass[:, None]
+    drift = momentum.sum(axis=0) / mass.sum()
+    energy = 0.5 * (mass * ((velocity - drift) ** 2).sum(axis=1)).sum()
+    return float(2.0 * energy / (3.0 * max(len(mass) - 1, 1) * BOLTZMANN))
