@@ -27,7 +27,7 @@ EACH = pytest.mark.parametrize("column", FORCES)
 
 def aggregate(column, **options):
     """A vibrating aggregate of 12 iron grains, with moments or with charges, in a small box, whose images act on it."""
-    given = {"charge": 1e-17 * (-1.0) ** np.arange(12)} if column == "coulomb" else {"moment": "200 A m^2/kg"}
+    given = {"charge": 3e-18 * (-1.0) ** np.arange(12)} if column == "coulomb" else {"moment": "200 A m^2/kg"}
     grains = random_aggregate(12, 4, material=sand.IRON, **given)
     return sand.Simulation(grains, [sand.Contact(), FORCES[column]], box=BOX, **options)
 
