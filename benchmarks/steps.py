@@ -170,13 +170,14 @@ def together(count: int, far: str, quick: bool) -> dict[str, Any]:
     )
 
 
-def gas_step(quick: bool, count: int, target: float) -> dict[str, Any]:
+def gas_step(quick: bool, count: int, target: float | None, periodic: str = "nearest image") -> dict[str, Any]:
     """Whole steps of a magnetic gas after its first contact."""
-    sim = worlds.gas(count)
+    sim = worlds.gas(count, periodic)
     while len(sim.contacts["pair"]) == 0 and sim.time < 2e-7:
         sim.run(steps=2000)
     pair = paired(sim, None, quick)
-    return row(f"main job's gas with contacts, {count} grains", pair, "us per step", target, scale=1e6)
+    sums = ", Ewald sum" if periodic == "ewald" else ""
+    return row(f"main job's gas with contacts, {count} grains{sums}", pair, "us per step", target, scale=1e6)
 
 
 def all_rows(quick: bool) -> Iterator[dict[str, Any]]:
@@ -195,3 +196,4 @@ def all_rows(quick: bool) -> Iterator[dict[str, Any]]:
             yield together(count, far, quick)
     yield gas_step(quick, 20, 2.5)
     yield gas_step(quick, 100, 25.0)
+    yield gas_step(quick, 100, None, "ewald")

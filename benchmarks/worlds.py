@@ -106,13 +106,13 @@ def cloud(count: int) -> sand.Simulation:
     return sand.Simulation(grains, [sand.Dipoles()])
 
 
-def gas(count: int) -> sand.Simulation:
+def gas(count: int, periodic: str = "nearest image") -> sand.Simulation:
     """The main job's density with `count` grains: contacts and dipoles, periodic."""
     box = sand.Box.periodic(1.2e-6 * (count / 100) ** (1 / 3))
     grains = sand.setup.gas(
         count, box, radius=1e-8, material=sand.IRON, moment="200 A m^2/kg", temperature=100.0, seed=1
     )
-    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles()], box=box)
+    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(periodic=periodic)], box=box)
 
 
 def dipoles_in_numpy(position: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

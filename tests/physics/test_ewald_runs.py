@@ -1,4 +1,4 @@
-"""Runs with the Ewald sum of dipoles: energy balance with contacts, resumed runs, threads, copies."""
+"""Runs with the Ewald sums of dipoles and charges: energy balance with contacts, resumed runs, threads, copies."""
 
 import copy
 
@@ -20,10 +20,16 @@ def default_threads():
     sand.set_threads(None)
 
 
-def aggregate(**options):
-    """A vibrating aggregate of 12 iron grains in a small box, whose images act on it."""
-    grains = random_aggregate(12, 4, material=sand.IRON, moment="200 A m^2/kg")
-    return sand.Simulation(grains, [sand.Contact(), sand.Dipoles(periodic="ewald")], box=BOX, **options)
+FORCES = {"magnetic": sand.Dipoles(periodic="ewald"), "coulomb": sand.Charges(periodic="ewald")}
+"""By ledger column."""
+EACH = pytest.mark.parametrize("column", FORCES)
+
+
+def aggregate(column, **options):
+    """A vibrating aggregate of 12 iron grains, with moments or with charges, in a small box, whose images act on it."""
+    given = {"charge": 3e-18 * (-1.0) ** np.arange(12)} if column == "coulomb" else {"moment": "200 A m^2/kg"}
+    grains = random_aggregate(12, 4, material=sand.IRON, **given)
+    return sand.Simulation(grains, [sand.Contact(), FORCES[column]], box=BOX, **options)
 
 
 def state(sim):
@@ -31,9 +37,10 @@ def state(sim):
     return {name: array.tobytes() for name, array in sim.state.to_arrays().items()}
 
 
+@EACH
 @pytest.mark.compiled("dipoles")
-def test_the_energy_error_is_of_second_order_in_the_step():
-    """Grains in contact with dipoles and all images, 1 ns: the total energy is kept to O(Δt²), also in r-RESPA cycles.
+def test_the_energy_error_is_of_second_order_in_the_step(column):
+    """Grains in contact, dipoles or charges, all images, 1 ns: the total energy is kept to O(Δt²), also in cycles.
 
     The largest change of the total energy falls by 4 per halved step (to 30 %: few periods); forces that were not the
     gradient of the energy would leave a change that does not fall with the step.  Verlet's error of a vibration of 25
@@ -41,23 +48,24 @@ def test_the_energy_error_is_of_second_order_in_the_step():
     """
     errors = []
     for number in (25, 50):
-        sim = aggregate(stepping=sand.Verlet(steps_per_period=number), frame_every="20 ps")
+        sim = aggregate(column, stepping=sand.Verlet(steps_per_period=number), frame_every="20 ps")
         sim.run(until="1 ns")
-        assert sim.ledger["contacts"][-1] == 11 and np.ptp(sim.ledger["magnetic"]) > 0.0
+        assert sim.ledger["contacts"][-1] == 11 and np.ptp(sim.ledger[column]) > 0.0
         total = sim.ledger["total"]
         errors.append(np.abs(total - total[0]).max())
     assert 2.8 < errors[0] / errors[1] < 6.0
     assert errors[0] < 8e-3 * sim.ledger["translation"].max()
 
 
+@EACH
 @pytest.mark.compiled("dipoles")
-def test_a_resumed_run_has_the_same_bits(tmp_path):
+def test_a_resumed_run_has_the_same_bits(column, tmp_path):
     """A run in two parts from a checkpoint, and a deep copy: the bits of one run."""
-    whole = aggregate()
+    whole = aggregate(column)
     whole.run(steps=400)
-    parts = aggregate(out=tmp_path / "run")
+    parts = aggregate(column, out=tmp_path / "run")
     parts.run(steps=150)
-    first = aggregate()
+    first = aggregate(column)
     first.run(steps=150)
     other = copy.deepcopy(first)
     resumed = sand.resume(tmp_path / "run")
@@ -66,19 +74,20 @@ def test_a_resumed_run_has_the_same_bits(tmp_path):
         assert state(sim) == state(whole)
 
 
+@EACH
 @pytest.mark.compiled("threads")
 @pytest.mark.parametrize("search", ["all pairs", pytest.param("cells", marks=pytest.mark.validate)])
-def test_the_number_of_threads_changes_no_bit(search):
+def test_the_number_of_threads_changes_no_bit(search, column):
     """20 steps of 1100 grains in contact, with 1 and 2 threads: pairs and wave vectors are shared in fixed blocks."""
     grid = np.stack(np.meshgrid(*map(np.arange, (11, 10, 10)), indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(4)
     position = (grid - [5, 4.5, 4.5]) * 1.985e-8
-    grains = sand.Grains(position, 1e-8, sand.IRON, moment=6e-18 * rng.normal(size=grid.shape))
+    moment, charge = 6e-18 * rng.normal(size=grid.shape), 1e-17 * (-1.0) ** grid.sum(axis=1)
+    grains = sand.Grains(position, 1e-8, sand.IRON, moment=moment, charge=charge)
     ends = []
     for threads in (1, 2):
         sand.set_threads(threads)
-        forces = [sand.Contact(), sand.Dipoles(periodic="ewald", accuracy=1e-3)]
-        sim = sand.Simulation(grains, forces, box=0.3e-6, neighbours=sand.Neighbours(search))
+        sim = sand.Simulation(grains, [sand.Contact(), FORCES[column]], box=0.3e-6, neighbours=sand.Neighbours(search))
         sim.run(steps=20)
         ends.append(state(sim))
     assert ends[0] == ends[1]

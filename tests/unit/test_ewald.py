@@ -324,7 +324,7 @@ def test_the_cheapest_parameters_are_chosen():
         position, moment = gas(100, CUBE)
         grains = sand.Grains(position, 1e-9, sand.IRON, moment=moment)
         chosen = sand.Dipoles(periodic="ewald", accuracy=accuracy).ewald(grains, sand.Box.periodic(*CUBE))
-        assert 0.3 * accuracy < max(chosen.force_error, chosen.torque_error) <= accuracy
+        assert 0.3 * accuracy < max(chosen.force_error, chosen.field_error) <= accuracy
         assert chosen.waves >= before and chosen.radius <= 0.5 * CUBE[0]
         before = chosen.waves
     grains = sand.Grains(*[gas(3000, 4 * CUBE)[0]], 1e-9, sand.IRON, moment=[0, 0, MOMENT])

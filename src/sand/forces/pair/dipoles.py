@@ -11,23 +11,17 @@ import numpy as np
 from ...arguments import checked
 from ...box import Box
 from ...constants import BOLTZMANN, MAGNETIC
-from ...errors import BadInput, ErrorCollector, did_you_mean, shown
 from ...grains import Grains
-from ...units import format_quantity, si
-from .cutoff import HALF_BOX_RATIO, CutoffChoice, CutoffForce, cutoff_for
+from ...units import format_quantity
+from .cutoff import HALF_BOX_RATIO, CutoffChoice, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
 from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParameters
-from .ewald import EwaldChoice, choose_ewald, degree_for, ewald_parameters, sides
+from .ewald import degree_for, ewald_parameters
+from .ewald_fit import DIPOLES, Sources
+from .ewald_force import DEFAULT_ACCURACY, EwaldForce
 from .ewald_loops import EwaldParameters, ewald_sums
 from .loops import LongRangeSums
 
-PERIODIC = ("nearest image", "ewald")
-BOUNDARIES = ("tin-foil", "vacuum")
-ACCURACIES = 1e-8, 0.1
-"""Smallest and largest accuracy of an Ewald sum."""
-DEFAULT_ACCURACY = 1e-3
-SMALLEST_RADIUS = 6.0
-"""Smallest radius of the real part of an Ewald sum, in radii of the largest grain, if the box allows it."""
 CAPTURE_RADII = 1.5
 """Automatic cut-off in a large box, in units of the capture radius b_max at thermal speed."""
 
@@ -49,7 +43,7 @@ class CapturingPair(NamedTuple):
 
 @checked
 @dataclass(frozen=True)
-class Dipoles(CutoffForce):
+class Dipoles(EwaldForce):
     """Forces and torques between magnetic moments.
 
     Parameters
@@ -95,60 +89,11 @@ class Dipoles(CutoffForce):
     references: ClassVar[str] = (
         "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975; Ewald sum: de Leeuw, Perram & Smith 1980; Wang & Holm 2001"
     )
+    sources: ClassVar[Sources] = DIPOLES
 
-    def __post_init__(self) -> None:
-        errors = ErrorCollector()
-        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES)):
-            value = getattr(self, name)
-            if value not in allowed:
-                errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
-        accuracy = errors.take(si, self.accuracy, "1", f"{self.name}: accuracy", least=ACCURACIES[0])
-        if accuracy is not None and accuracy > ACCURACIES[1]:
-            errors.problems.append(f"{self.name}: accuracy = {accuracy:g} must be at most {ACCURACIES[1]:g}")
-        errors.take(super().__post_init__)
-        errors.done()
-        object.__setattr__(self, "accuracy", accuracy)
-        given = [name for name in ("cutoff", "cut") if getattr(self, name) != getattr(type(self), name)]
-        if self.periodic == "ewald" and given:
-            errors.problems.append(
-                f"{self.name}: {given[0]} = {shown(getattr(self, given[0]))} cannot be given with periodic = 'ewald', "
-                "which sums all images and chooses the radius of its real part; leave one of them out"
-            )
-        given = [name for name in ("accuracy", "boundary") if getattr(self, name) != getattr(type(self), name)]
-        if self.periodic != "ewald" and given:
-            errors.problems.append(
-                f"{self.name}: {given[0]} is used only with periodic = 'ewald'; add that, or leave it out"
-            )
-        errors.done()
-
-    def choose(self, grains: Grains, box: Box) -> CutoffChoice:
-        """The cut-off radius, or that of the real part of the Ewald sum, with the reason."""
-        if self.periodic != "ewald":
-            return super().choose(grains, box)
-        chosen = self.ewald(grains, box)
-        return CutoffChoice(
-            chosen.radius,
-            f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
-            f"alpha = {chosen.product:g}/radius, {chosen.waves} wave vectors and their opposites; predicted errors "
-            f"of force {chosen.force_error:.1e}, of torque {chosen.torque_error:.1e}",
-        )
-
-    def ewald(self, grains: Grains, box: Box) -> EwaldChoice:
-        """The parameters of the Ewald sum.
-
-        Raises
-        ------
-        BadInput
-            If the box is open along an axis, or needs too many wave vectors.
-        """
-        if any(side is None for side in box.lengths):
-            raise BadInput(
-                f"{self.name}: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is "
-                f"{box.describe()}; give three lengths, or leave periodic out"
-            )
-        dipoles = max(int(grains.body_moment.any(axis=1).sum()), 1)
-        least = SMALLEST_RADIUS * float(grains.radius.max())
-        return choose_ewald(sides(box), len(grains), dipoles, self.accuracy, least)
+    def carriers(self, grains: Grains) -> int:
+        """Number of grains with a moment."""
+        return int(grains.body_moment.any(axis=1).sum())
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings; a cut-off in an open box as "none".

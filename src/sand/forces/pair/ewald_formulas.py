@@ -1,13 +1,14 @@
-"""The real part of an Ewald sum of dipoles: dipole loads less a polynomial in r², which vanish at the radius r_c.
+"""The real part of an Ewald sum: bare interactions less a polynomial in r², which vanish at the radius r_c.
 
 Ewald's real part is the interaction of bare dipoles less that of dipoles smeared out with a Gaussian,
 
     B(r) = 1/r³ − B_s(r),  C = −B′/r,  D = −C′/r,  B_s = [erf(αr) − 2αr/√π exp(−α²r²)]/r³
     U = k [B μ1·μ2 − C (μ1·r)(μ2·r)]
 
-B_s is an entire function of r².  Here it is a polynomial p(u), u = 2 r²/r_c² − 1, fitted for 0 ≤ r ≤ r_c under the
-condition that B, C and D are 0 at r_c (`ewald_fit`).  C and D are its exact derivatives: forces and torques are those
-of an energy that is continuous at r_c with its first derivatives, whatever the accuracy of the fit.
+and, for charges, A(r) = 1/r − A_s(r), B = −A′/r, A_s = erf(αr)/r, U = k A q1 q2.  A_s and B_s are entire functions of
+r².  Here they are polynomials p(u), u = 2 r²/r_c² − 1, fitted for 0 ≤ r ≤ r_c under the condition that the real part
+and its first two derivatives are 0 at r_c (`ewald_fit`).  B, C and D are exact derivatives of these polynomials: forces
+and torques are those of an energy that is continuous at r_c with its first derivatives, whatever the accuracy.
 """
 
 import functools
@@ -15,7 +16,7 @@ import math
 from collections.abc import Callable
 
 from ...compiler.jit import formula
-from ...numerics.vec import dot
+from ...numerics.vec import dot, scale
 from .dipole_formulas import invariants, loads_of
 
 CHUNK = 4
@@ -52,7 +53,7 @@ def polynomial(degree: int) -> Callable:
 
 @functools.cache
 def real_part(degree: int) -> Callable:
-    """The pair formula of the real part, with a polynomial of this degree.
+    """The pair formula of the real part of dipoles, with a polynomial of this degree.
 
     `f(apart, moment1, moment2, k, stretch, coefficients)` → force on 1 [N], flux densities at 1 and 2 [T], energy [J];
     `apart` r = x1 − x2 [m], `stretch` = 2/r_c² [1/m²], coefficients of B_s [1/m³]; for r ≤ r_c, finite beyond.
@@ -75,3 +76,23 @@ def real_part(degree: int) -> Callable:
         return force, field1, field2, b * both - c * along1 * along2
 
     return pair_loads
+
+
+@functools.cache
+def real_part_of_charges(degree: int) -> Callable:
+    """The pair formula of the real part of charges, with a polynomial of this degree.
+
+    `f(apart, product, stretch, coefficients)` → force on 1 [N], energy [J]; `product` = k q1 q2 [N m²], `stretch` =
+    2/r_c² [1/m²], coefficients of A_s [1/m]; for r ≤ r_c, finite beyond.
+    """
+    smooth = polynomial(degree)
+
+    @formula
+    def pair_force(apart, product, stretch, coefficients):
+        square = dot(apart, apart)
+        inverse = 1.0 / math.sqrt(square)
+        p, p1, _ = smooth(min(square * stretch - 1.0, 1.0), coefficients)
+        b = product * (inverse * inverse * inverse + 2.0 * stretch * p1)
+        return scale(b, apart), product * (inverse - p)
+
+    return pair_force

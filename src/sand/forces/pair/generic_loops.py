@@ -126,7 +126,24 @@ def pair_sums(pair_formula: Callable, rate: Callable | None, torques: bool, list
     LongRangeSums
         Their parameters are a `PairParameters`.
     """
-    of_pair = cut_pair(pair_formula, torques)
+    rates = None if rate is None or torques else _rate_loops(cut_rate(pair_formula, rate), listed)
+    return sums_of(cut_pair(pair_formula, torques), torques, listed)._replace(rates=rates)
+
+
+@functools.cache
+def sums_of(of_pair: Callable, torques: bool, listed: bool) -> LongRangeSums:
+    """The loops, without rates, of one function of a pair, over all pairs or over the Verlet list.
+
+    Parameters
+    ----------
+    of_pair : callable
+        `of_pair(apart, a, b, parameters)` → force on a [N], torques on a and on b [N m], energy [J], cut-off included;
+        `parameters` are those of the loops.
+    torques : bool
+        Whether torques differ from 0.
+    listed : bool
+        Over the pairs of the Verlet list instead of all pairs.
+    """
 
     @loop
     def separation(grains, span, i, j):
@@ -144,9 +161,8 @@ def pair_sums(pair_formula: Callable, rate: Callable | None, torques: bool, list
 
     make = _listed_loops if listed else _all_pairs_loops
     (begin, block, end, blocks), energies = make(of_pair, pair_energy, torques)
-    rates = None if rate is None or torques else _rate_loops(cut_rate(pair_formula, rate), listed)
     arrays = ("packed_grain",) if listed else ()
-    return LongRangeSums(begin, block, end, blocks, rates, energies, pair, arrays=arrays)
+    return LongRangeSums(begin, block, end, blocks, None, energies, pair, arrays=arrays)
 
 
 def _all_pairs_loops(of_pair: Callable, pair_energy: Callable, torques: bool) -> tuple[tuple[Callable, ...], Callable]:

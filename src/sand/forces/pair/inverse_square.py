@@ -9,11 +9,22 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ...arguments import checked
+from ...box import Box
 from ...compiler.jit import formula
 from ...constants import COULOMB, GRAVITATION
+from ...errors import ErrorCollector
 from ...grains import Grains
 from ...numerics.vec import axpy, dot, scale
+from ...units import format_quantity
+from .ewald import degree_for, ewald_parameters, mean_field
+from .ewald_charges import ewald_charge_sums
+from .ewald_fit import CHARGES, Sources
+from .ewald_force import DEFAULT_ACCURACY, EwaldForce
+from .loops import LongRangeSums
 from .pair_force import PairForce
+
+NEUTRAL = 1e-9
+"""Net charge, in units of the sum of all |q|, that counts as rounding."""
 
 
 class InverseSquareConstants(NamedTuple):
@@ -62,9 +73,23 @@ def newton_rate(apart, moving, a, b, constants):
     return inverse_square_rate(apart, moving, constants.k * a.mass * b.mass)
 
 
+class InverseSquare(PairForce):
+    """Base class of the forces of this module."""
+
+    constant: ClassVar[float]
+
+    def constants(self) -> InverseSquareConstants:
+        """Parameters of the formula."""
+        return InverseSquareConstants(self.constant)
+
+    def energy_scale(self, grains: Grains) -> float:
+        """Largest |k| q²/(2r) [J] of a grain in contact with an equal one."""
+        return float(abs(self.constant) * np.max(getattr(grains, self.source) ** 2 / (2.0 * grains.radius)))
+
+
 @checked
 @dataclass(frozen=True)
-class Charges(PairForce):
+class Charges(EwaldForce, InverseSquare):
     """Coulomb forces between the charges of the grains, U = q1 q2/(4πε₀ r).
 
     Charges are located at the centres; the polarisation of neighbouring grains is neglected.
@@ -78,38 +103,88 @@ class Charges(PairForce):
     cut : str, optional
         "smooth": the interaction is switched off over the outer fifth of the cut-off radius, which conserves energy;
         or "sharp".
+    periodic : str, optional
+        What acts in a periodic box. "nearest image": the nearest image of each grain within the cut-off. "ewald": all
+        images of all grains, by an Ewald sum, in a box that is periodic along all axes; without `cutoff` and `cut`. A
+        net charge Q of the box is neutralised by a uniform background, which exerts no force, with a warning; its
+        constant energy, −πkQ²/(2Vα²), is included.
+    accuracy : float, optional
+        Of the Ewald sum, 1e-8 … 0.1: largest rms error of force and potential, relative to their typical size in a gas
+        of these grains. The parameters of the sum are the cheapest with this accuracy.
+    boundary : str, optional
+        What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a conductor: no field of the polarisation).
+        "vacuum" is refused: its energy depends on the total dipole moment of the charges in the box, which jumps when a
+        charge crosses a wall.
 
     Raises
     ------
     BadInput
-        If a parameter is invalid; later, if the cut-off exceeds half the box.
+        If a parameter is invalid; later, if the cut-off exceeds half the box, or a box of an Ewald sum is open along an
+        axis.
     """
 
     cutoff: Any = "auto"
     cut: str = "smooth"
+    periodic: str = "nearest image"
+    accuracy: Any = DEFAULT_ACCURACY
+    boundary: str = "tin-foil"
 
     name: ClassVar[str] = "charges"
     no_effect: ClassVar[str] = "charges are switched on but no grain is charged"
     column: ClassVar[str] = "coulomb"
-    references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4"
+    references: ClassVar[str] = "Jackson 1975; Dominik & Nübold 2002, A.4; Ewald sum: Ewald 1921; Kolafa & Perram 1992"
     formula = staticmethod(coulomb)
     rate = staticmethod(coulomb_rate)
     source: ClassVar[str] = "charge"
     constant: ClassVar[float] = COULOMB
+    sources: ClassVar[Sources] = CHARGES
 
-    def constants(self) -> InverseSquareConstants:
-        """Parameters of the formula."""
-        return InverseSquareConstants(self.constant)
+    def __post_init__(self) -> None:
+        errors = ErrorCollector()
+        errors.take(super().__post_init__)
+        if self.periodic == "ewald" and self.boundary == "vacuum":
+            errors.problems.append(
+                f"{self.name}: boundary = 'vacuum' is for dipoles only: its energy depends on the total dipole moment "
+                "of the charges in the box, which jumps when a charge crosses a wall; use 'tin-foil'"
+            )
+        errors.done()
 
-    def energy_scale(self, grains: Grains) -> float:
-        """Largest |k| q²/(2r) [J] of a grain in contact with an equal one."""
-        return float(abs(self.constant) * np.max(getattr(grains, self.source) ** 2 / (2.0 * grains.radius)))
+    def carriers(self, grains: Grains) -> int:
+        """Number of charged grains."""
+        return int(np.count_nonzero(grains.charge))
+
+    def sums(self, box: Box, listed: bool) -> LongRangeSums:
+        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
+        if self.periodic == "ewald":
+            return ewald_charge_sums(degree_for(self.accuracy), listed, type(self).formula)
+        return super().sums(box, listed)
+
+    def numbers(self, grains: Grains, box: Box) -> Any:
+        """Parameters of the loops."""
+        if self.periodic == "ewald":
+            return ewald_parameters(self.ewald(grains, box), box, len(grains), False, CHARGES)
+        return super().numbers(grains, box)
+
+    def check(self, grains: Grains, box: Box) -> list[str]:
+        """Warnings: as for all cut-offs; a net charge in an Ewald sum."""
+        warnings, net = super().check(grains, box), math.fsum(grains.charge)
+        if self.periodic == "ewald" and abs(net) > NEUTRAL * np.abs(grains.charge).sum():
+            energy = 0.5 * mean_field(self.ewald(grains, box).alpha, box.volume, False, CHARGES) * net**2
+            warnings.append(
+                f"{self.name}: the net charge of the box is {format_quantity(net, 'C')}; periodic = 'ewald' balances "
+                f"it by a uniform background of {format_quantity(-net, 'C')}, which exerts no force on grains and adds "
+                f"the constant energy -pi k Q^2/(2 V alpha^2) = {format_quantity(energy, 'J')} to column {self.column}"
+            )
+        return warnings
 
 
 @checked
 @dataclass(frozen=True)
-class Attraction(Charges):
+class Attraction(InverseSquare):
     """Newtonian attraction between the grains, U = −G m1 m2/r; rarely relevant below kilometres.
+
+    There is no sum over all periodic images: it exists only with a uniform background of negative mass, which removes
+    the mean attraction (the Jeans swindle).
 
     Parameters
     ----------
@@ -126,7 +201,11 @@ class Attraction(Charges):
         If a parameter is invalid; later, if the cut-off exceeds half the box.
     """
 
+    cutoff: Any = "auto"
+    cut: str = "smooth"
+
     name: ClassVar[str] = "attraction"
+    no_effect: ClassVar[str] = "attraction is switched on but no grain has a mass"
     column: ClassVar[str] = "gravitation"
     references: ClassVar[str] = "Newton 1687"
     formula = staticmethod(newton)

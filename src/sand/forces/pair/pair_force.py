@@ -42,7 +42,7 @@ class PairForce(CutoffForce):
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
         return pair_sums(type(self).formula, type(self).rate, self.torques, listed)
 
-    def numbers(self, grains: Grains, box: Box) -> PairParameters:
+    def numbers(self, grains: Grains, box: Box) -> Any:
         """Parameters of the loops."""
         return PairParameters(self.constants(), cutoff_for(self.choose(grains, box).radius, self.cut))
 

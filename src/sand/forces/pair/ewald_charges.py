@@ -1,0 +1,85 @@
+"""Loops of the Ewald sum of charges in a periodic box.
+
+The real part is summed by the loops of `generic_loops`, the reciprocal part by those of `ewald_loops`.  The energies of
+the grains are ½ q_j φ_j, with the potential φ of all images, without that of the own charge,
+
+    φ_j = real part + waves − 2αk/√π q_j − πk/(Vα²) Q
+
+Q is the net charge; its uniform background, of charge −Q, gives the last term and no force.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+from ...compiler.jit import formula, loop
+from ...numerics.vec import accrue, dot
+from .ewald_formulas import real_part_of_charges
+from .ewald_loops import with_waves
+from .generic_loops import ZERO, sums_of
+from .loops import LongRangeSums, all_blocks
+
+
+@loop
+def add_wave_forces(grains, long_range, sums):
+    """Add the forces of all blocks of wave vectors."""
+    for b in range(sums.wave.shape[0]):
+        for i in range(grains.mass.size):
+            accrue(long_range.force, i, (sums.force_x[b, i], sums.force_y[b, i], sums.force_z[b, i]))
+
+
+@loop
+def add_wave_energies(grains, parameters, shares):
+    """Add ½ q (φ of the waves, less that of the own charge, with that of the background) [J] of each grain."""
+    sums, total = parameters.buffers, 0.0
+    for i in range(grains.mass.size):
+        total += grains.charge[i]
+    for i in range(grains.mass.size):
+        potential = parameters.mean_field * total - parameters.self_field * grains.charge[i]
+        for b in range(sums.wave.shape[0]):
+            potential += sums.potential[b, i]
+        shares[i] += 0.5 * grains.charge[i] * potential
+
+
+@functools.cache
+def ewald_charge_sums(degree: int, listed: bool, bare: Callable) -> LongRangeSums:
+    """The loops of charges, with a polynomial of this degree, over the pairs of the Verlet list or over all pairs.
+
+    In an r-RESPA cycle the bare force of grains in contact, by the pair formula `bare`, acts in every step; the sum
+    less these forces, which are those of all images, varies slowly.
+    """
+    loads = real_part_of_charges(degree)
+
+    @formula
+    def real_pair(apart, a, b, parameters):
+        inside = dot(apart, apart) < parameters.cutoff_square
+        product = parameters.k * a.charge * b.charge if inside else 0.0
+        force, energy = loads(apart, product, parameters.stretch, parameters.coefficients)
+        return force, ZERO, ZERO, energy
+
+    @formula
+    def bare_pair(apart, a, b, parameters):
+        force, energy = bare(apart, a, b, parameters)
+        return force, ZERO, ZERO, energy
+
+    pairs = sums_of(real_pair, False, listed)
+    begin, block, blocks = with_waves(pairs.begin, pairs.block, pairs.blocks, False)
+    end_pairs, pair_energies = pairs.end, pairs.energies
+
+    @loop
+    def end(grains, long_range, span, parameters):
+        end_pairs(grains, long_range, span, parameters)
+        add_wave_forces(grains, long_range, parameters.buffers)
+
+    @loop
+    def energies(grains, long_range, span, parameters, shares):
+        pair_energies(grains, long_range, span, parameters, shares)
+        begin(grains, long_range, span, parameters)
+        for b in range(all_blocks(grains)):  # those of the waves
+            block(grains, long_range, span, parameters, b)
+        add_wave_energies(grains, parameters, shares)
+
+    return pairs._replace(
+        begin=begin, block=block, end=end, blocks=blocks, energies=energies, pair=sums_of(bare_pair, False, listed).pair
+    )

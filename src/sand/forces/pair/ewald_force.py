@@ -1,0 +1,101 @@
+"""Base class of the forces that can be summed over all periodic images: settings and choice of the Ewald sum."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from ...box import Box
+from ...errors import BadInput, ErrorCollector, did_you_mean, shown
+from ...grains import Grains
+from ...units import si
+from .cutoff import CutoffChoice, CutoffForce
+from .ewald import EwaldChoice, choose_ewald, sides
+from .ewald_fit import Sources
+
+PERIODIC = ("nearest image", "ewald")
+BOUNDARIES = ("tin-foil", "vacuum")
+ACCURACIES = 1e-8, 0.1
+"""Smallest and largest accuracy of an Ewald sum."""
+DEFAULT_ACCURACY = 1e-3
+SMALLEST_RADIUS = 6.0
+"""Smallest radius of the real part of an Ewald sum, in radii of the largest grain, if the box allows it."""
+
+
+class EwaldForce(CutoffForce):
+    """A long-range force with the fields `periodic`, `accuracy` and `boundary` beside those of `CutoffForce`.
+
+    Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, `accuracy: Any = DEFAULT_ACCURACY` and
+    `boundary: str = "tin-foil"`.
+    """
+
+    periodic: str
+    accuracy: Any
+    boundary: str
+
+    sources: ClassVar[Sources]
+
+    def __post_init__(self) -> None:
+        errors = ErrorCollector()
+        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES)):
+            value = getattr(self, name)
+            if value not in allowed:
+                errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
+        accuracy = errors.take(si, self.accuracy, "1", f"{self.name}: accuracy", least=ACCURACIES[0])
+        if accuracy is not None:
+            object.__setattr__(self, "accuracy", accuracy)
+            if accuracy > ACCURACIES[1]:
+                errors.problems.append(f"{self.name}: accuracy = {accuracy:g} must be at most {ACCURACIES[1]:g}")
+        errors.take(super().__post_init__)
+        if self.periodic == "ewald":
+            for name in self._given("cutoff", "cut"):
+                errors.problems.append(
+                    f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with periodic = 'ewald', "
+                    "which sums all images and chooses the radius of its real part; leave one of them out"
+                )
+        elif self.periodic in PERIODIC:
+            for name in self._given("accuracy", "boundary"):
+                errors.problems.append(
+                    f"{self.name}: {name} is used only with periodic = 'ewald'; add that, or leave it out"
+                )
+        errors.done()
+
+    def _given(self, *names: str) -> list[str]:
+        """Of these fields the ones that differ from their defaults."""
+        return [name for name in names if getattr(self, name) != getattr(type(self), name)]
+
+    def carriers(self, grains: Grains) -> int:
+        """Number of grains with a charge or moment."""
+        raise NotImplementedError
+
+    def choose(self, grains: Grains, box: Box) -> CutoffChoice:
+        """The cut-off radius, or that of the real part of the Ewald sum, with the reason."""
+        if self.periodic != "ewald":
+            return super().choose(grains, box)
+        chosen = self.ewald(grains, box)
+        return CutoffChoice(
+            chosen.radius,
+            f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
+            f"alpha = {chosen.product:g}/radius, {chosen.waves} wave vectors and their opposites; predicted errors "
+            f"of force {chosen.force_error:.1e}, of {self.sources.field} {chosen.field_error:.1e}",
+        )
+
+    def ewald(self, grains: Grains, box: Box) -> EwaldChoice:
+        """The parameters of the Ewald sum.
+
+        Raises
+        ------
+        BadInput
+            If the box is open along an axis, or needs too many wave vectors.
+        """
+        if any(side is None for side in box.lengths):
+            raise BadInput(
+                f"{self.name}: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is "
+                f"{box.describe()}; give three lengths, or leave periodic out"
+            )
+        least = SMALLEST_RADIUS * float(grains.radius.max())
+        carriers = max(self.carriers(grains), 1)
+        return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources)
+
+    def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
+        """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box."""
+        return self.parameters() if self.periodic == "ewald" else super().resolved(grains, box)
