@@ -75,7 +75,7 @@ def dashpots_of(contact_radius, constants):
 @formula
 def surface_rotation(spin1, spin2, r1, r2):
     """Mean spin W = (r1 ω1 + r2 ω2)/(r1 + r2) [1/s], of which W×(x1 − x2) is the part of U due to spins."""
-    return scale(1.0 / (r1 + r2), add(scale(r1, spin1), scale(r2, spin2)))
+    return axpy(r1 / (r1 + r2), sub(spin1, spin2), spin2)
 
 
 @formula
@@ -154,8 +154,9 @@ def extrapolated(before, now, dt):
 @formula
 def loads_on_grains(damping, separation, r1, r2):
     """Force on grain 1 and torques on both grains."""
-    moment = scale(1.0 / (r1 + r2), cross(separation, damping.force))
-    return damping.force, axpy(-r1, moment, damping.torque), axpy(-r2, moment, scale(-1.0, damping.torque))
+    moment, share = cross(separation, damping.force), r1 / (r1 + r2)
+    torque1 = axpy(-share, moment, damping.torque)
+    return damping.force, torque1, sub(axpy(share, moment, scale(-1.0, damping.torque)), moment)
 
 
 @formula
@@ -182,7 +183,7 @@ def damping_losses(start, end, n, velocity, motion, rolling, dt):
         Length of the step [s].
     """
     half, force, torque = -0.5 * dt, add(start.force, end.force), add(start.torque, end.torque)
-    normal = half * dot(force, n) * dot(motion.velocity, n)
+    normal = half * dot(force, n) * dot(velocity, n)  # W×(x1 − x2) is perpendicular to n
     twist = half * dot(torque, n) * dot(motion.spin, n)
     both = half * (dot(force, motion.velocity) + dt * dot(start.force, cross(rolling, velocity)))
     return normal, both - normal, half * dot(torque, motion.spin) - twist, twist
