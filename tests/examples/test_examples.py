@@ -152,3 +152,48 @@ def test_measured_kernel(tmp_path, monkeypatch, capsys):
     assert all(0.2 < float(row[-2]) < 1.2 for row in rows)
     table = np.loadtxt(tmp_path / "kernel.txt")
     assert np.allclose(table[1:], table[1:].T)
+
+
+@pytest.mark.validate
+def test_selective_coagulation(tmp_path, monkeypatch, capsys):
+    """Table, figure, and the measures of a known set of clusters.
+
+    Grains 0 to 3 are magnetic.  Clusters {0, 1, 4}, {2}, {3}, {5, 6}, {7}: S of magnetic grains (3 + 3 + 1 + 1)/4 = 2,
+    of the others (3 + 2 + 2 + 1)/4 = 2; shares 2/4, 3/4; swept 1/4; two of three grains of the first are magnetic.
+    """
+    example = loaded("selective_coagulation")
+    found = example.measure(np.arange(8) < 4, np.array([[0, 1], [1, 4], [5, 6]]))
+    assert found == pytest.approx((2.0, 2.0, 0.5, 0.75, 0.25, 1.0, 1.0, 1.0, 2.0 / 3.0))
+    # v = sqrt(16 kT/(pi m)) relative, K = pi (2r)^2 v
+    mass = 4.0 / 3.0 * math.pi * 1e-24 * sand.IRON.density
+    rate = 4e-16 * math.pi * math.sqrt(16.0 * 1.380649e-21 / (math.pi * mass))
+    expected = 0.5 * 40 * example.MAGNETIC_DENSITY * rate * 3e-6
+    assert example.expected_contacts(40, 3e-6) == pytest.approx(expected, rel=1e-6)
+    monkeypatch.setattr(example, "ROWS", 2)
+    out = str(tmp_path / "out")
+    words = ["selective_coagulation.py", "--grains", "6", "--seeds", "2", "--until", "20 ns", "--out", out]
+    monkeypatch.setattr(sys, "argv", words)
+    example.main()
+    assert "2 boxes of 6 + 6 grains" in capsys.readouterr().out
+    rows = list(csv.DictReader(Path(f"{out}.csv").read_text().splitlines()))
+    assert [float(row["time"]) for row in rows] == [0.0, 1e-8, 2e-8]
+    assert float(rows[0]["size_magnetic"]) == 1.0 and float(rows[0]["share_plain"]) == 0.0
+    assert 10_000 < Path(f"{out}.png").stat().st_size < 150_000
+
+
+@pytest.mark.validate
+def test_sweeping_nets(tmp_path, monkeypatch, capsys):
+    """Table and figure; the cross-section of a single grain is π(2r)², the sphere's of 64 grains π(5r)²."""
+    example = loaded("sweeping_nets")
+    assert example.area_of_sphere(64) == pytest.approx(25e-16 * math.pi)
+    monkeypatch.setattr(example, "ROWS", 2)
+    one = example.simulate(sand.setup.grain(radius=1e-8, material=sand.IRON, moment="200 A m^2/kg"), 40, 2e-9, 1)
+    assert one[0, 3] == pytest.approx(4e-16 * math.pi, rel=1e-9)
+    out = str(tmp_path / "out")
+    words = ["sweeping_nets.py", "--grains", "8", "--gas", "40", "--seeds", "2", "--until", "4 ns", "--out", out]
+    monkeypatch.setattr(sys, "argv", words)
+    example.main()
+    assert "2 nets of 8 grains until 4 ns" in capsys.readouterr().out
+    rows = list(csv.DictReader(Path(f"{out}.csv").read_text().splitlines()))
+    assert len(rows) == 3 and float(rows[0]["expected"]) == 0.0 < float(rows[-1]["expected"])
+    assert 10_000 < Path(f"{out}.png").stat().st_size < 150_000

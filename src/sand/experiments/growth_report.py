@@ -59,6 +59,7 @@ def ensemble_summary(one: Ensemble) -> dict[str, Any]:
         "time": float(growth.time[-1]),
         "mean_size": float(growth.mean[-1]),
         "mean_size_error": float(growth.error[-1]),
+        "mean_size_interval": [None if np.isnan(end) else end for end in growth.interval],
         "window": list(growth.window),
         **{name: None if law is None else law._asdict() for name, law in laws.items()},
         "missing": growth.missing,
