@@ -38,7 +38,7 @@ from .damage import set_aside
 from .run_folder import refuse_devices, replace_file
 from .state_arrays import check_state
 
-VERSION = 7
+VERSION = 8
 """Version of the file format; other versions are refused. Versions before 7 were never released."""
 KEPT = 2
 """Checkpoints kept in a folder."""
