@@ -78,7 +78,7 @@ from .stages import (
     STORE_POSITIONS,
     VERLET_LIST,
 )
-from .step_control import cycle_steps, is_close
+from .step_control import cycle_steps, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 
@@ -227,7 +227,7 @@ def first_half(
         return stop
     if clock[LEFT] == 0.0:
         cycle = dt * cycle_steps(clock, count, respa, dt)
-        if clock[TIME] + cycle > until:
+        if is_past(clock[TIME] + cycle, until):
             if not shorten:
                 return Stop.TIME_REACHED.value
             cycle = until - clock[TIME]

@@ -48,7 +48,7 @@ from .motion import kick
 from .parts import Stop
 from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads
 from .stages import EXPLAIN, GAS_KICK
-from .step_control import StepCriteria, is_close, quantise_step
+from .step_control import StepCriteria, is_close, is_past, quantise_step
 from .step_parts import MAX_TURN
 from .verlet import Verlet
 
@@ -265,7 +265,7 @@ def symplectic_flight(
         )
     if not clock[FLIGHT] > 0.0:
         return Stop.NOT_FINITE.value
-    if clock[TIME] + clock[FLIGHT] > until:
+    if is_past(clock[TIME] + clock[FLIGHT], until):
         if not shorten:
             return Stop.TIME_REACHED.value
         clock[FLIGHT] = until - clock[TIME]

@@ -238,8 +238,14 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
 
 
 @formula
+def is_past(time, until):
+    """Whether a time [s] is later than another by more than the rounding error of a sum of steps."""
+    return time - until > ROUNDING * math.fabs(until)
+
+
+@formula
 def is_close(time, until):
-    """Whether the times [s] differ by less than the rounding error of a sum of steps, so that no step leads there."""
+    """Whether two times [s] differ by at most the rounding error of a sum of steps."""
     return math.fabs(until - time) <= ROUNDING * math.fabs(until)
 
 

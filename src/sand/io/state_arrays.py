@@ -59,7 +59,7 @@ STORED = {
     "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
 }
 """All arrays of a checkpoint."""
-NUMBERS = {"steps": int, "time": float, "shown": float, "wall_seconds": float, "temperature": float}
+NUMBERS = {"steps": int, "time": float, "wall_seconds": float, "temperature": float}
 """Required numbers of `meta.json` with their types; an integer is accepted for either."""
 PLANNED_END = {"until": float, "last_step": int}
 """Numbers of `meta.json` that may be null."""

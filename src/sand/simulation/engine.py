@@ -111,8 +111,7 @@ class Engine:
             return self.regular_state
         if self._shown is None:
             self.show(self._shown_time)
-        assert self._shown is not None
-        return self._shown
+        return self.regular_state if self._shown is None else self._shown
 
     @property
     def regular_state(self) -> State:

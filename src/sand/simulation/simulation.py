@@ -126,7 +126,7 @@ class Simulation(ReadOnlySettings):
         self._failure = ""  # why the simulation cannot continue
         if restart is not None:
             arrays, meta = restart
-            self._engine.load_state(arrays, meta["shown"])
+            self._engine.load_state(arrays, meta.get("shown"))
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
             self._choices_at_start = meta.get("choices", {})
             if "ledger" in arrays:  # a state without a ledger starts a new one
@@ -347,7 +347,7 @@ class Simulation(ReadOnlySettings):
         while True:
             began = wall.monotonic()
             most_steps = max(min(steps_per_call, last - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
-            goal = min(end, frames.due)
+            goal = frames.next(end)
             stop = self._engine.advance(goal, most_steps)
             unsound = self.steps - checked_at >= ENERGY_CHECK_EVERY and not self.is_sound
             if self.steps - checked_at >= ENERGY_CHECK_EVERY:
