@@ -232,8 +232,9 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms():
             sand.IRON,
             velocity=[[speed, 0, 0], [0, 0, 0]],
         )
-        sim = sand.Simulation(grains, [sand.Contact()], frame_every=1e-14)
-        sim.run(until=30 * 1.7e-12 + 12 * period)
+        sim = sand.Simulation(grains, [sand.Contact()], frame_every="1 s")
+        while sim.time < 30 * 1.7e-12 + 12 * period:
+            sim.run(steps=1)  # a row of the ledger for each step
         ledger = sim.ledger
         ringing = ledger["contacts"] > 0
         offset = (ledger["total"][ringing] - ledger["total"][0]).mean() / ledger["translation"][ringing].max()

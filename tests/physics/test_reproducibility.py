@@ -136,21 +136,42 @@ def test_array_sizes_change_no_bit():
 
 
 @pytest.mark.compiled("dipoles")
-def test_a_frame_is_the_first_step_at_or_after_its_time():
-    """Steps are not shortened for frames: a frame is late by less than a step or r-RESPA cycle.
+def test_times_are_met_to_the_last_bit():
+    """Frames are at the multiples of their interval, the end of a run at `until`; both lie within a step or cycle."""
+    sim = gas_simulation(frame_every="1 ns")
+    for end in (7.3e-9, 7.3e-9 + 1e-14, 10e-9):  # two ends within one step
+        sim.run(until=end)
+        assert sim.time == end and sim.state.time == end
+        assert sim.regular_state.time < end < sim.regular_state.time + 2 * sim.regular_state.clock[CYCLE]
+    ends = [7.3e-9, 7.3e-9 + 1e-14]
+    assert sorted({k * 1e-9 for k in range(10)} | {*ends, 10e-9}) == [row["time"] for row in sim.ledger.rows]
 
-    Each frame stores its true time.
-    """
-    seen = []
 
-    class Note(sand.Observer):
-        def see(self, simulation, row):
-            seen.append((row["time"], simulation.state.clock[CYCLE]))
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("integrator", list(INTEGRATORS))
+def test_a_continued_run_has_the_bits_of_a_direct_one(integrator):
+    """Ends of runs and frames are shown by a copy of the regular state: neither changes a regular step."""
+    stepping = INTEGRATORS[integrator]
+    direct = gas_simulation(stepping=stepping())
+    direct.run(until="10 ns")
+    continued = gas_simulation(frame_every="0.37 ns", stepping=stepping())
+    for end in ("3 ns", "3.0001 ns", "8 ns", "10 ns"):
+        continued.run(until=end)
+    assert state(direct) == state(continued)
+    for regular in (direct.regular_state, continued.regular_state):
+        assert regular.time < 10e-9
+    arrays = [sim.regular_state.to_arrays() for sim in (direct, continued)]
+    assert all((arrays[0][name] == arrays[1][name]).all() for name in arrays[0])
 
-    gas_simulation(frame_every="1 ns", observers=[Note()]).run(until="10 ns")
-    assert len(seen) == 11
-    for k, (time, cycle) in enumerate(seen):
-        assert k * 1e-9 <= time < k * 1e-9 + cycle or k == 0
+
+def test_the_state_shown_is_that_of_its_time():
+    """Free grains move by v t: x(t) = x(0) + v t to rounding at times that no regular step meets."""
+    grains = sand.Grains([[0, 0, 0], [0, 1e-6, 0]], "10 nm", "iron", velocity=[[1, 0, 0], [0, 2, 0]])
+    sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="1 ns"))
+    for time in (0.3e-9, 0.4e-9, 17.77e-9, 40e-9):
+        sim.run(until=time)
+        assert sim.time == time and sim.steps == int(time / 1e-9 + 1e-6)
+        assert np.allclose(sim.grains.position, grains.position + grains.velocity * time, rtol=1e-13, atol=0)
 
 
 @pytest.mark.compiled("dipoles")

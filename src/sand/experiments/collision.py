@@ -164,7 +164,7 @@ def run_to_end(start: Approach, simulation: Simulation) -> Collision:
 def _until_quiet(simulation: Simulation, start: Approach) -> bool:
     """Run until contacts neither form, slip nor break for `QUIET` intervals; False after `MOST_CHECKS` intervals.
 
-    Checks made before an interruption are repeated with the ledger: each uses the first row at or after its time.
+    Checks made before an interruption are repeated with the ledger: each uses the row of its time.
     """
     across = float(np.ptp(start.grains.position, axis=0).max())
     until, unchanged, last = start.flight, 0, (-1, -1, -1)

@@ -79,13 +79,20 @@ def first_trial(grains, contacts, long_range, clock, criteria, stride):
 @caller
 def adaptive_step(
     grains, contacts, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work, criteria,
-    flight_limits, forces, queue, program, table
+    flight_limits, forces, queue, program, table, until, shorten
 ):  # fmt: skip
-    """Take one Runge–Kutta step; returns its length [s], whether it ends at a contact, and a Stop."""
+    """Take one Runge–Kutta step; returns its length [s], whether it ends at a contact, and a Stop.
+
+    A step whose first trial would pass `until` [s] is not taken, or, with `shorten`, tried up to this time.
+    """
     begin, stride = clock[TIME], flight_limits.stride
     dt = proposed = first_trial(grains, contacts, long_range, clock, criteria, stride)
     if not dt > 0.0:
         return 0.0, False, Stop.NOT_FINITE
+    if begin + dt > until:
+        if not shorten:
+            return 0.0, False, Stop.TIME_REACHED
+        dt = proposed = until - begin
     begin_step(grains, runge_kutta, scratch, external_work, forces, program, table, begin)
     growth, attempts = GROW, 0
     while True:
@@ -118,7 +125,7 @@ def adaptive_step(
 @stage("the adaptive time steps")
 def free_flight(
     table, program, grains, contacts, pair_list, long_range, runge_kutta, clock, count, lost, span, settings, search,
-    external_work, criteria, flight_limits, forces, queue, scratch
+    external_work, criteria, flight_limits, forces, queue, scratch, until, shorten
 ):  # fmt: skip
     """Take one Runge–Kutta step and log the work of external forces; returns a `Stop`."""
     stop = refresh_verlet_list(grains, long_range, span, search, program, table)
@@ -129,7 +136,7 @@ def free_flight(
         before = sum_external(scratch, forces, program, table, clock[TIME], ENERGY)
     dt, in_contact, reason = adaptive_step(
         grains, contacts, long_range, runge_kutta, clock, count, scratch, span, settings, search, external_work,
-        criteria, flight_limits, forces, queue, program, table
+        criteria, flight_limits, forces, queue, program, table, until, shorten
     )  # fmt: skip
     if reason != Stop.NONE:
         return reason.value

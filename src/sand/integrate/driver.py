@@ -82,7 +82,7 @@ from .stages import (
     STORE_POSITIONS,
     VERLET_LIST,
 )
-from .step_control import cycle_steps
+from .step_control import cycle_steps, is_close, is_past
 from .step_parts import possible_step
 from .task_queue import CONTACTS_PER_BLOCK, GRAINS_PER_BLOCK, blocks_of, for_each_block, join_workers
 
@@ -216,9 +216,12 @@ def close_cycle(grains, contacts, long_range, clock, count, scratch, span, respa
 @caller
 def first_half(
     grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, respa, external_work, criteria, forces,
-    queue, program, table
+    queue, program, table, until, shorten
 ):  # fmt: skip
-    """Choose the step, kick dt/2 and drift; no step was taken unless the value of `Stop.NONE` is returned."""
+    """Choose the step, kick dt/2 and drift; no step was taken unless the value of `Stop.NONE` is returned.
+
+    A cycle that would pass `until` [s] is not begun, or, with `shorten`, ends at this time.
+    """
     dt, stop = possible_step(grains, contacts, pair_list, long_range, clock, count, span, criteria)
     if stop != Stop.NONE.value:
         scratch[DT] = dt
@@ -228,6 +231,11 @@ def first_half(
         return stop
     if clock[LEFT] == 0.0:
         cycle = dt * cycle_steps(clock, count, respa, dt)
+        if is_past(clock[TIME] + cycle, until):
+            if not shorten:
+                return Stop.TIME_REACHED.value
+            cycle = until - clock[TIME]
+            dt = cycle / math.ceil(cycle / dt - 1e-6)
         begin_cycle(grains, long_range, clock, scratch, respa, forces, program, table, dt, cycle)
     elif respa.impulse:  # between two steps of clock[STEP] and dt seconds
         integrate_displacement(grains, long_range, span, 0.5 * (clock[STEP] + dt))
@@ -334,11 +342,11 @@ def second_half(
 @caller
 def steps_until(
     grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa, external_work,
-    criteria, forces, queue, program, table, until, last
+    criteria, forces, queue, program, table, until, last, shorten
 ):  # fmt: skip
-    """Take steps until the first end of a step or cycle at or after `until` [s], or step `last`.
+    """Take steps until the last end of a step or cycle not after `until` [s], or step `last`.
 
-    Returns the value of a `Stop`.
+    With `shorten` the last step or cycle is shortened so that it ends at `until`. Returns the value of a `Stop`.
     """
     reset_skins(pair_list, count)
     while True:
@@ -348,7 +356,7 @@ def steps_until(
                 # before all other returns, so that no output lies between the step and the new cut-off
                 if count[COMPARED] >= 0 and count[COMPARED] != count[MADE] + count[BROKEN]:
                     return Stop.CLUSTERS_CHANGED.value
-                if clock[TIME] >= until:
+                if clock[TIME] >= until or (shorten and is_close(clock[TIME], until)):
                     return Stop.TIME_REACHED.value
                 if count[STEPS] >= last:
                     return Stop.NONE.value
@@ -359,7 +367,7 @@ def steps_until(
             else:
                 stop = first_half(
                     grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, respa, external_work,
-                    criteria, forces, queue, program, table
+                    criteria, forces, queue, program, table, until, shorten
                 )  # fmt: skip
         if stop == Stop.NONE.value and count[STAGE] == 1:
             stop = second_half(
@@ -373,7 +381,7 @@ def steps_until(
 @stage("the time steps")
 def advance(
     table, program, grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa,
-    external_work, criteria, forces, queue, until, last
+    external_work, criteria, forces, queue, until, last, shorten
 ):  # fmt: skip
     """Take steps, then end the work of the other threads; returns the value of a `Stop`.
 
@@ -382,7 +390,7 @@ def advance(
     """
     stop = steps_until(
         grains, contacts, pair_list, long_range, clock, count, lost, scratch, span, settings, search, respa,
-        external_work, criteria, forces, queue, program, table, until, last
+        external_work, criteria, forces, queue, program, table, until, last, shorten
     )  # fmt: skip
     join_workers(queue.words)
     return stop

@@ -48,7 +48,7 @@ from .motion import kick
 from .parts import Stop
 from .runge_kutta import STAGES, V, X, rows3, set_stage, store_start, sum_loads
 from .stages import EXPLAIN, GAS_KICK
-from .step_control import StepCriteria, quantise_step
+from .step_control import StepCriteria, is_close, is_past, quantise_step
 from .step_parts import MAX_TURN
 from .verlet import Verlet
 
@@ -253,7 +253,7 @@ def step_to_contact(
 @stage("the steps of fourth order")
 def symplectic_flight(
     table, program, grains, contacts, pair_list, long_range, runge_kutta, clock, count, lost, span, settings, search,
-    external_work, criteria, flight_limits, forces, queue, scratch, until, last
+    external_work, criteria, flight_limits, forces, queue, scratch, until, last, shorten
 ):  # fmt: skip
     """Take one step and log the work of external forces; returns a `Stop`."""
     stop = refresh_verlet_list(grains, long_range, span, search, program, table)
@@ -265,6 +265,10 @@ def symplectic_flight(
         )
     if not clock[FLIGHT] > 0.0:
         return Stop.NOT_FINITE.value
+    if is_past(clock[TIME] + clock[FLIGHT], until):
+        if not shorten:
+            return Stop.TIME_REACHED.value
+        clock[FLIGHT] = until - clock[TIME]
     before = 0.0
     if external_work.time_dependent:
         before = sum_external(scratch, forces, program, table, clock[TIME], ENERGY)
@@ -285,7 +289,8 @@ def symplectic_flight(
     clock[FLIGHT] = choose_free_step(grains, long_range, clock, count, span, search, criteria, flight_limits, forces)
     if not clock[FLIGHT] > 0.0:
         return Stop.NOT_FINITE.value
-    if clock[TIME] >= until or count[STEPS] >= last:  # output needs loads at the present positions; steps do not
+    if clock[TIME] >= until or is_close(clock[TIME], until) or count[STEPS] >= last:
+        # output needs loads at the present positions; steps do not
         sums = count[LONG_RANGE_SUMS]
         sum_loads(grains, long_range, count, scratch, forces, queue, program, table, clock[TIME])
         count[LONG_RANGE_SUMS] = sums

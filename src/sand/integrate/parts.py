@@ -14,7 +14,7 @@ PARTS = (
     # settings, fields of StepParameters
     *("span", "settings", "search", "respa", "external_work", "gas", "criteria", "flight_limits", "forces"),
     # data of one call of the driver
-    *("program", "queue", "scratch", "until", "last"),
+    *("program", "queue", "scratch", "until", "last", "shorten"),
 )
 """Names of the parts of a simulation, in the order of the table of addresses."""
 

@@ -51,6 +51,8 @@ IMPACT_DISPLACEMENT = 25.0
 """Largest relative displacement of an approaching pair, or along n in contact, per step, in δ_c / steps_per_period."""
 FLIGHT_FRACTION = 1.0 / 16.0
 """Largest flight of a grain in one step in units of the gap of the pair list, so that the list stays valid."""
+ROUNDING = 1e-14
+"""Rounding error of a sum of steps, in units of the time."""
 
 
 class StepCriteria(NamedTuple):
@@ -206,9 +208,10 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
     """
     between_cycles = clock[LEFT] == 0.0
     no_contacts = count[CONTACTS] == 0
+    chosen = count[CHECKED] == count[STEPS]  # by a call of the driver that ended before this step
     # with a fixed step the criteria only detect numbers that are not finite
     every_step = (no_contacts and criteria.fixed == 0.0) or (between_cycles and clock[CYCLE] > clock[STEP])
-    if every_step or count[STEPS] - count[CHECKED] >= CHECK_INTERVAL:
+    if (every_step and not chosen) or count[STEPS] - count[CHECKED] >= CHECK_INTERVAL:
         may_grow = count[STEPS] - count[STEP_INCREASES] >= INCREASE_INTERVAL
         if between_cycles:
             clock[CALM], cycle = steps_of_free_grains(grains, long_range, start, criteria)
@@ -232,6 +235,18 @@ def choose_step(grains, long_range, start, pair_list, clock, count, span, criter
     if criteria.fixed > 0.0:
         return criteria.fixed
     return min(clock[LEVEL], clock[CONTACT_STEP])
+
+
+@formula
+def is_past(time, until):
+    """Whether a time [s] is later than another by more than the rounding error of a sum of steps."""
+    return time - until > ROUNDING * math.fabs(until)
+
+
+@formula
+def is_close(time, until):
+    """Whether two times [s] differ by at most the rounding error of a sum of steps."""
+    return math.fabs(until - time) <= ROUNDING * math.fabs(until)
 
 
 @loop

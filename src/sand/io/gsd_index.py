@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import shutil
 from collections.abc import Sequence
@@ -127,15 +128,15 @@ def refuse_impossible_sizes(path: Path) -> None:
         raise BadInput(f"{path} is not a trajectory of SAND (parts of it lie outside the file)")
 
 
-def repair(path: Path, step: int) -> dict[int, tuple[int, int]]:
-    """Delete the first incomplete frame after `step` and all that follow; complete ones stay.
+def repair(path: Path, time: float) -> dict[float, tuple[int, int]]:
+    """Delete the first incomplete frame after `time` [s] and all that follow; complete ones stay.
 
     After a full disk or a power failure, the index may list more data than exist.
 
     Returns
     -------
-    dict[int, tuple[int, int]]
-        Index and checksum of each complete frame after `step`, by its step.
+    dict[float, tuple[int, int]]
+        Index and checksum of each complete frame after `time`, by its time.
 
     Raises
     ------
@@ -150,12 +151,12 @@ def repair(path: Path, step: int) -> dict[int, tuple[int, int]]:
         before = int(entries["frame"][bad[0] - 1]) if bad[0] else 0
         own = int(entries["frame"][bad[0]])
         cut(path, own if own == before + 1 else before)
-    complete: dict[int, tuple[int, int]] = {}
+    complete: dict[float, tuple[int, int]] = {}
     with gsd.hoomd.open(str(path), "r") as file:
-        for number in range(_frames_until(file, step), len(file)):
+        for number in range(_frames_until(file, time), len(file)):
             try:
                 stored = file[number]
-                complete[Frame(stored).step] = (number, code_of(stored))
+                complete[Frame(stored).time] = (number, code_of(stored))
             except Exception:  # gsd raises various exceptions for broken files
                 break
         else:
@@ -164,15 +165,15 @@ def repair(path: Path, step: int) -> dict[int, tuple[int, int]]:
     return complete
 
 
-def repair_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dict[int, tuple[int, int]], str]:
-    """As `repair`, for a run that has written frames of the steps `written`; a copy is kept if frames are lost.
+def repair_or_keep(path: Path, time: float, written: Sequence[float]) -> tuple[dict[float, tuple[int, int]], str]:
+    """As `repair`, for a run that has written frames of the times `written` [s]; a copy is kept if frames are lost.
 
     Frames before the first one in the file are not missed: they were written to a file that has been removed.
 
     Returns
     -------
-    tuple[dict[int, tuple[int, int]], str]
-        The result of `repair`, and a warning, which is empty if no frame up to `step` is lost.
+    tuple[dict[float, tuple[int, int]], str]
+        The result of `repair`, and a warning, which is empty if no frame up to `time` is lost.
 
     Raises
     ------
@@ -188,17 +189,17 @@ def repair_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dic
     kept = any(path.parent.glob(f"{path.name}{DAMAGED}*"))  # of an earlier loss, which was reported
     aside = set_aside(path, copy=True) if bad else None
     try:
-        complete = repair(path, step)
+        complete = repair(path, time)
         with gsd.hoomd.open(str(path), "r") as file:
-            present = _frames_until(file, step)
-            first = step_of(file, 0) if present else step + 1
+            present = _frames_until(file, time)
+            first = time_of(file, 0) if present else math.inf
             if not len(file) and holds_data(path):
                 raise BadInput(f"{path} has no complete frame")
     except (BadInput, RuntimeError):
         if aside is not None:
             aside.replace(path)
         raise
-    frames = sum(first <= one <= step for one in written)
+    frames = sum(first <= one <= time for one in written)
     if present >= frames or (kept and not bad):
         if aside is not None:
             aside.unlink()
@@ -208,10 +209,10 @@ def repair_or_keep(path: Path, step: int, written: Sequence[float]) -> tuple[dic
     return complete, lost
 
 
-def _frames_until(file: Any, step: int) -> int:
-    """Number of frames up to a step."""
+def _frames_until(file: Any, time: float) -> int:
+    """Number of frames up to a time [s]."""
     number = len(file)
-    while number > 0 and step_of(file, number - 1) > step:
+    while number > 0 and time_of(file, number - 1) > time:
         number -= 1
     return number
 
@@ -225,6 +226,11 @@ def read_number(file: Any, frame: int, chunk: str) -> int:
 def step_of(file: Any, frame: int) -> int:
     """Step of a frame."""
     return read_number(file.file, frame, "configuration/step")
+
+
+def time_of(file: Any, frame: int) -> float:
+    """Time of a frame [s]."""
+    return float(file.file.read_chunk(frame, "log/time")[0])
 
 
 def cut(path: Path, frame: int) -> None:

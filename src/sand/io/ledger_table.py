@@ -133,8 +133,10 @@ def _row_error(row: Row, before: Row | None, *, last: bool) -> str:
         return "" if last else "holds numbers that are not finite"
     if not isinstance(row["step"], int) or row["step"] < 0:
         return f"has step {row['step']}"
-    if before is not None and (row["step"] <= before["step"] or row.get("time", 0.0) < before.get("time", 0.0)):
-        return f"is of step {row['step']}, after step {before['step']}: steps and times must grow"
+    if before is not None:
+        step, time = row["step"] - before["step"], row.get("time", 0.0) - before.get("time", 0.0)
+        if min(step, time) < 0.0 or step == time == 0.0:
+            return f"is of step {row['step']}, after step {before['step']}: steps and times must grow"
     names = list(row)
     if "total" in names and "time" in names:
         parts = [row[name] for name in names[names.index("time") + 1 : names.index("total")]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import time as wall
 import warnings
@@ -38,11 +39,11 @@ class TrajectoryWriter:
     ----------
     path : Path
         The file; created if missing.
-    resume_at : int or None, optional
-        Step at which the run is resumed: later frames in the file are not written twice; incomplete frames and
-        frames that differ from the resumed run are deleted.
+    resume_at : float or None, optional
+        Time [s] of the last frame of a run that is resumed: later frames in the file are not written twice; incomplete
+        frames and frames that differ from the resumed run are deleted.
     written : Sequence[float], optional
-        Steps of the frames that the run has written up to that step.
+        Times of the frames [s] that the run has written up to that time.
 
     Raises
     ------
@@ -50,11 +51,12 @@ class TrajectoryWriter:
         If the file cannot be written.
     """
 
-    def __init__(self, path: Path, resume_at: int | None = None, written: Sequence[float] = ()):
+    def __init__(self, path: Path, resume_at: float | None = None, written: Sequence[float] = ()):
         self.path = path
         self._file: Any = None  # closed between runs
-        self._later: dict[int, tuple[int, int]] = {}  # frames after resume_at: index and checksum by step
-        self._last = self._whole_until = -1 if resume_at is None else resume_at  # steps: of the last frame, and flush
+        self._later: dict[float, tuple[int, int]] = {}  # frames after resume_at: index and checksum by time
+        # times of the last frame, and of the last one that was flushed
+        self._last = self._whole_until = -math.inf if resume_at is None else resume_at
         self._abandoned = False  # after an error
         self._waiting = self._pending = 0  # frames that wait for the next flush, and their approximate bytes
         self._entries = 0  # upper bound of the index entries
@@ -90,7 +92,7 @@ class TrajectoryWriter:
             If the frame cannot be written; earlier ones stay.
         """
         frame = stored_frame(step, time, grains, box, contacts, exact=exact)
-        if self._is_stored(step, code_of(frame)):
+        if self._is_stored(time, code_of(frame)):
             return
         self._waiting, self._entries = self._waiting + 1, self._entries + gsd_index.CHUNKS
         self._pending += sum(array.nbytes for array in frame.log.values()) + SINGLE_PER_GRAIN * len(grains)
@@ -100,13 +102,13 @@ class TrajectoryWriter:
             self._file.append(frame)
         except OSError as error:
             raise self._abandon(error) from error
-        self._last = step
+        self._last = time
         if wall.monotonic() - self._flushed > FLUSH_EVERY or self._waiting >= MOST_WAITING:
             self.flush()
 
-    def _is_stored(self, step: int, code: int) -> bool:
-        """Whether the file has this frame already; a different frame of this step and all later ones are deleted."""
-        number, stored = self._later.pop(step, (-1, code))
+    def _is_stored(self, time: float, code: int) -> bool:
+        """Whether the file has this frame already; a different frame of this time and all later ones are deleted."""
+        number, stored = self._later.pop(time, (-1, code))
         if number >= 0 and stored == code:
             return True
         others = [later for later, _ in self._later.values()] + [number] * (number >= 0)
@@ -247,14 +249,14 @@ class Frames(FrameSequence):
     def head(self, index: int) -> tuple[float, int, int]:
         """Time [s], step and number of contacts of a frame ≥ 0.  Raises BadInput if it is incomplete."""
         with self._reading(index):
-            time = float(self._file.file.read_chunk(index, "log/time")[0])
+            time = gsd_index.time_of(self._file, index)
             contacts = gsd_index.read_number(self._file.file, index, "bonds/N")
             return time, gsd_index.step_of(self._file, index), contacts
 
     @property
     def times(self) -> np.ndarray:
         """Time of each frame [s]."""
-        return np.array([float(self._file.file.read_chunk(k, "log/time")[0]) for k in range(len(self))])
+        return np.array([gsd_index.time_of(self._file, k) for k in range(len(self))])
 
     def close(self) -> None:
         """Close the file."""

@@ -51,6 +51,7 @@ from ..state.state import (
     STAGE,
     STEP_INCREASES,
     STEPS,
+    TIME,
     State,
 )
 from .cluster_cutoff import ClusterCutoff
@@ -96,6 +97,8 @@ class Engine:
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
+    _shown_time: float | None = field(init=False, default=None)  # time of the state shown, None: the regular state
+    _shown: State | None = field(init=False, default=None)  # made from the regular state when it is first needed
 
     def __post_init__(self) -> None:
         self._table = Table(PARTS)
@@ -109,24 +112,49 @@ class Engine:
         """A copy with a table of its own."""
         names = [each.name for each in fields(self) if each.init]
         other = Engine(*(copy.deepcopy(getattr(self, name), memo) for name in names))
-        other._is_sorted = self._is_sorted
+        other._is_sorted, other._shown_time = self._is_sorted, self._shown_time
         return other
 
     @property
     def state(self) -> State:
-        """The state, with grains in the user's order."""
+        """The state at the last time of `show`, otherwise the regular state; grains in the user's order."""
+        if self._shown_time is None:
+            return self.regular_state
+        if self._shown is None:
+            self.show(self._shown_time)
+        return self.regular_state if self._shown is None else self._shown
+
+    @property
+    def regular_state(self) -> State:
+        """The state after the last regular step, from which the run continues; grains in the user's order."""
         self.restore_user_order()
         return self._state
-
-    @state.setter
-    def state(self, other: State) -> None:
-        self._state, self._is_sorted = other, False
 
     def restore_user_order(self) -> None:
         """Undo the spatial sorting of the arrays, until the next step."""
         if self._is_sorted:
             reorder_grains(self._state, inverse(self._state.order))
             self._is_sorted = False
+
+    def show(self, time: float) -> Stop:
+        """Make `state` the state at exactly this time [s], after `advance` up to it; returns why no such state exists.
+
+        A copy of the regular state takes a shorter step or cycle. Regular steps do not depend on it, and so not on the
+        times of output. Its count of steps is that of the regular steps before it.
+        """
+        regular, is_sorted = self._state, self._is_sorted
+        if regular.time == time:
+            self._shown = self._shown_time = None
+            return Stop.TIME_REACHED
+        self._state = regular.copy()
+        self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
+        try:
+            stop = self._drive(time, math.inf, shorten=True)
+            self._shown, self._shown_time = self.regular_state, time
+        finally:
+            self._state, self._is_sorted = regular, is_sorted
+        self._shown.clock[TIME], self._shown.count[STEPS] = time, regular.steps
+        return stop
 
     @property
     def law(self) -> ContactLaw:
@@ -135,8 +163,8 @@ class Engine:
 
     @property
     def time(self) -> float:
-        """Simulation time [s]."""
-        return self._state.time
+        """Time of `state` [s]."""
+        return self._state.time if self._shown_time is None else self._shown_time
 
     @property
     def steps(self) -> int:
@@ -146,7 +174,7 @@ class Engine:
     def _sort_in_space(self) -> None:
         """Bring the arrays into Morton order; the order is recomputed every `SORT_INTERVAL` steps."""
         if not self._state.order.size or self.steps >= self._state.count[ORDERED] + SORT_INTERVAL:
-            state = self.state
+            state = self.regular_state
             state.order, state.count[ORDERED] = spatial_order(state), state.steps
             reorder_grains(state, state.order)
             sort_contacts_and_pairs(state)
@@ -156,23 +184,24 @@ class Engine:
         self._is_sorted = True
 
     def advance(self, until: float, most_steps: float) -> Stop:
-        """Take steps up to `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed."""
-        last = min(self.steps + most_steps, 2**62)
+        """Take steps not beyond `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed."""
+        self._shown = self._shown_time = None
+        last = self.steps + most_steps
         if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
             return self._drive(until, last)
         while True:
-            if self.time < until and self.steps < last:
+            if self._state.time < until and self.steps < last:
                 self._sort_in_space()
             renewed = self._state.count[ORDERED] + SORT_INTERVAL
             stop = self._drive(until, min(last, renewed))
             if not (stop is Stop.NONE and renewed <= self.steps < last):
                 return stop
 
-    def _drive(self, until: float, last: float) -> Stop:
+    def _drive(self, until: float, last: float, shorten: bool = False) -> Stop:
         """Take steps up to a time [s] or a step, in the present order of the arrays; enlarges arrays that overflow."""
-        state = self._state
+        state, last = self._state, min(last, 2**62)
         while True:
-            stop = self._call_driver(until, last)
+            stop = self._call_driver(until, last, shorten)
             if stop is Stop.CONTACTS_FULL:
                 state.grow_contacts()
             elif stop is Stop.PAIRS_FULL:
@@ -244,11 +273,11 @@ class Engine:
             self._table.set(name, getattr(state, name))
         return self._table
 
-    def _call_driver(self, until: float, last: float) -> Stop:
+    def _call_driver(self, until: float, last: float, shorten: bool) -> Stop:
         """One call of the driver."""
         state, table = self._state, self._current_table(self._state)
         queue = new_task_queue(len(state.grains), state.contacts.flag.size)
-        for name, value in (("queue", queue), ("until", float(until)), ("last", int(last))):
+        for name, value in (("queue", queue), ("until", float(until)), ("last", int(last)), ("shorten", shorten)):
             table.set(name, value)
         try:
             if self._program is None:
@@ -291,9 +320,9 @@ class Engine:
         state.lost[:] = 0.0
         state.contacts.lost[:] = 0.0
 
-    def load_state(self, saved: dict[str, np.ndarray]) -> None:
-        """Restore a saved state; quantities that a checkpoint does not hold are recomputed."""
-        state = self.state
+    def load_state(self, saved: dict[str, np.ndarray], shown_time: float | None = None) -> None:
+        """Restore a saved regular state, to be shown at a time [s]; quantities that are not saved are recomputed."""
+        state, self._shown_time = self.regular_state, shown_time
         state.from_arrays(saved)
         if self.cutoff is None:
             state.count[COMPARED] = -1

@@ -99,14 +99,14 @@ class Ledger(LedgerColumns):
         super().__init__(("step", "time", *KINETIC, *ENERGIES, MAGNETIC, *others, *of_state))
 
     def add(self, row: dict[str, float]) -> bool:
-        """Append a row; returns False if the ledger already has a row of this step."""
-        if self.rows and row["step"] <= self.rows[-1]["step"]:
+        """Append a row; returns False if the ledger already has a row of this time."""
+        if self.rows and not row["time"] > self.rows[-1]["time"]:
             return False
         self.rows.append(row)
         return True
 
     def with_row(self, row: dict[str, float]) -> Ledger:
-        """The ledger with one more row; the rows themselves if this step is the last one logged.
+        """The ledger with one more row; the rows themselves if this time is the last one logged.
 
         Used for the summary of an interrupted run: the ledger of the run itself must not depend on interruptions.
         """

@@ -43,11 +43,12 @@ def call_ticks(observers: Iterable[Observer], simulation: Simulation) -> None:
         observer.tick(simulation)
 
 
-class Schedule:
-    """Times of frames: multiples of `every` [s] of simulated time.
+NEAR = 1e-6
+"""Times nearer to a multiple than this fraction of the interval count as the multiple, as both are rounded."""
 
-    A frame is the first step at or after a multiple; steps are not shortened to meet it.
-    """
+
+class Schedule:
+    """Times of frames: multiples of `every` [s] of simulated time, met exactly."""
 
     def __init__(self, every: float, time: float):
         self._every = every
@@ -60,14 +61,19 @@ class Schedule:
         """Time [s] of the next frame."""
         return max(self._number * self._every, self._after) if math.isfinite(self._every) else math.inf
 
+    def next(self, end: float) -> float:
+        """Time [s] of the next frame, or of the end of the run if that is not later."""
+        return self.due if self.due < end - NEAR * self._every else end
+
     def advance(self, time: float) -> None:
         """Move to the first multiple after `time`."""
         if not math.isfinite(self._every):
             return
-        self._number = max(self._number, math.floor(time / self._every))
-        # rounding may put the first or the second multiple tried before `time`
+        late = time + NEAR * self._every
+        self._number = max(self._number, math.floor(late / self._every))
+        # rounding may put the first or the second multiple tried before `late`
         for _ in range(2):
-            if self._number * self._every <= time:
+            if self._number * self._every <= late:
                 self._number += 1
-        # where the spacing of doubles exceeds `every`, each step is a frame
+        # where the spacing of doubles exceeds `every`, frames follow at that spacing
         self._after = math.nextafter(time, math.inf)

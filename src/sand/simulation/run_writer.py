@@ -86,10 +86,9 @@ class RunWriter:
         if self._resumed:
             self._clean_up_earlier(simulation)
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
-        steps = simulation.steps if self._resumed else None
-        self._trajectory = TrajectoryWriter(
-            self.folder / files.TRAJECTORY, steps, [row["step"] for row in simulation.ledger.rows]
-        )
+        times = [row["time"] for row in simulation.ledger.rows]
+        resumed_at = (times[-1] if times else -math.inf) if self._resumed else None
+        self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, resumed_at, times)
         if not self._resumed:
             self._frame(simulation)
         self.save(simulation)
@@ -144,17 +143,19 @@ class RunWriter:
             self.save(simulation)
 
     def save(self, simulation: Simulation) -> None:
-        """Write a checkpoint; the trajectory is flushed first, so that no earlier frame can be lost.
+        """Write the regular state as a checkpoint; the trajectory is flushed first, so that no frame can be lost.
 
         An unsound state is not written: the last good checkpoint stays.
         """
-        assert simulation.state.count[STAGE] == 0
+        regular = simulation.regular_state
+        assert regular.count[STAGE] == 0
         begun = wall.monotonic()
         if self._trajectory is not None:
             self._trajectory.flush(sync=True)
         meta = {
             "steps": simulation.steps,
-            "time": simulation.time,
+            "time": regular.time,
+            "shown": simulation.time,
             "until": None if math.isinf(self._ends[0]) else self._ends[0],
             "last_step": None if math.isinf(self._ends[1]) else int(self._ends[1]),
             "wall_seconds": simulation.wall_seconds,
@@ -168,7 +169,7 @@ class RunWriter:
             "cutoff": CUTOFF,
         }
         if simulation.is_sound:
-            arrays = {**simulation.state.to_arrays(), "ledger": simulation.ledger.to_array()}
+            arrays = {**regular.to_arrays(), "ledger": simulation.ledger.to_array()}
             self._own = _stamp(write_checkpoint(self.folder, arrays, meta))
         self._saved = wall.monotonic()
         self._took = self._saved - begun

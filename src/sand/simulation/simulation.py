@@ -127,7 +127,7 @@ class Simulation(ReadOnlySettings):
         self._failure = ""  # why the simulation cannot continue
         if restart is not None:
             arrays, meta = restart
-            self._engine.load_state(arrays)
+            self._engine.load_state(arrays, meta.get("shown"))
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
             self._choices_at_start = meta.get("choices", {})
             if "ledger" in arrays:  # a state without a ledger starts a new one
@@ -139,8 +139,13 @@ class Simulation(ReadOnlySettings):
 
     @property
     def state(self) -> State:
-        """State of the simulation: grains, contacts, box and clock."""
+        """State of the simulation at `time`: grains, contacts, box and clock."""
         return self._engine.state
+
+    @property
+    def regular_state(self) -> State:
+        """State after the last regular step, not later than `time`: that of checkpoints, from which a run continues."""
+        return self._engine.regular_state
 
     @property
     def time(self) -> float:
@@ -149,7 +154,7 @@ class Simulation(ReadOnlySettings):
 
     @property
     def steps(self) -> int:
-        """Number of steps taken so far."""
+        """Number of regular steps taken so far."""
         return self._engine.steps
 
     @property
@@ -244,8 +249,8 @@ class Simulation(ReadOnlySettings):
         Parameters
         ----------
         until : float or str, optional
-            Absolute simulation time [s]; the run ends at the first step at or after it. A resumed run ends at its
-            planned end by default.
+            Absolute simulation time [s]; the state at the end of the run is that at exactly this time. A resumed run
+            ends at its planned end by default.
         steps : int, optional
             Number of further steps, at least 1; a started r-RESPA cycle (`Verlet.far`) is completed.
 
@@ -348,23 +353,28 @@ class Simulation(ReadOnlySettings):
             observer.see(self, row)
 
     def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
-        frames = Schedule(self.frame_every or math.inf, self.time)
+        logged = [row["time"] for row in self.ledger.rows[-1:]]
+        frames = Schedule(self.frame_every or math.inf, max([self.time, *logged]))
         steps_per_call, checked_at, estimate = 64, self.steps, RunTimeEstimate(end, last)
         while True:
             began = wall.monotonic()
             most_steps = max(min(steps_per_call, last - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
-            stop = self._engine.advance(min(end, frames.due), most_steps)
+            goal = frames.next(end)
+            stop = self._engine.advance(goal, most_steps)
+            unsound = self.steps - checked_at >= ENERGY_CHECK_EVERY and not self.is_sound
+            if self.steps - checked_at >= ENERGY_CHECK_EVERY:
+                checked_at = self.steps
+            if stop is Stop.TIME_REACHED:  # before the first step that would pass this time
+                stop = self._engine.show(goal)
             seconds = wall.monotonic() - began
             if most_steps == steps_per_call:
                 growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)
                 steps_per_call = max(64, min(int(steps_per_call * growth), 10**7))
             if stop in OUTCOME_OF_STOP:
                 return OUTCOME_OF_STOP[stop]
+            if unsound:
+                return Outcome.RUNAWAY
             estimate.update(self.time, self.steps, seconds)
-            if self.steps - checked_at >= ENERGY_CHECK_EVERY:
-                checked_at = self.steps
-                if not self.is_sound:
-                    return Outcome.RUNAWAY
             done = self.time >= end or self.steps >= last
             output = stop is Stop.TIME_REACHED or done
             if output:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -131,7 +130,10 @@ class State:
 
     def copy(self) -> State:
         """Independent copy (snapshot)."""
-        return replace(copy.deepcopy(self))  # __post_init__ aligns the arrays
+        groups = ("contacts", "pair_list", "long_range", "runge_kutta", "clusters")
+        copied = {name: type(group)(*(a.copy() for a in group)) for name in groups for group in [getattr(self, name)]}
+        single = {name: getattr(self, name).copy() for name in ("clock", "count", "lost", "cutoff", "order")}
+        return replace(self, grains=self.grains.copy(), **copied, **single)  # __post_init__ aligns the arrays
 
     def _uniform_arrays(self) -> tuple[str, ...]:
         """Names of arrays with identical columns."""
