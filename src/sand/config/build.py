@@ -19,11 +19,11 @@ from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
 from ..io.trajectory import Frames
 from ..material import Material
-from ..schema import OWN
 from ..setup.checks import check_body
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
 from ..simulation.simulation import Simulation
+from ..state.state import grains_from_arrays
 from .case import THERMAL, Case, check_case
 
 TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
@@ -220,21 +220,11 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
     library = case.materials_by_name()
     try:
-        part = {name.split("/", 1)[1]: array for name, array in arrays.items() if name.startswith("grains/")}
-        grains = Grains(
-            part["position"].T,
-            part["radius"],
-            [library[names[i]] for i in part["material"]],
-            velocity=part["velocity"].T,
-            spin=part["spin"].T,
-            moment=part["body_moment"].T,
-            charge=part["charge"],
-            mass=part["mass"],
-            own={name: part[name] for name in OWN},
-        )
+        index = arrays["grains/material"]
+        grains = grains_from_arrays(arrays, [library[names[i]] for i in index])
     except (KeyError, IndexError) as error:
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
-    if (grains.arrays.material != part["material"]).any():
+    if (grains.arrays.material != index).any():
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
     options |= {"out": place, "frame_every": case.run.frame_every, "restart": (arrays, meta)}
     simulation = simulate(case, grains, case.box.periodic, **options)

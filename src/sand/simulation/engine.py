@@ -41,14 +41,17 @@ from ..state.state import (
     CONTACTS,
     CUT_RADIUS,
     CUTOFF_CHANGED,
+    CYCLE,
     GRAIN1,
     GRAIN2,
+    LEFT,
     LONG_RANGE_SUMS,
     MADE,
     ORDERED,
     PAIRS,
     SLIPPED,
     STAGE,
+    STEP,
     STEP_INCREASES,
     STEPS,
     TIME,
@@ -319,6 +322,15 @@ class Engine:
         state.count[COMPARED] = min(state.count[COMPARED], 0)
         state.lost[:] = 0.0
         state.contacts.lost[:] = 0.0
+
+    def refresh_loads(self) -> None:
+        """Sum the loads anew by the second half of a step of 0 s, after the user has changed grains or forces."""
+        state = self.regular_state
+        steps, sums = state.steps, int(state.count[LONG_RANGE_SUMS])
+        state.count[STAGE] = 1
+        state.clock[STEP] = state.clock[CYCLE] = state.clock[LEFT] = 0.0
+        self._drive(-math.inf, steps + 1)
+        state.count[STEPS], state.count[LONG_RANGE_SUMS] = steps, sums
 
     def load_state(self, saved: dict[str, np.ndarray], shown_time: float | None = None) -> None:
         """Restore a saved regular state, to be shown at a time [s]; quantities that are not saved are recomputed."""

@@ -62,6 +62,7 @@ class RunWriter:
         self._ends = (math.inf, math.inf)
         self._case: dict[str, Any] = {}
         self._lock: FolderLock | None = None
+        self._changed = False  # by the user since the last checkpoint
         self._own: tuple[str, int] | None = None  # the last checkpoint that this simulation wrote
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
@@ -76,12 +77,15 @@ class RunWriter:
         """
         self._lock = FolderLock(self.folder)
         self._refuse_others_files(simulation.steps)
-        if (until, last_step) != self._ends:
+        changed, self._changed = self._changed, False
+        if changed or (until, last_step) != self._ends:
             self._ends = (until, last_step)
             self._case = case_of(simulation, until, last_step)
             text = "the complete case in SI units, with all defaults"
             write_toml(self.folder / files.CASE, self._case, text)
         if self._trajectory is not None:
+            if changed:
+                self.save(simulation)
             return
         if self._resumed:
             self._clean_up_earlier(simulation)
@@ -92,6 +96,10 @@ class RunWriter:
         if not self._resumed:
             self._frame(simulation)
         self.save(simulation)
+
+    def changed(self) -> None:
+        """Note that the user changed the simulation: the next `open` writes case.toml and a checkpoint."""
+        self._changed = True
 
     def release(self) -> None:
         """Release the lock of the folder; `open` takes it again."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time as wall
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,10 @@ from ..integrate.registry import checked_integrator
 from ..integrate.verlet import Verlet
 from ..neighbours.settings import Neighbours
 from ..setup.from_frame import StrainedContacts
-from ..state.state import State
+from ..state.state import COMPARED, OUTSIDE, State, grains_from_arrays
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
+from .change import Change
 from .contact_table import ContactTable
 from .displays import DISPLAYS
 from .ledger import Ledger, kinetic_energies, log_row
@@ -293,6 +295,49 @@ class Simulation(ReadOnlySettings):
         finally:
             if self.writer:
                 self.writer.release()
+
+    @contextlib.contextmanager
+    def change(self) -> Iterator[Change]:
+        """Change velocities, spins, moments or charges of grains, or parameters of forces, at the present time.
+
+        The change is made at the end of the `with` block, or not at all if an exception is raised in it. The change of
+        the energy is the work of the user: it is added to `lost_outside`, with the opposite sign. The run continues
+        from the state at `time`, also where no regular step ends.
+
+        Yields
+        ------
+        Change
+            Arrays `velocity`, `spin`, `moment`, `charge`, and `replace(force)`.
+
+        Raises
+        ------
+        BadInput
+            If a quantity is out of range, a kind of force is added or left out, or the contact model differs.
+        """
+        if self._failure:
+            raise BadInput(f"this simulation cannot be changed: {self._failure}")
+        self._begin()
+        change = Change(self.grains, self.forces)
+        yield change
+        forces = change.checked_forces(self.forces)
+        arrays = change.arrays(self.state)
+        arrays["count"][COMPARED] = self.regular_state.count[COMPARED]
+        grains = grains_from_arrays(arrays, [self.grains.materials[k] for k in self.grains.material])
+        parts = (grains, forces, self.box, self.stepping, self.neighbours, int(self.seed or 0))
+        engine = build_engine(*parts, fresh=False, cutoff=arrays["cutoff"])
+        acting = [[force.name for force, _, _ in one.long_range] for one in (self._engine, engine)]
+        if acting[0] != acting[1]:
+            names = ", ".join(sorted(set(acting[0]) ^ set(acting[1])))
+            raise BadInput(f"forces: {names} would act on no grain, or on the first one; a change cannot do that")
+        engine.load_state(arrays)
+        engine.refresh_loads()
+        before = self._log_row()["total"]
+        self._engine = engine
+        object.__setattr__(self, "forces", forces)
+        object.__setattr__(self, "start", self.grains.copy())
+        engine.regular_state.lost[OUTSIDE] += before - self._log_row()["total"]
+        if self.writer:
+            self.writer.changed()
 
     @checked
     def view(self, path: str | Path | None = None) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from ..box import Box
 from ..errors import BadInput
 from ..grains import GrainArrays, Grains
+from ..material import Material
 from ..numerics.simd import all_aligned
+from ..schema import OWN
 from .arrays import (
     GROWTH,
     NOT_SAVED,
@@ -201,6 +204,39 @@ class State:
             if name == "anchor" and saved.get("long_range/anchor", self.long_range.anchor).size == 0:
                 continue  # saved without a Verlet list: Engine.load_state builds one
             _copy_into(getattr(self.long_range, name), saved, f"long_range/{name}")
+
+
+def grains_from_arrays(saved: Mapping[str, np.ndarray], materials: Sequence[Material]) -> Grains:
+    """Grains with the radii, masses, velocities, spins, moments and charges of saved arrays.
+
+    Their moments are those in the body frames; `State.from_arrays` restores the orientations.
+
+    Parameters
+    ----------
+    saved : Mapping[str, ndarray]
+        Arrays of `State.to_arrays`.
+    materials : Sequence[Material]
+        Material of each grain.
+
+    Raises
+    ------
+    KeyError
+        If an array is missing.
+    BadInput
+        If a quantity is out of range.
+    """
+    part = {name.split("/", 1)[1]: array for name, array in saved.items() if name.startswith("grains/")}
+    return Grains(
+        part["position"].T,
+        part["radius"],
+        materials,
+        velocity=part["velocity"].T,
+        spin=part["spin"].T,
+        moment=part["body_moment"].T,
+        charge=part["charge"],
+        mass=part["mass"],
+        own={name: part[name] for name in OWN},
+    )
 
 
 def _copy_into(target: np.ndarray, saved: dict[str, np.ndarray], name: str) -> None:
