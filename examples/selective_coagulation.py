@@ -128,6 +128,8 @@ def main() -> None:
     parser.add_argument("--until", default="3 us")
     parser.add_argument("--out", default="selective", help="name of the table and the figure")
     options = parser.parse_args()
+    if options.seeds < 2:
+        parser.error("--seeds must be at least 2: errors follow from the scatter between boxes")
     until = si(options.until, "s", "until", above=0.0)
     time = np.linspace(0.0, until, ROWS + 1)
     boxes = np.array([simulate(options.grains, until, seed) for seed in range(1, options.seeds + 1)])

@@ -132,6 +132,8 @@ def main() -> None:
     parser.add_argument("--until", default="0.12 us")
     parser.add_argument("--out", default="sweeping", help="name of the table and the figure")
     options = parser.parse_args()
+    if options.seeds < 2:
+        parser.error("--seeds must be at least 2: errors follow from the scatter between boxes")
     until = si(options.until, "s", "until", above=0.0)
     time, seeds = np.linspace(0.0, until, ROWS + 1), range(1, options.seeds + 1)
     samples = np.array([simulate(net(options.grains, seed), options.gas, until, seed) for seed in seeds])

@@ -26,7 +26,7 @@ LARGEST_PART = 0.1
 """Largest S of the fit as a fraction of all grains; beyond it collision partners are depleted.
 
 With 0.15 the 95 % interval of z contained z = 1 of a constant kernel in only 87 % of ensembles of eight boxes of 125
-grains, with 0.1 in 92 % (tests/reference/fit_coverage.py).
+grains, with 0.1 in 91 % (tests/reference/fit_coverage.py).
 """
 LEAST = 3
 """Smallest number of grains of an aggregate in the fit of moments."""

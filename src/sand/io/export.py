@@ -39,6 +39,18 @@ def _table(columns: Sequence[np.ndarray], form: str) -> str:
     return "".join(f"{k} {row}\n" for k, row in enumerate(format_rows(columns, form), 1))
 
 
+def _file_names(stem: str, ending: str, steps: Sequence[int]) -> list[str]:
+    """File of each frame: with the number of its step, and "-1", "-2", … where several frames follow one step."""
+    if "{" not in ending:  # one file for all
+        return [stem + ending] * len(steps)
+    names = []
+    for k, step in enumerate(steps):
+        repeated = sum(other == step for other in steps[:k])
+        number, _, suffix = ending.format(step).rpartition(".")
+        names.append(f"{stem}{number}{f'-{repeated}' if repeated else ''}.{suffix}")
+    return names
+
+
 def to_lammps_dump(frame: Frame, cluster: np.ndarray) -> str:
     """Format a frame as a snapshot of a custom dump: id, type, position, radius, velocity, spin, moment, cluster.
 
@@ -163,7 +175,7 @@ def export_frames(
     if not place.parent.is_dir():
         raise BadInput(f"there is no folder {place.parent}; make it first")
     text_of, ending = FORMATS[form]
-    paths = [place.with_name(place.name + ending.format(frame.step)) for frame in frames]
+    paths = [place.with_name(name) for name in _file_names(place.name, ending, [frame.step for frame in frames])]
     texts = (text_of(frame, clusters(len(frame), frame.pair)) for frame in frames)
     for path, group in groupby(zip(paths, texts, strict=True), itemgetter(0)):
         replace_file(path, "".join(text for _, text in group).encode())

@@ -135,7 +135,7 @@ def _row_error(row: Row, before: Row | None, *, last: bool) -> str:
         return f"has step {row['step']}"
     if before is not None:
         step, time = row["step"] - before["step"], row.get("time", 0.0) - before.get("time", 0.0)
-        if min(step, time) < 0.0 or step == time == 0.0:
+        if step < 0.0 or time < 0.0 or step == time == 0.0:
             return f"is of step {row['step']}, after step {before['step']}: steps and times must grow"
     names = list(row)
     if "total" in names and "time" in names:

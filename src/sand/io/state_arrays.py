@@ -60,7 +60,7 @@ STORED = {
     "long_range/anchor": ArraySpec("f8", (3, (0, "N")), "no nan"),
 }
 """All arrays of a checkpoint."""
-NUMBERS = {"steps": int, "time": float, "wall_seconds": float, "temperature": float}
+NUMBERS = {"steps": int, "time": float, "output_time": float, "wall_seconds": float, "temperature": float}
 """Required numbers of `meta.json` with their types; an integer is accepted for either."""
 PLANNED_END = {"until": float, "last_step": int}
 """Numbers of `meta.json` that may be null."""
@@ -201,6 +201,8 @@ def _check_counters(arrays: Mapping[str, np.ndarray], meta: Mapping[str, Any]) -
     for index in (GRAIN1, GRAIN2):
         if not -1 <= count[index] < n:
             raise BadInput(f"'count' says {COUNT[index]} = {count[index]}, but the grains are 0 to {n - 1}")
+    if not 0.999999 * meta["time"] <= meta["output_time"] < np.inf:
+        raise BadInput(f"meta.json says output_time = {meta['output_time']!r} s, less than time = {meta['time']!r} s")
     if clock[TIME] != meta["time"]:
         raise BadInput(f"'clock' says time = {float(clock[TIME])!r} s, but its meta.json {meta['time']!r} s")
 

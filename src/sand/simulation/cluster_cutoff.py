@@ -40,7 +40,7 @@ class ClusterCutoff:
     """The cut-off that follows the clusters.
 
     A choice depends only on contacts, moments and the temperature at the start, so that it is the same for any output,
-    interruption or number of threads. The cut-off never becomes shorter: it is too long then, which costs time only.
+    interruption or number of threads. The cut-off never becomes shorter: a cut-off that is too long costs time only.
 
     Attributes
     ----------
@@ -74,9 +74,9 @@ class ClusterCutoff:
             return None
         # the first two moments that exist need a shorter cut-off than half the box, which is used without them
         radius = max(self.force.for_pair(pair, state.grains, self.largest).radius or 0.0, before)
-        if radius > before:
-            time = state.time
-            limited = min(limited, time) if CAPTURE_RADII * pair.capture > self.largest else limited
+        time = state.time if radius > before else time
+        if CAPTURE_RADII * pair.capture > self.largest and "limited by the box" not in self.at_start.reason:
+            limited = min(limited, state.time)
         state.cutoff[:] = _values(radius, pair, temperature, time, limited)
         return radius if radius > before else None
 

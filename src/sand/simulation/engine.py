@@ -26,7 +26,7 @@ from ..integrate.force_stages import SUM, WHOLE, pair_force_stages
 from ..integrate.parts import PARTS, SCRATCH, StepParameters, Stop
 from ..integrate.program import Components, build_program
 from ..integrate.respa import clear_long_range_loads
-from ..integrate.step_control import INCREASE_INTERVAL
+from ..integrate.step_control import INCREASE_INTERVAL, is_past
 from ..integrate.task_queue import benefits_from_workers, new_task_queue, release_workers, take_blocks, uses_task_queue
 from ..integrate.worker_threads import WorkerThreads
 from ..neighbours.cell_list import FULL, rebuild_verlet_list
@@ -45,10 +45,13 @@ from ..state.state import (
     GRAIN1,
     GRAIN2,
     LEFT,
+    LISTED,
     LONG_RANGE_SUMS,
     MADE,
     ORDERED,
     PAIRS,
+    REBUILT,
+    REJECTED,
     SLIPPED,
     STAGE,
     STEP,
@@ -100,8 +103,8 @@ class Engine:
     _table: Table = field(init=False)
     _program: Program | None = field(init=False, default=None)  # None: it is made before the next step
     _workers: WorkerThreads | None = field(init=False, default=None)
-    _shown_time: float | None = field(init=False, default=None)  # time of the state shown, None: the regular state
-    _shown: State | None = field(init=False, default=None)  # made from the regular state when it is first needed
+    _output_time: float | None = field(init=False, default=None)  # time of `state`; None: that of the regular state
+    _output_state: State | None = field(init=False, default=None)  # made from the regular state when first needed
 
     def __post_init__(self) -> None:
         self._table = Table(PARTS)
@@ -115,17 +118,15 @@ class Engine:
         """A copy with a table of its own."""
         names = [each.name for each in fields(self) if each.init]
         other = Engine(*(copy.deepcopy(getattr(self, name), memo) for name in names))
-        other._is_sorted, other._shown_time = self._is_sorted, self._shown_time
+        other._is_sorted, other._output_time = self._is_sorted, self._output_time
         return other
 
     @property
     def state(self) -> State:
-        """The state at the last time of `show`, otherwise the regular state; grains in the user's order."""
-        if self._shown_time is None:
-            return self.regular_state
-        if self._shown is None:
-            self.show(self._shown_time)
-        return self.regular_state if self._shown is None else self._shown
+        """The state at the last time of `go_to`, otherwise the regular state; grains in the user's order."""
+        if self._output_time is not None and self._output_state is None and self._output_time != self._state.time:
+            self.go_to(self._output_time)  # of a checkpoint
+        return self.regular_state if self._output_state is None else self._output_state
 
     @property
     def regular_state(self) -> State:
@@ -139,24 +140,43 @@ class Engine:
             reorder_grains(self._state, inverse(self._state.order))
             self._is_sorted = False
 
-    def show(self, time: float) -> Stop:
+    def go_to(self, time: float) -> Stop:
         """Make `state` the state at exactly this time [s], after `advance` up to it; returns why no such state exists.
 
-        A copy of the regular state takes a shorter step or cycle. Regular steps do not depend on it, and so not on the
-        times of output. Its count of steps is that of the regular steps before it.
+        A copy of the regular state takes one shorter step or cycle. Regular steps do not depend on it, and so not on
+        the times of output. If an event, such as a first contact, ends the shorter step before this time, the regular
+        step, which may end there too, is tried first.
         """
-        regular, is_sorted = self._state, self._is_sorted
-        if regular.time == time:
-            self._shown = self._shown_time = None
-            return Stop.TIME_REACHED
+        while True:
+            stop = self._shorten_copy(time, self._state, 1)
+            if stop is Stop.TIME_REACHED:
+                return stop
+            before, is_sorted = self._state.copy(), self._is_sorted
+            regular = self.advance(math.inf, 1)
+            if regular is not Stop.NONE:
+                return regular
+            if is_past(self._state.time, time):  # only the shorter step ended before: go on with shorter steps
+                self._state, self._is_sorted = before, is_sorted
+                return self._shorten_copy(time, before, math.inf)
+            stop = self.advance(time, math.inf)
+            if stop is not Stop.TIME_REACHED:
+                return stop
+
+    def _shorten_copy(self, time: float, regular: State, most_steps: float) -> Stop:
+        """Make `state` a copy of the regular state after steps or cycles that end at `time`, at most so many."""
+        is_sorted, self._output_state = self._is_sorted, None
         self._state = regular.copy()
         self._state.count[COMPARED] = -1  # a cut-off that follows the clusters changes between regular steps only
         try:
-            stop = self._drive(time, math.inf, shorten=True)
-            self._shown, self._shown_time = self.regular_state, time
+            stop = self._drive(time, regular.steps + most_steps, shorten=True)
+            reached = self.regular_state
         finally:
             self._state, self._is_sorted = regular, is_sorted
-        self._shown.clock[TIME], self._shown.count[STEPS] = time, regular.steps
+        if stop is Stop.TIME_REACHED:
+            reached.clock[TIME] = time
+            for index in (STEPS, LONG_RANGE_SUMS, REBUILT, LISTED, REJECTED):
+                reached.count[index] = regular.count[index]
+            self._output_state, self._output_time = reached, time
         return stop
 
     @property
@@ -167,7 +187,7 @@ class Engine:
     @property
     def time(self) -> float:
         """Time of `state` [s]."""
-        return self._state.time if self._shown_time is None else self._shown_time
+        return self._state.time if self._output_time is None else self._output_time
 
     @property
     def steps(self) -> int:
@@ -188,7 +208,7 @@ class Engine:
 
     def advance(self, until: float, most_steps: float) -> Stop:
         """Take steps not beyond `until` [s] or at least `most_steps` steps; a started r-RESPA cycle is completed."""
-        self._shown = self._shown_time = None
+        self._output_state = self._output_time = None
         last = self.steps + most_steps
         if not self.neighbours.uses_spatial_sort(len(self._state.grains)):
             return self._drive(until, last)
@@ -332,9 +352,9 @@ class Engine:
         self._drive(-math.inf, steps + 1)
         state.count[STEPS], state.count[LONG_RANGE_SUMS] = steps, sums
 
-    def load_state(self, saved: dict[str, np.ndarray], shown_time: float | None = None) -> None:
-        """Restore a saved regular state, to be shown at a time [s]; quantities that are not saved are recomputed."""
-        state, self._shown_time = self.regular_state, shown_time
+    def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
+        """Restore a saved regular state; `state` is that at a time of output [s]. Recomputes what is not saved."""
+        state, self._output_time = self.regular_state, output_time
         state.from_arrays(saved)
         if self.cutoff is None:
             state.count[COMPARED] = -1

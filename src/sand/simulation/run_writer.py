@@ -13,7 +13,7 @@ from typing import Any
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
-from ..io.checkpoint import checkpoint_name, write_checkpoint
+from ..io.checkpoint import write_checkpoint
 from ..io.damage import sealed
 from ..io.ledger_table import LedgerFile, keep_if_damaged
 from ..io.lock import FolderLock
@@ -63,7 +63,9 @@ class RunWriter:
         self._case: dict[str, Any] = {}
         self._lock: FolderLock | None = None
         self._changed = False  # by the user since the last checkpoint
-        self._own: tuple[str, int] | None = None  # the last checkpoint that this simulation wrote
+        newest = max(self.folder.glob("checkpoint-*.npz"), default=None) if resumed else None
+        # the checkpoint from which this simulation continues, or the last one that it wrote
+        self._own: tuple[str, int] | None = None if newest is None else _stamp(newest)
 
     def open(self, simulation: Simulation, until: float, last_step: float) -> None:
         """Create the files or continue them; called by each `run` with its stop criteria.
@@ -113,8 +115,6 @@ class RunWriter:
         newest = max(self.folder.glob("checkpoint-*.npz"), default=None)
         if newest is None:
             strange = not begun and (self.folder / files.TRAJECTORY).exists()
-        elif self._own is None and self._resumed:  # another process may have continued the run since it was read
-            strange = newest.name != checkpoint_name(steps)
         else:
             strange = _stamp(newest) != self._own
         if strange:
@@ -163,7 +163,7 @@ class RunWriter:
         meta = {
             "steps": simulation.steps,
             "time": regular.time,
-            "shown": simulation.time,
+            "output_time": simulation.time,
             "until": None if math.isinf(self._ends[0]) else self._ends[0],
             "last_step": None if math.isinf(self._ends[1]) else int(self._ends[1]),
             "wall_seconds": simulation.wall_seconds,

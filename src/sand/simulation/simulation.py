@@ -129,7 +129,7 @@ class Simulation(ReadOnlySettings):
         self._failure = ""  # why the simulation cannot continue
         if restart is not None:
             arrays, meta = restart
-            self._engine.load_state(arrays, meta.get("shown"))
+            self._engine.load_state(arrays, meta.get("output_time"))
             self.temperature, self._wall_seconds = meta["temperature"], meta["wall_seconds"]
             self._choices_at_start = meta.get("choices", {})
             if "ledger" in arrays:  # a state without a ledger starts a new one
@@ -172,7 +172,7 @@ class Simulation(ReadOnlySettings):
 
     @property
     def grains(self) -> Grains:
-        """The present state of the grains, as read-only arrays."""
+        """State of the grains at `time`, as read-only arrays; to be read again after each run."""
         return self.state.grains
 
     @property
@@ -402,15 +402,18 @@ class Simulation(ReadOnlySettings):
         frames = Schedule(self.frame_every or math.inf, max([self.time, *logged]))
         steps_per_call, checked_at, estimate = 64, self.steps, RunTimeEstimate(end, last)
         while True:
+            logged = [row["time"] for row in self.ledger.rows[-1:]]
             began = wall.monotonic()
             most_steps = max(min(steps_per_call, last - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
             goal = frames.next(end)
             stop = self._engine.advance(goal, most_steps)
+            while stop is Stop.NONE and self.time < max(logged, default=0.0):  # an event ended the step before it
+                stop = self._engine.advance(goal, 1)
             unsound = self.steps - checked_at >= ENERGY_CHECK_EVERY and not self.is_sound
             if self.steps - checked_at >= ENERGY_CHECK_EVERY:
                 checked_at = self.steps
             if stop is Stop.TIME_REACHED:  # before the first step that would pass this time
-                stop = self._engine.show(goal)
+                stop = self._engine.go_to(goal)
             seconds = wall.monotonic() - began
             if most_steps == steps_per_call:
                 growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)

@@ -145,7 +145,7 @@ class RunDataset:
             numbers = np.array(self.frame_numbers, dtype=int)
             summary = self._summary
             # A resumed run has the summary of its first part until it ends again.
-            running = summary is None or summary.get("steps", np.inf) < self.frames.steps[-1]
+            running = summary is None or summary.get("time", np.inf) < self.frames.times[-1]
             return {
                 "format": FORMAT,
                 "name": self.name,
