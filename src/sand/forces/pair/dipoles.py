@@ -18,11 +18,12 @@ from .cutoff import HALF_BOX_RATIO, CutoffChoice, CutoffForce, cutoff_for
 from .dipole_formulas import capture_radius, contact_energy
 from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParameters
 from .ewald import EwaldChoice, choose_ewald, degree_for, ewald_parameters, sides
-from .ewald_loops import EwaldParameters, ewald_sums
+from .ewald_loops import EwaldParameters, MeshEwaldParameters, ewald_sums
 from .loops import LongRangeSums
 
 PERIODIC = ("nearest image", "ewald")
 BOUNDARIES = ("tin-foil", "vacuum")
+RECIPROCALS = ("auto", "direct", "mesh")
 ACCURACIES = 1e-8, 0.1
 """Smallest and largest accuracy of an Ewald sum."""
 DEFAULT_ACCURACY = 1e-3
@@ -56,12 +57,15 @@ class Dipoles(CutoffForce):
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a medium of infinite permeability: no
         demagnetising field) or "vacuum" (a sphere of images in vacuum: demagnetising field −μ₀M/3 of the total
         moment, M per volume).
+    reciprocal : str, optional
+        How the reciprocal part of the Ewald sum is computed: "direct", summed over wave vectors; "mesh", by Fourier
+        transforms on a mesh; "auto", the cheaper of both (the mesh from some hundred to a thousand grains on).
 
     Raises
     ------
     BadInput
         If a parameter is invalid; later, if the cut-off exceeds half the box, or a box of an Ewald sum is open along an
-        axis.
+        axis, or the sum would need too many wave vectors and nodes.
     """
 
     cutoff: Any = "auto"
@@ -69,6 +73,7 @@ class Dipoles(CutoffForce):
     periodic: str = "nearest image"
     accuracy: Any = DEFAULT_ACCURACY
     boundary: str = "tin-foil"
+    reciprocal: str = "auto"
 
     name: ClassVar[str] = "dipoles"
     no_effect: ClassVar[str] = "dipoles are switched on but no grain has a magnetic moment"
@@ -79,7 +84,8 @@ class Dipoles(CutoffForce):
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES)):
+        allowed_words = ("periodic", PERIODIC), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS)
+        for name, allowed in allowed_words:
             value = getattr(self, name)
             if value not in allowed:
                 errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
@@ -95,7 +101,8 @@ class Dipoles(CutoffForce):
                 f"{self.name}: {given[0]} = {shown(getattr(self, given[0]))} cannot be given with periodic = 'ewald', "
                 "which sums all images and chooses the radius of its real part; leave one of them out"
             )
-        given = [name for name in ("accuracy", "boundary") if getattr(self, name) != getattr(type(self), name)]
+        of_ewald = "accuracy", "boundary", "reciprocal"
+        given = [name for name in of_ewald if getattr(self, name) != getattr(type(self), name)]
         if self.periodic != "ewald" and given:
             errors.problems.append(
                 f"{self.name}: {given[0]} is used only with periodic = 'ewald'; add that, or leave it out"
@@ -110,7 +117,7 @@ class Dipoles(CutoffForce):
         return CutoffChoice(
             chosen.radius,
             f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
-            f"alpha = {chosen.product:g}/radius, {chosen.waves} wave vectors and their opposites; predicted errors "
+            f"alpha = {chosen.product:g}/radius, {chosen.reciprocal}; predicted errors "
             f"of force {chosen.force_error:.1e}, of torque {chosen.torque_error:.1e}",
         )
 
@@ -129,7 +136,7 @@ class Dipoles(CutoffForce):
             )
         dipoles = max(int(grains.body_moment.any(axis=1).sum()), 1)
         least = SMALLEST_RADIUS * float(grains.radius.max())
-        return choose_ewald(sides(box), len(grains), dipoles, self.accuracy, least)
+        return choose_ewald(sides(box), len(grains), dipoles, self.accuracy, least, self.reciprocal)
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box."""
@@ -154,15 +161,16 @@ class Dipoles(CutoffForce):
             return CutoffChoice(shortest, f"{self.cut}, two grain diameters, more than {full}")
         return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max at the grains' thermal speed")
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
+        """The loops over the pairs of the Verlet list if `listed`, else over all pairs; `grains` for an Ewald sum."""
         if self.periodic == "ewald":
-            return ewald_sums(degree_for(self.accuracy), listed)
+            order = 0 if grains is None or box.is_open else self.ewald(grains, box).order
+            return ewald_sums(degree_for(self.accuracy), listed, order)
         if listed:
             return LISTED_PAIRS
         return ALL_PAIRS if box.is_open and self.cutoff in (None, "auto") else ALL_PAIRS_CUT
 
-    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters:
+    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters | MeshEwaldParameters:
         """Parameters of the loops."""
         if self.periodic == "ewald":
             return ewald_parameters(self.ewald(grains, box), box, len(grains), self.boundary == "vacuum")
