@@ -315,7 +315,7 @@ def ewald_parameters(
     if choice.order:
         sums = mesh_sums(lengths, choice.nodes, choice.order, alpha)
         own = 4.0 * alpha**3 * MAGNETIC / (3.0 * math.sqrt(math.pi)) + MAGNETIC / volume * sums.self_mean
-        mesh = new_mesh(sums, choice.nodes, choice.order, volume, count)
+        mesh = new_mesh(sums, choice.nodes, volume, count)
         return MeshEwaldParameters(*of_pairs, own, mean, mesh)
     blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
     return EwaldParameters(

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...constants import MAGNETIC
+from ...numerics.simd import SIMD_WIDTH
 from .mesh_loops import ORDERS, Mesh
 
 ALIASES = 3
@@ -105,6 +106,7 @@ def mesh_sums(lengths: tuple[float, float, float], nodes: tuple[int, int, int], 
     twice[0] = twice[-1] = 1.0
     splines = _second(x.splines, y.splines, z.splines)
     smeared = _second(x.smeared, y.smeared, z.smeared)
+    splines[0, 0, 0] = 1.0  # 0 up to rounding, not divided by
     influence = 4.0 * math.pi * smeared / splines**2
     influence[0, 0, 0] = 0.0
     gauss, square = _product(x.gauss, y.gauss, z.gauss), _product(x.square[0], y.square[0], z.square[0])
@@ -177,15 +179,15 @@ def nodes_for(lengths: tuple[float, float, float], spacing: float, order: int) -
     return x, y, z
 
 
-def new_mesh(sums: MeshSums, nodes: tuple[int, int, int], order: int, volume: float, count: int) -> Mesh:
+def new_mesh(sums: MeshSums, nodes: tuple[int, int, int], volume: float, count: int) -> Mesh:
     """The mesh of the loops for a number of grains, of dipoles."""
     scale = MAGNETIC / volume
     rows, columns = nodes[:2], nodes[2] // 2 + 1
     return Mesh(
-        np.zeros((*rows, nodes[2] + order - 1)),
+        np.zeros((*rows, nodes[2] + SIMD_WIDTH - 1)),
         np.zeros((*rows, columns, 2)),
         scale * math.prod(nodes) * sums.influence,
-        np.zeros((count, 9, order)),
+        np.zeros((count, 9, SIMD_WIDTH)),
         np.zeros((3, count), np.int64),
         np.zeros(nodes[0] + 1, np.int64),
         np.zeros(count, np.int64),

@@ -25,21 +25,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiler.jit import formula, loop
+from ...numerics.simd import SIMD_WIDTH
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
 from .loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM, Round, all_blocks, listed_blocks
 
 ORDERS = 5, 6, 7, 8
-"""Orders of the splines that are compared."""
+"""Orders of the splines that are compared; at most `SIMD_WIDTH`."""
 
 
 class Mesh(NamedTuple):
     """A mesh of K_x × K_y × K_z nodes, and the arrays of its loops; V is the padded number of grains."""
 
-    density: np.ndarray  # (K_x, K_y, K_z + p − 1): ρ, then φ; the last p − 1 columns repeat the first
+    density: np.ndarray  # (K_x, K_y, K_z + 7): ρ, then φ; the last 7 columns repeat the first
     spectrum: np.ndarray  # (K_x, K_y, K_z/2 + 1, 2): Fourier transform of ρ, real and imaginary parts
     influence: np.ndarray  # (K_x, K_y, K_z/2 + 1): G
-    spline: np.ndarray  # (N, 9, p): M, M′, M″ along x, along y, along z [1, 1/m, 1/m²]
+    spline: np.ndarray  # (N, 9, 8): M, M′, M″ along x, along y, along z [1, 1/m, 1/m²]; p values, then 0
     node: np.ndarray  # (3, N) int64: first node of each grain
     start: np.ndarray  # (K_x + 1,) int64: first entry of each plane in `order`
     order: np.ndarray  # (N,) int64: grains by their first plane
@@ -144,6 +145,25 @@ def charge_loads(grains, i, potential, slope, curve):
     return (-q * slope[0], -q * slope[1], -q * slope[2]), (potential, 0.0, 0.0)
 
 
+@loop
+def add_to_row(row, weights, z, across, along):
+    """Add across · M + along · M′ of z to a row of nodes; whole SIMD vectors."""
+    for m in range(np.uint64(SIMD_WIDTH)):
+        row[z + m] += across * weights[6, m] + along * weights[7, m]
+
+
+@loop
+def sums_over_row(row, weights, z):
+    """Sums of a row of nodes with M, M′ and M″ of z."""
+    s0 = s1 = s2 = 0.0
+    for m in range(np.uint64(SIMD_WIDTH)):
+        value = row[z + m]
+        s0 += value * weights[6, m]
+        s1 += value * weights[7, m]
+        s2 += value * weights[8, m]
+    return s0, s1, s2
+
+
 def transform_planes(parameters: object, b: int, blocks: int) -> None:
     """Fourier transforms of a block of planes along y and z."""
     from scipy.fft import rfft2  # slow import
@@ -180,7 +200,7 @@ def transform_back(parameters: object, b: int, blocks: int) -> None:
 
 def _columns(mesh: Mesh) -> int:
     """K_z."""
-    return mesh.density.shape[2] - mesh.spline.shape[2] + 1
+    return mesh.density.shape[2] - (SIMD_WIDTH - 1)
 
 
 def _complex(spectrum: np.ndarray) -> np.ndarray:
@@ -193,21 +213,23 @@ def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole
     """The rounds of a mesh sum with splines of this order, which set `mesh.force` and `mesh.field`.
 
     `row` is the formula of the sources, `loads` that of the loads in the potential, such as `dipole_row` and
-    `dipole_loads`; the parameters have the field `mesh`, a `Mesh`.
+    `dipole_loads`; the parameters have the field `mesh`, a `Mesh`.  Rows of splines are extended with zeros to whole
+    SIMD vectors, and the columns of the mesh with them.
     """
+    one, nodes, pad = np.uint64(1), np.uint64(order), np.uint64(SIMD_WIDTH - 1)
 
     @loop
     def fill_splines(grains, span, parameters, b, blocks):
         mesh = parameters.mesh
-        nodes = mesh.density.shape[0], mesh.density.shape[1], mesh.density.shape[2] - (order - 1)
+        numbers = mesh.density.shape[0], mesh.density.shape[1], mesh.density.shape[2] - (SIMD_WIDTH - 1)
         inverse = span.inverse_x, span.inverse_y, span.inverse_z
         first, last = block_limits(b, blocks, grains.mass.size)
         for i in range(first, last):
             x = load(grains.position, i)
             for axis in range(3):
-                node, t = nodes_and_fraction(x[axis] * inverse[axis], nodes[axis])
+                node, t = nodes_and_fraction(x[axis] * inverse[axis], numbers[axis])
                 mesh.node[axis, i] = node
-                fill_spline(mesh.spline, i, axis, order, t, nodes[axis] * inverse[axis])
+                fill_spline(mesh.spline, i, axis, order, t, numbers[axis] * inverse[axis])
 
     @loop
     def prepare_planes(grains, span, parameters):
@@ -216,67 +238,64 @@ def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole
     @loop
     def fill_planes(grains, span, parameters, b, blocks):
         mesh = parameters.mesh
-        density, spline, node = mesh.density, mesh.spline, mesh.node
-        planes, rows, columns = density.shape[0], density.shape[1], density.shape[2] - (order - 1)
+        density, spline = mesh.density, mesh.spline
+        planes, rows, width = density.shape[0], np.uint64(density.shape[1]), np.uint64(density.shape[2])
+        columns = width - pad
         first, last = block_limits(b, blocks, planes)
-        for k in range(first, last):
+        for k in range(np.uint64(first), np.uint64(last)):
             for n in range(rows):
-                for m in range(density.shape[2]):
+                for m in range(width):
                     density[k, n, m] = 0.0
-            for j in range(order):
-                plane = k - j if k >= j else k - j + planes
-                for s in range(mesh.start[plane], mesh.start[plane + 1]):
-                    i = mesh.order[s]
-                    m_x, d_x = spline[i, 0, j], spline[i, 1, j]
-                    n, z = node[1, i], node[2, i]
-                    for l in range(order):
-                        a, b_z = row(grains, i, m_x, d_x, spline[i, 3, l], spline[i, 4, l])
-                        for m in range(order):
-                            density[k, n, z + m] += a * spline[i, 6, m] + b_z * spline[i, 7, m]
-                        n = n + 1 if n + 1 < rows else 0
+            for j in range(nodes):
+                plane = k - j if k >= j else k - j + np.uint64(planes)
+                for s in range(np.uint64(mesh.start[plane]), np.uint64(mesh.start[plane + one])):
+                    i = np.uint64(mesh.order[s])
+                    weights = spline[i]
+                    m_x, d_x = weights[0, j], weights[1, j]
+                    n, z = np.uint64(mesh.node[1, i]), np.uint64(mesh.node[2, i])
+                    for l in range(nodes):
+                        across, along = row(grains, i, m_x, d_x, weights[3, l], weights[4, l])
+                        add_to_row(density[k, n], weights, z, across, along)
+                        n = n + one if n + one < rows else np.uint64(0)
             for n in range(rows):
-                for m in range(order - 1):
+                for m in range(pad):
                     density[k, n, m] += density[k, n, columns + m]
 
     @loop
     def read_planes(grains, span, parameters, b, blocks):
         mesh = parameters.mesh
-        density, spline, node = mesh.density, mesh.spline, mesh.node
-        planes, rows = density.shape[0], density.shape[1]
+        density, spline = mesh.density, mesh.spline
+        planes, rows = np.uint64(density.shape[0]), np.uint64(density.shape[1])
         first, last = block_limits(b, blocks, grains.mass.size)
-        for i in range(first, last):
-            k, z = node[0, i], node[2, i]
+        for i in range(np.uint64(first), np.uint64(last)):
+            weights = spline[i]
+            k, z = np.uint64(mesh.node[0, i]), np.uint64(mesh.node[2, i])
             potential = x1 = y1 = z1 = x2 = y2 = z2 = xy = xz = yz = 0.0
-            for j in range(order):
+            for j in range(nodes):
                 p00 = p10 = p01 = p20 = p02 = p11 = 0.0  # derivatives along y and z
-                n = node[1, i]
-                for l in range(order):
-                    s0 = s1 = s2 = 0.0
-                    for m in range(order):
-                        value = density[k, n, z + m]
-                        s0 += value * spline[i, 6, m]
-                        s1 += value * spline[i, 7, m]
-                        s2 += value * spline[i, 8, m]
-                    m_y, d_y = spline[i, 3, l], spline[i, 4, l]
+                n = np.uint64(mesh.node[1, i])
+                for l in range(nodes):
+                    s0, s1, s2 = sums_over_row(density[k, n], weights, z)
+                    m_y, d_y = weights[3, l], weights[4, l]
                     p00 += m_y * s0
                     p01 += m_y * s1
                     p02 += m_y * s2
                     p10 += d_y * s0
                     p11 += d_y * s1
-                    p20 += spline[i, 5, l] * s0
-                    n = n + 1 if n + 1 < rows else 0
-                m_x, d_x = spline[i, 0, j], spline[i, 1, j]
+                    p20 += weights[5, l] * s0
+                    n = n + one if n + one < rows else np.uint64(0)
+                m_x, d_x = weights[0, j], weights[1, j]
                 potential += m_x * p00
                 x1 += d_x * p00
                 y1 += m_x * p10
                 z1 += m_x * p01
-                x2 += spline[i, 2, j] * p00
+                x2 += weights[2, j] * p00
                 y2 += m_x * p20
                 z2 += m_x * p02
                 xy += d_x * p10
                 xz += d_x * p01
                 yz += m_x * p11
-                k = k + 1 if k + 1 < planes else 0
+                k = k + one if k + one < planes else np.uint64(0)
             force, field = loads(grains, i, potential, (x1, y1, z1), (x2, y2, z2, xy, xz, yz))
             put(mesh.force, i, force)
             put(mesh.field, i, field)
@@ -299,7 +318,7 @@ def add_self_waves(grains, span, mesh):
     """
     spacing_x = mesh.density.shape[0] * span.inverse_x
     spacing_y = mesh.density.shape[1] * span.inverse_y
-    spacing_z = (mesh.density.shape[2] - mesh.spline.shape[2] + 1) * span.inverse_z
+    spacing_z = (mesh.density.shape[2] - (SIMD_WIDTH - 1)) * span.inverse_z
     inverse = spacing_x, spacing_y, spacing_z
     for i in range(grains.mass.size):
         x, mu = load(grains.position, i), load(grains.moment, i)
