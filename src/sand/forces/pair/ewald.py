@@ -35,10 +35,10 @@ RADII = 1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.12, 0.1
 """Values of r_c, in units of half the shortest side, that are compared."""
 PAIR_COST, LISTED_COST, WAVE_COST = 1.0, 1.2, 0.16
 """Relative costs of a pair, of an entry of the Verlet list, and of a wave vector of one grain; 1 is 8 ns (Zen 3)."""
-NODE_COST, SPREAD_COST, GRAIN_COST = 2.5, 0.7, 20.0
-"""Relative costs of a node of a mesh, of a node of the spline of one grain (p³), and of one grain."""
-TRANSFORMS_COST = 15000.0
-"""Relative cost of the calls of the Fourier transforms."""
+NODE_COST, ROW_COST, GRAIN_COST = 4.0, 3.3, 20.0
+"""Relative costs of a node of a mesh, of a row of nodes of the spline of one grain (p² rows), and of one grain."""
+TRANSFORMS_COST = 5000.0
+"""Relative cost of the calls of the Fourier transforms, for each block."""
 LIST_FROM, LIST_REACH, LIST_UP_TO = 64, 1.1, 0.38
 """Conditions for a Verlet list, as in `neighbours.settings`: grains, reach in units of r_c, fraction within reach."""
 LARGEST_SPACING = 0.8
@@ -228,7 +228,8 @@ def _meshes(
 
 
 def _cost_of_mesh(count: int, nodes: tuple[int, int, int], order: int) -> float:
-    return TRANSFORMS_COST + NODE_COST * math.prod(nodes) + count * (GRAIN_COST + SPREAD_COST * order**3)
+    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
+    return blocks * TRANSFORMS_COST + NODE_COST * math.prod(nodes) + count * (GRAIN_COST + ROW_COST * order**2)
 
 
 def _with_mesh(

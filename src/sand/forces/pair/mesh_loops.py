@@ -247,7 +247,7 @@ def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole
                 for m in range(width):
                     density[k, n, m] = 0.0
             for j in range(nodes):
-                plane = k - j if k >= j else k - j + np.uint64(planes)
+                plane = k - j if k >= j else k + np.uint64(planes) - j
                 for s in range(np.uint64(mesh.start[plane]), np.uint64(mesh.start[plane + one])):
                     i = np.uint64(mesh.order[s])
                     weights = spline[i]
