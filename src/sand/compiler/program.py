@@ -45,9 +45,7 @@ def _first_call(
     return compile_and_call
 
 
-def _python_call(
-    stage: PythonStage, parameters: Any, table: weakref.ref[Table], failures: list[BaseException]
-) -> Any:
+def _python_call(stage: PythonStage, parameters: Any, table: weakref.ref[Table], failures: list[BaseException]) -> Any:
     """A function in place of a compiled stage, which calls a Python function."""
 
     @_NATIVE

@@ -13,8 +13,8 @@ SUM, IN_CONTACT, REASSIGN, RATES, ROUND = range(5)
 ROUNDS = 6
 """Largest number of rounds of a pair force, with the numbers ROUND, ROUND + 1, …"""
 PAIR_STAGES = ROUND + ROUNDS
-"""Stages of a pair force: sum over all pairs, pairs in contact, their change between cycles, rates of Taylor series, and
-the rounds of a mesh before the sum."""
+"""Stages of a pair force: sum over all pairs, pairs in contact, their change between cycles, rates of Taylor series,
+and the rounds of a mesh before the sum."""
 LOADS, WORK = range(2)
 EXTERNAL_STAGES = 2
 """Stages of an external force: its loads; energy, power or work of wrapping."""

@@ -304,9 +304,7 @@ def own_field(alpha: float, waves: int, volume: float) -> float:
     return 4.0 * alpha**3 * MAGNETIC / (3.0 * math.sqrt(math.pi)) * part
 
 
-def ewald_parameters(
-    choice: EwaldChoice, box: Box, count: int, vacuum: bool
-) -> EwaldParameters | MeshEwaldParameters:
+def ewald_parameters(choice: EwaldChoice, box: Box, count: int, vacuum: bool) -> EwaldParameters | MeshEwaldParameters:
     """Parameters of the loops, with buffers for `count` grains."""
     lengths, volume = sides(box), box.volume
     radius, alpha = choice.radius, choice.alpha

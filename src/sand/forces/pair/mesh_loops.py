@@ -28,7 +28,7 @@ from ...compiler.jit import formula, loop
 from ...numerics.simd import SIMD_WIDTH
 from ...numerics.turns import cosine_and_sine
 from ...numerics.vec import accrue, load, put
-from .loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM, Round, all_blocks, listed_blocks
+from .loops import Round
 
 ORDERS = 5, 6, 7, 8
 """Orders of the splines that are compared; at most `SIMD_WIDTH`."""
