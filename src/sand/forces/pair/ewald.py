@@ -217,7 +217,7 @@ def choose_ewald(
 def _meshes(
     problem: _Problem, pairs: float, radius: float, product: float, limits: tuple[float, float]
 ) -> list[tuple[float, float, float, tuple[int, int, int], int]]:
-    """Costs of the meshes of all orders, each with −r_c, α r_c, nodes and order; `pairs` is the cost of the real part."""
+    """Costs of the meshes of all orders, with −r_c, α r_c, nodes, order; `pairs` is the cost of the real part."""
     found = []
     for order in ORDERS:
         widest = widest_cells(order, product / radius, problem.spacing, limits)
