@@ -6,7 +6,7 @@ mean square error (per μ², over k²/3V²)
 
     Σ_q Σ_{m,m'} (G W_m W_m' − δ_mm' R_m)² q_m² q_m'²,  least for  G = Σ_m R_m W_m² q_m⁴ / (Σ_m W_m² q_m²)²
 
-and so has the energy; that of the force has q_m'².  R q⁴ is a sum of products of functions of q_x, q_y and q_z,
+and so has the energy; the force has one more q_m'².  R q⁴ is a sum of products of functions of q_x, q_y and q_z,
 so that all sums over aliases are sums of products of sums along the axes.
 """
 
