@@ -222,8 +222,14 @@ class PythonStage:
         """The stage itself, which holds no data of a simulation."""
         return self
 
-    in_python = Stage.in_python
-    run = Stage.in_python
+    def in_python(self, table: Table, parameters: Any, block: int) -> Any:
+        """Call the function."""
+        special = {TABLE: table, BLOCK: block, PARAMETERS: parameters}
+        return self.function(*(special[name] if name in special else table[name] for name in self.needs))
+
+    def run(self, table: Table, parameters: Any = (), block: int = 0) -> int:
+        """Call the function; returns its integer."""
+        return int(self.in_python(table, parameters, block))
 
 
 def stage(purpose: str, *, long_vectors: bool = False, cached: bool = True) -> Callable[[Callable], Stage]:

@@ -136,7 +136,7 @@ class _Problem(NamedTuple):
     spacing: float  # a [m]
     accuracy: float
     degree: int
-    count: int  # of grains
+    grains: int  # number of them
 
 
 @functools.lru_cache(64)
@@ -223,7 +223,7 @@ def _meshes(
         widest = widest_cells(order, product / radius, problem.spacing, limits)
         if widest > 0.0:
             nodes = nodes_for(problem.lengths, widest, order)
-            found.append((pairs + _cost_of_mesh(problem.count, nodes, order), -radius, product, nodes, order))
+            found.append((pairs + _cost_of_mesh(problem.grains, nodes, order), -radius, product, nodes, order))
     return found
 
 

@@ -243,9 +243,9 @@ def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole
         columns = width - pad
         first, last = block_limits(b, blocks, planes)
         for k in range(np.uint64(first), np.uint64(last)):
-            for n in range(rows):
+            for line in range(rows):
                 for m in range(width):
-                    density[k, n, m] = 0.0
+                    density[k, line, m] = 0.0
             for j in range(nodes):
                 plane = k - j if k >= j else k + np.uint64(planes) - j
                 for s in range(np.uint64(mesh.start[plane]), np.uint64(mesh.start[plane + one])):
@@ -257,9 +257,9 @@ def mesh_rounds(order: int, row: Callable = dipole_row, loads: Callable = dipole
                         across, along = row(grains, i, m_x, d_x, weights[3, l], weights[4, l])
                         add_to_row(density[k, n], weights, z, across, along)
                         n = n + one if n + one < rows else np.uint64(0)
-            for n in range(rows):
+            for line in range(rows):
                 for m in range(pad):
-                    density[k, n, m] += density[k, n, columns + m]
+                    density[k, line, m] += density[k, line, columns + m]
 
     @loop
     def read_planes(grains, span, parameters, b, blocks):
