@@ -171,7 +171,7 @@ def _long_range_loops(
     forces: ForcesByType, grains: Grains, box: Box, listed: Sequence[bool]
 ) -> list[tuple[LongRangeForce, LongRangeSums, Any]]:
     """Long-range forces with their loops and numbers."""
-    sums = [force.sums(box, own) for force, own in zip(forces.long_range, listed, strict=True)]
+    sums = [force.sums(box, own, grains) for force, own in zip(forces.long_range, listed, strict=True)]
     return [(force, own, force.numbers(grains, box)) for force, own in zip(forces.long_range, sums, strict=True)]
 
 

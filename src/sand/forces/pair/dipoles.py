@@ -19,7 +19,7 @@ from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParamete
 from .ewald import degree_for, ewald_parameters
 from .ewald_fit import DIPOLES, Sources
 from .ewald_force import DEFAULT_ACCURACY, EwaldForce
-from .ewald_loops import EwaldParameters, ewald_sums
+from .ewald_loops import EwaldParameters, MeshEwaldParameters, ewald_sums
 from .loops import LongRangeSums
 
 CAPTURE_RADII = 1.5
@@ -69,12 +69,15 @@ class Dipoles(EwaldForce):
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a medium of infinite permeability: no
         demagnetising field) or "vacuum" (a sphere of images in vacuum: demagnetising field −μ₀M/3 of the total
         moment, M per volume).
+    reciprocal : str, optional
+        How the reciprocal part of the Ewald sum is computed: "direct", summed over wave vectors; "mesh", by Fourier
+        transforms on a mesh; "auto", the cheaper of both (the mesh from some thousand grains on).
 
     Raises
     ------
     BadInput
         If a parameter is invalid; later, if the cut-off exceeds half the box, or a box of an Ewald sum is open along an
-        axis.
+        axis, or the sum would need too many wave vectors and nodes.
     """
 
     cutoff: Any = "auto"
@@ -82,6 +85,7 @@ class Dipoles(EwaldForce):
     periodic: str = "nearest image"
     accuracy: Any = DEFAULT_ACCURACY
     boundary: str = "tin-foil"
+    reciprocal: str = "auto"
 
     name: ClassVar[str] = "dipoles"
     no_effect: ClassVar[str] = "dipoles are switched on but no grain has a magnetic moment"
@@ -131,15 +135,16 @@ class Dipoles(EwaldForce):
             return CutoffChoice(shortest, f"{self.cut}, two grain diameters, more than {full}")
         return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max of {pair} at thermal speed")
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
+        """The loops over the pairs of the Verlet list if `listed`, else over all pairs; `grains` for an Ewald sum."""
         if self.periodic == "ewald":
-            return ewald_sums(degree_for(self.accuracy), listed)
+            order = 0 if grains is None or box.is_open else self.ewald(grains, box).order
+            return ewald_sums(degree_for(self.accuracy), listed, order)
         if listed:
             return LISTED_PAIRS
         return ALL_PAIRS if box.is_open and self.cutoff in (None, "auto") else ALL_PAIRS_CUT
 
-    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters:
+    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters | MeshEwaldParameters:
         """Parameters of the loops."""
         if self.periodic == "ewald":
             return ewald_parameters(self.ewald(grains, box), box, len(grains), self.boundary == "vacuum")

@@ -14,6 +14,7 @@ from .ewald_fit import Sources
 
 PERIODIC = ("nearest image", "ewald")
 BOUNDARIES = ("tin-foil", "vacuum")
+RECIPROCALS = ("auto", "direct", "mesh")
 ACCURACIES = 1e-8, 0.1
 """Smallest and largest accuracy of an Ewald sum."""
 DEFAULT_ACCURACY = 1e-3
@@ -31,12 +32,13 @@ class EwaldForce(CutoffForce):
     periodic: str
     accuracy: Any
     boundary: str
+    reciprocal: str = "direct"  # a field of forces that have the loops of a mesh
 
     sources: ClassVar[Sources]
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES)):
+        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS)):
             value = getattr(self, name)
             if value not in allowed:
                 errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
@@ -53,7 +55,7 @@ class EwaldForce(CutoffForce):
                     "which sums all images and chooses the radius of its real part; leave one of them out"
                 )
         elif self.periodic in PERIODIC:
-            for name in self._given("accuracy", "boundary"):
+            for name in self._given("accuracy", "boundary", "reciprocal"):
                 errors.problems.append(
                     f"{self.name}: {name} is used only with periodic = 'ewald'; add that, or leave it out"
                 )
@@ -75,7 +77,7 @@ class EwaldForce(CutoffForce):
         return CutoffChoice(
             chosen.radius,
             f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
-            f"alpha = {chosen.product:g}/radius, {chosen.waves} wave vectors and their opposites; predicted errors "
+            f"alpha = {chosen.product:g}/radius, {chosen.reciprocal}; predicted errors "
             f"of force {chosen.force_error:.1e}, of {self.sources.field} {chosen.field_error:.1e}",
         )
 
@@ -85,7 +87,7 @@ class EwaldForce(CutoffForce):
         Raises
         ------
         BadInput
-            If the box is open along an axis, or needs too many wave vectors.
+            If the box is open along an axis, or needs too many wave vectors and nodes.
         """
         if any(side is None for side in box.lengths):
             raise BadInput(
@@ -94,7 +96,7 @@ class EwaldForce(CutoffForce):
             )
         least = SMALLEST_RADIUS * float(grains.radius.max())
         carriers = max(self.carriers(grains), 1)
-        return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources)
+        return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources, self.reciprocal)
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box."""
