@@ -20,7 +20,11 @@ from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParamete
 from .ewald import EwaldChoice, choose_ewald, degree_for, ewald_parameters, sides
 from .ewald_loops import EwaldParameters, ewald_sums
 from .loops import LongRangeSums
+from .tree import ACCURACIES as TREE_ACCURACIES
+from .tree import TREE_FROM, TreeChoice, choose_tree, tree_parameters
+from .tree_loops import TREE, TreeParameters
 
+OPEN = ("auto", "pairs", "tree")
 PERIODIC = ("nearest image", "ewald")
 BOUNDARIES = ("tin-foil", "vacuum")
 ACCURACIES = 1e-8, 0.1
@@ -49,9 +53,13 @@ class Dipoles(CutoffForce):
     periodic : str, optional
         What acts in a periodic box. "nearest image": the nearest image of each grain within the cut-off. "ewald": all
         images of all grains, by an Ewald sum, in a box that is periodic along all axes; without `cutoff` and `cut`.
+    open : str, optional
+        How all pairs in an open box are summed. "pairs": directly. "tree": near pairs directly, distant grains by
+        multipole expansions of the cells of a tree, in a time proportional to the number of grains. "auto": a tree from
+        5000 grains on.
     accuracy : float, optional
-        Of the Ewald sum, 1e-8 … 0.1: largest rms error of force and torque, relative to their typical size in a gas of
-        these grains. The parameters of the sum are the cheapest with this accuracy.
+        Of the Ewald sum, 1e-8 … 0.1, or of the tree, 1e-6 … 0.1: largest rms error of force and torque, relative to
+        their typical size in a gas of these grains. The parameters of the sum are the cheapest with this accuracy.
     boundary : str, optional
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a medium of infinite permeability: no
         demagnetising field) or "vacuum" (a sphere of images in vacuum: demagnetising field −μ₀M/3 of the total
@@ -60,13 +68,14 @@ class Dipoles(CutoffForce):
     Raises
     ------
     BadInput
-        If a parameter is invalid; later, if the cut-off exceeds half the box, or a box of an Ewald sum is open along an
-        axis.
+        If a parameter is invalid; later, if the cut-off exceeds half the box, a box of an Ewald sum is open along an
+        axis, or that of a tree is not open.
     """
 
     cutoff: Any = "auto"
     cut: str = "smooth"
     periodic: str = "nearest image"
+    open: str = "auto"
     accuracy: Any = DEFAULT_ACCURACY
     boundary: str = "tin-foil"
 
@@ -75,11 +84,12 @@ class Dipoles(CutoffForce):
     column: ClassVar[str] = "magnetic"
     references: ClassVar[str] = (
         "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975; Ewald sum: de Leeuw, Perram & Smith 1980; Wang & Holm 2001"
+        "; tree: Dehnen 2002"
     )
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES)):
+        for name, allowed in (("periodic", PERIODIC), ("open", OPEN), ("boundary", BOUNDARIES)):
             value = getattr(self, name)
             if value not in allowed:
                 errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
@@ -96,14 +106,48 @@ class Dipoles(CutoffForce):
                 "which sums all images and chooses the radius of its real part; leave one of them out"
             )
         given = [name for name in ("accuracy", "boundary") if getattr(self, name) != getattr(type(self), name)]
+        if self.open == "tree" and given == ["accuracy"]:
+            given = []
         if self.periodic != "ewald" and given:
+            other = " or open = 'tree'" if given[0] == "accuracy" else ""
             errors.problems.append(
-                f"{self.name}: {given[0]} is used only with periodic = 'ewald'; add that, or leave it out"
+                f"{self.name}: {given[0]} is used only with periodic = 'ewald'{other}; add that, or leave it out"
             )
+        errors.problems += self._problems_of_tree()
         errors.done()
+
+    def _problems_of_tree(self) -> list[str]:
+        """What cannot be given with open = 'tree'."""
+        if self.open != "tree":
+            return []
+        problems = []
+        if self.periodic == "ewald":
+            problems.append(f"{self.name}: open = 'tree' is for open boxes, periodic = 'ewald' for others; give one")
+        if self.cutoff not in (None, "auto") or self.cut != type(self).cut:
+            problems.append(f"{self.name}: open = 'tree' sums all pairs; leave cutoff and cut out")
+        if self.accuracy < TREE_ACCURACIES[0]:
+            least = f"{TREE_ACCURACIES[0]:g}"
+            problems.append(
+                f"{self.name}: accuracy = {self.accuracy:g} must be at least {least} with open = 'tree'; "
+                "open = 'pairs' is exact"
+            )
+        return problems
 
     def choose(self, grains: Grains, box: Box) -> CutoffChoice:
         """The cut-off radius, or that of the real part of the Ewald sum, with the reason."""
+        if self.open == "tree" and not box.is_open:
+            raise BadInput(
+                f"{self.name}: open = 'tree' needs an open box, and the box is {box.describe()}; "
+                "use periodic = 'ewald', or leave open out"
+            )
+        if self.uses_tree(grains, box):
+            tree = self.tree(grains)
+            return CutoffChoice(
+                None,
+                f"open box: all grains, by a tree of multipoles, degree {tree.degree}, opening angle {tree.opening:g}, "
+                f"accuracy {self.accuracy:g}; predicted errors of force {tree.force_error:.1e}, "
+                f"of torque {tree.torque_error:.1e}",
+            )
         if self.periodic != "ewald":
             return super().choose(grains, box)
         chosen = self.ewald(grains, box)
@@ -113,6 +157,16 @@ class Dipoles(CutoffForce):
             f"alpha = {chosen.product:g}/radius, {chosen.waves} wave vectors and their opposites; predicted errors "
             f"of force {chosen.force_error:.1e}, of torque {chosen.torque_error:.1e}",
         )
+
+    def uses_tree(self, grains: Grains, box: Box) -> bool:
+        """Whether all pairs are summed with a tree."""
+        if not box.is_open or self.periodic == "ewald" or self.cutoff not in (None, "auto"):
+            return False
+        return self.open == "tree" or (self.open == "auto" and len(grains) >= TREE_FROM)
+
+    def tree(self, grains: Grains) -> TreeChoice:
+        """The parameters of the tree."""
+        return choose_tree(len(grains), self.accuracy)
 
     def ewald(self, grains: Grains, box: Box) -> EwaldChoice:
         """The parameters of the Ewald sum.
@@ -154,16 +208,21 @@ class Dipoles(CutoffForce):
             return CutoffChoice(shortest, f"{self.cut}, two grain diameters, more than {full}")
         return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max at the grains' thermal speed")
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
+        """The loops over the pairs of the Verlet list if `listed`, else over all pairs, or the tree of these grains."""
+        if grains is not None and self.uses_tree(grains, box):
+            return TREE
         if self.periodic == "ewald":
             return ewald_sums(degree_for(self.accuracy), listed)
         if listed:
             return LISTED_PAIRS
         return ALL_PAIRS if box.is_open and self.cutoff in (None, "auto") else ALL_PAIRS_CUT
 
-    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters:
+    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters | TreeParameters:
         """Parameters of the loops."""
+        if self.uses_tree(grains, box):
+            tree = self.tree(grains)
+            return tree_parameters(len(grains), tree.degree, tree.opening)
         if self.periodic == "ewald":
             return ewald_parameters(self.ewald(grains, box), box, len(grains), self.boundary == "vacuum")
         return DipoleParameters(MAGNETIC, cutoff_for(self.choose(grains, box).radius, self.cut))

@@ -52,6 +52,7 @@ class LongRangeSums(NamedTuple):
     energies: Callable  # (…, shares): adds half the energy of each pair to shares (N,) of both grains
     pair: Callable  # (grains, span, parameters, i, j): force on i, torques on i and on j, of one pair
     arrays: tuple = ()  # names of the copies in long_range that the loops use, see state.arrays.PACKED_ARRAYS
+    own_memory: bool = False  # blocks keep their sums in the parameters, never in long_range.block_sums
 
 
 @functools.cache
