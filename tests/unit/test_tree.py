@@ -270,25 +270,25 @@ def test_cells_divide_all_grains_and_interactions_are_symmetric():
 
     Acceptance of (A, B) is that of (B, A).  In plain Python.
     """
-    grains = sand.Grains(*_unequal(300))
-    parameters = tree.tree_parameters(300, 3, 0.7)
+    grains = sand.Grains(*_unequal(1200))
+    parameters = tree.tree_parameters(1200, 3, 0.9)
     cells, arrays = parameters.cells, grains.arrays
-    position = np.zeros((3, 304))
+    position = np.zeros((3, 1200))
     tree_loops.build_cells(arrays, cells, position)
-    levels = tree.levels_for(300)
-    assert levels == 3 == tree_loops.levels_below(arrays)
-    assert sorted(cells.order) == list(range(300))
-    assert (position[:, :300] == arrays.position[:, cells.order]).all()
+    levels = tree.levels_for(1200)
+    assert levels == 5 == tree_loops.levels_below(arrays)
+    assert sorted(cells.order) == list(range(1200))
+    assert (position == arrays.position[:, cells.order]).all()
     for level in range(levels + 1):
-        edges = [tree_loops.first_grain(300, c, level) for c in range(2**level - 1, 2 ** (level + 1))]
-        assert edges[0] == 0 and edges[-1] == 300 and max(np.diff(edges)) <= tree_loops.LEAF * 2 ** (levels - level)
+        edges = [tree_loops.first_grain(1200, c, level) for c in range(2**level - 1, 2 ** (level + 1))]
+        assert edges[0] == 0 and edges[-1] == 1200 and max(np.diff(edges)) <= tree_loops.LEAF * 2 ** (levels - level)
         for cell, first, last in zip(range(2**level - 1, 2 ** (level + 1)), edges[:-1], edges[1:], strict=False):
             apart = np.linalg.norm(position[:, first:last].T - cells.centre[:, cell], axis=1)
             assert (apart <= cells.size[0, cell] * (1 + 1e-14)).all()
             reach = cells.size[0, cell] + 1.01 * grains.radius[cells.order[first:last]].max()
             assert cells.size[1, cell] == pytest.approx(reach, rel=1e-14)
     every = range(2 ** (levels + 1) - 1)
-    accepted = np.array([[tree_loops.far_enough(cells, 0.7, a, b) for b in every] for a in every])
+    accepted = np.array([[tree_loops.far_enough(cells, 0.9, a, b) for b in every] for a in every])
     assert (accepted == accepted.T).all() and 0 < accepted.sum() < accepted.size
 
 
