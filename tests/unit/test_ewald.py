@@ -341,7 +341,7 @@ def test_the_choice_is_stated():
     assert line.startswith("600 nm (radius of the real part of an Ewald sum, vacuum, accuracy 0.0001: alpha = ")
     assert "wave vectors and their opposites; predicted errors of force " in line
     kept = {"cutoff": "auto", "cut": "smooth", "periodic": "ewald", "accuracy": 1e-4, "boundary": "vacuum"}
-    kept |= {"reciprocal": "auto"}
+    kept |= {"reciprocal": "auto", "open": "auto"}
     assert force.parameters() == force.resolved(grains, sim.box) == kept
     assert dataclasses.asdict(force) == kept
 

@@ -101,7 +101,7 @@ def test_the_mesh_against_the_direct_sum(kind, accuracy, boundary):
     if kind == "gas":
         box, grains = sand.Box.periodic(*SIDES), sand.Grains(position, 1e-9, sand.IRON, moment=moment)
         chosen = sand.Dipoles(periodic="ewald", accuracy=accuracy, reciprocal="mesh").ewald(grains, box)
-        assert chosen.order in ORDERS and max(chosen.force_error, chosen.torque_error) <= accuracy
+        assert chosen.order in ORDERS and max(chosen.force_error, chosen.field_error) <= accuracy
         typical = math.sqrt(6) * MAGNETIC * mean_square * (4 * math.pi * 150 / 3 / SIDES.prod()) ** (4 / 3)
         assert 0.5 < errors[0] / (chosen.force_error * typical) < 1.5
 
@@ -202,7 +202,7 @@ def test_the_cheaper_sum_is_chosen():
         force, box = sand.Dipoles(periodic="ewald"), sand.Box.periodic(side)
         chosen = force.ewald(grains, box)
         assert (chosen.order > 0) == mesh == (chosen.waves == 0)
-        assert max(chosen.force_error, chosen.torque_error) <= 1e-3
+        assert max(chosen.force_error, chosen.field_error) <= 1e-3
         assert bool(force.sums(box, True, grains).rounds) == mesh
         reason = force.choose(grains, box).reason
         assert ("nodes with splines of order" in reason) == mesh == ("wave vectors" not in reason)
@@ -252,7 +252,7 @@ def test_the_mesh_is_made_finer_until_the_accuracy_is_reached(monkeypatch):
     monkeypatch.setattr(ewald, "widest_cells", lambda *given: 2.0 * estimate(*given))
     found = force.ewald(grains, box)
     ewald.choose_ewald.cache_clear()
-    assert max(found.force_error, found.torque_error) <= 1.01e-3
+    assert max(found.force_error, found.field_error) <= 1.01e-3
     assert found.nodes != fine.nodes
 
 

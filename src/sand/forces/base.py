@@ -87,7 +87,7 @@ class LongRangeForce(Force, Protocol):
     def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """Its loops: over the pairs of the Verlet list if `listed`, else over all pairs.
 
-        `grains` for a force whose loops depend on their number.
+        `grains` for a force whose loops depend on their number, as those of a tree and of an Ewald sum do.
         """
 
     def numbers(self, grains: Grains, box: Box) -> Any:

@@ -75,8 +75,8 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
         number += PAIR_STAGES
     needed = {LOADS, *((WORK,) if work.time_dependent or work.position_dependent else ())}
     for formula, own in given.external_forces:
-        own_stages = external_force_stages(formula)
-        program |= {number + k: (own_stages[k], own) for k in needed}
+        of_force = external_force_stages(formula)
+        program |= {number + k: (of_force[k], own) for k in needed}
         number += EXTERNAL_STAGES
     return program
 

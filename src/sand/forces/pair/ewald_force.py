@@ -1,4 +1,4 @@
-"""Base class of the forces that can be summed over all periodic images: settings and choice of the Ewald sum."""
+"""Base class of the forces that can be summed over all periodic images: settings, and choice of the Ewald sum."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from ...units import si
 from .cutoff import CutoffChoice, CutoffForce
 from .ewald import EwaldChoice, choose_ewald, sides
 from .ewald_fit import Sources
+from .tree import ACCURACIES as TREE_ACCURACIES
 
 PERIODIC = ("nearest image", "ewald")
 BOUNDARIES = ("tin-foil", "vacuum")
 RECIPROCALS = ("auto", "direct", "mesh")
+OPEN = ("auto", "pairs", "tree")
 ACCURACIES = 1e-8, 0.1
 """Smallest and largest accuracy of an Ewald sum."""
 DEFAULT_ACCURACY = 1e-3
@@ -26,19 +28,22 @@ class EwaldForce(CutoffForce):
     """A long-range force with the fields `periodic`, `accuracy` and `boundary` beside those of `CutoffForce`.
 
     Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, `accuracy: Any = DEFAULT_ACCURACY` and
-    `boundary: str = "tin-foil"`.
+    `boundary: str = "tin-foil"`; with `reciprocal: str = "auto"` if there are loops of a mesh, and `open: str = "auto"`
+    if there is a tree.
     """
 
     periodic: str
     accuracy: Any
     boundary: str
-    reciprocal: str = "direct"  # a field of forces that have the loops of a mesh
+    reciprocal: str = "direct"
+    open: str = "pairs"
 
     sources: ClassVar[Sources]
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS)):
+        words = ("periodic", PERIODIC), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS), ("open", OPEN)
+        for name, allowed in words:
             value = getattr(self, name)
             if value not in allowed:
                 errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
@@ -47,19 +52,42 @@ class EwaldForce(CutoffForce):
             object.__setattr__(self, "accuracy", accuracy)
             if accuracy > ACCURACIES[1]:
                 errors.problems.append(f"{self.name}: accuracy = {accuracy:g} must be at most {ACCURACIES[1]:g}")
+            elif self.open == "tree" and accuracy < TREE_ACCURACIES[0]:
+                errors.problems.append(
+                    f"{self.name}: accuracy = {accuracy:g} must be at least {TREE_ACCURACIES[0]:g} with open = 'tree'; "
+                    "open = 'pairs' is exact"
+                )
         errors.take(super().__post_init__)
+        errors.problems += self._contradictions()
+        errors.done()
+
+    def _contradictions(self) -> list[str]:
+        """Settings that cannot be given together, or are not used; a misspelt word is not judged."""
+        problems, ewald = [], "periodic = 'ewald'"
         if self.periodic == "ewald":
             for name in self._given("cutoff", "cut"):
-                errors.problems.append(
-                    f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with periodic = 'ewald', "
+                problems.append(
+                    f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with {ewald}, "
                     "which sums all images and chooses the radius of its real part; leave one of them out"
                 )
-        elif self.periodic in PERIODIC:
-            for name in self._given("accuracy", "boundary", "reciprocal"):
-                errors.problems.append(
-                    f"{self.name}: {name} is used only with periodic = 'ewald'; add that, or leave it out"
+            if self._given("open"):
+                problems.append(
+                    f"{self.name}: open = {shown(self.open)} is for open boxes and {ewald} for periodic ones; "
+                    "leave one of them out"
                 )
-        errors.done()
+        elif self.periodic in PERIODIC:
+            uses = {"boundary": ewald, "reciprocal": ewald}
+            if self.open != "tree":
+                uses["accuracy"] = f"{ewald} or open = 'tree'" if type(self).open == "auto" else ewald
+            for name in self._given(*uses):
+                problems.append(f"{self.name}: {name} is used only with {uses[name]}; add that, or leave it out")
+            for name in self._given("cutoff", "cut") if self.open == "tree" else ():
+                if getattr(self, name) is not None:
+                    problems.append(
+                        f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with open = 'tree', "
+                        "which sums all pairs; leave one of them out"
+                    )
+        return problems
 
     def _given(self, *names: str) -> list[str]:
         """Of these fields the ones that differ from their defaults."""
