@@ -48,6 +48,7 @@ def test_influence_function_and_errors_by_sums_over_aliases():
     shifts = np.stack(np.meshgrid(*[np.arange(-3, 4)] * 3, indexing="ij"), -1).reshape(-1, 3)
     field = force = own = 0.0
     wave = np.zeros((3, 3))
+    pairs = [np.argwhere((shifts[None] == shifts[:, None] + step).all(axis=2)).T for step in np.eye(3)]
     for n in np.ndindex(*nodes):
         signed = np.array([k if k <= size // 2 else k - size for k, size in zip(n, nodes, strict=True)])
         turns = signed / np.array(nodes) + shifts
@@ -63,12 +64,8 @@ def test_influence_function_and_errors_by_sums_over_aliases():
         field += (difference**2 * np.outer(square, square)).sum()
         force += (difference**2 * np.outer(square, square**2)).sum()
         own += (np.diag(difference) * square).sum() / 3
-        for a in range(3):
-            step = np.eye(3)[a]
-            after = [np.flatnonzero((shifts == s + step).all(axis=1)) for s in shifts]
-            for i, j in enumerate(after):
-                if len(j):
-                    wave[a] += (-1) ** order * g * w[i] * w[j[0]] * q[i] * q[j[0]]
+        for a, (i, j) in enumerate(pairs):
+            wave[a] += (-1) ** order * g * (w[i] * w[j]) @ (q[i] * q[j])
     assert found.field_square == pytest.approx(field, rel=1e-8)
     assert found.force_square == pytest.approx(force, rel=1e-8)
     assert found.self_mean == pytest.approx(own, rel=1e-6)
