@@ -39,9 +39,7 @@ class MeshSums(NamedTuple):
     field_square: float  # Σ_q of the field's mean square error, see the module
     force_square: float  # of the force's [1/m²]
     self_mean: float  # Σ_q (G Σ_m W_m² q_m² − Σ_m R_m q_m²)/3: error of the mean flux density of a dipole at itself
-    self_wave: (
-        np.ndarray
-    )  # (3, 3): Σ_q G Σ_m W_m W_m+1(a) q_b² …: amplitude of its variation along a, for the moment's b
+    self_wave: np.ndarray  # (3, 3): amplitudes Σ_q G Σ_m W_m W_m+1(a) q_b² of its variation along a, for the moment's b
 
 
 class _Axis(NamedTuple):
