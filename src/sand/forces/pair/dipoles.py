@@ -78,7 +78,7 @@ class Dipoles(EwaldForce):
         moment, M per volume).
     reciprocal : str, optional
         How the reciprocal part of the Ewald sum is computed: "direct", summed over wave vectors; "mesh", by Fourier
-        transforms on a mesh; "auto", the cheaper of both (the mesh from some thousand grains on).
+        transforms on a mesh; "auto", the cheaper of both (the mesh from one or two thousand grains on).
 
     Raises
     ------
