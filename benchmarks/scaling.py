@@ -34,6 +34,28 @@ def available() -> float:
     return next((1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")), np.inf)
 
 
+class Tree(NamedTuple):
+    """Cost of one sum of dipoles in an open cube with the density of the first run."""
+
+    seconds: float  # thread time per grain
+    memory: int  # of the tree [bytes]
+
+
+def tree(count: int, accuracy: float = 1e-3) -> Tree:
+    """The least of some sums by a tree of multipoles; nothing moves."""
+    sites = int(np.ceil(count ** (1.0 / 3.0) - 1e-9))
+    grid = np.stack(np.meshgrid(*[np.arange(sites)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    rng = np.random.default_rng(9)
+    place = 1.2e-6 / 100 ** (1.0 / 3.0) * (rng.permutation(grid)[:count] + 0.8 * rng.random((count, 3)))
+    moment = 6.6e-18 * rng.normal(size=(count, 3))
+    grains = sand.Grains(place, 1e-8, sand.IRON, moment=moment)
+    sim = sand.Simulation(grains, [sand.Dipoles(open="tree", accuracy=accuracy)], stepping=sand.Verlet(step="1 fs"))
+    sim.run(steps=1)
+    (_, parameters) = sim._engine._components.pair_forces[0]
+    memory = sum(array.nbytes for group in (parameters.cells, parameters.scratch) for array in group)
+    return Tree(min(per_step(sim, max(100_000 // count, 1)) for _ in range(PIECES)) / count, memory)
+
+
 class Cost(NamedTuple):
     """Of one world."""
 
@@ -72,6 +94,18 @@ def rows(quick: bool) -> Iterator[dict[str, Any]]:
                 building = max(each.building for each in costs.values())
                 one |= {way: 1e9 * each.step for way, each in costs.items()} | {"building": building}
             yield one
+    yield from tree_rows(quick)
+
+
+def tree_rows(quick: bool) -> Iterator[dict[str, Any]]:
+    """Sums by the tree from 10³ grains on; `quick` ends at 10⁴."""
+    tree(COUNTS[1])  # compiled before anything is timed
+    for count in COUNTS[1:3] if quick else COUNTS[1:]:
+        if ROOM * count > available():
+            yield {"kind": "tree", "grains": count, "skipped": f"needs {1e-9 * ROOM * count:.2g} GB of free memory"}
+        else:
+            found = tree(count)
+            yield {"kind": "tree", "grains": count, "skipped": "", "us": 1e6 * found.seconds, "memory": found.memory}
 
 
 def tell(told: Iterable[dict[str, Any]]) -> None:
@@ -80,6 +114,8 @@ def tell(told: Iterable[dict[str, Any]]) -> None:
     print(f"{'':12} {'grains':>8} {ways}  ns per grain and step {'building':>10}  s")
     for one in told:
         text = one["skipped"]
-        if not text:
+        if not text and one["kind"] == "tree":
+            text = f"{one['us']:10.3g} us per grain and sum of dipoles, {1e-6 * one['memory']:.3g} MB"
+        elif not text:
             text = " ".join(f"{one[way]:10.3g}" for way in WAYS) + f" {'':22} {one['building']:10.3g}"
         print(f"{one['kind']:12} {one['grains']:8d} {text}", flush=True)

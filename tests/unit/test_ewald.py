@@ -341,6 +341,7 @@ def test_the_choice_is_stated():
     assert line.startswith("600 nm (radius of the real part of an Ewald sum, vacuum, accuracy 0.0001: alpha = ")
     assert "wave vectors and their opposites; predicted errors of force " in line
     kept = {"cutoff": "auto", "cut": "smooth", "periodic": "ewald", "accuracy": 1e-4, "boundary": "vacuum"}
+    kept |= {"reciprocal": "auto", "open": "auto"}
     assert force.parameters() == force.resolved(grains, sim.box) == kept
     assert dataclasses.asdict(force) == kept
 
@@ -369,6 +370,10 @@ GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
         (lambda: sand.Dipoles(periodic="ewald", cut="sharp"), "dipoles: cut = 'sharp' cannot be given with periodic"),
         (lambda: sand.Dipoles(accuracy=1e-4), "dipoles: accuracy is used only with periodic = 'ewald'"),
         (
+            lambda: sand.Dipoles(periodic="ewald", open="pairs"),
+            "dipoles: open = 'pairs' is for open boxes and periodic = 'ewald' for periodic ones",
+        ),
+        (
             lambda: sand.Simulation(GRAINS, [sand.Dipoles(periodic="ewald")]),
             "dipoles: periodic = 'ewald' needs a box that is periodic along x, y and z, and the box is open",
         ),
@@ -396,3 +401,20 @@ def test_mistakes_with_the_ewald_sum(make, line):
     with pytest.raises(BadInput) as error:
         make()
     assert str(error.value).startswith(line) and len(error.value.problems) == 1
+
+
+def test_all_mistakes_are_reported_at_once():
+    """One line each, of misspelt words, of numbers, and of settings that exclude each other."""
+    with pytest.raises(BadInput) as error:
+        sand.Dipoles("1 um", "sharp", periodic="ewald", open="tree", accuracy=0.2, boundary="foil", reciprocal="meshes")
+    lines = (
+        "boundary = 'foil'; did you mean",
+        "reciprocal = 'meshes'; did you mean 'mesh'?",
+        "accuracy = 0.2 must be at most 0.1",
+        "cutoff = 1e-06 cannot be given with periodic = 'ewald'",
+        "cut = 'sharp' cannot be given with periodic = 'ewald'",
+        "open = 'tree' is for open boxes and periodic = 'ewald' for periodic ones; leave one of them out",
+    )
+    assert len(error.value.problems) == len(lines)
+    for problem, line in zip(error.value.problems, lines, strict=True):
+        assert problem.startswith(f"dipoles: {line}")

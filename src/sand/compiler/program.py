@@ -16,7 +16,7 @@ from numba.extending import intrinsic, overload
 from .groups import WORD
 from .jit import COMPILED
 from .native_calls import status_and_result
-from .stage import Stage
+from .stage import PythonStage, Stage
 from .table import Table, words_of
 
 __all__ = ["Program", "call_stage", "has_stage", "stage_fails"]
@@ -45,6 +45,21 @@ def _first_call(
     return compile_and_call
 
 
+def _python_call(stage: PythonStage, parameters: Any, table: weakref.ref[Table], failures: list[BaseException]) -> Any:
+    """A function in place of a compiled stage, which calls a Python function."""
+
+    @_NATIVE
+    def call(result: int, _exception: Any, _table: Any, _parameters: Any, block: int) -> int:
+        try:
+            ctypes.c_int64.from_address(result).value = stage.in_python(table(), parameters, block)  # type: ignore[arg-type]
+        except BaseException as error:  # passed on by `Program.run`
+            failures.append(error)
+            return FAILED
+        return 0
+
+    return call
+
+
 FAILED = -1
 """Numba's status of a function that has raised a Python exception."""
 NOT_READY, READY = 0, 1
@@ -61,22 +76,26 @@ class Program:
     ----------
     table : Table
         The parts of the state.
-    stages : dict[int, tuple[Stage, Any]]
+    stages : dict[int, tuple[Stage | PythonStage, Any]]
         Stage and parameters by number; other numbers have no stage.
     size : int
         Number of entries.
     """
 
-    def __init__(self, table: Table, stages: Mapping[int, tuple[Stage, Any]], size: int):
+    def __init__(self, table: Table, stages: Mapping[int, tuple[Stage | PythonStage, Any]], size: int):
         self.stages, self.entries, self._failures = dict(stages), np.zeros((size, 3), np.int64), list[BaseException]()
-        self._rows, self._first_calls = list[np.ndarray](), list[Any]()
+        self._rows, self._calls = list[np.ndarray](), list[Any]()
         if COMPILED:
             for number, (stage, parameters) in self.stages.items():
                 entry, row = self.entries[number], np.array([*words_of(parameters), 0], np.int64)
-                first_call = _first_call(stage, parameters, weakref.ref(table), entry, self._failures)
-                entry[:] = ctypes.cast(first_call, ctypes.c_void_p).value, row.ctypes.data, NOT_READY
+                if isinstance(stage, PythonStage):
+                    call = _python_call(stage, parameters, weakref.ref(table), self._failures)
+                else:
+                    call = _first_call(stage, parameters, weakref.ref(table), entry, self._failures)
+                ready = READY if isinstance(stage, PythonStage) else NOT_READY
+                entry[:] = ctypes.cast(call, ctypes.c_void_p).value, row.ctypes.data, ready
                 self._rows.append(row)
-                self._first_calls.append(first_call)
+                self._calls.append(call)
 
     def run(self, stage: Stage, table: Table) -> int:
         """Call a stage that calls the stages of this program.  Raises what the compilation of one of them raised."""

@@ -43,7 +43,7 @@ from .table import (
 )
 from .user_code import user_code_digest
 
-__all__ = ["Stage", "stage"]
+__all__ = ["PythonStage", "Stage", "stage"]
 
 
 def is_not_inlined() -> None:
@@ -198,6 +198,38 @@ class Stage:
         return kernel(
             entry, cached=self._cached and digest is not None, nogil=True, wrapper=False, purpose=self._purpose
         )
+
+
+class PythonStage:
+    """An ordinary Python function of parts of the state, which a program calls by address like a compiled stage.
+
+    It holds the GIL, so that it suits few calls of library functions, such as Fourier transforms; a call costs a few
+    microseconds.
+
+    Attributes
+    ----------
+    function : callable
+        The function; its arguments are names of parts, `block` or `parameters`. It returns an integer.
+    needs : tuple of str
+        Names of its arguments.
+    """
+
+    def __init__(self, function: Callable):
+        self.function = function
+        self.needs = tuple(inspect.signature(function).parameters)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PythonStage:
+        """The stage itself, which holds no data of a simulation."""
+        return self
+
+    def in_python(self, table: Table, parameters: Any, block: int) -> Any:
+        """Call the function."""
+        special = {TABLE: table, BLOCK: block, PARAMETERS: parameters}
+        return self.function(*(special[name] if name in special else table[name] for name in self.needs))
+
+    def run(self, table: Table, parameters: Any = (), block: int = 0) -> int:
+        """Call the function; returns its integer."""
+        return int(self.in_python(table, parameters, block))
 
 
 def stage(purpose: str, *, long_vectors: bool = False, cached: bool = True) -> Callable[[Callable], Stage]:

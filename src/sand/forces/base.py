@@ -84,8 +84,11 @@ class LongRangeForce(Force, Protocol):
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings as in `parameters`, with automatic ones as chosen for these grains: a resumed run uses the same."""
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """Its loops: over the pairs of the Verlet list if `listed`, else over all pairs."""
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
+        """Its loops: over the pairs of the Verlet list if `listed`, else over all pairs.
+
+        `grains` for a force whose loops depend on their number, as those of a tree and of an Ewald sum do.
+        """
 
     def numbers(self, grains: Grains, box: Box) -> Any:
         """The `parameters` of its loops: a NamedTuple, without values of single grains, whose indices may change."""

@@ -304,7 +304,7 @@ class OwnPair(_Own, CutoffForce):
         self.kind.check(self.constants())
         return CutoffForce.check(self, grains, box)
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
         return pair_sums(self.formula, None, self.torques, listed)
 

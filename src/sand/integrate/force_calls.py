@@ -1,7 +1,7 @@
 """Loops over the forces of a simulation, each of which is called by address."""
 
 from ..compiler.jit import caller
-from ..compiler.program import call_stage
+from ..compiler.program import call_stage, has_stage
 from ..state.state import LONG_RANGE_SUMS
 from .force_stages import (
     BEGIN,
@@ -11,6 +11,8 @@ from .force_stages import (
     LOADS,
     PAIR_STAGES,
     REASSIGN,
+    ROUND,
+    ROUNDS,
     SUBTRACT,
     SUM,
     UPDATE,
@@ -20,7 +22,7 @@ from .force_stages import (
 from .parts import EXTERNAL, LOAD_TIME
 from .respa import clear_long_range_loads, mark_every_step
 from .stages import FIRST_FORCE
-from .task_queue import SHARED, share_blocks
+from .task_queue import SHARED, for_each_block, share_blocks
 
 
 @caller
@@ -47,6 +49,9 @@ def sum_pair_forces(long_range, count, forces, queue, program, table):
     clear_long_range_loads(long_range)
     for k in range(forces.pair):
         number = FIRST_FORCE + PAIR_STAGES * k + SUM
+        for r in range(number + ROUND, number + ROUND + ROUNDS):
+            if has_stage(program, r):
+                for_each_block(program, r, table, queue.words, call_stage(program, r, table, BEGIN))
         if queue.words[SHARED] == 1:
             blocks = call_stage(program, number, table, BEGIN)
             share_blocks(program, number, table, queue.words, blocks)

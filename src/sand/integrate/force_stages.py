@@ -3,15 +3,18 @@
 import functools
 from collections.abc import Callable
 
-from ..compiler.stage import Stage, stage
+from ..compiler.stage import PythonStage, Stage, stage
 from ..forces.external.loops import external_energy, external_loads, external_power, wrapping_work
-from ..forces.pair.loops import LongRangeSums
+from ..forces.pair.loops import LongRangeSums, Round, all_blocks
 from .parts import EXTERNAL, LOAD_TIME
 from .respa import contact_pair_loops
 
-SUM, IN_CONTACT, REASSIGN, RATES = range(4)
-PAIR_STAGES = 4
-"""Stages of a pair force: sum over all pairs, pairs in contact, their change between cycles, rates of Taylor series."""
+SUM, IN_CONTACT, REASSIGN, RATES, ROUND = range(5)
+ROUNDS = 6
+"""Largest number of rounds of a pair force, with the numbers ROUND, ROUND + 1, …"""
+PAIR_STAGES = ROUND + ROUNDS
+"""Stages of a pair force: sum over all pairs, pairs in contact, their change between cycles, rates of Taylor series,
+and the rounds of a mesh before the sum."""
 LOADS, WORK = range(2)
 EXTERNAL_STAGES = 2
 """Stages of an external force: its loads; energy, power or work of wrapping."""
@@ -24,7 +27,7 @@ ENERGY, POWER, WRAPPING = range(3)
 
 
 @functools.cache
-def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stage]:
+def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stage | PythonStage]:
     """The stages of one pair force by number."""
     begin, sum_block, end, blocks = sums.begin, sums.block, sums.end, sums.blocks
     add, subtract, reassign = contact_pair_loops(sums.pair)
@@ -56,7 +59,9 @@ def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stag
             reassign(grains, contacts, count, long_range, span, parameters)
         return 0
 
+    found: dict[int, Stage | PythonStage]
     found = {SUM: sum_pairs, IN_CONTACT: pairs_in_contact, REASSIGN: reassign_pairs}
+    found |= {ROUND + k: _round_stage(each) for k, each in enumerate(sums.rounds)}
     if sums.rates is None:
         return found
     sum_rates = sums.rates
@@ -67,6 +72,31 @@ def pair_force_stages(sums: LongRangeSums, long_vectors: bool) -> dict[int, Stag
         return 0
 
     return found | {RATES: rates}
+
+
+@functools.cache
+def _round_stage(given: Round) -> Stage | PythonStage:
+    """The stage of one round of blocks."""
+    begin, round_block = given.begin, given.block
+    if not given.compiled:
+
+        def in_python(grains, parameters, block):
+            if block != BEGIN:
+                round_block(parameters, block, all_blocks(grains))
+            return all_blocks(grains)
+
+        return PythonStage(in_python)
+
+    @stage("the loops of the mesh")
+    def in_blocks(grains, span, parameters, block):
+        """Process one block; returns the number of blocks."""
+        if block == BEGIN:
+            begin(grains, span, parameters)
+        else:
+            round_block(grains, span, parameters, block, all_blocks(grains))
+        return all_blocks(grains)
+
+    return in_blocks
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from ..compiler.program import Program
-from ..compiler.stage import Stage
+from ..compiler.stage import PythonStage, Stage
 from ..compiler.table import Table
 from ..contact.damping import DASHPOTS, NONE, THERMAL
 from ..contact.gather import resort_contacts_by_grain
@@ -21,6 +21,7 @@ from .force_stages import (
     PAIR_STAGES,
     RATES,
     REASSIGN,
+    ROUND,
     SUM,
     WORK,
     external_force_stages,
@@ -41,7 +42,7 @@ class Components(NamedTuple):
     wide: bool  # enough grains for the longest SIMD vectors
 
 
-def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[Stage, Any]]:
+def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[Stage | PythonStage, Any]]:
     """The stages that a simulation calls, by number, with their own parameters."""
     respa, work = parameters.respa, parameters.external_work
     found: dict[int, Stage] = {
@@ -64,17 +65,18 @@ def stages_of(given: Components, parameters: StepParameters) -> dict[int, tuple[
         found[stages.GAS_KICK] = stages.kick_by_gas
     if given.flight is not None:
         found[stages.FLIGHT] = given.flight
-    program: dict[int, tuple[Stage, Any]] = {number: (each, ()) for number, each in found.items()}
+    program: dict[int, tuple[Stage | PythonStage, Any]] = {number: (each, ()) for number, each in found.items()}
     number = stages.FIRST_FORCE
     needed = {SUM, *((IN_CONTACT, REASSIGN) if respa.impulse else ()), *((RATES,) if respa.taylor else ())}
     for sums, own in given.pair_forces:
         own_stages = pair_force_stages(sums, given.wide)
-        program |= {number + k: (own_stages[k], own) for k in needed}
+        rounds = range(ROUND, ROUND + len(sums.rounds))
+        program |= {number + k: (own_stages[k], own) for k in (*needed, *rounds)}
         number += PAIR_STAGES
     needed = {LOADS, *((WORK,) if work.time_dependent or work.position_dependent else ())}
     for formula, own in given.external_forces:
-        own_stages = external_force_stages(formula)
-        program |= {number + k: (own_stages[k], own) for k in needed}
+        of_force = external_force_stages(formula)
+        program |= {number + k: (of_force[k], own) for k in needed}
         number += EXTERNAL_STAGES
     return program
 

@@ -133,7 +133,7 @@ def build_engine(
         box.span,
         _contact_parameters(by_type.contact, grains, verlet, seed),
         found.search,
-        _respa_settings(by_type, verlet),
+        _respa_settings(by_type, verlet, long_range),
         _external_work(by_type.external, box),
         _gas_settings(by_type.gas, grains, seed),
         control,
@@ -150,7 +150,8 @@ def build_engine(
         len(grains) >= WIDE_FROM,
     )
     capacity = int(OVER_ALLOCATION * (len(start.pair) + (0 if contacts is None else len(contacts.pair))))
-    state = _new_state(wrapped, box, parameters, components, capacity, over_all_pairs=not all(listed))
+    over_all_pairs = any(not own and not sums.own_memory for own, (_, sums, _) in zip(listed, long_range, strict=True))
+    state = _new_state(wrapped, box, parameters, components, capacity, over_all_pairs=over_all_pairs)
     chosen = neighbours.settled(found.search, len(grains)) if fresh else neighbours
     search = found.reason + (
         "; arrays sorted along a space-filling curve" if chosen.uses_spatial_sort(len(grains)) else ""
@@ -171,7 +172,7 @@ def _long_range_loops(
     forces: ForcesByType, grains: Grains, box: Box, listed: Sequence[bool]
 ) -> list[tuple[LongRangeForce, LongRangeSums, Any]]:
     """Long-range forces with their loops and numbers."""
-    sums = [force.sums(box, own) for force, own in zip(forces.long_range, listed, strict=True)]
+    sums = [force.sums(box, own, grains) for force, own in zip(forces.long_range, listed, strict=True)]
     return [(force, own, force.numbers(grains, box)) for force, own in zip(forces.long_range, sums, strict=True)]
 
 
@@ -184,7 +185,9 @@ def _forces_by_type(forces: Sequence[Force], grains: Grains) -> ForcesByType:
     )
 
 
-def _respa_settings(forces: ForcesByType, verlet: Verlet) -> RespaSettings:
+def _respa_settings(
+    forces: ForcesByType, verlet: Verlet, loops: Sequence[tuple[LongRangeForce, LongRangeSums, Any]]
+) -> RespaSettings:
     """Multiple time stepping; cycles of one step without long-range forces.
 
     Without contacts, or with cycles of one step, there is neither extrapolation nor a constant force.
@@ -193,7 +196,7 @@ def _respa_settings(forces: ForcesByType, verlet: Verlet) -> RespaSettings:
     scheme = verlet.far if forces.contact and most > 1 else "every step"
     taylor = scheme.startswith("taylor")
     if taylor:
-        without = [f.name for f in forces.long_range if f.sums(Box.open(), False).rates is None]
+        without = [force.name for force, sums, _ in loops if sums.rates is None]
         if without:
             raise BadInput(
                 f"stepping: far = '{scheme}' needs the rate of change of every pair force, which {', '.join(without)} "

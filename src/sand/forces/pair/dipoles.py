@@ -11,6 +11,7 @@ import numpy as np
 from ...arguments import checked
 from ...box import Box
 from ...constants import BOLTZMANN, MAGNETIC
+from ...errors import BadInput
 from ...grains import Grains
 from ...units import format_quantity
 from .cutoff import HALF_BOX_RATIO, CutoffChoice, cutoff_for
@@ -19,8 +20,10 @@ from .dipole_loops import ALL_PAIRS, ALL_PAIRS_CUT, LISTED_PAIRS, DipoleParamete
 from .ewald import degree_for, ewald_parameters
 from .ewald_fit import DIPOLES, Sources
 from .ewald_force import DEFAULT_ACCURACY, EwaldForce
-from .ewald_loops import EwaldParameters, ewald_sums
+from .ewald_loops import EwaldParameters, MeshEwaldParameters, ewald_sums
 from .loops import LongRangeSums
+from .tree import TREE_FROM, TreeChoice, choose_tree, tree_parameters
+from .tree_loops import TREE, TreeParameters
 
 CAPTURE_RADII = 1.5
 """Automatic cut-off in a large box, in units of the capture radius b_max at thermal speed."""
@@ -62,32 +65,42 @@ class Dipoles(EwaldForce):
     periodic : str, optional
         What acts in a periodic box. "nearest image": the nearest image of each grain within the cut-off. "ewald": all
         images of all grains, by an Ewald sum, in a box that is periodic along all axes; without `cutoff` and `cut`.
+    open : str, optional
+        How all pairs in an open box are summed. "pairs": directly. "tree": near pairs directly, distant grains by
+        multipole expansions of the cells of a tree, in a time proportional to the number of grains. "auto": a tree from
+        5000 grains on.
     accuracy : float, optional
-        Of the Ewald sum, 1e-8 … 0.1: largest rms error of force and torque, relative to their typical size in a gas of
-        these grains. The parameters of the sum are the cheapest with this accuracy.
+        Of the Ewald sum, 1e-8 … 0.1, or of the tree, 1e-6 … 0.1: largest rms error of force and torque, relative to
+        their typical size in a gas of these grains. The parameters of the sum are the cheapest with this accuracy.
     boundary : str, optional
         What surrounds the images of the Ewald sum, at infinity: "tin-foil" (a medium of infinite permeability: no
         demagnetising field) or "vacuum" (a sphere of images in vacuum: demagnetising field −μ₀M/3 of the total
         moment, M per volume).
+    reciprocal : str, optional
+        How the reciprocal part of the Ewald sum is computed: "direct", summed over wave vectors; "mesh", by Fourier
+        transforms on a mesh; "auto", the cheaper of both (the mesh from one or two thousand grains on).
 
     Raises
     ------
     BadInput
-        If a parameter is invalid; later, if the cut-off exceeds half the box, or a box of an Ewald sum is open along an
-        axis.
+        If a parameter is invalid; later, if the cut-off exceeds half the box, a box of an Ewald sum is open along an
+        axis, or that of a tree is not open, or an Ewald sum would need too many wave vectors and nodes.
     """
 
     cutoff: Any = "auto"
     cut: str = "smooth"
     periodic: str = "nearest image"
+    open: str = "auto"
     accuracy: Any = DEFAULT_ACCURACY
     boundary: str = "tin-foil"
+    reciprocal: str = "auto"
 
     name: ClassVar[str] = "dipoles"
     no_effect: ClassVar[str] = "dipoles are switched on but no grain has a magnetic moment"
     column: ClassVar[str] = "magnetic"
     references: ClassVar[str] = (
         "Dominik & Nübold 2002, Eqs. 6, 34–41; Jackson 1975; Ewald sum: de Leeuw, Perram & Smith 1980; Wang & Holm 2001"
+        "; Essmann et al. 1995; tree: Dehnen 2002"
     )
     sources: ClassVar[Sources] = DIPOLES
 
@@ -106,6 +119,33 @@ class Dipoles(EwaldForce):
     def follows_clusters(self, box: Box) -> bool:
         """Whether the cut-off is chosen anew during a run."""
         return self.cutoff == "auto" and self.periodic != "ewald" and not box.is_open
+
+    def choose(self, grains: Grains, box: Box) -> CutoffChoice:
+        """The cut-off radius, or that of the real part of the Ewald sum, or none with a tree, with the reason."""
+        if self.open == "tree" and not box.is_open:
+            raise BadInput(
+                f"{self.name}: open = 'tree' needs an open box, and the box is {box.describe()}; "
+                "use periodic = 'ewald', or leave open out"
+            )
+        if not self.uses_tree(grains, box):
+            return super().choose(grains, box)
+        tree = self.tree(grains)
+        return CutoffChoice(
+            None,
+            f"open box: all grains, by a tree of multipoles, degree {tree.degree}, opening angle {tree.opening:g}, "
+            f"accuracy {self.accuracy:g}; predicted errors of force {tree.force_error:.1e}, "
+            f"of torque {tree.torque_error:.1e}",
+        )
+
+    def uses_tree(self, grains: Grains, box: Box) -> bool:
+        """Whether all pairs are summed with a tree."""
+        if not box.is_open or self.periodic == "ewald" or self.cutoff not in (None, "auto"):
+            return False
+        return self.open == "tree" or (self.open == "auto" and len(grains) >= TREE_FROM)
+
+    def tree(self, grains: Grains) -> TreeChoice:
+        """The parameters of the tree."""
+        return choose_tree(len(grains), self.accuracy)
 
     def automatic(self, grains: Grains, largest: float) -> CutoffChoice:
         """The cut-off for single grains; none in an open box."""
@@ -131,16 +171,24 @@ class Dipoles(EwaldForce):
             return CutoffChoice(shortest, f"{self.cut}, two grain diameters, more than {full}")
         return CutoffChoice(capture, f"{self.cut}, {CAPTURE_RADII} b_max of {pair} at thermal speed")
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
-        """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
+        """The loops over the pairs of the Verlet list if `listed`, else over all pairs, or the tree of these grains."""
+        if grains is not None and self.uses_tree(grains, box):
+            return TREE
         if self.periodic == "ewald":
-            return ewald_sums(degree_for(self.accuracy), listed)
+            order = 0 if grains is None or box.is_open else self.ewald(grains, box).order
+            return ewald_sums(degree_for(self.accuracy), listed, order)
         if listed:
             return LISTED_PAIRS
         return ALL_PAIRS if box.is_open and self.cutoff in (None, "auto") else ALL_PAIRS_CUT
 
-    def numbers(self, grains: Grains, box: Box) -> DipoleParameters | EwaldParameters:
+    def numbers(
+        self, grains: Grains, box: Box
+    ) -> DipoleParameters | EwaldParameters | MeshEwaldParameters | TreeParameters:
         """Parameters of the loops."""
+        if self.uses_tree(grains, box):
+            tree = self.tree(grains)
+            return tree_parameters(len(grains), tree.degree, tree.opening)
         if self.periodic == "ewald":
             return ewald_parameters(self.ewald(grains, box), box, len(grains), self.boundary == "vacuum")
         return self.numbers_at(self.choose(grains, box).radius)

@@ -24,17 +24,23 @@ from ...box import Box
 from ...errors import BadInput
 from ...numerics.simd import padded_size
 from .ewald_fit import DIPOLES, Sources, fitted
-from .ewald_loops import UNUSED, Buffers, EwaldParameters, Waves
+from .ewald_loops import UNUSED, Buffers, EwaldParameters, MeshEwaldParameters, Waves
 from .loops import ALL_PAIRS_BLOCKS, PARALLEL_FROM
+from .mesh import MOST_NODES, mesh_errors, mesh_sums, new_mesh, nodes_for, widest_cells
+from .mesh_loops import ORDERS
 
 DEGREES = {5e-2: 8, 1e-3: 12, 1e-4: 16, 1e-6: 24, 1e-8: 32}
 """Degree of the polynomial of the real part, by the smallest accuracy for which it is used."""
 PRODUCTS = tuple(round(0.1 * k, 1) for k in range(16, 64))
 """Values of α r_c that are compared."""
-RADII = 1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1
+RADII = 1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.12, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02
 """Values of r_c, in units of half the shortest side, that are compared."""
 PAIR_COST, LISTED_COST, WAVE_COST = 1.0, 1.2, 0.16
 """Relative costs of a pair, of an entry of the Verlet list, and of a wave vector of one grain; 1 is 8 ns (Zen 3)."""
+NODE_COST, ROW_COST, GRAIN_COST = 4.0, 3.3, 20.0
+"""Relative costs of a node of a mesh, of a row of nodes of the spline of one grain (p² rows), and of one grain."""
+TRANSFORMS_COST = 5000.0
+"""Relative cost of the calls of the Fourier transforms, for each block."""
 LIST_FROM, LIST_REACH, LIST_UP_TO = 64, 1.1, 0.38
 """Conditions for a Verlet list, as in `neighbours.settings`: grains, reach in units of r_c, fraction within reach."""
 LARGEST_SPACING = 0.8
@@ -44,16 +50,25 @@ MOST_WAVES = 1_000_000
 
 
 class EwaldChoice(NamedTuple):
-    """Parameters of an Ewald sum, with its predicted errors."""
+    """Parameters of an Ewald sum, over wave vectors or with a mesh, with its predicted errors."""
 
     alpha: float  # α [1/m]
     radius: float  # r_c [m]
-    largest: float  # q_max [1/m]
-    waves: int  # number of wave vectors, half of all
+    largest: float  # q_max [1/m]; 0 with a mesh
+    waves: int  # number of wave vectors, half of all; 0 with a mesh
     degree: int  # of the polynomial of the real part
     product: float  # α r_c
     force_error: float
     field_error: float  # of torque (dipoles) or potential (charges)
+    nodes: tuple[int, int, int] = (0, 0, 0)  # of the mesh along the axes
+    order: int = 0  # of the splines of a mesh; 0 without one
+
+    @property
+    def reciprocal(self) -> str:
+        """The reciprocal part in words."""
+        if self.order:
+            return f"mesh of {' x '.join(map(str, self.nodes))} nodes with splines of order {self.order}"
+        return f"{self.waves} wave vectors and their opposites"
 
 
 def degree_for(accuracy: float) -> int:
@@ -126,6 +141,17 @@ def _cost_of_pairs(count: int, radius: float, volume: float) -> float:
     return PAIR_COST * 0.5 * count * count
 
 
+class _Problem(NamedTuple):
+    """What the parameters are chosen for."""
+
+    lengths: tuple[float, float, float]  # of the box [m]
+    volume: float
+    spacing: float  # a [m]
+    accuracy: float
+    degree: int
+    grains: int  # number of them
+
+
 @functools.lru_cache(64)
 def choose_ewald(
     lengths: tuple[float, float, float],
@@ -134,6 +160,7 @@ def choose_ewald(
     accuracy: float,
     least: float,
     sources: Sources = DIPOLES,
+    reciprocal: str = "auto",
 ) -> EwaldChoice:
     """The cheapest parameters for an accuracy.
 
@@ -150,37 +177,100 @@ def choose_ewald(
     least : float
         Smallest r_c [m]; half the shortest side if that is smaller.
     sources : Sources
-        `ewald_fit.CHARGES` or `DIPOLES`.
+        `ewald_fit.CHARGES`, with "direct" alone, or `DIPOLES`.
+    reciprocal : str, optional
+        How the reciprocal part is summed: "direct", over wave vectors; "mesh"; or "auto", the cheaper of both.
 
     Raises
     ------
     BadInput
-        If more than a million wave vectors are needed.
+        If more than a million wave vectors or 32 million nodes are needed.
     """
     volume, half, degree = math.prod(lengths), 0.5 * min(lengths), degree_for(accuracy)
     spacing = min((3.0 * volume / (4.0 * math.pi * carriers)) ** (1.0 / 3.0), LARGEST_SPACING * half)
-    found = []
-    for radius in {max(min(least, half), fraction * half) for fraction in RADII}:
+    problem = _Problem(lengths, volume, spacing, accuracy, degree, count)
+    direct, meshes = [], []
+    for radius in sorted({max(min(least, half), fraction * half) for fraction in RADII}):
+        pairs = _cost_of_pairs(count, radius, volume)
         for product in PRODUCTS:
             force, field = real_errors(product, degree, radius, spacing, sources)
-            if max(force, field) < accuracy:
-                limits = math.sqrt(accuracy**2 - force**2), math.sqrt(accuracy**2 - field**2)
+            if max(force, field) >= accuracy:
+                continue
+            limits = math.sqrt(accuracy**2 - force**2), math.sqrt(accuracy**2 - field**2)
+            if reciprocal != "mesh":
                 waves = _waves_needed(product / radius, spacing, volume, limits, sources)
-                cost = _cost_of_pairs(count, radius, volume) + WAVE_COST * count * waves
-                found.append((cost, -radius, product, waves))
-    if not found:
+                direct.append((pairs + WAVE_COST * count * waves, -radius, product, waves))
+            if reciprocal != "direct":
+                meshes += _meshes(problem, pairs, radius, product, limits)
+    if not direct and not meshes:
+        instead = "" if reciprocal != "mesh" else ", or leave reciprocal = 'mesh' out"
         raise BadInput(
             f"{sources.name}: periodic = 'ewald' with accuracy = {accuracy:g} is not possible in this box; "
-            "give a larger accuracy, such as 1e-3"
+            f"give a larger accuracy, such as 1e-3{instead}"
         )
-    _, radius, product, waves = min(found)
-    if waves >= MOST_WAVES:
+    possible = [each for each in meshes if math.prod(each[3]) <= MOST_NODES]
+    cheapest = min((each for each in direct if each[3] < MOST_WAVES), default=None)
+    if possible and (cheapest is None or min(possible)[0] < cheapest[0]):
+        _, radius, product, nodes, order = min(possible)
+        return _with_mesh(problem, -radius, product, nodes, order)
+    if cheapest is None:
+        needs = " and ".join(
+            what
+            for what, used in (
+                (f"more than {MOST_WAVES} wave vectors", bool(direct)),
+                (f"a mesh of more than {MOST_NODES} nodes", bool(meshes)),
+            )
+            if used
+        ).replace(" and a mesh", ", or a mesh")
         raise BadInput(
-            f"{sources.name}: periodic = 'ewald' with accuracy = {accuracy:g} needs more than {MOST_WAVES} wave "
-            f"vectors in a box of {' x '.join(f'{side:.3g}' for side in lengths)} m; "
-            "give a larger accuracy, or sides more alike"
+            f"{sources.name}: periodic = 'ewald' with accuracy = {accuracy:g} needs {needs} in a "
+            f"box of {' x '.join(f'{side:.3g}' for side in lengths)} m; give a larger accuracy, or sides more alike"
         )
+    _, radius, product, waves = cheapest
     return _with_whole_shells(lengths, volume, spacing, accuracy, degree, -radius, product, waves, sources)
+
+
+def _meshes(
+    problem: _Problem, pairs: float, radius: float, product: float, limits: tuple[float, float]
+) -> list[tuple[float, float, float, tuple[int, int, int], int]]:
+    """Costs of the meshes of all orders, with −r_c, α r_c, nodes, order; `pairs` is the cost of the real part."""
+    found = []
+    for order in ORDERS:
+        widest = widest_cells(order, product / radius, problem.spacing, limits)
+        if widest > 0.0:
+            nodes = nodes_for(problem.lengths, widest, order)
+            found.append((pairs + _cost_of_mesh(problem.grains, nodes, order), -radius, product, nodes, order))
+    return found
+
+
+def _cost_of_mesh(count: int, nodes: tuple[int, int, int], order: int) -> float:
+    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
+    return blocks * TRANSFORMS_COST + NODE_COST * math.prod(nodes) + count * (GRAIN_COST + ROW_COST * order**2)
+
+
+def _with_mesh(
+    problem: _Problem, radius: float, product: float, nodes: tuple[int, int, int], order: int
+) -> EwaldChoice:
+    """The choice, with the errors of this mesh; a finer one as long as they exceed the accuracy.
+
+    The estimates by which nodes are chosen are those of cubic cells in a large box.
+    """
+    alpha = product / radius
+    real = real_errors(product, problem.degree, radius, problem.spacing)
+    spacing = max(side / number for side, number in zip(problem.lengths, nodes, strict=True))
+    while True:
+        sums = mesh_sums(problem.lengths, nodes, order, alpha)
+        other = mesh_errors(sums, problem.volume, problem.spacing)
+        force, field = (math.hypot(own, mesh) for own, mesh in zip(real, other, strict=True))
+        if max(force, field) <= problem.accuracy:
+            return EwaldChoice(alpha, radius, 0.0, 0, problem.degree, product, force, field, nodes, order)
+        spacing *= 0.97
+        nodes = nodes_for(problem.lengths, spacing, order)
+        if math.prod(nodes) > 2 * MOST_NODES:
+            raise BadInput(
+                f"dipoles: periodic = 'ewald' with accuracy = {problem.accuracy:g} is not reached by a mesh of "
+                f"{MOST_NODES} nodes; give a larger accuracy, or reciprocal = 'direct'"
+            )
 
 
 def _with_whole_shells(
@@ -246,20 +336,24 @@ def mean_field(alpha: float, volume: float, vacuum: bool, sources: Sources = DIP
 
 def ewald_parameters(
     choice: EwaldChoice, box: Box, count: int, vacuum: bool, sources: Sources = DIPOLES
-) -> EwaldParameters:
+) -> EwaldParameters | MeshEwaldParameters:
     """Parameters of the loops, with buffers for `count` grains."""
     lengths, volume = sides(box), box.volume
     radius, alpha, order = choice.radius, choice.alpha, sources.order
-    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
     found = fitted(choice.product, choice.degree, order)
+    coefficients = tuple(c / radius ** (2 * order + 1) for c in found.coefficients)
+    of_pairs = sources.k, radius**2, 2.0 / radius**2, coefficients
+    mean = mean_field(alpha, volume, vacuum, sources)
+    if choice.order:
+        sums = mesh_sums(lengths, choice.nodes, choice.order, alpha)
+        own = 4.0 * alpha**3 * sources.k / (3.0 * math.sqrt(math.pi)) + sources.k / volume * sums.self_mean
+        return MeshEwaldParameters(*of_pairs, own, mean, new_mesh(sums, choice.nodes, volume, count))
+    blocks = ALL_PAIRS_BLOCKS if count >= PARALLEL_FROM else 1
     size = padded_size(count)
     return EwaldParameters(
-        sources.k,
-        radius**2,
-        2.0 / radius**2,
-        tuple(c / radius ** (2 * order + 1) for c in found.coefficients),
+        *of_pairs,
         own_field(alpha, choice.waves, volume, sources),
-        mean_field(alpha, volume, vacuum, sources),
+        mean,
         _waves(lengths, choice, count, blocks, sources),
         Buffers(*(np.zeros((blocks, 0 if name in UNUSED[order] else size)) for name in Buffers._fields)),
     )

@@ -1,4 +1,4 @@
-"""Base class of the forces that can be summed over all periodic images: settings and choice of the Ewald sum."""
+"""Base class of the forces that can be summed over all periodic images: settings, and choice of the Ewald sum."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from ...units import si
 from .cutoff import CutoffChoice, CutoffForce
 from .ewald import EwaldChoice, choose_ewald, sides
 from .ewald_fit import Sources
+from .tree import ACCURACIES as TREE_ACCURACIES
 
 PERIODIC = ("nearest image", "ewald")
 BOUNDARIES = ("tin-foil", "vacuum")
+RECIPROCALS = ("auto", "direct", "mesh")
+OPEN = ("auto", "pairs", "tree")
 ACCURACIES = 1e-8, 0.1
 """Smallest and largest accuracy of an Ewald sum."""
 DEFAULT_ACCURACY = 1e-3
@@ -25,18 +28,22 @@ class EwaldForce(CutoffForce):
     """A long-range force with the fields `periodic`, `accuracy` and `boundary` beside those of `CutoffForce`.
 
     Subclasses are frozen dataclasses with `periodic: str = "nearest image"`, `accuracy: Any = DEFAULT_ACCURACY` and
-    `boundary: str = "tin-foil"`.
+    `boundary: str = "tin-foil"`; with `reciprocal: str = "auto"` if there are loops of a mesh, and `open: str = "auto"`
+    if there is a tree.
     """
 
     periodic: str
     accuracy: Any
     boundary: str
+    reciprocal: str = "direct"
+    open: str = "pairs"
 
     sources: ClassVar[Sources]
 
     def __post_init__(self) -> None:
         errors = ErrorCollector()
-        for name, allowed in (("periodic", PERIODIC), ("boundary", BOUNDARIES)):
+        words = ("periodic", PERIODIC), ("boundary", BOUNDARIES), ("reciprocal", RECIPROCALS), ("open", OPEN)
+        for name, allowed in words:
             value = getattr(self, name)
             if value not in allowed:
                 errors.problems.append(f"{self.name}: {name} = {shown(value)}; {did_you_mean(str(value), allowed)}")
@@ -45,19 +52,42 @@ class EwaldForce(CutoffForce):
             object.__setattr__(self, "accuracy", accuracy)
             if accuracy > ACCURACIES[1]:
                 errors.problems.append(f"{self.name}: accuracy = {accuracy:g} must be at most {ACCURACIES[1]:g}")
+            elif self.open == "tree" and accuracy < TREE_ACCURACIES[0]:
+                errors.problems.append(
+                    f"{self.name}: accuracy = {accuracy:g} must be at least {TREE_ACCURACIES[0]:g} with open = 'tree'; "
+                    "open = 'pairs' is exact"
+                )
         errors.take(super().__post_init__)
+        errors.problems += self._contradictions()
+        errors.done()
+
+    def _contradictions(self) -> list[str]:
+        """Settings that cannot be given together, or are not used; a misspelt word is not judged."""
+        problems, ewald = [], "periodic = 'ewald'"
         if self.periodic == "ewald":
             for name in self._given("cutoff", "cut"):
-                errors.problems.append(
-                    f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with periodic = 'ewald', "
+                problems.append(
+                    f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with {ewald}, "
                     "which sums all images and chooses the radius of its real part; leave one of them out"
                 )
-        elif self.periodic in PERIODIC:
-            for name in self._given("accuracy", "boundary"):
-                errors.problems.append(
-                    f"{self.name}: {name} is used only with periodic = 'ewald'; add that, or leave it out"
+            if self._given("open"):
+                problems.append(
+                    f"{self.name}: open = {shown(self.open)} is for open boxes and {ewald} for periodic ones; "
+                    "leave one of them out"
                 )
-        errors.done()
+        elif self.periodic in PERIODIC:
+            uses = {"boundary": ewald, "reciprocal": ewald}
+            if self.open != "tree":
+                uses["accuracy"] = f"{ewald} or open = 'tree'" if type(self).open == "auto" else ewald
+            for name in self._given(*uses):
+                problems.append(f"{self.name}: {name} is used only with {uses[name]}; add that, or leave it out")
+            for name in self._given("cutoff", "cut") if self.open == "tree" else ():
+                if getattr(self, name) is not None:
+                    problems.append(
+                        f"{self.name}: {name} = {shown(getattr(self, name))} cannot be given with open = 'tree', "
+                        "which sums all pairs; leave one of them out"
+                    )
+        return problems
 
     def _given(self, *names: str) -> list[str]:
         """Of these fields the ones that differ from their defaults."""
@@ -75,7 +105,7 @@ class EwaldForce(CutoffForce):
         return CutoffChoice(
             chosen.radius,
             f"radius of the real part of an Ewald sum, {self.boundary}, accuracy {self.accuracy:g}: "
-            f"alpha = {chosen.product:g}/radius, {chosen.waves} wave vectors and their opposites; predicted errors "
+            f"alpha = {chosen.product:g}/radius, {chosen.reciprocal}; predicted errors "
             f"of force {chosen.force_error:.1e}, of {self.sources.field} {chosen.field_error:.1e}",
         )
 
@@ -85,7 +115,7 @@ class EwaldForce(CutoffForce):
         Raises
         ------
         BadInput
-            If the box is open along an axis, or needs too many wave vectors.
+            If the box is open along an axis, or needs too many wave vectors and nodes.
         """
         if any(side is None for side in box.lengths):
             raise BadInput(
@@ -94,7 +124,7 @@ class EwaldForce(CutoffForce):
             )
         least = SMALLEST_RADIUS * float(grains.radius.max())
         carriers = max(self.carriers(grains), 1)
-        return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources)
+        return choose_ewald(sides(box), len(grains), carriers, self.accuracy, least, self.sources, self.reciprocal)
 
     def resolved(self, grains: Grains, box: Box) -> dict[str, Any]:
         """Settings with the automatic cut-off as a number; those of an Ewald sum follow from grains and box."""

@@ -41,6 +41,7 @@ from .dipole_loops import (
 )
 from .ewald_formulas import real_part
 from .loops import LongRangeSums, all_blocks, listed_blocks
+from .mesh_loops import Mesh, add_mesh, add_self_waves, mesh_rounds
 
 
 class Buffers(NamedTuple):
@@ -86,7 +87,7 @@ class Waves(NamedTuple):
 
 
 class EwaldParameters(NamedTuple):
-    """Parameters of the loops."""
+    """Parameters of the loops, with wave vectors."""
 
     k: float  # μ₀/4π [T m/A] or 1/(4πε₀) [N m²/C²]
     cutoff_square: float  # r_c² [m²]
@@ -96,6 +97,18 @@ class EwaldParameters(NamedTuple):
     mean_field: float  # per total moment −4πk/(3V) in vacuum, 0 for tin foil [T/(A m²)]; per net charge −πk/(Vα²) [V/C]
     waves: Waves
     buffers: Buffers
+
+
+class MeshEwaldParameters(NamedTuple):
+    """Parameters of the loops, with a mesh; the first ones are those of `EwaldParameters`."""
+
+    k: float
+    cutoff_square: float
+    stretch: float
+    coefficients: tuple
+    self_field: float
+    mean_field: float
+    mesh: Mesh
 
 
 @loop
@@ -277,19 +290,23 @@ def with_waves(begin_pairs: Callable, pair_block: Callable, blocks_of_pairs: Cal
 
 
 @loop
-def add_waves(grains, long_range, parameters):
-    """Add the reciprocal part of all blocks, the fields of a grain's own smeared dipole, and the mean field."""
-    sums = parameters.buffers
+def add_waves(grains, long_range, sums):
+    """Add the reciprocal part of all blocks."""
     for b in range(sums.wave.shape[0]):
         for i in range(grains.mass.size):
             accrue(long_range.force, i, (sums.force_x[b, i], sums.force_y[b, i], sums.force_z[b, i]))
             accrue(grains.field, i, (sums.field_x[b, i], sums.field_y[b, i], sums.field_z[b, i]))
+
+
+@loop
+def add_own_and_mean_field(grains, self_field, mean_field):
+    """Add the fields that remove those of a grain's own smeared dipole, and the mean field."""
     total = (0.0, 0.0, 0.0)
     for i in range(grains.mass.size):
         total = add(total, load(grains.moment, i))
-    mean = scale(parameters.mean_field, total)
+    mean = scale(mean_field, total)
     for i in range(grains.mass.size):
-        accrue(grains.field, i, add(mean, scale(parameters.self_field, load(grains.moment, i))))
+        accrue(grains.field, i, add(mean, scale(self_field, load(grains.moment, i))))
 
 
 @loop
@@ -306,8 +323,11 @@ def bare_pair(grains, span, parameters, i, j):
 
 
 @functools.cache
-def ewald_sums(degree: int, listed: bool) -> LongRangeSums:
-    """The loops of dipoles, with a polynomial of this degree, over the pairs of the Verlet list or over all pairs."""
+def ewald_sums(degree: int, listed: bool, order: int = 0) -> LongRangeSums:
+    """The loops of dipoles, with a polynomial of this degree, over the pairs of the Verlet list or over all pairs.
+
+    `order` is that of the splines of a mesh, 0 for a sum over wave vectors.
+    """
     loads = real_part(degree)
 
     @formula
@@ -317,16 +337,41 @@ def ewald_sums(degree: int, listed: bool) -> LongRangeSums:
         k = parameters.k if inside else 0.0
         return loads(apart, moment1, moment2, k, parameters.stretch, parameters.coefficients)
 
-    if listed:
-        begin, block, blocks = with_waves(pack_moments, listed_block_of(pair_loads), listed_blocks, True)
-    else:
-        begin, block, blocks = with_waves(copy_moments, all_pairs_block_of(pair_loads), all_blocks, True)
+    pack = pack_moments if listed else copy_moments
+    blocks_of_pairs = listed_blocks if listed else all_blocks
+    pair_block = listed_block_of(pair_loads) if listed else all_pairs_block_of(pair_loads)
+
+    if order:
+
+        @loop
+        def end_with_mesh(grains, long_range, span, parameters):
+            if not listed:
+                add_blocks(grains, long_range, span, parameters)
+            add_self_waves(grains, span, parameters.mesh)
+            add_mesh(grains, long_range, parameters.mesh)
+            add_own_and_mean_field(grains, parameters.self_field, parameters.mean_field)
+            add_torques(grains, long_range, span, parameters)
+
+        return LongRangeSums(
+            pack,
+            pair_block,
+            end_with_mesh,
+            blocks_of_pairs,
+            None,
+            energy_shares,
+            bare_pair,
+            arrays=COPIES,
+            rounds=mesh_rounds(order),
+        )
+
+    begin, block, blocks = with_waves(pack, pair_block, blocks_of_pairs, True)
 
     @loop
     def end(grains, long_range, span, parameters):
         if not listed:
             add_blocks(grains, long_range, span, parameters)
-        add_waves(grains, long_range, parameters)
+        add_waves(grains, long_range, parameters.buffers)
+        add_own_and_mean_field(grains, parameters.self_field, parameters.mean_field)
         add_torques(grains, long_range, span, parameters)
 
     return LongRangeSums(begin, block, end, blocks, None, energy_shares, bare_pair, arrays=COPIES)

@@ -153,7 +153,7 @@ class Charges(EwaldForce, InverseSquare):
         """Number of charged grains."""
         return int(np.count_nonzero(grains.charge))
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
         if self.periodic == "ewald":
             return ewald_charge_sums(degree_for(self.accuracy), listed, type(self).formula)

@@ -38,6 +38,19 @@ def listed_blocks(grains):
     return (grains.mass.size + ROWS_PER_BLOCK - 1) // ROWS_PER_BLOCK
 
 
+@loop
+def nothing_before(grains, span, parameters):
+    """No work before the blocks of a round."""
+
+
+class Round(NamedTuple):
+    """Blocks that need the results of all earlier rounds; blocks of one round do not depend on each other."""
+
+    block: Callable  # compiled: (grains, span, parameters, b, blocks); in Python: (parameters, b, blocks)
+    begin: Callable = nothing_before  # (grains, span, parameters): before the blocks; not in Python
+    compiled: bool = True  # False: an ordinary Python function, which needs the GIL
+
+
 class LongRangeSums(NamedTuple):
     """The loops of one long-range force; arguments (grains, long_range, span, parameters) unless stated.
 
@@ -52,6 +65,8 @@ class LongRangeSums(NamedTuple):
     energies: Callable  # (…, shares): adds half the energy of each pair to shares (N,) of both grains
     pair: Callable  # (grains, span, parameters, i, j): force on i, torques on i and on j, of one pair
     arrays: tuple = ()  # names of the copies in long_range that the loops use, see state.arrays.PACKED_ARRAYS
+    rounds: tuple[Round, ...] = ()  # before `begin`; each has as many blocks as a sum over all pairs, `all_blocks`
+    own_memory: bool = False  # blocks keep their sums in the parameters, never in long_range.block_sums
 
 
 @functools.cache

@@ -38,7 +38,7 @@ class PairForce(CutoffForce):
         """The `parameters` of the formula: a NamedTuple of floats."""
         raise NotImplementedError
 
-    def sums(self, box: Box, listed: bool) -> LongRangeSums:
+    def sums(self, box: Box, listed: bool, grains: Grains | None = None) -> LongRangeSums:
         """The loops over the pairs of the Verlet list if `listed`, else over all pairs."""
         return pair_sums(type(self).formula, type(self).rate, self.torques, listed)
 

@@ -1,0 +1,277 @@
+"""The particle mesh of the Ewald sum of dipoles: splines, influence function, accuracy, gradients, momentum, choice."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+import sand
+from sand.compiler.program import Program
+from sand.compiler.stage import PythonStage, stage
+from sand.constants import MAGNETIC
+from sand.errors import BadInput
+from sand.forces.pair import ewald
+from sand.forces.pair.loops import all_blocks
+from sand.forces.pair.mesh import MeshSums, mesh_errors, mesh_sums, new_mesh, nodes_for
+from sand.forces.pair.mesh_loops import ORDERS, add_mesh, charge_loads, charge_row, fill_spline, mesh_rounds
+from tests.tables import table_of
+
+from .test_ewald import MOMENT, SIDES, clusters, gas, loads
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_splines_and_their_derivatives(order):
+    """M, M′ and M″ of node j are those of the B-spline with knots 0 … p at t + p − 1 − j, as SciPy computes them."""
+    t, stretch = 0.37, 2.5
+    spline = np.full((1, 9, 8), 0.0)
+    fill_spline(spline, 0, 1, order, t, stretch)
+    exact = BSpline.basis_element(np.arange(order + 1.0), extrapolate=False)
+    at = t + order - 1 - np.arange(order)
+    for k in range(3):
+        expected = stretch**k * exact.derivative(k)(at)
+        assert spline[0, 3 + k, :order] == pytest.approx(expected, rel=1e-12, abs=1e-13)
+        assert not spline[0, 3 + k, order:].any()
+        assert not spline[0, [0, 1, 2, 6, 7, 8]].any()
+
+
+def test_influence_function_and_errors_by_sums_over_aliases():
+    """G and the mean square errors are Σ over q and all pairs of aliases m, m′, as in the docstring of `mesh`.
+
+    Written out over 7³ aliases (here for the modes of a mesh of 4 × 4 × 6 nodes), W = Π sinc(q h/2)^p:
+    field Σ (G W W′ − δR)² q² q′², force with a further q′²; own field (Σ G W² q² − Σ R q²)/3; and of neighbours along
+    a G Σ W_m W_m′ q_b q_b′ (−1)^p.
+    """
+    sides, nodes, order, alpha = (1.0, 1.1, 1.3), (4, 4, 6), 5, 3.0
+    found = mesh_sums(sides, nodes, order, alpha)
+    shifts = np.stack(np.meshgrid(*[np.arange(-3, 4)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    field = force = own = 0.0
+    wave = np.zeros((3, 3))
+    pairs = [np.argwhere((shifts[None] == shifts[:, None] + step).all(axis=2)).T for step in np.eye(3)]
+    for n in np.ndindex(*nodes):
+        signed = np.array([k if k <= size // 2 else k - size for k, size in zip(n, nodes, strict=True)])
+        turns = signed / np.array(nodes) + shifts
+        q = 2 * math.pi * turns * np.array(nodes) / sides
+        square = (q**2).sum(axis=1)
+        w = np.sinc(turns).prod(axis=1) ** order
+        real = np.zeros(len(q))
+        real[square > 0] = 4 * math.pi * np.exp(-square[square > 0] / (4 * alpha**2)) / square[square > 0]
+        g = (real * w**2 * square**2).sum() / (w**2 * square).sum() ** 2 if any(n) else 0.0
+        if n[2] <= nodes[2] // 2:
+            assert found.influence[n] == pytest.approx(g, rel=1e-10)
+        difference = g * np.outer(w, w) - np.diag(real)
+        field += (difference**2 * np.outer(square, square)).sum()
+        force += (difference**2 * np.outer(square, square**2)).sum()
+        own += (np.diag(difference) * square).sum() / 3
+        for a, (i, j) in enumerate(pairs):
+            wave[a] += (-1) ** order * g * (w[i] * w[j]) @ (q[i] * q[j])
+    assert found.field_square == pytest.approx(field, rel=1e-8)
+    assert found.force_square == pytest.approx(force, rel=1e-8)
+    assert found.self_mean == pytest.approx(own, rel=1e-6)
+    assert found.self_wave == pytest.approx(wave, rel=1e-8)
+
+
+@pytest.mark.compiled("dipoles")
+@pytest.mark.parametrize("boundary", ["tin-foil", "vacuum"])
+@pytest.mark.parametrize(
+    "accuracy", [1e-3, 1e-6, *(pytest.param(a, marks=pytest.mark.validate) for a in (1e-2, 1e-4, 1e-5))]
+)
+@pytest.mark.parametrize("kind", ["gas", "clusters"])
+def test_the_mesh_against_the_direct_sum(kind, accuracy, boundary):
+    """Rms errors of forces and torques, relative to the median (gas) or rms (clusters) load, ≤ accuracy; three sides.
+
+    Against a sum over wave vectors with an accuracy 20 times as high.  In a gas the error is the predicted one within
+    a factor of 1.5, and the energy differs by less than the errors of single grains allow.
+    """
+    position, moment = gas(150, SIDES, gap=2e-8) if kind == "gas" else clusters()
+    options = {"boundary": boundary}
+    expected = loads(position, moment, SIDES, accuracy=0.05 * accuracy, reciprocal="direct", **options)
+    found = loads(position, moment, SIDES, accuracy=accuracy, reciprocal="mesh", **options)
+    errors = []
+    for ours, right in ((found[0], expected[0]), (found[2], expected[2])):
+        errors.append(np.sqrt(((ours - right) ** 2).sum(axis=1).mean()))
+        sizes = np.linalg.norm(right, axis=1)
+        assert errors[-1] < accuracy * (np.median(sizes) if kind == "gas" else np.sqrt((sizes**2).mean()))
+    mean_square = (moment**2).sum(axis=1).mean()
+    assert abs(found[3] - expected[3]) < 5 * len(position) ** 0.5 * errors[1] + 1e-9 * abs(expected[3])
+    if kind == "gas":
+        box, grains = sand.Box.periodic(*SIDES), sand.Grains(position, 1e-9, sand.IRON, moment=moment)
+        chosen = sand.Dipoles(periodic="ewald", accuracy=accuracy, reciprocal="mesh").ewald(grains, box)
+        assert chosen.order in ORDERS and max(chosen.force_error, chosen.field_error) <= accuracy
+        typical = math.sqrt(6) * MAGNETIC * mean_square * (4 * math.pi * 150 / 3 / SIDES.prod()) ** (4 / 3)
+        assert 0.5 < errors[0] / (chosen.force_error * typical) < 1.5
+
+
+@pytest.mark.compiled("dipoles")
+def test_loads_are_gradients_of_the_energy_of_the_mesh():
+    """F_i − F_j = −∂U/∂x_i + ∂U/∂x_j and M = −∂U/∂θ for an accuracy of 1e-2: exact whatever the accuracy.
+
+    The net force of the mesh is removed in proportion to the masses, here equal, and cancels in F_i − F_j: two grains
+    are moved by opposite steps.  Central differences with one Richardson step, as in `test_ewald`: 1e-7 of U/L.
+    """
+    position, moment = gas(6, SIDES, seed=3)
+    options = {"accuracy": 1e-2, "reciprocal": "mesh"}
+    force, _, torque, energy = loads(position, moment, SIDES, **options)
+    assert np.abs(force.sum(axis=0)).max() < 1e-12 * np.abs(force).max()
+    h, size = 1e-4 * SIDES[0], abs(energy) / SIDES[0]
+
+    def slope(change):
+        steps = {t: loads(*change(t), SIDES, **options)[3] for t in (-1.0, -0.5, 0.5, 1.0)}
+        return (8 * (steps[0.5] - steps[-0.5]) - (steps[1.0] - steps[-1.0])) / 6
+
+    for i, j, axis in ((0, 1, 0), (3, 2, 1), (5, 4, 2)):
+        unit = np.eye(3)[axis]
+
+        def moved(t, i=i, j=j, unit=unit):
+            signs = (np.arange(6) == i).astype(float) - (np.arange(6) == j)
+            return position + t * h * unit * signs[:, None], moment
+
+        def turned(t, i=i, unit=unit):
+            other, angle = moment.copy(), 1e-4 * t
+            v = moment[i]
+            other[i] = v * math.cos(angle) + np.cross(unit, v) * math.sin(angle)
+            other[i] += unit * (unit @ v) * (1 - math.cos(angle))
+            return position, other
+
+        assert -slope(moved) / h == pytest.approx(force[i, axis] - force[j, axis], abs=1e-7 * size)
+        assert -slope(turned) / 1e-4 == pytest.approx(torque[i, axis], abs=1e-7 * size * SIDES[0])
+
+
+def test_the_net_force_is_removed_as_a_common_acceleration():
+    """F_i − m_i ΣF/Σm: no net force, and differences of accelerations are those of the mesh."""
+    rng = np.random.default_rng(1)
+    raw, mass = rng.normal(size=(3, 5)), rng.random(5) + 0.5
+    grains = SimpleNamespace(mass=mass, field=np.zeros((3, 5)))
+    far, mesh = SimpleNamespace(force=np.zeros((3, 5))), SimpleNamespace(force=raw, field=rng.normal(size=(3, 5)))
+    add_mesh(grains, far, mesh)
+    assert np.abs(far.force.sum(axis=1)).max() < 1e-14
+    common = (far.force - raw) / mass
+    assert common == pytest.approx(np.repeat(-raw.sum(axis=1)[:, None] / mass.sum(), 5, axis=1), rel=1e-12)
+    assert (grains.field == mesh.field).all()
+
+
+def test_charges_on_the_same_mesh():
+    """With q in place of μ·∇: F and potential are those of the sum over wave vectors, U = (1/2V) Σ R |Σ q exp(iqx)|².
+
+    R = 4π exp(−q²/4α²)/q²; G = R W²/(ΣW²)², which is optimal up to aliases of R.  α h = 0.25 and p = 8: 1e-5.
+    """
+    sides, nodes, order, count = np.array([1.0, 1.1, 0.9]), (16, 18, 16), 8, 4
+    alpha, volume = 4.0, sides.prod()
+    rng = np.random.default_rng(2)
+    position, charge = (rng.random((count, 3)) - 0.5) * sides, rng.normal(size=count)
+    turns = [np.fft.fftfreq(n)[:, None] + np.arange(-3, 4) for n in nodes]
+    w = [np.sinc(each) ** (2 * order) for each in turns]
+    n = np.stack(np.meshgrid(*(np.fft.fftfreq(k, 1 / k) for k in nodes), indexing="ij"), -1)
+    q = 2 * math.pi * n / sides
+    square = (q**2).sum(axis=-1)
+    square[0, 0, 0] = 1.0
+    real = 4 * math.pi * np.exp(-square / (4 * alpha**2)) / square
+    real[0, 0, 0] = 0.0
+    ratio = [each[:, 3] / each.sum(axis=1) ** 2 for each in w]
+    influence = real * ratio[0][:, None, None] * ratio[1][:, None] * ratio[2]
+    mesh = new_mesh(MeshSums(influence[:, :, : nodes[2] // 2 + 1], 0, 0, 0, np.zeros((3, 3))), nodes, volume, count)
+    mesh.influence[...] /= MAGNETIC
+    grains = SimpleNamespace(mass=np.ones(count), position=position.T.copy(), charge=charge)
+    span = SimpleNamespace(**{f"inverse_{a}": 1 / side for a, side in zip("xyz", sides, strict=True)})
+    parameters = SimpleNamespace(mesh=mesh)
+    for each in mesh_rounds(order, charge_row, charge_loads):
+        if each.compiled:
+            each.begin(grains, span, parameters)
+        for b in range(3):
+            each.block(*((grains, span) if each.compiled else ()), parameters, b, 3)
+    waves, flat = q.reshape(-1, 3), real.ravel()
+    phase = np.exp(1j * position @ waves.T)
+    factor = flat * (charge @ phase).conj() / volume
+    potential = (factor * phase).real.sum(axis=1)
+    force = -charge[:, None] * ((1j * factor * phase) @ waves).real
+    assert all_blocks(grains) == 1
+    assert mesh.field[0] == pytest.approx(potential, abs=1e-5 * np.abs(potential).max())
+    assert pytest.approx(force, abs=1e-5 * np.abs(force).max()) == mesh.force.T
+
+
+def test_the_cheaper_sum_is_chosen():
+    """Wave vectors for 100 grains, a mesh for 4000, with predicted errors below the accuracy, stated in the log."""
+    for count, mesh in ((100, False), (4000, True)):
+        side = 1.2e-6 * (count / 100) ** (1 / 3)
+        position = (np.random.default_rng(1).random((count, 3)) - 0.5) * side
+        grains = sand.Grains(position, 1e-9, sand.IRON, moment=[0, 0, MOMENT])
+        force, box = sand.Dipoles(periodic="ewald"), sand.Box.periodic(side)
+        chosen = force.ewald(grains, box)
+        assert (chosen.order > 0) == mesh == (chosen.waves == 0)
+        assert max(chosen.force_error, chosen.field_error) <= 1e-3
+        assert bool(force.sums(box, True, grains).rounds) == mesh
+        reason = force.choose(grains, box).reason
+        assert ("nodes with splines of order" in reason) == mesh == ("wave vectors" not in reason)
+    sums = mesh_sums((side,) * 3, chosen.nodes, chosen.order, chosen.alpha)
+    spacing = (3 * side**3 / (4 * math.pi * count)) ** (1 / 3)
+    assert max(mesh_errors(sums, side**3, spacing)) < 1e-3
+
+
+def test_numbers_of_nodes():
+    """Even, products of 2, 3 and 5, at most the spacing, at least 2p."""
+    assert nodes_for((1.0, 1.0, 0.1), 1 / 31, 5) == (32, 32, 10)
+    assert nodes_for((1.0, 1.05, 2.0), 0.05, 6) == (20, 24, 40)
+
+
+GRAINS = sand.Grains([[0, 0, 0]], 1e-8, sand.IRON, moment=[0, 0, 1e-18])
+
+
+@pytest.mark.parametrize(
+    ("make", "line"),
+    [
+        (lambda: sand.Dipoles(periodic="ewald", reciprocal="pme"), "dipoles: reciprocal = 'pme'; allowed: auto, dir"),
+        (lambda: sand.Dipoles(reciprocal="mesh"), "dipoles: reciprocal is used only with periodic = 'ewald'"),
+        (
+            lambda: sand.Simulation(
+                GRAINS,
+                [sand.Dipoles(periodic="ewald", reciprocal="mesh", accuracy=1e-6)],
+                box=(1e-4, 1e-4, 1e-7),
+            ),
+            "dipoles: periodic = 'ewald' with accuracy = 1e-06 needs a mesh of more than 33554432 nodes in a box of",
+        ),
+    ],
+)
+def test_mistakes_with_the_mesh(make, line):
+    """One clear line each."""
+    with pytest.raises(BadInput) as error:
+        make()
+    assert str(error.value).startswith(line) and len(error.value.problems) == 1
+
+
+def test_the_mesh_is_made_finer_until_the_accuracy_is_reached(monkeypatch):
+    """Nodes are chosen by an estimate for cubic cells; where that is too coarse, the mesh is refined."""
+    grains, box = sand.Grains(gas(50, SIDES)[0], 1e-9, sand.IRON, moment=[0, 0, MOMENT]), sand.Box.periodic(*SIDES)
+    force = sand.Dipoles(periodic="ewald", accuracy=1.01e-3, reciprocal="mesh")
+    fine = force.ewald(grains, box)
+    ewald.choose_ewald.cache_clear()
+    estimate = ewald.widest_cells
+    monkeypatch.setattr(ewald, "widest_cells", lambda *given: 2.0 * estimate(*given))
+    found = force.ewald(grains, box)
+    ewald.choose_ewald.cache_clear()
+    assert max(found.force_error, found.field_error) <= 1.01e-3
+    assert found.nodes != fine.nodes
+
+
+@pytest.mark.compiled("small")
+def test_a_python_function_as_a_stage():
+    """Compiled code calls it by address, with parts and parameters, and passes on its exceptions."""
+    from sand.compiler.program import call_stage
+
+    def in_python(clock, parameters, block):
+        if block < 0:
+            raise ValueError("negative block")
+        clock[0] += parameters[0] * block
+        return 7 * block
+
+    @stage("a call")
+    def calls(table, program, count):
+        return call_stage(program, 0, table, count[0])
+
+    table = table_of(clock=np.zeros(1), count=np.array([3]), program=None)
+    program = Program(table, {0: (PythonStage(in_python), (2.0,))}, 1)
+    table.set("program", program)
+    assert program.run(calls, table) == 21 and table["clock"][0] == 6.0
+    table["count"][0] = -1
+    with pytest.raises(ValueError, match="negative block"):
+        program.run(calls, table)
