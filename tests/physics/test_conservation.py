@@ -69,10 +69,10 @@ def test_energy_of_a_magnetic_gas_before_its_first_contact():
     assert np.abs(totals - totals[0]).max() < 1e-6 * u_min
 
 
-def chain_errors(steps_per_period):
-    """|change of the total energy| over the impact energy, for nine points of impact."""
+def chain_error(steps_per_period, hits):
+    """Rms change of the total energy over the impact energy, for some points of impact."""
     errors = []
-    for offset in np.linspace(-0.5, 0.5, 9):
+    for offset in np.linspace(-0.5, 0.5, hits):
         sim = struck_chain(offset=offset, steps_per_period=steps_per_period)
         sim.run(until=2e-9)
         first, last = sim.ledger.rows[0], sim.ledger.rows[-1]
@@ -83,17 +83,18 @@ def chain_errors(steps_per_period):
 
 
 @pytest.mark.compiled("contacts")
-def test_energy_balance_of_a_struck_chain():
-    """Chain of 7 iron grains (20 nm) hit at 100 m/s: rms error of nine hits ≤ 3e-3 of the impact energy at T/20.
+@pytest.mark.parametrize(("hits", "halvings"), [(5, 3), pytest.param(9, 4, marks=pytest.mark.validate)])
+def test_energy_balance_of_a_struck_chain(hits, halvings):
+    """Chain of 7 iron grains (20 nm) hit at 100 m/s: rms error of the hits ≤ 3e-3 of the impact energy at T/20.
 
     Contacts form, break, slide and roll.  Verlet is of order two and transitions are exact, so the error falls by about
-    4, at least 3, per halving of the step, down to 1e-5.
+    4, at least 3, per halving of the step, down to 1e-5; four halvings reach 1.5e-5, three 4 times as much.
     """
-    errors = [chain_errors(20.0 * 2**k) for k in range(5)]
+    errors = [chain_error(20.0 * 2**k, hits) for k in range(halvings + 1)]
     assert errors[0] < 3e-3
     for coarse, fine in itertools.pairwise(errors):
         assert fine < coarse / 3 or fine < 1e-5
-    assert errors[-1] < 1.5e-5
+    assert errors[-1] < 1.5e-5 * 4.0 ** (4 - halvings)
 
 
 @pytest.mark.compiled("contacts")
@@ -225,7 +226,7 @@ def test_mean_energy_of_the_ringing_after_a_contact_forms():
     """
     r, speed = 1e-8, 0.5
     period = sand.theory.contact(sand.IRON, r).normal_period
-    for phase in np.linspace(0.0, 1.0, 5)[:-1]:
+    for phase in (0.0, 0.5):
         grains = sand.Grains(
             [[0, 0, 0], [2 * r + (30 + phase) * speed * 1.7e-12, 0, 0]],
             r,

@@ -194,7 +194,7 @@ except ValueError as error:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", ["every block", "last block"])
+@pytest.mark.parametrize("where", ["every block", pytest.param("last block", marks=pytest.mark.validate)])
 def test_an_exception_in_a_block_ends_the_run(where):
     """In the block of the worker or of the driver: the exception is raised with its message, and no thread waits.
 

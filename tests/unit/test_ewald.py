@@ -141,13 +141,13 @@ def test_ewald_sum_against_images_in_a_sphere(boundary):
     """Four dipoles in a box of unequal sides: F, B and U are those of all images in a sphere of 25 sides.
 
     The sphere in vacuum has the demagnetising field −4πk Σμ/3V, which tin foil removes.  The sum over a sphere of
-    radius R errs by (L/R)² to (L/R)³ ~ 1e-4 of the loads by its ragged surface; the Ewald sum is to be exact to 1e-4.
+    radius R errs by (L/R)² to (L/R)³ ~ 1e-4 of the loads by its ragged surface; the Ewald sum is to be exact to 1e-8.
     """
     position, moment = gas(4, SIDES)
     force, field = brute_force(position, moment, SIDES, 25e-6)
     if boundary == "tin-foil":
         field += 4 * math.pi / 3 * MAGNETIC / SIDES.prod() * moment.sum(axis=0)
-    found = loads(position, moment, SIDES, accuracy=1e-4, boundary=boundary)
+    found = loads(position, moment, SIDES, accuracy=1e-8, boundary=boundary)
     assert relative(found[0], force) < 1.5e-4
     assert relative(found[1], field) < 3e-4
     assert found[3] == pytest.approx(-0.5 * (moment * field).sum(), rel=5e-4)
@@ -195,7 +195,7 @@ def test_lattice_energies(sites, sides, signs, expected):
     """
     sides = np.array(sides) * 1e-6
     moment = MOMENT * np.array([[0.0, 0.0, s] for s in signs])
-    energy = loads((np.array(sites) - 0.4) * sides, moment, sides, accuracy=1e-4)[3]
+    energy = loads((np.array(sites) - 0.4) * sides, moment, sides, accuracy=1e-8)[3]
     assert energy / len(sites) / (MAGNETIC * MOMENT**2 / 1e-18) == pytest.approx(expected, abs=1e-3)
 
 

@@ -224,9 +224,17 @@ def test_drag_alone_is_an_exponential(accommodation):
 
 @pytest.mark.compiled("small")
 @compiled
-@pytest.mark.parametrize(("count", "part", "start"), [(1, 20.0, 0.0), (200, 0.1, 0.0), (200, 0.1, 3.0)])
-@pytest.mark.parametrize("accommodation", [0.2, 1.0])
-def test_equipartition(count, part, start, accommodation):
+@pytest.mark.parametrize(
+    ("accommodation", "count", "part", "start"),
+    [
+        *((0.2, 1, 20.0, 0.0), (1.0, 200, 0.1, 3.0)),
+        *(
+            pytest.param(*case, marks=pytest.mark.validate)
+            for case in ((0.2, 200, 0.1, 0.0), (0.2, 200, 0.1, 3.0), (1.0, 1, 20.0, 0.0), (1.0, 200, 0.1, 0.0))
+        ),
+    ],
+)
+def test_equipartition(accommodation, count, part, start):
     """⟨m v_k²⟩ = ⟨I ω_k²⟩ = k_B T after ≥ 20 relaxation times, in one kick or many, from rest or from 9 T.
 
     Each of the six is a mean of N squares of normal deviates, 1 ± √(2/N): 0.01 for N = 20,000; within 3 σ.

@@ -45,11 +45,10 @@ def test_each_box_is_a_run_of_its_seed(ensembles, tmp_path):
     """The bits of a simulation with that seed, also from a process of its own."""
     alone = tmp_path / "alone"
     with executor_for(2) as executor:
-        grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2, 3], alone, executor)
-    for seed in (2, 3):
-        ours, theirs = (sand.open(top / f"seed-{seed}") for top in (alone, ensembles / "magnetic"))
-        assert (ours.frames[-1].position == theirs.frames[-1].position).all()
-        assert ours.case["run"]["seed"] == seed
+        grow(CASE | {"run": CASE["run"] | {"seed": 99}}, [2], alone, executor)
+    ours, theirs = (sand.open(top / "seed-2") for top in (alone, ensembles / "magnetic"))
+    assert (ours.frames[-1].position == theirs.frames[-1].position).all()
+    assert ours.case["run"]["seed"] == 2
 
 
 @pytest.mark.compiled("dipoles")

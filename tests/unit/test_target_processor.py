@@ -80,7 +80,7 @@ def compiled_for(folder, name, features=""):
     return json.loads(done.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="LLVM knows these names on x86 only")
 def test_code_is_compiled_for_the_named_processor(tmp_path):
     """Zen gathers numbers one by one; Intel's since Sapphire Rapids use 512 bits in long loops only.
