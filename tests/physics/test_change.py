@@ -9,7 +9,7 @@ from sand.state.state import CONTACTS
 
 
 def warm_gas(damped=True, **options):
-    """Magnetic grains in a field, damped with thermal noise or undamped; the first contacts form after some nanoseconds."""
+    """Magnetic grains in a field, damped with thermal noise or undamped; contacts form within some nanoseconds."""
     grains = sand.setup.gas(
         20, "0.25 um", radius="10 nm", material="iron", moment="200 A m^2/kg", temperature="100 K", seed=11
     )
