@@ -231,8 +231,11 @@ def figure(found: dict[tuple[str, str], Ensemble], single: float):
                 middle.errorbar(one.size, value, error, fmt="o-", color=colours[way], ms=3, lw=0.8, label=way)
         size = next(iter(found.values())).size
         middle.plot(size, size**0.63, color="0.4", ls="--", lw=0.8, label=r"$N^{0.63}$ (paper)")
-        left.set(xscale="log", yscale="log", xlabel="$N$", ylabel="$r_g/r$")
-        middle.set(xscale="log", yscale="log", xlabel="$N$", ylabel=r"$\mu/\mu_1$")
+        for axes, ylabel, ticks in ((left, "$r_g/r$", (1, 3, 10, 30)), (middle, r"$\mu/\mu_1$", (2, 5, 10, 20, 50))):
+            axes.set(xscale="log", yscale="log", xlabel="$N$", ylabel=ylabel)
+            axes.set_xticks(size, size)
+            axes.set_yticks(ticks, ticks)
+            axes.minorticks_off()
         for way, shift in zip(WAYS, (0.0, -1.0), strict=True):
             body = found[way, "magnetic"].picture
             x = body.position - body.position.mean(axis=0)
