@@ -197,3 +197,42 @@ def test_sweeping_nets(tmp_path, monkeypatch, capsys):
     rows = list(csv.DictReader(Path(f"{out}.csv").read_text().splitlines()))
     assert len(rows) == 3 and float(rows[0]["expected"]) == 0.0 < float(rows[-1]["expected"])
     assert 10_000 < Path(f"{out}.png").stat().st_size < 150_000
+
+
+@pytest.mark.validate
+def test_particle_cluster(tmp_path, monkeypatch, capsys):
+    """Table and figure of four grains, both ways; the statistics of encounters; exponents of straight chains.
+
+    P(b < d) = ∫ v f(v) min(d², b̂²) dv / ∫ v f(v) b̂² dv, and the mean of v likewise, with b̂² = 3 (α/m̄v²)^(2/3) + R²
+    and v f(v) ∝ v³ exp(−m̄v²/2kT), by quadrature; four standard errors of 20,000 draws are 0.014 and 1 %.
+    Chains: r_g = D √((N² − 1)/12), so that ln r_g has a slope of 1.00 from 8 to 64 grains, and μ = N μ₁.
+    """
+    example = loaded("particle_cluster")
+    grain = sand.setup.grain(radius=1e-8, material=sand.IRON, moment="200 A m^2/kg")
+    size, mass, heat = example.net_moment(grain), float(grain.mass[0]), 1.380649e-21
+    v = np.linspace(1e-3, 3.0, 200_000)
+    reach = 3.0 * (2e-7 * 2.0 * size**2 / (0.75 * mass * v**2)) ** (2.0 / 3.0) + (8e-8) ** 2
+    weight = v**3 * np.exp(-0.75 * mass * v**2 / (2.0 * heat))
+    rng = np.random.default_rng(1)
+    drawn = np.array([example.drawn_encounter(8e-8, (size, 2.0 * size), 0.75 * mass, rng) for _ in range(20_000)])
+    for d in (1e-7, 3e-7):
+        expected = (weight * np.minimum(d**2, reach)).sum() / (weight * reach).sum()
+        assert (drawn[:, 1] < d).mean() == pytest.approx(expected, abs=0.014)
+    assert drawn[:, 0].mean() == pytest.approx((v * weight * reach).sum() / (weight * reach).sum(), rel=0.01)
+    sizes = np.array([2, 4, 8, 16, 32, 64])
+    chains = np.tile(2e-8 * np.sqrt((sizes**2 - 1.0) / 12.0), (3, 1))
+    assert example.exponent(sizes, chains).exponent == pytest.approx(1.0036, abs=0.0005)
+    assert example.exponent(sizes, np.tile(sizes * size, (3, 1))).exponent == pytest.approx(1.0)
+    out = str(tmp_path / "out")
+    words = ["particle_cluster.py", "--grains", "4", "--repetitions", "2", "--out", out]
+    monkeypatch.setattr(sys, "argv", words)
+    example.main()
+    text = capsys.readouterr().out
+    assert text.count("unstuck 0, slipped 0") == 4 and text.count("gamma") == 2
+    rows = list(csv.DictReader(Path(f"{out}.csv").read_text().splitlines()))
+    assert [row["N"] for row in rows] == ["2", "4"] * 4
+    # two grains in contact: r_g = D/2, with the rest distance of the contact
+    distance = 2e-8 - sand.theory.contact(sand.IRON, 1e-8).rest_overlap
+    assert all(float(row["r_g/r"]) == pytest.approx(0.5e8 * distance, rel=1e-3) for row in rows[::2])
+    assert all(1.0 < float(row["moment/moment_1"]) <= 2.0 for row in (rows[0], rows[2]))
+    assert 10_000 < Path(f"{out}.png").stat().st_size < 150_000

@@ -126,6 +126,29 @@ def test_energy_and_angular_momentum():
         assert np.abs(np.linalg.norm(one.moment_target, axis=1) - 1.0).max() < 1e-12
 
 
+@pytest.mark.compiled("scattering")
+def test_grains_at_contact():
+    """The grains at contact have the energy ½m̄v², the angular momentum m̄bv and the momentum 0 of the start.
+
+    U of the two dipoles is Eq. 6, D = 2r.  At the start, |U| ≤ α/d³ with d = 10 b_max, 2/(3√3 10³) = 4e-4 of ½m̄v².
+    """
+    pair = scattering.flight(**THERMAL)
+    end, grains = sand.experiments.scattering.grains_at_contact(pair, "0.4 b_max", seed=3)
+    assert end == "hit" and len(grains) == 2
+    apart, between = (v[0] - v[1] for v in (grains.position, grains.velocity))
+    assert np.linalg.norm(apart) == pytest.approx(2e-8, rel=1e-6, abs=0.0)
+    mass, inertia = float(grains.mass[0]), float(grains.inertia[0])
+    start = 0.25 * mass * pair.speed**2
+    energy = 0.5 * mass * (grains.velocity**2).sum() + 0.5 * inertia * (grains.spin**2).sum()
+    energy += sand.theory.magnetic.dipole_energy(*grains.moment, apart)
+    assert abs(energy - start) < 1e-3 * start
+    angular = 0.5 * mass * np.cross(apart, between) + inertia * grains.spin.sum(axis=0)
+    b = 0.4 * pair.scales.capture
+    assert np.linalg.norm(angular) == pytest.approx(0.5 * mass * b * pair.speed, rel=1e-5, abs=0.0)
+    assert np.abs(grains.velocity.sum(axis=0)).max() < 1e-12 * np.linalg.norm(between)
+    assert sand.experiments.scattering.grains_at_contact(pair, "2 b_max", seed=3) == ("miss", None)
+
+
 @pytest.mark.validate
 def test_rigid_bodies_of_one_grain_move_as_spheres():
     """The rigid-body kernel with one grain per body and the kernel of spheres agree to 1e-6 of R at the end."""

@@ -16,6 +16,7 @@ _MODULES = {
     "Trajectory": "flights",
     "cross_section": "cross_sections",
     "flight": "problem",
+    "grains_at_contact": "flights",
     "run_flights": "cross_sections",
     "measure": "cross_sections",
     "probability_map": "maps",

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from ...errors import BadInput
+from ...grains import Grains
 from ...units import si
 from .encounters import Flight
 from .flight_driver import HIT, RESULTS, allocate_workspace, flights_of
@@ -169,6 +170,40 @@ def trajectory(
     square = impact_parameter(b, setup) ** 2
     angle = si(azimuth, "1", "azimuth", least=0.0)
     return _recorded(setup, (stratum, number), (square, square), seed, angle)
+
+
+def grains_at_contact(
+    setup: Flight, b: Any, *, seed: int = 0, stratum: int = 0, number: int = 0
+) -> tuple[str, Grains | None]:
+    """Compute one flight and return the grains of both bodies at their first contact, to simulate what follows.
+
+    Parameters
+    ----------
+    setup : Flight
+        From `flight`.
+    b : float or str
+        Impact parameter ≥ 0 [m], or "0.95 b_max"; its azimuth is random.
+    seed, stratum, number : int, optional
+        Identifier of the random numbers.
+
+    Returns
+    -------
+    end : str
+        "hit", "miss", "bound" or "failed", as in `Trajectory`.
+    grains : Grains or None
+        Grains, the projectile's first, in the frame of the centre of mass; None without a hit.
+
+    Raises
+    ------
+    BadInput
+        If b is out of range.
+    """
+    from .sticking import grains_at
+
+    square = np.array([impact_parameter(b, setup) ** 2])
+    results, ends, _ = _run(setup, np.array([stratum]), np.array([number]), square, square, seed)
+    end = int(results[0, RESULTS.index("end")])
+    return ENDS[end], grains_at(setup, ends[0])[0] if end == HIT else None
 
 
 def replay(setup: Flight, stratum: int, number: int, width: float, seed: int = 0) -> Trajectory:
