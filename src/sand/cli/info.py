@@ -158,13 +158,9 @@ def describe_case(path: Path) -> Description:
     end = math.inf if case.run.until is None else case.run.until
     steps = math.inf if case.run.steps is None else case.run.steps
     limits = _limits(simulation)
-    content = {
-        "kind": "case",
-        "case": case_of(simulation, end, steps, case.run.stop),
-        "choices": simulation.choices,
-        "limits": limits,
-    }
-    rows = report.opening(simulation, end, steps, Path(case.run.out or path.stem), case.run.stop)
+    ends = (end, steps, case.run.stop)
+    content = {"kind": "case", "case": case_of(simulation, *ends), "choices": simulation.choices, "limits": limits}
+    rows = report.opening(simulation, *ends, Path(case.run.out or path.stem))
     return "a valid case", [*rows, *limits.items()], content
 
 

@@ -53,12 +53,13 @@ def launch(
     with report.compiling(quiet), InterruptObserver() as interrupts:
         simulation = make()
         simulation.observers.append(interrupts)
-        *goal, condition = simulation.planned
+        end, last_step, condition = simulation.planned
         if (until, steps, stop) != (None, None, None):
-            goal = [until or math.inf, math.inf if steps is None else simulation.steps + steps]
-            condition = stop
+            end, condition = until or math.inf, stop
+            last_step = math.inf if steps is None else simulation.steps + steps
+        goal = (end, last_step)
         if not (quiet or as_json):
-            report.show(heading, report.opening(simulation, *goal, folder, condition))
+            report.show(heading, report.opening(simulation, *goal, condition, folder))
             if sys.stderr.isatty():
                 bar = Progress(*goal)
                 simulation.observers.append(bar)

@@ -157,14 +157,14 @@ def progress_bar(total: float, hidden: bool, **layout: Any) -> Any:
     return tqdm(total=total, disable=hidden or None, **settings, **layout)
 
 
-def opening(simulation: Any, end: float, last_step: float, folder: Path, condition: str | None = None) -> Rows:
+def opening(simulation: Any, end: float, last_step: float, condition: str | None, folder: Path) -> Rows:
     """Describe a simulation before its start, with the choices made automatically.
 
     Parameters
     ----------
     end, last_step : float
         Planned end: time [s] and step, infinite where not set.
-    condition : str, optional
+    condition : str or None
         Condition that ends the run.
     """
     from ..simulation.cadence import read_cadence

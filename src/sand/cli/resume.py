@@ -143,6 +143,5 @@ def _run(place: Path, until: float | None, *, quiet: bool, as_json: bool) -> int
             report.note("the condition that ended this run is a function of a script; it no longer applies")
         elif met:
             report.note(f"the condition {stop} is met and no longer applies")
-        stop = None if met or stop == GIVEN else stop
-    further = None if until is None else stop
-    return launch(lambda: simulation, place, f"resume {place}", until, None, further, quiet=quiet, as_json=as_json)
+    kept = None if until is None or met or stop == GIVEN else stop
+    return launch(lambda: simulation, place, f"resume {place}", until, None, kept, quiet=quiet, as_json=as_json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -169,12 +170,13 @@ class _Reader:
             what = "it ends too early" if not found else f"{shown(found)} is not a comparison"
             raise self._error(f"{what}; a comparison is a quantity, one of {' '.join(OPERATORS)}, and a number")
         value: Any = number
-        try:
+        with contextlib.suppress(ValueError):
             value = float(number)  # SI
-        except ValueError:
-            pass
+        unit = unit_of(name)
+        if unit == "1" and isinstance(value, str):
+            raise self._error(f"{name} is compared with a number without a unit, not with {shown(number)}")
         try:
-            limit = si(value, unit_of(name), name)
+            limit = si(value, unit, name)
         except BadInput as error:
             raise BadInput(f"stop = {shown(self.text)}: {problem}" for problem in error.problems) from None
         self.names.append(name)
