@@ -145,3 +145,43 @@ def test_a_function_is_given_again(tmp_path):
     with pytest.raises(sand.BadInput, match="a function of a script"):
         again.run()
     assert again.run(until=lambda sim: sim.steps > 250).steps == 300
+
+
+@pytest.mark.compiled("dipoles")
+def test_a_copy_is_independent(tmp_path):
+    """It continues with the same bits from a time between two steps, and neither writes files nor changes the other."""
+    sim = gas_simulation(out=tmp_path / "run", frame_every="1 ns")
+    sim.writer.draws = False
+    sim.run(until="2.3 ns")
+    before, files = state(sim), {path: path.stat().st_mtime_ns for path in (tmp_path / "run").iterdir()}
+    other = sim.copy()
+    assert state(other) == before and other.observers == [] and other.writer is None
+    other.run(until="4 ns")
+    assert state(sim) == before and len(sim.ledger) < len(other.ledger)
+    assert files == {path: path.stat().st_mtime_ns for path in (tmp_path / "run").iterdir()}
+    sim.run(until="4 ns")
+    assert state(sim) == state(other) and sim.ledger.rows == other.ledger.rows
+    assert "t = 4 ns" in sim.status() and f"{sim.steps} steps" in sim.status() and "20 clusters" in sim.status()
+    assert repr(other) == f"<simulation of 20 grains (contact, dipoles) at t = 4 ns after {sim.steps} steps>"
+
+
+@pytest.mark.compiled("contacts")
+def test_frames_by_time(finished_run_of_frames):
+    """The nearest frame; times beyond the ends are refused."""
+    frames = finished_run_of_frames
+    assert [frames.at(time).time for time in (0.0, "1.4 ns", 1.6e-9, "3 ns")] == [0.0, 1e-9, 2e-9, 3e-9]
+    for time in ("3.1 ns", -1e-9):
+        with pytest.raises(sand.BadInput, match="has frames from 0 s to 3 ns"):
+            frames.at(time)
+    with pytest.raises(sand.BadInput, match="time = '1 m' is not a quantity in s"):
+        frames.at("1 m")
+
+
+@pytest.fixture
+def finished_run_of_frames(tmp_path):
+    """Frames of a run at 0, 1, 2 and 3 ns."""
+    grains = sand.Grains([[0, 0, 0], [0, 1e-6, 0]], "10 nm", "iron", velocity=[[1, 0, 0], [0, 2, 0]])
+    sim = sand.Simulation(grains, stepping=sand.Verlet(step="1 ns"), out=tmp_path / "run", frame_every="1 ns")
+    sim.writer.draws = False
+    sim.run(until="3 ns")
+    return sand.open(tmp_path / "run").frames

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time as wall
 from collections.abc import Iterable, Sequence
@@ -348,6 +349,42 @@ class Simulation(ReadOnlySettings):
         """Draw the run so far: S(t), energies and losses, the aggregates in 3-D (matplotlib)."""
         self._begin()
         return DISPLAYS["figure"](self)
+
+    def copy(self) -> Simulation:
+        """Return an independent simulation in memory, which continues with the same bits.
+
+        It has the state, the ledger and the settings of this one, but no observers, and writes no files.
+        """
+        memo: dict[int, Any] = {}
+        other = object.__new__(type(self))
+        for name, value in vars(self).items():
+            given = None if name == "writer" else [] if name == "observers" else copy.deepcopy(value, memo)
+            object.__setattr__(other, name, given)
+        return other
+
+    def status(self) -> str:
+        """Describe the simulation in one line: time, steps, contacts, clusters, energy error and speed."""
+        self._begin()
+        row = self._log_row()
+        parts = [
+            f"t = {format_quantity(self.time, 's')}",
+            f"{self.steps} steps",
+            f"{row['contacts']} contacts",
+            f"{row['clusters']} clusters",
+            f"largest {row['largest_cluster']}",
+            f"energy error {self.ledger.with_row(row).drift:.2g}",
+        ]
+        seconds = self.wall_seconds
+        if seconds > 0.0 and self.steps:
+            parts.append(f"{self.steps / seconds:.2g} steps/s")
+        return ", ".join(parts)
+
+    def __repr__(self) -> str:
+        names = ", ".join(force.name for force in self.forces) or "no forces"
+        return (
+            f"<simulation of {len(self.start)} grains ({names}) at t = {format_quantity(self.time, 's')} "
+            f"after {self.steps} steps>"
+        )
 
     def notes(self) -> list[str]:
         """What the run so far says about its own set-up, one text each.
