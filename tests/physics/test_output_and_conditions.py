@@ -66,6 +66,7 @@ def test_a_resumed_run_continues_its_cadences(tmp_path, monkeypatch):
     whole, parts = content(tmp_path / "whole"), content(tmp_path / "parts")
     assert whole[1] == parts[1] and whole[2] == parts[2] and whole[0] == parts[0]
     assert len(whole[2]) < whole[1].count("\n") - 1
+    assert not list((tmp_path / "parts").glob("*damaged*"))  # no frame of a row without one is missed
 
 
 @pytest.mark.compiled("dipoles")
