@@ -111,6 +111,8 @@ SIMULATIONS = [
     ("sand.Simulation(grains, observers=sand.Observer())", "must be a list"),
     ("sand.Simulation(grains, contacts=[[0, 1]])", "contacts = [[0, 1]]; give sand.setup.StrainedContacts(…)"),
     ("sand.Simulation(grains, frame_every='often')", "frame_every = 'often' is not a quantity in s"),
+    ("sand.Simulation(grains, row_every='1 s wall')", "wall time is for checkpoint_every only"),
+    ("sim.run(stop='clustrs == 1')", "unknown quantity 'clustrs'; did you mean 'clusters'?"),
     ("sim.run('5 us', 100)", "takes 1 argument without a name (until), not 2"),
     ("sim.run(untill='5 us')", "no argument 'untill'; did you mean 'until'?"),
     ("sim.run(steps='10')", "steps = '10' must be a whole number"),

@@ -10,7 +10,7 @@ from sand.cli.main import main
 from sand.config.case import read_case
 from sand.errors import BadInput
 from sand.io.run_folder import read_json, read_text, read_toml
-from sand.simulation.observers import Schedule
+from sand.simulation.cadence import Cadence, Schedule
 from sand.units import in_unit, si
 
 CASE = """
@@ -199,7 +199,7 @@ def test_zero_needs_no_unit():
 @pytest.mark.parametrize("every", [1e-59, 1e-30])
 def test_frame_intervals_below_the_resolution_of_the_clock(every):
     """The next frame is after the present time for any interval, and is found at once."""
-    schedule = Schedule(every, 1e-12)
+    schedule = Schedule(Cadence("time", every), 1e-12)
     assert schedule.due > 1e-12
     schedule.advance(2e-12)
     assert schedule.due > 2e-12
@@ -207,7 +207,7 @@ def test_frame_intervals_below_the_resolution_of_the_clock(every):
 
 def test_frames_are_due_at_multiples():
     """At the first multiple of the interval after the present time, to the last bit."""
-    schedule = Schedule(0.1, 0.0)
+    schedule = Schedule(Cadence("time", 0.1), 0.0)
     for number in range(1, 1000):
         assert schedule.due == number * 0.1
         schedule.advance(schedule.due)

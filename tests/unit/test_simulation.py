@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sand
-from sand.simulation.observers import Schedule
+from sand.simulation.cadence import Cadence, Schedule
 from sand.state.state import INNER_COUNT, PAIRS
 
 from ..physics.setups import rest_distance, struck_chain
@@ -437,12 +437,12 @@ def test_an_interrupt_stops_between_two_steps(tmp_path):
 
 def test_when_frames_are_due():
     """Multiples of the interval, the first after the present time; none without an interval."""
-    schedule = Schedule(0.1, 0.0)
+    schedule = Schedule(Cadence("time", 0.1), 0.0)
     assert schedule.due == pytest.approx(0.1, rel=1e-6, abs=0.0)
     schedule.advance(0.35)
     assert schedule.due == pytest.approx(0.4, rel=1e-6, abs=0.0)
-    assert Schedule(0.1, 7.05).due == pytest.approx(7.1, rel=1e-6, abs=0.0)
-    assert Schedule(math.inf, 0.0).due == math.inf
+    assert Schedule(Cadence("time", 0.1), 7.05).due == pytest.approx(7.1, rel=1e-6, abs=0.0)
+    assert Schedule(None, 0.0).due == math.inf
 
 
 @pytest.mark.compiled("contacts")

@@ -113,6 +113,8 @@ def _describe_run(path: Path, listed: tuple[str, str]) -> Description:
         ]
     if "until" in planned:
         rows.append(("planned end", format_quantity(planned["until"], "s")))
+    if "stop" in planned:
+        rows.append(("ends if", planned["stop"]))
     rows.append(listed)
     until = planned.get("until", 0.0)
     ended = summary and not beyond and summary["outcome"] == "finished" and summary["time"] >= until
@@ -156,8 +158,9 @@ def describe_case(path: Path) -> Description:
     end = math.inf if case.run.until is None else case.run.until
     steps = math.inf if case.run.steps is None else case.run.steps
     limits = _limits(simulation)
-    content = {"kind": "case", "case": case_of(simulation, end, steps), "choices": simulation.choices, "limits": limits}
-    rows = report.opening(simulation, end, steps, Path(case.run.out or path.stem))
+    ends = (end, steps, case.run.stop)
+    content = {"kind": "case", "case": case_of(simulation, *ends), "choices": simulation.choices, "limits": limits}
+    rows = report.opening(simulation, *ends, Path(case.run.out or path.stem))
     return "a valid case", [*rows, *limits.items()], content
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ def launch(
     heading: str,
     until: float | None,
     steps: int | None = None,
+    stop: str | None = None,
     *,
     quiet: bool,
     as_json: bool,
@@ -39,9 +40,9 @@ def launch(
         Returns the simulation, which writes its files to `folder`.
     heading : str
         Heading of the description before the start.
-    until, steps : float or None, int or None
-        End of the run: a time [s], a number of further steps, or whichever comes first; without both, the planned end
-        of the simulation.
+    until, steps, stop : float or None, int or None, str or None
+        End of the run: a time [s], a number of further steps, a condition, or whichever comes first; without all, the
+        planned end of the simulation.
 
     Returns
     -------
@@ -52,16 +53,18 @@ def launch(
     with report.compiling(quiet), InterruptObserver() as interrupts:
         simulation = make()
         simulation.observers.append(interrupts)
-        goal: tuple[float, float] = simulation.planned
-        if until is not None or steps is not None:
-            goal = (until or math.inf, math.inf if steps is None else simulation.steps + steps)
+        end, last_step, condition = simulation.planned
+        if (until, steps, stop) != (None, None, None):
+            end, condition = until or math.inf, stop
+            last_step = math.inf if steps is None else simulation.steps + steps
+        goal = (end, last_step)
         if not (quiet or as_json):
-            report.show(heading, report.opening(simulation, *goal, folder))
+            report.show(heading, report.opening(simulation, *goal, condition, folder))
             if sys.stderr.isatty():
                 bar = Progress(*goal)
                 simulation.observers.append(bar)
         try:
-            result = simulation.run(until, steps=steps)
+            result = simulation.run(until, steps=steps, stop=stop)
         except Interrupted as stop:
             result = stop.result
         except FilesFailed as error:
@@ -79,17 +82,20 @@ def launch(
     return _conclude(result, folder, quiet=quiet, as_json=as_json)
 
 
-def _finished_result(simulation: Any, goal: tuple[float, float], folder: Path) -> Any:
+def _finished_result(simulation: Any, goal: Sequence[float], folder: Path) -> Any:
     """The result of a run that had finished except for its figure when it was interrupted; None for any other."""
-    if simulation.time < goal[0] and simulation.steps < goal[1]:
+    if simulation.time < goal[0] and simulation.steps < goal[1] and simulation.met_condition is None:
         return None
     try:
         summary = read_json(folder / SUMMARY)
     except BadInput:
         return None
-    if (summary.get("steps"), summary.get("outcome")) != (simulation.steps, "finished"):
+    ends = {one.name.lower(): one for one in (Outcome.FINISHED, Outcome.CONDITION_MET)}
+    if summary.get("steps") != simulation.steps or summary.get("outcome") not in ends:
         return None
-    return Result(Outcome.FINISHED, simulation.steps, simulation.time, simulation.ledger.drift)
+    met = summary.get("condition") or ""
+    outcome = ends[summary["outcome"]]
+    return Result(outcome, simulation.steps, simulation.time, simulation.ledger.drift, condition=met)
 
 
 def _conclude(result: Any, folder: Path, **output: bool) -> int:
@@ -97,8 +103,10 @@ def _conclude(result: Any, folder: Path, **output: bool) -> int:
     outcome, when = result.outcome, f"t = {format_quantity(result.time, 's')}"
     summary = read_json(folder / SUMMARY)
     rows = [*report.results(summary), ("files", report.listed(folder))]
-    heading = "done" if outcome is Outcome.FINISHED else "so far"
+    heading = "done" if outcome in (Outcome.FINISHED, Outcome.CONDITION_MET) else "so far"
     report.answer({**summary, "folder": str(folder)}, heading, rows, **output)
+    if outcome is Outcome.CONDITION_MET:
+        report.note(f"ended at {when}: {outcome.value}: {result.condition}")
     if outcome is Outcome.INTERRUPTED:
         report.note(f"interrupted at {when}; resume with: {report.resume_line(folder)}")
         return INTERRUPTED

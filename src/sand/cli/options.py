@@ -73,7 +73,7 @@ def _seconds(_context: click.Context, _option: click.Parameter, text: str | None
     """Convert a time to seconds, checked as in a case file; a bare number is SI.  Raises BadInput."""
     if text is None:
         return None
-    from ..simulation.stop import duration
+    from ..simulation.cadence import duration
 
     try:
         value: float | str = float(text)

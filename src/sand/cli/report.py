@@ -157,23 +157,34 @@ def progress_bar(total: float, hidden: bool, **layout: Any) -> Any:
     return tqdm(total=total, disable=hidden or None, **settings, **layout)
 
 
-def opening(simulation: Any, end: float, last_step: float, folder: Path) -> Rows:
+def opening(simulation: Any, end: float, last_step: float, condition: str | None, folder: Path) -> Rows:
     """Describe a simulation before its start, with the choices made automatically.
 
     Parameters
     ----------
     end, last_step : float
         Planned end: time [s] and step, infinite where not set.
+    condition : str or None
+        Condition that ends the run.
     """
+    from ..simulation.cadence import read_cadence
     from ..units import format_quantity
 
     every = simulation.frame_every
     if every is None:  # the default of `run`
         every = (end - simulation.time) / 200.0
-    several = math.isfinite(every) and every <= end - simulation.time
-    frames = f"a frame every {format_quantity(every, 's')}" if several else "frames at start and end"
+    if isinstance(every, str):
+        frames = f"frames {read_cadence(every, 'frame_every')}"
+    else:
+        several = math.isfinite(every) and every <= end - simulation.time
+        frames = f"a frame every {format_quantity(every, 's')}" if several else "frames at start and end"
+    if simulation.row_every is not None:
+        frames += f", further rows of the ledger {read_cadence(simulation.row_every, 'row_every')}"
+    if simulation.checkpoint_every is not None:
+        frames += f", checkpoints {read_cadence(simulation.checkpoint_every, 'checkpoint_every', wall=True)}"
     ends = [f"{format_quantity(end, 's')}"] if math.isfinite(end) else []
     ends += [f"step {int(last_step)}"] if math.isfinite(last_step) else []
+    ends += [condition] if condition else []
     start = f"from {format_quantity(simulation.time, 's')} " if simulation.time > 0.0 else ""
     return [
         ("grains", _grains(simulation.grains, simulation.temperature)),

@@ -46,6 +46,8 @@ def command(
 ) -> int | None:
     """Continue the run in DIR from its newest checkpoint to its planned end, or to --until.
 
+    A run whose condition (`stop`) was met goes on with another condition in its case.toml, or to --until.
+
     Jobs of `sand collide`, `sand scatter` and `sand grow` are continued as well: finished parts are kept, and the
     results are those of an uninterrupted job.
     """
@@ -109,11 +111,21 @@ def _job(kind: str, folder: Path, scheduler: str | None, how: dict[str, Any]) ->
 def _run(place: Path, until: float | None, *, quiet: bool, as_json: bool) -> int | None:
     """Continue a run; returns the exit code, None if its planned end is reached."""
     from ..config.build import resume
+    from ..simulation.condition import GIVEN
     from ..units import format_quantity
     from .launch import launch
 
     simulation = resume(place)
-    (end, last_step), now = simulation.planned, format_quantity(simulation.time, "s")
+    (end, last_step, stop), now = simulation.planned, format_quantity(simulation.time, "s")
+    met = stop is not None and simulation.met_condition == stop
+    if until is None and met:
+        summary = read_json(place / SUMMARY) if as_json and (place / SUMMARY).exists() else {}
+        text = (
+            f"{place} ended at t = {now}, as its condition is met: {stop}; to continue it, change stop in "
+            f"{place / CASE}, or: {report.resume_line(place)} --until TIME, which ignores this condition"
+        )
+        report.answer({**summary, "folder": str(place)}, text, [], as_json=as_json, quiet=quiet)
+        return None
     if until is None and (simulation.time >= end or simulation.steps >= last_step):
         summary = read_json(place / SUMMARY) if as_json and (place / SUMMARY).exists() else {}
         further = f"to continue it further: {report.resume_line(place)} --until TIME"
@@ -126,4 +138,10 @@ def _run(place: Path, until: float | None, *, quiet: bool, as_json: bool) -> int
     if until is not None and until < end < math.inf:
         new, planned = format_quantity(until, "s"), format_quantity(end, "s")
         report.note(f"{place} now ends at {new} instead of {planned}, as --until is earlier than the planned end")
-    return launch(lambda: simulation, place, f"resume {place}", until, quiet=quiet, as_json=as_json)
+    if until is not None and stop is not None:
+        if stop == GIVEN:
+            report.note("the condition that ended this run is a function of a script; it no longer applies")
+        elif met:
+            report.note(f"the condition {stop} is met and no longer applies")
+    kept = None if until is None or met or stop == GIVEN else stop
+    return launch(lambda: simulation, place, f"resume {place}", until, None, kept, quiet=quiet, as_json=as_json)

@@ -89,7 +89,7 @@ def command(
             return simulation_of(described, folder, overwrite=overwrite)
 
     heading = f"run {name}" + (f" from {source}" if source else "")
-    return launch(build, folder, heading, described.run.until, described.run.steps, **output)
+    return launch(build, folder, heading, described.run.until, described.run.steps, described.run.stop, **output)
 
 
 def _source(source: str) -> Path:

@@ -22,6 +22,7 @@ from ..material import Material
 from ..setup.checks import check_body
 from ..setup.from_frame import Start, from_frame
 from ..setup.gas import gas
+from ..simulation.condition import GIVEN
 from ..simulation.simulation import Simulation
 from ..state.state import grains_from_arrays
 from .case import THERMAL, Case, check_case
@@ -39,6 +40,9 @@ def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Sim
         stepping=case.stepping,
         neighbours=case.neighbours,
         seed=case.run.seed,
+        frame_every=case.run.frame_every,
+        row_every=case.run.row_every,
+        checkpoint_every=case.run.checkpoint_every,
         **options,
     )
 
@@ -77,7 +81,11 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     if case.grains.file is not None and out is not None:
         _refuse_own_source(Path(case.grains.file), Path(out))
     start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
-    options |= {"out": out, "frame_every": case.run.frame_every, "contacts": start.contacts}
+    if case.run.stop == GIVEN:
+        raise BadInput(
+            "run.stop = 'given': this condition is a function of a script; use sand.resume(DIR).run(until=function)"
+        )
+    options |= {"out": out, "contacts": start.contacts}
     simulation = simulate(case, start.grains, start.box, **options)
     simulation.recipe, simulation.origin = case.grains.recipe(), start.note
     return simulation
@@ -168,14 +176,15 @@ def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
     begun: dict[str, Any] = meta["case"]
     there = read_toml(path) if path.exists() else begun
     was, case = (check_case(content, str(path)) for content in (begun, there))
-    was.run.until, was.run.steps = case.run.until, case.run.steps  # the end may be changed
+    for name in ("until", "steps", "stop"):  # the end may be changed
+        setattr(was.run, name, getattr(case.run, name))
     for name in {**begun, **there}:
         if begun.get(name) != there.get(name) and getattr(was, name) != getattr(case, name):
             raise BadInput(
                 f"{path}: [{name}] is not what the run began with, and a run cannot change on its way; restore it, "
                 f"or start a new run from the last frame: sand run CASE.toml --from {shlex.quote(str(folder))}"
             )
-    meta["until"], meta["last_step"] = case.run.until, case.run.steps
+    meta["until"], meta["last_step"], meta["stop"] = case.run.until, case.run.steps, case.run.stop
     return case
 
 
@@ -226,10 +235,10 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml ({error})") from None
     if (grains.arrays.material != index).any():
         raise BadInput(f"the checkpoint in {place} does not fit its case.toml (materials that no grain has)")
-    options |= {"out": place, "frame_every": case.run.frame_every, "restart": (arrays, meta)}
+    options |= {"out": place, "restart": (arrays, meta)}
     simulation = simulate(case, grains, case.box.periodic, **options)
     if case.grains.kind != "given":
         simulation.recipe = case.grains.recipe()
     end, last = (math.inf if planned is None else planned for planned in (meta["until"], meta["last_step"]))
-    simulation.planned = (end, last)
+    simulation.planned = (end, last, meta["stop"])
     return simulation

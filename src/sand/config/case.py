@@ -17,28 +17,59 @@ from ..io.run_folder import read_toml
 from ..material import PRESETS, Material, like_preset
 from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
+from ..simulation.condition import GIVEN, read_condition
+from ..simulation.ledger import Ledger
 from .commands import refuse_other_command
 from .errors import validate
-from .sections import Count, Duration, Moment, PathName, Section, Seed, Stepping, Steps, quantity, with_integrator, word
+from .sections import (
+    Cadence,
+    Count,
+    Duration,
+    Moment,
+    PathName,
+    SaveCadence,
+    Section,
+    Seed,
+    Stepping,
+    Steps,
+    quantity,
+    with_integrator,
+    word,
+)
 
 
 class RunSection(Section):
-    """[run]: duration (a time, or a number of steps), interval of frames, seed and output folder."""
+    """[run]: end (a time, a number of steps, or a condition), cadences of output, seed and output folder."""
 
     until: Duration | None = None
-    """End of the run [s], simulated time; either this or `steps` is required."""
+    """End of the run [s], simulated time; this, `steps` or `stop` is required; with several, the first one reached."""
     steps: Steps | None = None
-    """End of the run as a number of steps, completed to the end of the cycle; with both, whichever is reached first."""
-    frame_every: Duration | None = None
-    """Time between frames and rows of the ledger [s]; by default 1/200 of the run."""
+    """End of the run as a number of steps, completed to the end of the cycle."""
+    stop: str | None = None
+    """Condition that ends the run, such as "clusters == 1" or "mean_cluster_size >= 20 and time > 1 us": columns of the
+    ledger compared (< <= > >= == !=) with numbers with units; checked every 100 steps, see `Simulation.run`."""
+    frame_every: Cadence | None = None
+    """Frames: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default 1/200
+    of `until`."""
+    row_every: Cadence | None = None
+    """Further rows of the ledger, in the same forms; every frame has a row."""
+    checkpoint_every: SaveCadence | None = None
+    """Checkpoints, in the same forms or by wall time, "30 s wall"; by default at least every minute of wall time."""
     seed: Seed = 0
     """Seed of all random numbers: initial conditions and random kicks of a gas."""
     out: PathName | None = None
     """Folder of the run."""
 
+    @field_validator("stop", mode="after")
+    @classmethod
+    def _condition(cls, value: str | None) -> str | None:
+        if value not in (None, GIVEN):
+            read_condition(value)
+        return value
+
     @model_validator(mode="after")
     def _ends(self) -> RunSection:
-        if self.until is None and self.steps is None:
+        if self.until is None and self.steps is None and self.stop is None:
             raise ValueError("until is missing; add it, for example until = '5 us'")
         return self
 
@@ -235,6 +266,23 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
     return problems
 
 
+def condition_errors(content: dict[str, Any]) -> list[str]:
+    """Error messages for quantities in run.stop that the ledger will not have; `content` is not validated yet."""
+    run, forces = content.get("run"), content.get("forces")
+    text = run.get("stop") if isinstance(run, dict) else None
+    names = list(forces) if isinstance(forces, dict) else []
+    columns = [str(getattr(FORCES.get(name), "column", name)) for name in names if name != "contact"]
+    try:
+        condition = read_condition(text)
+    except BadInput:  # reported by the validation of the whole file
+        return []
+    try:
+        condition.check([*Ledger().columns, *columns])
+    except BadInput as error:
+        return error.at("run").problems
+    return []
+
+
 def read_case(path: str | Path) -> Case:
     """Read and check a case file.
 
@@ -253,4 +301,5 @@ def read_case(path: str | Path) -> Case:
 
 def check_case(content: dict[str, Any], name: str) -> Case:
     """Validate the content of a case file; `name` begins each message.  Raises BadInput."""
-    return validate(with_integrator(Case, content), content, name, material_errors(content, ["grains"]))
+    problems = [*material_errors(content, ["grains"]), *condition_errors(content)]
+    return validate(with_integrator(Case, content), content, name, problems)

@@ -14,7 +14,7 @@ from ..grains import moment_size
 from ..integrate.registry import INTEGRATORS
 from ..integrate.verlet import Verlet
 from ..io.run_folder import checked_name
-from ..simulation.stop import duration
+from ..simulation.cadence import duration, read_cadence
 from ..units import si
 
 
@@ -52,6 +52,10 @@ def _checked_moment(value: Any) -> Any:
 
 Duration = Annotated[Any, BeforeValidator(_named(duration))]
 """A time span [s]."""
+Cadence = Annotated[Any, BeforeValidator(_named(lambda value, name: read_cadence(value, name).setting))]
+"""A cadence of output: by time, by steps, or logarithmic in time."""
+SaveCadence = Annotated[Any, BeforeValidator(_named(lambda value, name: read_cadence(value, name, wall=True).setting))]
+"""A cadence of checkpoints, also by wall time."""
 PathName = Annotated[str, AfterValidator(_named(checked_name))]
 """Name of a file or folder."""
 Moment = Annotated[Any, AfterValidator(_checked_moment)]

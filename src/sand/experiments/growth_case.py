@@ -11,7 +11,7 @@ from ..config.case import check_case
 from ..config.commands import refuse_other_command
 from ..config.errors import validate
 from ..config.sections import Section, Seed
-from ..errors import ErrorCollector
+from ..errors import BadInput, ErrorCollector
 from ..io.run_folder import read_toml
 
 
@@ -44,6 +44,8 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
         section = errors.take(validate, GrowSection, given, str(path), table="grow")
     case = errors.take(check_case, content, str(path))
     errors.done()
+    if case.run.stop is not None:
+        raise BadInput(f"{path}: run.stop is for sand run; sand grow takes all boxes to the same end, so remove it")
     if case.grains.file is not None:  # relative to the case file
         content["grains"]["file"] = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return content, section and section.seeds

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from ..box import Box
-from ..errors import BadInput, FilesFailed
+from ..errors import BadInput, FilesFailed, shown
 from ..grains import Grains
+from ..units import format_quantity, si
 from . import gsd_index
 from .damage import set_aside
 from .frame import Frame, FrameSequence, code_of, stored_frame
@@ -257,6 +258,21 @@ class Frames(FrameSequence):
     def times(self) -> np.ndarray:
         """Time of each frame [s]."""
         return np.array([gsd_index.time_of(self._file, k) for k in range(len(self))])
+
+    def at(self, time: Any) -> Frame:
+        """The frame nearest to a time, in seconds or as text; of two equally near ones the earlier.
+
+        Raises
+        ------
+        BadInput
+            If there is no frame, or the time lies before the first or after the last.
+        """
+        now, times = si(time, "s", "time"), self.times
+        if not len(times) or not times[0] <= now <= times[-1]:
+            ends = [format_quantity(float(t), "s") for t in times[[0, -1]]] if len(times) else []
+            held = f"has frames from {ends[0]} to {ends[1]}" if ends else "has no frame"
+            raise BadInput(f"time = {shown(time)}: {self.path} {held}")
+        return self[int(np.argmin(np.abs(times - now)))]
 
     def close(self) -> None:
         """Close the file."""

@@ -140,8 +140,10 @@ class Engine:
             reorder_grains(self._state, inverse(self._state.order))
             self._is_sorted = False
 
-    def go_to(self, time: float) -> Stop:
+    def go_to(self, time: float, last: float = math.inf) -> Stop:
         """Make `state` the state at exactly this time [s], after `advance` up to it; returns why no such state exists.
+
+        `Stop.NONE`: the regular state has arrived at step `last` before this time.
 
         A copy of the regular state takes one shorter step or cycle. Regular steps do not depend on it, and so not on
         the times of output. If an event, such as a first contact, ends the shorter step before this time, the regular
@@ -158,7 +160,9 @@ class Engine:
             if is_past(self._state.time, time):  # only the shorter step ended before: go on with shorter steps
                 self._state, self._is_sorted = before, is_sorted
                 return self._shorten_copy(time, before, math.inf)
-            stop = self.advance(time, math.inf)
+            if self.steps >= last:
+                return Stop.NONE
+            stop = self.advance(time, last - self.steps)
             if stop is not Stop.TIME_REACHED:
                 return stop
 

@@ -29,6 +29,8 @@ INTERNAL = "internal"
 CORRECTION = "angular_momentum_corrected"
 """Column of the corrections that keep the angular momentum constant over r-RESPA cycles, their magnitudes summed."""
 NUMBERS = ("contacts", "made", "moved", "broken", "clusters", "mean_cluster_size", "largest_cluster")
+COUNTED = {"step", "time", *NUMBERS}
+"""Columns that need no energies, see `count_row`."""
 WHOLE = {"step", *NUMBERS} - {"mean_cluster_size"}
 """Columns of whole numbers."""
 
@@ -46,8 +48,8 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
     contacts = int(state.count[CONTACTS])
     pairs = state.contacts.pair[:, :contacts].T
     energies = [*map(math.fsum, kinetic_energies(state.grains)), *of_contacts]
-    labels = cluster_labels(len(state.grains), pairs)
-    row: dict[str, float] = {"step": state.steps, "time": state.time}
+    counts = count_row(state)
+    row: dict[str, float] = {name: counts[name] for name in ("step", "time")}
     row |= dict(zip((*KINETIC, *ENERGIES), energies, strict=True)) | {MAGNETIC: 0.0} | forces
     row |= dict(zip(LOSSES, state.lost.tolist(), strict=True))
     row["total"] = math.fsum([*energies, *forces.values(), *state.lost.tolist()])
@@ -55,6 +57,17 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
     row |= {
         CORRECTION: float(state.clock[CORRECTED]),
         INTERNAL: math.fsum(internal_kinetic_energy(state.grains, pairs, state.box)[0]),
+    }
+    return row | {name: counts[name] for name in NUMBERS}
+
+
+def count_row(state: State) -> dict[str, float]:
+    """The part of a row that needs no energies: step, time [s], counts of contacts and clusters."""
+    contacts = int(state.count[CONTACTS])
+    labels = cluster_labels(len(state.grains), state.contacts.pair[:, :contacts].T)
+    return {
+        "step": state.steps,
+        "time": state.time,
         "contacts": contacts,
         "made": int(state.count[MADE]),
         "moved": int(state.count[SLIPPED]),
@@ -63,7 +76,6 @@ def log_row(state: State, of_contacts: Sequence[float], forces: dict[str, float]
         "mean_cluster_size": mean_cluster_size(labels),
         "largest_cluster": int(cluster_sizes(labels).max()),
     }
-    return row
 
 
 def kinetic_energies(grains: Grains) -> tuple[np.ndarray, np.ndarray]:

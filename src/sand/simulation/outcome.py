@@ -12,6 +12,7 @@ class Outcome(Enum):
     """Why a run ended; the values are sentences for the user."""
 
     FINISHED = "the requested end is reached"
+    CONDITION_MET = "the condition that ends the run is met"
     INTERRUPTED = "interrupted by a signal; a checkpoint lets the run continue"
     NOT_FINITE = "a speed or spin is no longer a finite number"
     RUNAWAY = "the energy runs away: its error exceeds half of all energy in the system; the step is too long"
@@ -23,7 +24,7 @@ class Outcome(Enum):
     @property
     def is_physics(self) -> bool:
         """Whether the physics or the numerics stopped the run (exit code 3)."""
-        return self not in (Outcome.FINISHED, Outcome.INTERRUPTED)
+        return self not in (Outcome.FINISHED, Outcome.CONDITION_MET, Outcome.INTERRUPTED)
 
 
 OUTCOME_OF_STOP = {stop: Outcome[stop.name] for stop in Stop if stop.name in Outcome.__members__}
@@ -45,6 +46,8 @@ class Result:
         Relative energy error: |change of the ledger's total| / (energy dissipated + largest kinetic energy).
     grains : tuple[int, ...]
         Indices of the grains that caused the outcome; empty if the run finished.
+    condition : str
+        The condition that was met, with `Outcome.CONDITION_MET`; "given" for a function.
     """
 
     outcome: Outcome
@@ -52,7 +55,9 @@ class Result:
     time: float
     drift: float
     grains: tuple[int, ...] = ()
+    condition: str = ""
 
     def __str__(self) -> str:
         named = f" (grains {', '.join(map(str, self.grains))})" if self.grains else ""
+        named += f" ({self.condition})" if self.condition else ""
         return f"{self.outcome.value}{named}: {self.time:.6g} s after {self.steps} steps, energy drift {self.drift:.2g}"

@@ -10,6 +10,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..compiler.jit import cache_folder
 from ..errors import BadInput, FilesFailed
 from ..io import run_folder as files
@@ -21,10 +23,12 @@ from ..io.run_folder import make_folder, plain, read_json, write_json, write_tom
 from ..io.trajectory import TrajectoryWriter
 from ..state.state import CLOCK, COUNT, CUTOFF, LOST, STAGE
 from ..version import __version__
+from .cadence import read_cadence
 from .displays import DISPLAYS
 from .ledger import Ledger
 from .outcome import Outcome, Result
 from .serialise import case_of
+from .stop import StopCriteria
 
 Simulation = Any
 """`sand.Simulation`, which imports this module."""
@@ -59,7 +63,7 @@ class RunWriter:
         self._trajectory: TrajectoryWriter | None = None
         self._ledger: LedgerFile | None = None
         self._saved, self._took = wall.monotonic(), 0.0
-        self._ends = (math.inf, math.inf)
+        self._ends: tuple[float, float, str | None] = (math.inf, math.inf, None)
         self._case: dict[str, Any] = {}
         self._lock: FolderLock | None = None
         self._changed = False  # by the user since the last checkpoint
@@ -67,7 +71,7 @@ class RunWriter:
         # the checkpoint from which this simulation continues, or the last one that it wrote
         self._own: tuple[str, int] | None = None if newest is None else _stamp(newest)
 
-    def open(self, simulation: Simulation, until: float, last_step: float) -> None:
+    def open(self, simulation: Simulation, criteria: StopCriteria) -> None:
         """Create the files or continue them; called by each `run` with its stop criteria.
 
         Raises
@@ -80,9 +84,10 @@ class RunWriter:
         self._lock = FolderLock(self.folder)
         self._refuse_others_files(simulation.steps)
         changed, self._changed = self._changed, False
-        if changed or (until, last_step) != self._ends:
-            self._ends = (until, last_step)
-            self._case = case_of(simulation, until, last_step)
+        ends = (criteria.time, criteria.step, criteria.stop)
+        if changed or ends != self._ends:
+            self._ends = ends
+            self._case = case_of(simulation, *ends)
             text = "the complete case in SI units, with all defaults"
             write_toml(self.folder / files.CASE, self._case, text)
         if self._trajectory is not None:
@@ -92,7 +97,7 @@ class RunWriter:
         if self._resumed:
             self._clean_up_earlier(simulation)
         self._ledger = LedgerFile(self.folder / files.LEDGER, simulation.ledger.columns, simulation.ledger.rows)
-        times = [row["time"] for row in simulation.ledger.rows]
+        times = simulation._frame_times
         resumed_at = (times[-1] if times else -math.inf) if self._resumed else None
         self._trajectory = TrajectoryWriter(self.folder / files.TRAJECTORY, resumed_at, times)
         if not self._resumed:
@@ -132,20 +137,26 @@ class RunWriter:
         except OSError as error:
             raise FilesFailed(f"cannot write to folder {self.folder}: {error.strerror}") from error
 
-    def write(self, simulation: Simulation, row: dict[str, float]) -> None:
-        """Write a frame and a row of the ledger."""
+    def write(self, simulation: Simulation, row: dict[str, float], with_frame: bool = True) -> None:
+        """Write a row of the ledger, and a frame."""
         if self._ledger is None:
             return
         self._ledger.append(row)
-        self._frame(simulation)
+        if with_frame:
+            self._frame(simulation)
 
     def _frame(self, simulation: Simulation) -> None:
         assert self._trajectory is not None
         w = simulation.state
         self._trajectory.write(w.steps, w.time, w.grains, w.box, simulation.contacts)
 
-    def tick(self, simulation: Simulation, at_output: bool = False) -> None:
-        """Write a checkpoint if the last one is old enough."""
+    def tick(self, simulation: Simulation, at_output: bool = False, due: bool = False) -> None:
+        """Write a checkpoint if it is due by the cadence of the simulation, or if the last one is old enough."""
+        if simulation.checkpoint_every is not None:
+            cadence = read_cadence(simulation.checkpoint_every, "checkpoint_every", wall=True)
+            if due or (cadence.kind == "wall" and wall.monotonic() - self._saved > cadence.every):
+                self.save(simulation)
+            return
         cheap = max(AT_OUTPUT_EVERY, self._took / COST)
         if wall.monotonic() - self._saved > (min(cheap, CHECKPOINT_EVERY) if at_output else CHECKPOINT_EVERY):
             self.save(simulation)
@@ -166,6 +177,8 @@ class RunWriter:
             "output_time": simulation.time,
             "until": None if math.isinf(self._ends[0]) else self._ends[0],
             "last_step": None if math.isinf(self._ends[1]) else int(self._ends[1]),
+            "stop": self._ends[2],
+            "condition_met": simulation.met_condition,
             "wall_seconds": simulation.wall_seconds,
             "temperature": simulation.temperature,
             "choices": simulation.choices,
@@ -178,6 +191,8 @@ class RunWriter:
         }
         if simulation.is_sound:
             arrays = {**regular.to_arrays(), "ledger": simulation.ledger.to_array()}
+            if len(simulation._frame_times) < len(simulation.ledger.rows):  # otherwise every row has a frame
+                arrays["frame_times"] = np.array(simulation._frame_times)
             self._own = _stamp(write_checkpoint(self.folder, arrays, meta))
         self._saved = wall.monotonic()
         self._took = self._saved - begun
@@ -220,7 +235,8 @@ def summary_of(simulation: Simulation, result: Result, ledger: Ledger) -> dict[s
     grain_steps = result.steps * len(simulation.grains)
     return {
         "outcome": result.outcome.name.lower(),
-        "outcome_text": result.outcome.value,
+        "outcome_text": result.outcome.value + (f": {result.condition}" if result.condition else ""),
+        "condition": result.condition or None,
         "grains_concerned": list(result.grains),
         "time": result.time,
         "steps": result.steps,

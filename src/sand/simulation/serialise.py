@@ -6,10 +6,10 @@ import dataclasses
 from typing import Any
 
 from ..forces.base import LongRangeForce
-from .stop import SHORTEST_DURATION
+from .cadence import SHORTEST_DURATION
 
 
-def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
+def case_of(simulation: Any, until: float, last_step: float, stop: str | None = None) -> dict[str, Any]:
     """Build the case of a simulation, all defaults filled in, SI units; `sand resume` reads it back.
 
     Parameters
@@ -18,6 +18,8 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
         Planned end [s], or infinity.
     last_step : float
         Planned last step, or infinity.
+    stop : str, optional
+        Condition that ends the run.
     """
     materials = simulation.grains.materials
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
@@ -25,7 +27,10 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
     run = {
         "until": max(until, SHORTEST_DURATION),  # a run to time 0 can also be resumed
         "steps": last_step if last_step == float("inf") else int(last_step),
+        "stop": stop,
         "frame_every": simulation.frame_every,
+        "row_every": simulation.row_every,
+        "checkpoint_every": simulation.checkpoint_every,
         "seed": int(simulation.seed or 0),
     }
     forces = {}
@@ -36,7 +41,7 @@ def case_of(simulation: Any, until: float, last_step: float) -> dict[str, Any]:
         )
     lengths = ["open" if v is None else v for v in simulation.box.lengths]
     return {
-        "run": {k: v for k, v in run.items() if v is not None and v < float("inf")},
+        "run": {k: v for k, v in run.items() if v is not None and v != float("inf")},
         "box": {} if simulation.box.is_open else {"periodic": lengths},
         "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
         "materials": {

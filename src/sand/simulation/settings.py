@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 from ..errors import BadInput, NoSuchAttribute, did_you_mean, shown
 from ..forces.base import Force
+from .cadence import read_cadence
 from .observers import Observer
-from .stop import duration
 
 ARGUMENTS = ("grains", "forces", "box", "stepping", "neighbours", "seed", "contacts", "out")
 """Arguments of a simulation that are fixed once it is built."""
@@ -22,9 +22,9 @@ def _rebuild(name: str) -> str:
     return f"build a new one: sand.Simulation({others.get(name, f'sim.grains, sim.forces, {name}=…')})"
 
 
-def read_frame_interval(value: Any) -> float | None:
-    """Time between frames [s] > 0, or None if the first `run` is to choose it.  Raises BadInput."""
-    return None if value is None else duration(value, "frame_every")
+def read_setting(name: str, *, wall: bool = False) -> Callable[[Any], float | str | None]:
+    """Converter of a cadence of output to its setting in SI; None stays None."""
+    return lambda value: None if value is None else read_cadence(value, name, wall=wall).setting
 
 
 def read_observers(value: Any) -> list[Observer]:
@@ -68,13 +68,15 @@ def read_forces(value: Any) -> tuple[Force, ...]:
 class ReadOnlySettings:
     """Base of `Simulation`: refuses assignments that would have no effect, and misspelt names.
 
-    `frame_every` and `observers` can be assigned at any time; subclasses of `Simulation` may add attributes.
+    `observers` and the cadences of output can be assigned at any time; subclasses of `Simulation` may add attributes.
     """
 
     _built = False
 
     CONVERTERS: ClassVar[dict[str, Callable[[Any], Any]]] = {
-        "frame_every": read_frame_interval,
+        "frame_every": read_setting("frame_every"),
+        "row_every": read_setting("row_every"),
+        "checkpoint_every": read_setting("checkpoint_every", wall=True),
         "observers": read_observers,
     }
     INTERNAL = ("recipe", "origin", "planned")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import math
 import time as wall
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,17 +28,19 @@ from ..setup.from_frame import StrainedContacts
 from ..state.state import COMPARED, OUTSIDE, State, grains_from_arrays
 from ..units import format_quantity, seed_given
 from .assemble import build_engine
+from .cadence import SHORTEST_DURATION, Cadence, Schedule, read_cadence
 from .change import Change
+from .condition import EVERY, GIVEN, Condition, OwnCondition
 from .contact_table import ContactTable
 from .displays import DISPLAYS
-from .ledger import Ledger, kinetic_energies, log_row
-from .observers import Observer, Schedule, call_ticks
+from .ledger import COUNTED, Ledger, count_row, kinetic_energies, log_row
+from .observers import Observer, call_ticks
 from .outcome import OUTCOME_OF_STOP, Outcome, Result
 from .pace import RunTimeEstimate
 from .run_writer import RunWriter
 from .settings import ReadOnlySettings, read_forces
 from .signals import Signals
-from .stop import SHORTEST_DURATION, stop_criteria
+from .stop import StopCriteria, stop_criteria
 from .vibration import vibration_notes
 
 RETURN_EVERY = 0.1
@@ -52,7 +55,7 @@ ELASTIC = ("energy_normal", "energy_sliding", "energy_rolling", "energy_twisting
 class Simulation(ReadOnlySettings):
     """A simulation: grains, forces, boundary conditions and an integrator.
 
-    Only `frame_every` and `observers` can be assigned later.
+    Only `observers`, `frame_every`, `row_every` and `checkpoint_every` can be assigned later.
 
     Parameters
     ----------
@@ -75,7 +78,13 @@ class Simulation(ReadOnlySettings):
     observers : Iterable[Observer], optional
         Objects that are called during the run (see `sand.Observer`); they must not change the simulation.
     frame_every : float or str, optional
-        Time between frames [s]; by default 1/200 of the first `run`.
+        When frames are written: a time between them [s], "1000 steps", or "log(10 per decade, from 1 ns)"; by default
+        1/200 of the first `run`.
+    row_every : float or str or None, optional
+        When rows are added to the ledger, in the same forms; every frame has a row in any case.
+    checkpoint_every : float or str or None, optional
+        When checkpoints are written, in the same forms or by wall time, "30 s wall"; by default at least every minute
+        of wall time. The end of each `run` and an interruption write one in any case.
     contacts : StrainedContacts or None, optional
         Initial contacts with their displacements, from `sand.setup.from_frame`.
     restart : tuple[dict[str, ndarray], dict[str, Any]] or None, optional
@@ -100,6 +109,8 @@ class Simulation(ReadOnlySettings):
         overwrite: bool = False,
         observers: Iterable[Observer] = (),
         frame_every: Any = None,
+        row_every: Any = None,
+        checkpoint_every: Any = None,
         contacts: StrainedContacts | None = None,
         restart: tuple[dict[str, np.ndarray], dict[str, Any]] | None = None,
     ):
@@ -107,10 +118,11 @@ class Simulation(ReadOnlySettings):
         self.box, self.neighbours = as_box(box), neighbours or Neighbours()
         self.seed = None if seed is None else seed_given(seed, bits=63)
         self.observers, self.frame_every = observers, frame_every
+        self.row_every, self.checkpoint_every = row_every, checkpoint_every
         self._choices_at_start: dict[str, str] = {}  # of a resumed run, from its checkpoint
         self.recipe: dict[str, Any] | None = None  # the [grains] table of the case file that described the grains
         self.origin = ""  # description of the file that the grains come from
-        self.planned = (math.inf, math.inf)  # planned end of a resumed run: time [s] and step
+        self.planned: tuple[float, float, str | None] = (math.inf, math.inf, None)  # end of a resumed run
         self.start = grains.copy()
         integrator = Verlet() if stepping is None else checked_integrator(stepping)
         parts = (grains, self.forces, self.box, integrator, self.neighbours, int(self.seed or 0))
@@ -125,6 +137,8 @@ class Simulation(ReadOnlySettings):
         self._wall_seconds: float = 0.0  # of earlier calls of `run`
         self._began_at: float | None = None  # start of the present call of `run` (monotonic clock)
         self._has_begun = restart is not None
+        self._frame_times: list[float] = []  # [s], of all frames so far
+        self._met: tuple[Any, int] | None = None  # the condition that was met, and the step
         self._notes_shown: set[str] = set()  # kinds of notes that were shown as warnings
         self._failure = ""  # why the simulation cannot continue
         if restart is not None:
@@ -135,6 +149,10 @@ class Simulation(ReadOnlySettings):
             if "ledger" in arrays:  # a state without a ledger starts a new one
                 self.ledger.from_array(arrays["ledger"], meta["ledger"])
                 self._notes_shown = set(self._notes(self.ledger.rows))
+                every_row = [row["time"] for row in self.ledger.rows]
+                self._frame_times = arrays["frame_times"].tolist() if "frame_times" in arrays else every_row
+            if meta.get("condition_met"):
+                self._met = (meta["condition_met"], self.steps)
         for text in self._engine.warnings:
             warn(text)
         self._built = True
@@ -169,6 +187,13 @@ class Simulation(ReadOnlySettings):
     def is_sound(self) -> bool:
         """Whether the state is finite and the energy error is below the abort threshold."""
         return not self.ledger.runs_away(self._log_row())
+
+    @property
+    def met_condition(self) -> str | None:
+        """The condition that ended the last run, if the simulation is still at that step; "given" for a function."""
+        if self._met is None or self._met[1] != self.steps:
+            return None
+        return GIVEN if callable(self._met[0]) else str(self._met[0])
 
     @property
     def grains(self) -> Grains:
@@ -245,16 +270,22 @@ class Simulation(ReadOnlySettings):
         return {"flux_density": flux} | energies | self._engine.energies_at_grains()
 
     @checked
-    def run(self, until: Any = None, *, steps: Any = None) -> Result:
-        """Run until a time, or for a number of steps, whichever comes first.
+    def run(self, until: Any = None, *, steps: Any = None, stop: Any = None) -> Result:
+        """Run until a time, for a number of steps, or until a condition is met, whichever comes first.
 
         Parameters
         ----------
-        until : float or str, optional
-            Absolute simulation time [s]; the state at the end of the run is that at exactly this time. A resumed run
-            ends at its planned end by default.
+        until : float or str or callable, optional
+            Absolute simulation time [s]; the state at the end of the run is that at exactly this time. Or a function,
+            as for `stop`. A resumed run ends at its planned end by default.
         steps : int, optional
             Number of further steps, at least 1; a started r-RESPA cycle (`Verlet.far`) is completed.
+        stop : str or callable, optional
+            A condition that ends the run: columns of the ledger, compared with numbers with units, joined by `and`,
+            `or` and parentheses, such as "mean_cluster_size >= 20 and time > 1 us"; or a function of the simulation
+            that returns True or False and changes nothing. It is checked at the regular steps 0, 100, 200, …, or the
+            ends of the r-RESPA cycles in which these lie, and so at moments that depend neither on output nor on
+            interruptions.
 
         Returns
         -------
@@ -272,21 +303,24 @@ class Simulation(ReadOnlySettings):
         """
         if self._failure:
             raise BadInput(f"this simulation cannot continue: {self._failure}")
-        end, last = stop_criteria(until, steps, self.time, self.steps, self.planned)
+        criteria = stop_criteria(until, steps, stop, self.time, self.steps, self.planned)
+        end, _, condition = criteria
+        if condition is not None and not isinstance(condition, OwnCondition):
+            condition.check(self.ledger.columns)
         if self.frame_every is None and 0.0 < end - self.time < math.inf:
             self.frame_every = max((end - self.time) / 200.0, SHORTEST_DURATION)
         try:
             self._begin()
             if self.writer:
-                self.writer.open(self, end, last)
+                self.writer.open(self, criteria)
             self._began_at = wall.monotonic()
             with Signals() as signals:
                 try:
-                    outcome = self._loop(end, last, signals)
+                    outcome = self._loop(criteria, signals)
                 finally:
                     self._wall_seconds, self._began_at = self.wall_seconds, None
                     self._engine.restore_user_order()
-            return self._close(outcome)
+            return self._close(outcome, criteria)
         except FilesFailed as error:
             if self.writer:
                 self.writer.rescue()
@@ -361,6 +395,42 @@ class Simulation(ReadOnlySettings):
         self._begin()
         return DISPLAYS["figure"](self)
 
+    def copy(self) -> Simulation:
+        """Return an independent simulation in memory, which continues with the same bits.
+
+        It has the state, the ledger and the settings of this one, but no observers, and writes no files.
+        """
+        memo: dict[int, Any] = {}
+        other = object.__new__(type(self))
+        for name, value in vars(self).items():
+            given = None if name == "writer" else [] if name == "observers" else copy.deepcopy(value, memo)
+            object.__setattr__(other, name, given)
+        return other
+
+    def status(self) -> str:
+        """Describe the simulation in one line: time, steps, contacts, clusters, energy error and speed."""
+        self._begin()
+        row = self._log_row()
+        parts = [
+            f"t = {format_quantity(self.time, 's')}",
+            f"{self.steps} steps",
+            f"{row['contacts']} contacts",
+            f"{row['clusters']} clusters",
+            f"largest {row['largest_cluster']}",
+            f"energy error {self.ledger.with_row(row).drift:.2g}",
+        ]
+        seconds = self.wall_seconds
+        if seconds > 0.0 and self.steps:
+            parts.append(f"{self.steps / seconds:.2g} steps/s")
+        return ", ".join(parts)
+
+    def __repr__(self) -> str:
+        names = ", ".join(force.name for force in self.forces) or "no forces"
+        return (
+            f"<simulation of {len(self.start)} grains ({names}) at t = {format_quantity(self.time, 's')} "
+            f"after {self.steps} steps>"
+        )
+
     def notes(self) -> list[str]:
         """What the run so far says about its own set-up, one text each.
 
@@ -383,37 +453,48 @@ class Simulation(ReadOnlySettings):
     def _log_row(self) -> dict[str, float]:
         return log_row(self.state, self._engine.contact_energies(), self._engine.force_energies())
 
-    def _record_output(self) -> None:
-        """Add a row to the ledger, write it with a frame, and call the observers."""
+    def _record_output(self, with_frame: bool = True) -> None:
+        """Add a row to the ledger, write it, with a frame or without, and call the observers."""
         row = self._log_row()
         if not self.ledger.add(row):
             return
+        if with_frame:
+            self._frame_times.append(row["time"])
         for kind, text in self._notes([self.ledger.rows[0], row]).items():
             if kind not in self._notes_shown:
                 warn(text)
                 self._notes_shown.add(kind)
         if self.writer:
-            self.writer.write(self, row)
+            self.writer.write(self, row, with_frame)
         for observer in self.observers:
             observer.see(self, row)
 
-    def _loop(self, end: float, last: float, signals: Signals) -> Outcome:
-        logged = [row["time"] for row in self.ledger.rows[-1:]]
-        frames = Schedule(self.frame_every or math.inf, max([self.time, *logged]))
+    def _loop(self, criteria: StopCriteria, signals: Signals) -> Outcome:
+        end, last, condition = criteria
+        if condition is not None and self._met == (_key(condition), self.steps):
+            return Outcome.CONDITION_MET
+        frames, rows, saves = self._schedules()
+        checks = Schedule(None if condition is None else Cadence("steps", EVERY), self.time, self.steps)
+        if condition is not None and self.steps == 0.0 == self.time and self._is_met(condition):
+            return Outcome.CONDITION_MET
         steps_per_call, checked_at, estimate = 64, self.steps, RunTimeEstimate(end, last)
         while True:
             logged = [row["time"] for row in self.ledger.rows[-1:]]
             began = wall.monotonic()
-            most_steps = max(min(steps_per_call, last - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
-            goal = frames.next(end)
+            step = min(last, *(each.step_due for each in (frames, rows, saves, checks)))
+            most_steps = max(min(steps_per_call, step - self.steps, checked_at + ENERGY_CHECK_EVERY - self.steps), 0)
+            shown = rows.next(frames.next(end))
+            goal = saves.next(shown)
             stop = self._engine.advance(goal, most_steps)
             while stop is Stop.NONE and self.time < max(logged, default=0.0):  # an event ended the step before it
                 stop = self._engine.advance(goal, 1)
             unsound = self.steps - checked_at >= ENERGY_CHECK_EVERY and not self.is_sound
             if self.steps - checked_at >= ENERGY_CHECK_EVERY:
                 checked_at = self.steps
-            if stop is Stop.TIME_REACHED:  # before the first step that would pass this time
-                stop = self._engine.go_to(goal)
+            reached = self.time
+            if stop is Stop.TIME_REACHED and self.steps < step:  # before the first step that would pass this time
+                stop = self._engine.go_to(goal, step) if goal == shown else Stop.NONE
+                reached = self.time if stop is Stop.NONE and goal == shown else goal
             seconds = wall.monotonic() - began
             if most_steps == steps_per_call:
                 growth = min(RETURN_EVERY / max(seconds, 1e-9), 2.0)
@@ -424,26 +505,62 @@ class Simulation(ReadOnlySettings):
                 return Outcome.RUNAWAY
             estimate.update(self.time, self.steps, seconds)
             done = self.time >= end or self.steps >= last
-            output = stop is Stop.TIME_REACHED or done
+            met = False
+            if condition is not None and checks.is_due(self.time, self.steps):
+                checks.advance(self.time, self.steps)
+                met = self._is_met(condition)
+            with_frame = done or met or frames.is_due(self.time, self.steps)
+            output = with_frame or rows.is_due(self.time, self.steps)
             if output:
-                self._record_output()
-                frames.advance(self.time)
-            if done:
-                return Outcome.FINISHED if self.is_sound else Outcome.RUNAWAY
+                self._record_output(with_frame)
+                rows.advance(self.time, self.steps)
+            if with_frame:
+                frames.advance(self.time, self.steps)
+            if done or met:
+                ended = Outcome.CONDITION_MET if met else Outcome.FINISHED
+                return ended if self.is_sound else Outcome.RUNAWAY
+            due = saves.is_due(reached, self.steps)
+            if due:
+                saves.advance(reached, self.steps)
             if self.writer:
-                self.writer.tick(self, output)
+                self.writer.tick(self, output, due)
             call_ticks(self.observers, self)
             if signals.received:
                 return Outcome.INTERRUPTED
 
-    def _close(self, outcome: Outcome) -> Result:
+    def _schedules(self) -> list[Schedule]:
+        """Schedules of frames, rows of the ledger and checkpoints, which continue those of earlier runs."""
+        last = {"frame_every": self._frame_times, "row_every": [row["time"] for row in self.ledger.rows[-1:]]}
+        return [
+            Schedule(
+                None if setting is None else read_cadence(setting, name, wall=True),
+                self.time,
+                self.steps,
+                max(last.get(name, [])[-1:], default=-math.inf),
+            )
+            for name in ("frame_every", "row_every", "checkpoint_every")
+            for setting in [getattr(self, name)]
+        ]
+
+    def _is_met(self, condition: Condition | OwnCondition) -> bool:
+        """Whether the present regular state meets a condition."""
+        if isinstance(condition, OwnCondition):
+            holds = condition.holds(self)
+        else:
+            holds = condition.holds(count_row(self.state) if COUNTED.issuperset(condition.names) else self._log_row())
+        if holds:
+            self._met = (_key(condition), self.steps)
+        return holds
+
+    def _close(self, outcome: Outcome, criteria: StopCriteria) -> Result:
         grains = self._engine.limiting_grains() if outcome.is_physics else ()
         if outcome is Outcome.RUNAWAY:
             grains = tuple(sorted(np.argsort(np.add(*kinetic_energies(self.grains)))[-2:].tolist()))
         if outcome.is_physics:
             self._record_output()
         ledger = self.ledger.with_row(self._log_row())
-        result = Result(outcome, self.steps, self.time, ledger.drift, grains)
+        met = (criteria.stop or "") if outcome is Outcome.CONDITION_MET else ""
+        result = Result(outcome, self.steps, self.time, ledger.drift, grains, met)
         if self.writer:
             self.writer.close(self, result, ledger)
         for observer in self.observers:
@@ -451,3 +568,8 @@ class Simulation(ReadOnlySettings):
         if outcome is Outcome.INTERRUPTED:
             raise Interrupted(result)
         return result
+
+
+def _key(condition: Condition | OwnCondition) -> Any:
+    """What identifies a condition."""
+    return condition.function if isinstance(condition, OwnCondition) else condition.text

@@ -1,0 +1,138 @@
+"""Cadences of output and conditions that end a run: what is read, what is refused, and when outputs are due."""
+
+import itertools
+import math
+
+import pytest
+
+import sand
+from sand.config.case import check_case
+from sand.simulation.cadence import Schedule, read_cadence
+from sand.simulation.condition import read_condition
+
+CASE = {"run": {"until": "1 us"}, "grains": {"number": 2, "radius": "10 nm"}, "box": {"periodic": "1 um"}}
+
+
+@pytest.mark.parametrize(
+    ("given", "setting"),
+    [
+        (2e-9, 2e-9),
+        ("50 ns", 50e-9),
+        ("1000 steps", "1000 steps"),
+        ("log(10 per decade, from 1 ns)", "log(10 per decade, from 1e-09 s)"),
+        ("30 s wall", "30.0 s wall"),
+    ],
+)
+def test_settings_are_read_back(given, setting):
+    """The setting in SI, as in case.toml, gives the same cadence."""
+    cadence = read_cadence(given, "checkpoint_every", wall=True)
+    assert cadence.setting == setting and read_cadence(setting, "checkpoint_every", wall=True) == cadence
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("30 s wall", "wall time is for checkpoint_every only"),
+        ("1.5 steps", "steps in frame_every = '1.5' must be a whole number"),
+        ("0 steps", "steps in frame_every = 0 must be a whole number of at least 1"),
+        ("log(10)", "write it as 'log.10 per decade, from 1 ns.'"),
+        ("log(0 per decade, from 1 ns)", "outputs per decade in frame_every = 0 must be a whole number of at least 1"),
+        ("log(10 per decade, from 1 kg)", "first time in frame_every = '1 kg' is not a quantity in s"),
+        ("-1 ns", "frame_every = '-1 ns' must be above 0"),
+        ("ten steps", "frame_every = 'ten steps' is not a quantity in s"),
+    ],
+)
+def test_impossible_cadences_are_refused(given, message):
+    """In a script and in a case file, in one line."""
+    with pytest.raises(sand.BadInput, match=message) as caught:
+        sand.Simulation(sand.Grains([[0, 0, 0]], "10 nm", "iron"), frame_every=given)
+    assert len(caught.value.problems) == 1
+    with pytest.raises(sand.BadInput, match=f"run.frame_every: .*{message}"):
+        check_case({**CASE, "run": {"until": "1 us", "frame_every": given}}, "some.toml")
+
+
+def test_logarithmic_outputs():
+    """t_k = t_0 10^(k/n): equal ratios to rounding, decades exact to the last bit, and continued at any time."""
+    cadence = read_cadence("log(4 per decade, from 1 ns)", "frame_every")
+    schedule, times = Schedule(cadence, 0.0), []
+    while schedule.next(1e-6) < 1e-6:
+        times.append(schedule.due)
+        schedule.advance(schedule.due)
+    assert times[::4] == [1e-9, 1e-8, 1e-7] and len(times) == 12
+    ratios = [b / a for a, b in itertools.pairwise(times)]
+    assert ratios == pytest.approx([10**0.25] * 11, rel=1e-14, abs=0.0)
+    for before, after in itertools.pairwise(times):
+        assert Schedule(cadence, before).due == Schedule(cadence, 1.1 * before, last=before).due == after
+
+
+def test_outputs_by_steps():
+    """At multiples of the number of steps, or the end of a cycle beyond one; never by time."""
+    schedule = Schedule(read_cadence("100 steps", "row_every"), 0.0, 250)
+    assert schedule.step_due == 300 and schedule.due == math.inf and schedule.next(1.0) == 1.0
+    schedule.advance(1e-9, 305)
+    assert schedule.step_due == 400 and not schedule.is_due(1.0, 399) and schedule.is_due(0.0, 404)
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("clusters == 1", False),
+        ("clusters != 1", True),
+        ("clusters<=5 and time>1 us", True),
+        ("clusters < 5 or total >= -2 aJ and time < 1 us", False),
+        ("(clusters == 5 or total > 0) and time < 1 ms", True),
+        ("time >= 2e-6", True),
+        ("time > 2 us", False),
+        ("momentum_x > 1 ng m/s", False),
+    ],
+)
+def test_what_a_condition_says(text, holds):
+    """Compared in SI; `and` before `or`: false or (true and false) is false, with the row below."""
+    row = {"clusters": 5, "time": 2e-6, "total": 0.0, "momentum_x": 1e-15}
+    assert read_condition(text).holds(row) is holds
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is not a condition; write 'clusters == 1'"),
+        ("clusters = 1", "'clusters = 1' is not a comparison"),
+        ("clustrs == 1", "unknown quantity 'clustrs'; did you mean 'clusters'?"),
+        ("speed == 1", "unknown quantity 'speed'; allowed: step, time, translation"),
+        ("clusters == 1 nm", "clusters is compared with a number without a unit, not with '1 nm'"),
+        ("time > 1 kg", "time = '1 kg' is not a quantity in s"),
+        ("(clusters == 1", "a parenthesis is not closed"),
+        ("clusters == 1)", "is not expected there"),
+        ("clusters == 1 or", "it ends too early"),
+        ("3 < clusters", "'3 < clusters' is not a comparison"),
+        ("not clusters == 1", "is not a comparison"),
+        ("__import__('os').getcwd() == 1", "is not a comparison"),
+        (30 * "(" + "clusters == 1" + 30 * ")", "more than 20 parentheses"),
+    ],
+)
+def test_impossible_conditions_are_refused(text, message):
+    """In a script before the first step, and in a case file; in one line, and nothing is evaluated."""
+    sim = sand.Simulation(sand.Grains([[0, 0, 0]], "10 nm", "iron"))
+    for read in (
+        lambda: sim.run(until="1 ns", stop=text),
+        lambda: check_case({**CASE, "run": {"stop": text}}, "some.toml"),
+    ):
+        with pytest.raises(sand.BadInput) as caught:
+            read()
+        assert len(caught.value.problems) == 1 and message in str(caught.value)
+    assert sim.steps == 0
+
+
+def test_energies_of_the_forces_of_a_case_are_known():
+    """A condition may use the column of each of its forces, and of no other."""
+    run = {"stop": "magnetic < -1 aJ and field < 1 aJ and coulomb == 0"}
+    with pytest.raises(sand.BadInput, match=r"run: .*unknown quantity 'coulomb'") as caught:
+        check_case({**CASE, "run": run, "forces": {"field": {"flux_density": "1 mT"}}}, "some.toml")
+    assert len(caught.value.problems) == 1
+
+
+def test_two_conditions_are_refused():
+    """A function as `until`, and `stop`."""
+    sim = sand.Simulation(sand.Grains([[0, 0, 0]], "10 nm", "iron"))
+    with pytest.raises(sand.BadInput, match="until and stop are both conditions"):
+        sim.run(until=lambda sim: True, stop="clusters == 1")
