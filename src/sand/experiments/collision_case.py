@@ -13,7 +13,6 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ..arguments import MOST_GRAINS
-from ..config.build import body_from_file
 from ..config.case import ForcesSection, MaterialSection, material_errors
 from ..config.commands import BODIES, refuse_other_command
 from ..config.errors import validate
@@ -24,6 +23,7 @@ from ..io.run_folder import read_toml
 from ..material import PRESETS, Material
 from ..setup.aggregates import build
 from ..setup.encounters import offset_of
+from ..setup.from_file import body_from_file
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
