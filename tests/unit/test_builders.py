@@ -424,7 +424,7 @@ def test_built_bodies_in_collide_and_run(tmp_path, capsys, monkeypatch):
     assert main(["build", "bcca", "--grains", "12", *laws, "--out", "a.xyz"]) == 0
     assert "fractal dimension" in capsys.readouterr().out
     (tmp_path / "hit.toml").write_text(
-        '[target]\nkind = "file"\npath = "a.xyz"\n[projectile]\nkind = "dla"\ngrains = 6\nradius = "0.1 um"\n'
+        '[target]\nkind = "file"\nfile = "a.xyz"\n[projectile]\nkind = "dla"\ngrains = 6\nradius = "0.1 um"\n'
         'moment = "1e-18 A m^2"\nmoments = "relaxed"\n[impact]\nspeed = "0.1 m/s"\n[forces.contact]\n'
     )
     from sand.experiments.collision_case import read_collision

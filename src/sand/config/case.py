@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -284,18 +283,23 @@ def read_case(path: str | Path) -> Case:
     """
     content = read_toml(path)
     refuse_other_command(content, path, "run")
-    case = check_case(content, str(path))
-    if case.grains.file is not None:
-        case.grains.file = _relative_to(path, case.grains.file)
-    case.grains.classes = [
-        one if one.file is None else replace(one, file=_relative_to(path, one.file)) for one in case.grains.classes
-    ]
-    return case
+    return check_case(with_absolute_files(content, path), str(path))
 
 
-def _relative_to(case: str | Path, file: str) -> str:
-    """The absolute path of a file that a case file names."""
-    return str((Path(case).parent / Path(file).expanduser()).absolute())
+def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, Any]:
+    """The content of a case file with absolute paths, from names relative to the case file, in [grains]."""
+    grains = content.get("grains")
+    if not isinstance(grains, dict):
+        return content
+    classes = grains.get("classes")
+    whole = {**content, "grains": dict(grains)}
+    if isinstance(classes, list):
+        whole["grains"]["classes"] = [dict(one) if isinstance(one, dict) else one for one in classes]
+    for table in (whole["grains"], *(whole["grains"].get("classes") or ())):
+        file = table.get("file") if isinstance(table, dict) else None
+        if isinstance(file, str) and file.strip() and "\0" not in file:  # others are reported by the validation
+            table["file"] = str((Path(path).parent / Path(file).expanduser()).absolute())
+    return whole
 
 
 def check_case(content: dict[str, Any], name: str) -> Case:

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from ..config.case import check_case
+from ..config.case import check_case, with_absolute_files
 from ..config.commands import refuse_other_command
 from ..config.errors import validate
 from ..config.sections import Section, Seed
@@ -42,8 +42,7 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     given, errors, section = content.pop("grow", None), ErrorCollector(), None
     if given is not None:
         section = errors.take(validate, GrowSection, given, str(path), table="grow")
-    case = errors.take(check_case, content, str(path))
+    content = with_absolute_files(content, path)
+    errors.take(check_case, content, str(path))
     errors.done()
-    if case.grains.file is not None:  # relative to the case file
-        content["grains"]["file"] = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return content, section and section.seeds

@@ -11,6 +11,7 @@ import numpy as np
 from ..arguments import MOST_GRAINS, checked
 from ..errors import FORBID_EXTRA, BadInput, ErrorCollector, did_you_mean, shown
 from ..grains import Grains, moment_size, vector_for_all
+from ..io.run_folder import checked_name
 from ..material import PRESETS, Material, as_material
 from ..units import si, whole_number
 from .aggregates import KINDS, build
@@ -119,6 +120,7 @@ class GrainClass:
             "number": lambda v: whole_number(v, "number", 1, MOST_GRAINS),
             "grains": lambda v: whole_number(v, "grains", 1, MOST_GRAINS),
             "frame": lambda v: whole_number(v, "frame", -(2**31), 2**31 - 1),
+            "file": lambda v: checked_name(str(v), "file"),
             "radius": radius_as_given,
             "material": material_as_given,
             "moment": moment_as_given,
