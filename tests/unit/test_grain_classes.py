@@ -186,6 +186,10 @@ def test_members_from_a_frame_keep_strained_contacts(tmp_path):
     classes = [{"number": 3, "kind": "file", "file": str(tmp_path / "run"), "frame": -1}]
     with pytest.raises(sand.BadInput, match="gas_with_contacts"):
         gas(None, BOX, classes=classes)
+    content = {"run": {"steps": 5}, "box": {"periodic": BOX}, "grains": {"classes": classes}, "forces": {"contact": {}}}
+    with pytest.raises(sand.BadInput, match="holds the run that the grains come from"):
+        simulation_of(check_case(content, "copies.toml"), tmp_path / "run", overwrite=True)
+    assert len(simulation_of(check_case(content, "copies.toml"), None).contacts["pair"]) == 9
     start = gas_with_contacts(None, BOX, classes=classes, temperature="10 K", seed=1)
     assert np.sort(start.contacts.pair, axis=1).tolist() == [
         [4 * k + n, 4 * k + n + 1] for k in range(3) for n in range(3)

@@ -54,8 +54,9 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     """
     if case.grains.kind == "given":
         raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
-    if case.grains.file is not None and out is not None:
-        _refuse_own_source(Path(case.grains.file), Path(out))
+    for file in (case.grains.file, *(one.file for one in case.grains.classes)):
+        if file is not None and out is not None:
+            _refuse_own_source(Path(file), Path(out))
     start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
     options |= {"out": out, "frame_every": case.run.frame_every, "contacts": start.contacts}
     simulation = simulate(case, start.grains, start.box, **options)
