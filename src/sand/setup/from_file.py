@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..errors import BadInput
 from ..grains import Grains
 from ..io.run_folder import TRAJECTORY
 from ..material import Material
 from ..schema import own_values
 from .checks import check_body, largest_cluster
 from .from_frame import Start, StrainedContacts, from_frame
-
-if TYPE_CHECKING:
-    from .grain_classes import GrainClass
 
 TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
 """Suffixes of text files with a body; all other files are read as trajectories."""
@@ -56,26 +52,6 @@ def from_trajectory(path: str | Path, frame: int, materials: Mapping[str, Materi
     finally:
         frames.close()
     return start._replace(note=f"{place}, {start.note}")
-
-
-def body_and_contacts(
-    given: GrainClass, material: Material | None, library: Mapping[str, Material]
-) -> tuple[Grains, StrainedContacts | None]:
-    """The aggregate of a class with a `file`, its centre of mass at the origin, and its contacts from a trajectory.
-
-    Raises
-    ------
-    BadInput
-        If the file cannot be read, or a key does not apply to it.
-    """
-    path = Path(given.file).expanduser()
-    if path.suffix in TEXT_SUFFIXES:
-        if given.frame is not None:
-            raise BadInput(f"frame = {given.frame}: {path} is a body, without frames; leave frame out")
-        return body_from_file(path, material, given.radius, given.length, library), None
-    if extra := [name for name in ("radius", "material", "length") if getattr(given, name) is not None]:
-        raise BadInput(f"{extra[0]}: the trajectory {path} has it; leave {extra[0]} out")
-    return largest_body(from_trajectory(path, -1 if given.frame is None else given.frame, library))
 
 
 def largest_body(start: Start) -> tuple[Grains, StrainedContacts | None]:

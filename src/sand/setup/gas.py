@@ -191,6 +191,8 @@ def _members(
 ) -> Members:
     """Members of all classes; without classes there is one, of single grains. Raises BadInput with all errors."""
     if not classes:
+        if missing := [name for name in ("radius", "material") if defaults[name] is None]:
+            raise BadInput(f"gas: {name} is missing; add {name}=…" for name in missing)
         size = in_unit(defaults["radius"], "m")
         if number is not None and number > MANY and size is not None and np.ndim(size) == 0:
             _refuse_full(np.full(1, size), number, space)  # before arrays of this length are allocated

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..material import PRESETS, Material, as_material
 from ..units import si, whole_number
 from .aggregates import KINDS, build
 from .encounters import combined, turned
-from .from_file import body_and_contacts
+from .from_file import TEXT_SUFFIXES, body_from_file, from_trajectory, largest_body
 from .from_frame import StrainedContacts
 from .population import divided, drawn, fractions_of, radii_of, refuse_sum
 
@@ -233,7 +234,7 @@ def members_of(
     if given.kind == "grain":
         return _single(replace(given, material=material), count, rng)
     contacts, bodies = [], []
-    copied = body_and_contacts(given, material, library) if given.kind == "file" else None
+    copied = _body_and_contacts(given, material, library) if given.kind == "file" else None
     for _ in range(count):
         if copied is not None:
             body, strained = copied
@@ -257,6 +258,26 @@ def members_of(
     directed = np.zeros(len(grains), dtype=bool)
     joined = joined_contacts(contacts, sizes) if contacts else None
     return Members(grains, np.repeat(np.arange(count), sizes), np.array(reach), joined, directed)
+
+
+def _body_and_contacts(
+    given: GrainClass, material: Material | None, library: Mapping[str, Material]
+) -> tuple[Grains, StrainedContacts | None]:
+    """The aggregate of a class with a `file`, its centre of mass at the origin, and its contacts from a trajectory.
+
+    Raises
+    ------
+    BadInput
+        If the file cannot be read, or a key does not apply to it.
+    """
+    path = Path(given.file).expanduser()
+    if path.suffix in TEXT_SUFFIXES:
+        if given.frame is not None:
+            raise BadInput(f"frame = {given.frame}: {path} is a body, without frames; leave frame out")
+        return body_from_file(path, material, given.radius, given.length, library), None
+    if extra := [name for name in ("radius", "material", "length") if getattr(given, name) is not None]:
+        raise BadInput(f"{extra[0]}: the trajectory {path} has it; leave {extra[0]} out")
+    return largest_body(from_trajectory(path, -1 if given.frame is None else given.frame, library))
 
 
 def _single(given: GrainClass, count: int, rng: np.random.Generator) -> Members:
