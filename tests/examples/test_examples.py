@@ -6,6 +6,7 @@ import importlib.util
 import math
 import runpy
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 import sand
+from sand.config.build import simulation_of
 from sand.config.case import check_case, read_case
 from sand.experiments.collision_case import read_collision
 from sand.experiments.scattering import sampling
 from sand.experiments.scattering.case import read_scattering
+from sand.io.run_folder import read_toml
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -29,6 +32,47 @@ def test_case_files_are_valid(path):
     comment = path.read_text().split("[", 1)[0]
     command = next(word for word in reads if f"sand {word} examples/{path.name}" in comment)
     reads[command](path)
+
+
+def started(name, **changes):
+    """The simulation of a case file of the examples, with changes of its [run] table; it must raise no warning."""
+    content = read_toml(EXAMPLES / name)
+    content["run"] |= changes
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return simulation_of(check_case(content, name), None)
+
+
+@pytest.mark.compiled("contacts")
+def test_silica_gas():
+    """Log-normal radii: the median of ln r is that of the file to four standard errors, 4 × 1.25 × 0.25/√150."""
+    gas = started("silica-gas.toml")
+    assert abs(np.median(np.log(gas.grains.radius / 80e-9))) < 4.0 * 1.25 * 0.25 / math.sqrt(150)
+    gas.run(steps=20)
+    assert gas.ledger["total"][-1] == pytest.approx(gas.ledger["total"][0], rel=1e-6, abs=0.0)
+
+
+@pytest.mark.compiled("contacts")
+def test_aggregate_gas():
+    """Ten clusters of sixteen grains, which remain; translation + rotation = (3/2 × 9 + 10/2) kT at the start."""
+    gas = started("aggregate-gas.toml")
+    gas.run(steps=20)
+    kinetic = gas.ledger["translation"][0] + gas.ledger["rotation"][0]
+    assert kinetic == pytest.approx((13.5 + 5.0) * 1.380649e-23 * 300.0, rel=1e-9, abs=0.0)
+    assert (gas.ledger["clusters"] == 10).all() and (gas.ledger["contacts"] == 150).all()
+
+
+@pytest.mark.validate
+def test_charged_mixture():
+    """A neutral mixture: 30 grains of iron with three charges, 90 of silica with one; the energy of 20 steps."""
+    gas = started("charged-mixture.toml")
+    charges = gas.grains.charge / 1.6e-19
+    assert np.rint(charges).tolist() == [3.0] * 30 + [-1.0] * 90 and abs(charges.sum()) < 1e-9
+    names = [gas.grains.materials[k].name for k in gas.grains.material]
+    assert names == ["oxidised"] * 30 + ["silica"] * 90
+    gas.run(steps=20)
+    kinetic = gas.ledger["translation"][0]
+    assert abs(np.ptp(gas.ledger["total"])) < 1e-3 * kinetic
 
 
 @pytest.mark.validate

@@ -354,7 +354,7 @@ def test_only_ten_grains_are_named(tmp_path):
         (lambda: fractal(100, dimension=1.3, prefactor=0.1, radius=R, material=M), "but a straight chain has only"),
         (lambda: fractal(100, dimension=2.4, prefactor=20, radius=R, material=M), "random close packing has"),
         (lambda: bpca(9, radius="power law(-3.5, 1 nm, 1 um)", material=M), "at most 200 is allowed"),
-        (lambda: bpca(9, radius="lognormal(1 nm)", material=M), "wrong number of arguments"),
+        (lambda: bpca(9, radius="lognormal(1 nm)", material=M), "lacks its width"),
         (lambda: bpca(9, radius="lognormal(9 nm, 3)", material=M), "must not exceed 2"),
         (lambda: bpca(9, radius="gauss(1 nm, 1)", material=M), "give a length, N of them, 'lognormal"),
         (lambda: bpca(9, radius=[R] * 8, material=M), "radius has 8 entries but there are 9 grains"),
@@ -424,7 +424,7 @@ def test_built_bodies_in_collide_and_run(tmp_path, capsys, monkeypatch):
     assert main(["build", "bcca", "--grains", "12", *laws, "--out", "a.xyz"]) == 0
     assert "fractal dimension" in capsys.readouterr().out
     (tmp_path / "hit.toml").write_text(
-        '[target]\nkind = "file"\npath = "a.xyz"\n[projectile]\nkind = "dla"\ngrains = 6\nradius = "0.1 um"\n'
+        '[target]\nkind = "file"\nfile = "a.xyz"\n[projectile]\nkind = "dla"\ngrains = 6\nradius = "0.1 um"\n'
         'moment = "1e-18 A m^2"\nmoments = "relaxed"\n[impact]\nspeed = "0.1 m/s"\n[forces.contact]\n'
     )
     from sand.experiments.collision_case import read_collision

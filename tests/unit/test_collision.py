@@ -175,7 +175,7 @@ def test_bodies_from_files(tmp_path):
     path = tmp_path / "hit.toml"
     old = 'kind = "pca"\ngrains = 8\nradius = "0.1 um"'
     path.write_text(
-        CASE.replace(old, f'kind = "file"\npath = "{tmp_path}/body.txt"\nlength = "1 nm"\nradius = "0.1 um"')
+        CASE.replace(old, f'kind = "file"\nfile = "{tmp_path}/body.txt"\nlength = "1 nm"\nradius = "0.1 um"')
     )
     outcome, _ = read_collision(path).run(1)
     assert outcome.contacts_before == 7

@@ -82,7 +82,7 @@ def test_info_names_the_command_of_a_case(tmp_path, capsys, name):
         ('kind = "grain"', 'kind = "grain"\ngrains = 5', "grains = 5"),
         ('kind = "chain"', 'kind = "chain"\ndimension = 2', "dimension"),
         ('"2 m/s"', '"2 m/s"\n[materials.glass]\nlike = "silica"\ndensity = -1', "density"),
-        ('kind = "grain"\nradius = "0.1 um"', 'kind = "file"\npath = "nowhere.xyz"', "there is no file nowhere.xyz"),
+        ('kind = "grain"\nradius = "0.1 um"', 'kind = "file"\nfile = "nowhere.xyz"', "there is no file nowhere.xyz"),
         ("[impact]", '[forces.field]\nflux_density = "1 K"\n[impact]', "flux_density"),
     ],
 )
@@ -115,7 +115,7 @@ def test_a_body_file_is_not_overwritten(tmp_path, monkeypatch, capsys, command):
     source = tmp_path / "runs" / "trajectory.gsd"
     write_body(tmp_path / "one.gsd", sand.setup.grain(radius="10 nm", material="iron", moment="200 A m^2/kg"))
     (tmp_path / "one.gsd").rename(source)
-    body = '[target]\nkind = "file"\npath = "runs/trajectory.gsd"\n'
+    body = '[target]\nkind = "file"\nfile = "runs/trajectory.gsd"\n'
     other = COLLIDE[COLLIDE.index("[projectile]") :] if command == "collide" else SCATTER
     (tmp_path / "a.toml").write_text(body + other)
     before = source.read_bytes()

@@ -180,6 +180,6 @@ def refuse_folder(folder: Path, case: Path, *, overwrite: bool) -> None:
         )
     content = read_toml(case)
     for body in sorted(BODIES & content.keys()):
-        source = Path(content[body].get("path", case))
+        source = Path(content[body].get("file", case))
         if source.exists() and any(path.samefile(source) for path in replaced):
             raise BadInput(f"--overwrite would replace {source}, the {body} of {case}; give another --out")

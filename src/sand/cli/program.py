@@ -10,10 +10,10 @@ import click
 
 from ..errors import SandError
 from ..version import __version__
-from . import analyse, build, cite, collide, export, grow, info, options, plot, report, resume, run, scatter, view
+from . import analyse, build, cite, collide, export, grow, info, new, options, plot, report, resume, run, scatter, view
 from .exits import BAD_INPUT, DONE, FAILED, INTERRUPTED
 
-COMMANDS = (run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
+COMMANDS = (new, run, resume, build, collide, scatter, grow, analyse, plot, view, export, info, cite)
 """One module per command, with a click command named `command`."""
 
 

@@ -13,22 +13,16 @@ from ..box import Box, as_box
 from ..errors import BadInput
 from ..forces.own import import_modules
 from ..grains import Grains
-from ..io.bodies import read_body
 from ..io.checkpoint import newest_checkpoint
 from ..io.lock import writing
 from ..io.run_folder import CASE, TRAJECTORY, read_toml
-from ..io.trajectory import Frames
-from ..material import Material
-from ..setup.checks import check_body
-from ..setup.from_frame import Start, from_frame
-from ..setup.gas import gas
+from ..setup.from_file import TEXT_SUFFIXES, body_from_file, from_trajectory
+from ..setup.from_frame import Start
+from ..setup.gas import gas_with_contacts
 from ..simulation.condition import GIVEN
 from ..simulation.simulation import Simulation
 from ..state.state import grains_from_arrays
 from .case import THERMAL, Case, check_case
-
-TEXT_SUFFIXES = (".xyz", ".extxyz", ".txt", ".dat")
-"""Suffixes of text files with a body; all other files are read as trajectories."""
 
 
 def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Simulation:
@@ -45,20 +39,6 @@ def simulate(case: Case, grains: Grains, box: Box | None, **options: Any) -> Sim
         checkpoint_every=case.run.checkpoint_every,
         **options,
     )
-
-
-def body_from_file(path: str | Path, material: Material | None = None, *others: Any, **named: Any) -> Grains:
-    """Read a body that is in one piece; parameters as for `io.bodies.read_body`.
-
-    Raises
-    ------
-    BadInput
-        As `read_body`; also for grains that overlap by more than a simulation allows at its start, and for grains
-        without a contact to the rest. The first ten are named.
-    """
-    body = read_body(path, material, *others, **named)
-    check_body(body, str(path))
-    return body
 
 
 def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulation:
@@ -78,8 +58,9 @@ def simulation_of(case: Case, out: str | Path | None, **options: Any) -> Simulat
     """
     if case.grains.kind == "given":
         raise BadInput("grains.kind = 'given': these grains came from a script; use `sand resume` on the folder")
-    if case.grains.file is not None and out is not None:
-        _refuse_own_source(Path(case.grains.file), Path(out))
+    for file in (case.grains.file, *(one.file for one in case.grains.classes)):
+        if file is not None and out is not None:
+            _refuse_own_source(Path(file), Path(out))
     start = _of_gas(case) if case.grains.kind == "gas" else _of_file(case)
     if case.run.stop == GIVEN:
         raise BadInput(
@@ -99,13 +80,15 @@ def _refuse_own_source(source: Path, out: Path) -> None:
 
 
 def _of_gas(case: Case) -> Start:
-    section, library = case.grains, case.materials_by_name()
-    if not isinstance(section.material, str):
-        raise BadInput("grains.material of a gas must be one name")
-    given = {name: getattr(section, name) for name in ("radius", "moment", "charge", *THERMAL)}
-    material, box = library[section.material], case.box.periodic
-    grains = gas(section.number, box, material=material, seed=case.run.seed, **given)  # type: ignore[arg-type]
-    return Start(grains, None, as_box(box), "")
+    section = case.grains
+    given = {name: getattr(section, name) for name in ("radius", "material", "moment", "charge", "classes", *THERMAL)}
+    try:
+        return gas_with_contacts(
+            section.number, case.box.periodic, seed=case.run.seed, materials=case.materials_by_name(), **given
+        )
+    except BadInput as error:
+        problems = error.problems
+        raise BadInput(f"grains.{line}" if line.startswith("classes") else line for line in problems) from None
 
 
 def _of_file(case: Case) -> Start:
@@ -145,23 +128,6 @@ def same_box(first: Box, second: Box) -> bool:
     """Whether two boxes have the same axes, equal to the precision of a trajectory."""
     pairs = list(zip(first.lengths, second.lengths, strict=True))
     return all((a is None) == (b is None) and (a is None or math.isclose(a, b, rel_tol=1e-6)) for a, b in pairs)  # type: ignore[arg-type]
-
-
-def from_trajectory(path: str | Path, frame: int, materials: dict[str, Material]) -> Start:
-    """Read one frame of a trajectory, or of the run in a folder, as a new start; see `setup.from_frame`.
-
-    Raises
-    ------
-    BadInput
-        If there is no such file or frame, or the frame cannot be a start.
-    """
-    place = Path(path) / TRAJECTORY if Path(path).is_dir() else Path(path)
-    frames = Frames(place)
-    try:
-        start = from_frame(frames[frame], materials)
-    finally:
-        frames.close()
-    return start._replace(note=f"{place}, {start.note}")
 
 
 def _case_of_checkpoint(folder: Path, meta: dict[str, Any]) -> Case:
@@ -226,7 +192,7 @@ def resume(folder: str | Path, *, imports: Iterable[str] = (), **options: Any) -
     with writing(place):
         arrays, meta = newest_checkpoint(place)
     case = _case_of_checkpoint(place, meta)
-    names = [case.grains.material] if isinstance(case.grains.material, str) else case.grains.material
+    names = list(meta["case"]["materials"])  # in the order of the indices in the checkpoint
     library = case.materials_by_name()
     try:
         index = arrays["grains/material"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, PrivateAttr, ValidationError, create_model, field_validator, model_validator
 
 from ..box import Box, as_box
-from ..errors import BadInput, did_you_mean
+from ..errors import BadInput, ErrorCollector, did_you_mean
 from ..forces.own import IMPORT, own_force
 from ..forces.registry import FORCES
 from ..integrate.verlet import Verlet
@@ -17,6 +17,7 @@ from ..io.run_folder import read_toml
 from ..material import PRESETS, Material, like_preset
 from ..neighbours.settings import Neighbours
 from ..setup.gas import SPINS
+from ..setup.grain_classes import GrainClass, class_numbers
 from ..simulation.condition import GIVEN, read_condition
 from ..simulation.ledger import Ledger
 from .commands import refuse_other_command
@@ -25,8 +26,10 @@ from .sections import (
     Cadence,
     Count,
     Duration,
+    Materials,
     Moment,
     PathName,
+    Radii,
     SaveCadence,
     Section,
     Seed,
@@ -118,11 +121,13 @@ class GrainsSection(Section):
     kind: Literal["gas", "file", "given"] = "gas"
     """`gas`: random positions; `file`: grains of a frame or body; `given`: case file of a run from a script."""
     number: Count | None = None
-    """Number of grains."""
-    radius: quantity("m", above=0.0) | None = None  # type: ignore[valid-type]
-    """Radius of each grain [m]; for a body from a file only if the file has none."""
-    material: str | list[str] = "iron"
-    """Preset or name in [materials]; for a body from a file it takes precedence over the file's material."""
+    """Number of grains; with `classes` of grains and aggregates."""
+    radius: Radii | None = None
+    """Radius [m]: a length, `lognormal(MEDIAN, SIGMA, LEAST, MOST)`, `power law(EXPONENT, LEAST, MOST)`, or a list with
+    one length for each grain; for a body from a file one length, only if the file has none."""
+    material: Materials = "iron"
+    """Preset or name in [materials], or fractions with the sum 1, `{silica = 0.7, iron = 0.3}`; for a body from a file
+    it takes precedence over the file's material."""
     moment: Moment | None = None
     """Moment of each grain [A m^2], per mass ("200 A m^2/kg"), or "material"; none: no moment."""
     charge: quantity("C") | None = None  # type: ignore[valid-type]
@@ -133,6 +138,8 @@ class GrainsSection(Section):
     """Mean rotational energy: `kT/2`, `equipartition` (3/2 kT) or `none`."""
     exact_temperature: Annotated[bool, Field(strict=True)] = True
     """Whether velocities and spins are scaled to exactly this temperature; otherwise they are random draws."""
+    classes: list[GrainClass] = Field(default_factory=list)
+    """Classes of grains and aggregates, each a table [[grains.classes]]; see below."""
     file: PathName | None = None
     """Trajectory or body (`.gsd`), run folder, extended XYZ (`.xyz`), or columns x y z [r] (`.txt`, `.dat`)."""
     frame: Annotated[int, Field(ge=-(2**31), lt=2**31, strict=True)] = -1
@@ -143,13 +150,25 @@ class GrainsSection(Section):
     @model_validator(mode="after")
     def _check_keys(self) -> GrainsSection:
         needed, foreign = GRAINS_KEYS[self.kind]
+        in_classes = {"number", "radius"} if self.classes else set()  # checked for each class
         problems = [
             f"{name} is missing; add it, for example {name} = {example}"
             for name, example in needed.items()
-            if getattr(self, name) is None
+            if getattr(self, name) is None and name not in in_classes
         ]
         given = [name for name in foreign if name in self.model_fields_set]
         problems += [f"{name} is not for kind = '{self.kind}'; remove it, or change kind" for name in given]
+        if self.kind != "gas" and isinstance(self.material, dict):
+            problems.append("material: fractions are for kind = 'gas'; give one name")
+        if self.kind == "gas" and self.classes:
+            errors = ErrorCollector()
+            errors.take(class_numbers, self.classes, self.number)
+            problems += errors.problems
+            problems += [
+                f"classes.{k}: radius is missing; add it here, or to [grains]"
+                for k, one in enumerate(self.classes)
+                if one.kind != "file" and one.radius is None and self.radius is None
+            ]
         if problems:
             raise ValueError("\n".join(problems))
         return self
@@ -157,15 +176,16 @@ class GrainsSection(Section):
     def recipe(self) -> dict[str, Any]:
         """The [grains] table that describes these grains, all defaults filled in."""
         _, foreign = GRAINS_KEYS[self.kind]
-        return self.model_dump(exclude_none=True, exclude=set(foreign))
+        described = self.model_dump(exclude_none=True, exclude=set(foreign))
+        return described if self.classes else {k: v for k, v in described.items() if k != "classes"}
 
 
 THERMAL = ("temperature", "spins", "exact_temperature")
 """Keys of velocities and spins, which a file gives itself."""
 GRAINS_KEYS: dict[str, tuple[dict[str, str], tuple[str, ...]]] = {
     "gas": ({"number": "125", "radius": "'10 nm'"}, ("file", "frame", "length")),
-    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", *THERMAL)),
-    "given": ({"number": "125"}, ("file", "frame", "length")),
+    "file": ({"file": "'run/trajectory.gsd'"}, ("number", "moment", "charge", "classes", *THERMAL)),
+    "given": ({"number": "125"}, ("file", "frame", "length", "classes")),
 }
 """By kind: required keys, each with an example, and keys that do not apply."""
 
@@ -259,10 +279,16 @@ def material_errors(content: dict[str, Any], tables: Iterable[str], default: str
     known = [*PRESETS, *own]
     for table in tables:
         section = content.get(table)
-        given = section.get("material", default) if isinstance(section, dict) else default
-        for name in given if isinstance(given, list) else [] if given is None else [given]:
-            if isinstance(name, str) and name not in known:
-                problems.append(f"{table}.material: unknown material '{name}'; {did_you_mean(name, known)}")
+        if not isinstance(section, dict):
+            continue
+        classes = section.get("classes")
+        parts = {table: section.get("material", default)}
+        for k, one in enumerate(classes if isinstance(classes, list) else []):
+            parts[f"{table}.classes.{k}"] = one.get("material") if isinstance(one, dict) else None
+        for place, given in parts.items():
+            for name in given if isinstance(given, (list, dict)) else [] if given is None else [given]:
+                if isinstance(name, str) and name not in known:
+                    problems.append(f"{place}.material: unknown material '{name}'; {did_you_mean(name, known)}")
     return problems
 
 
@@ -293,10 +319,23 @@ def read_case(path: str | Path) -> Case:
     """
     content = read_toml(path)
     refuse_other_command(content, path, "run")
-    case = check_case(content, str(path))
-    if case.grains.file is not None:  # relative to the case file
-        case.grains.file = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
-    return case
+    return check_case(with_absolute_files(content, path), str(path))
+
+
+def with_absolute_files(content: dict[str, Any], path: str | Path) -> dict[str, Any]:
+    """The content of a case file with absolute paths, from names relative to the case file, in [grains]."""
+    grains = content.get("grains")
+    if not isinstance(grains, dict):
+        return content
+    classes = grains.get("classes")
+    whole = {**content, "grains": dict(grains)}
+    if isinstance(classes, list):
+        whole["grains"]["classes"] = [dict(one) if isinstance(one, dict) else one for one in classes]
+    for table in (whole["grains"], *(whole["grains"].get("classes") or ())):
+        file = table.get("file") if isinstance(table, dict) else None
+        if isinstance(file, str) and file.strip() and "\0" not in file:  # others are reported by the validation
+            table["file"] = str((Path(path).parent / Path(file).expanduser()).absolute())
+    return whole
 
 
 def check_case(content: dict[str, Any], name: str) -> Case:

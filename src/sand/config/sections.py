@@ -14,6 +14,7 @@ from ..grains import moment_size
 from ..integrate.registry import INTEGRATORS
 from ..integrate.verlet import Verlet
 from ..io.run_folder import checked_name
+from ..setup.grain_classes import material_as_given, radius_as_given
 from ..simulation.cadence import duration, read_cadence
 from ..units import si
 
@@ -60,6 +61,10 @@ PathName = Annotated[str, AfterValidator(_named(checked_name))]
 """Name of a file or folder."""
 Moment = Annotated[Any, AfterValidator(_checked_moment)]
 """A magnetic moment, absolute or per mass; stays as given."""
+Radii = Annotated[Any, AfterValidator(radius_as_given)]
+"""Radii: a length, which becomes SI, a law of radii as text, or a list."""
+Materials = Annotated[Any, AfterValidator(material_as_given)]
+"""The name of a material, a list of names, or fractions by name."""
 Count = Annotated[int, Field(ge=1, le=MOST_GRAINS, strict=True)]
 """A number of grains."""
 Steps = Annotated[int, Field(ge=1, le=MOST_STEPS, strict=True)]

@@ -13,7 +13,6 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ..arguments import MOST_GRAINS
-from ..config.build import body_from_file
 from ..config.case import ForcesSection, MaterialSection, material_errors
 from ..config.commands import BODIES, refuse_other_command
 from ..config.errors import validate
@@ -24,6 +23,7 @@ from ..io.run_folder import read_toml
 from ..material import PRESETS, Material
 from ..setup.aggregates import build
 from ..setup.encounters import offset_of
+from ..setup.from_file import body_from_file
 from ..setup.moments import MOMENT_MODES
 from ..setup.population import radii_of
 from ..simulation.simulation import Simulation
@@ -40,7 +40,7 @@ class BodySection(Section):
 
     kind: BodyKind
     """Builder (as for `sand build`), or `file`."""
-    path: PathName | None = None
+    file: PathName | None = None
     """File of the body; required with `kind = "file"`."""
     length: str | None = None
     """Unit of the file's lengths, such as 1 nm; default 1 Å in extended XYZ, 1 m in columns."""
@@ -70,8 +70,8 @@ class BodySection(Section):
 
     @model_validator(mode="after")
     def _whole(self) -> BodySection:
-        if self.kind == "file" and self.path is None:
-            raise ValueError("path is missing: which file holds the grains?")
+        if self.kind == "file" and self.file is None:
+            raise ValueError("file is missing: which file holds the grains?")
         if self.kind != "file" and self.radius is None:
             raise ValueError("radius is missing; add it, for example radius = '0.1 um'")
         regular = self.kind in ("lattice", "hexagonal")
@@ -90,7 +90,7 @@ class BodySection(Section):
         if self.kind == "file":
             own = materials[self.material]
             one = own if "material" in self.model_fields_set else None
-            return body_from_file(str(self.path), one, self.radius, self.length, materials, otherwise=own)
+            return body_from_file(str(self.file), one, self.radius, self.length, materials, otherwise=own)
         names = ("radius", "moment", "moments", "magnetic", "dimension", "prefactor")
         given = {name: getattr(self, name) for name in names}
         return build(self.kind, self.grains, shape=self.shape, seed=seed, material=materials[self.material], **given)
@@ -167,8 +167,8 @@ def with_absolute_paths(content: dict[str, Any]) -> dict[str, Any]:
     whole = dict(content)
     for body in BODIES & content.keys():
         given = content[body]
-        if isinstance(given, dict) and isinstance(given.get("path"), str):
-            whole[body] = {**given, "path": str(Path(given["path"]).absolute())}
+        if isinstance(given, dict) and isinstance(given.get("file"), str):
+            whole[body] = {**given, "file": str(Path(given["file"]).absolute())}
     return whole
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field
 
-from ..config.case import check_case
+from ..config.case import check_case, with_absolute_files
 from ..config.commands import refuse_other_command
 from ..config.errors import validate
 from ..config.sections import Section, Seed
@@ -42,10 +42,9 @@ def read_growth(path: str | Path) -> tuple[dict[str, Any], list[int] | None]:
     given, errors, section = content.pop("grow", None), ErrorCollector(), None
     if given is not None:
         section = errors.take(validate, GrowSection, given, str(path), table="grow")
+    content = with_absolute_files(content, path)
     case = errors.take(check_case, content, str(path))
     errors.done()
     if case.run.stop is not None:
         raise BadInput(f"{path}: run.stop is for sand run; sand grow takes all boxes to the same end, so remove it")
-    if case.grains.file is not None:  # relative to the case file
-        content["grains"]["file"] = str((Path(path).parent / Path(case.grains.file).expanduser()).absolute())
     return content, section and section.seeds

@@ -6,7 +6,8 @@ from .deposit import rbd
 from .encounters import Encounter, encounter, turned, turned_at_random
 from .fractal import fractal
 from .from_frame import Start, StrainedContacts, from_frame
-from .gas import gas
+from .gas import gas, gas_with_contacts
+from .grain_classes import GrainClass
 from .growing import bcca, bpca, dla, dlca
 from .moments import magnetic_energy, relaxed
 from .population import Lognormal, PowerLaw
@@ -17,6 +18,7 @@ pca = bpca
 __all__ = [
     "KINDS",
     "Encounter",
+    "GrainClass",
     "Lognormal",
     "PowerLaw",
     "Start",
@@ -31,6 +33,7 @@ __all__ = [
     "fractal",
     "from_frame",
     "gas",
+    "gas_with_contacts",
     "grain",
     "hexagonal",
     "in_space_order",

@@ -5,18 +5,21 @@ from __future__ import annotations
 import itertools
 import math
 import time as wall
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arguments import MOST_GRAINS, checked
 from ..box import Box, Span, as_box
 from ..constants import BOLTZMANN, LIGHT
-from ..errors import BadInput, did_you_mean, warn
-from ..grains import Grains, moment_size, vector_for_all
-from ..material import Material
+from ..errors import BadInput, ErrorCollector, did_you_mean, warn
+from ..grains import Grains
+from ..material import PRESETS, Material
 from ..units import MELTED, format_quantity, in_unit, seed_given, si, whole_number
+from .from_frame import Start
+from .grain_classes import GrainClass, Members, class_from, class_numbers, joined_members, members_of
+from .moments import directions
 
 SPINS = {"kT/2": 1.0 / 3.0, "equipartition": 1.0, "none": 0.0}
 """Variance of each spin component in units of kT/I, for a mean rotational energy of kT/2, (3/2)kT or 0."""
@@ -37,30 +40,32 @@ RELATIVE = 0.2
 
 @checked
 def gas(
-    number: int,
+    number: int | None,
     box: Any,
     *,
-    radius: Any,
-    material: Material | str,
+    radius: Any = None,
+    material: Any = None,
     moment: Any = None,
     charge: Any = None,
     temperature: Any = "0 K",
     spins: str = "kT/2",
     exact_temperature: bool = True,
+    classes: Sequence[Any] = (),
     seed: int = 0,
 ) -> Grains:
-    """Thermal gas of grains at random positions without overlaps, with random moments.
+    """Thermal gas of grains, or of grains and aggregates, at random positions without overlaps, with random moments.
 
     Parameters
     ----------
-    number : int
-        Number of grains N ≥ 1.
+    number : int or None
+        Number of members N ≥ 1: grains, and with `classes` also aggregates. None if each class has a number.
     box : Box or float or str
         Box periodic along all axes, or the length of a cubic one.
-    radius : float or str or array_like
-        One radius or (N,) [m].
-    material : Material or str
-        Material or name of a preset.
+    radius : float or str or array_like or Lognormal or PowerLaw
+        One radius or (N,) [m], or a distribution: `Lognormal`, `PowerLaw`, or text as for `bpca`.
+    material : Material or str or sequence or mapping
+        Material or name of a preset, N of them, or fractions with the sum 1, {"silica": 0.7, "iron": 0.3}: randomly
+        chosen grains get each material, N times the fraction to within rounding.
     moment : float or str or array_like, optional
         Magnitude of each moment, absolute [A m²] or per mass ("200 A m^2/kg"), or "material" for the material's
         specific moment; directions are isotropic. One vector (3,) [A m²] is the moment of every grain.
@@ -68,17 +73,72 @@ def gas(
         Charge of each grain [C], one number or (N,). Default: 0.
     temperature : float or str, optional
         Temperature T [K] ≥ 0 of velocities and spins; thermal speeds must be far below that of light. Velocities are
-        Maxwellian with zero total momentum.
+        Maxwellian with zero total momentum. An aggregate moves and rotates as a rigid body.
     spins : str, optional
-        Mean rotational energy per grain: "kT/2" as in Dominik & Nübold (2002), section 3; "equipartition", (3/2) kT;
-        "none".
+        Mean rotational energy per member: "kT/2" as in Dominik & Nübold (2002), section 3; "equipartition", (3/2) kT;
+        "none". It is divided equally among the three principal axes.
     exact_temperature : bool, optional
         True: velocities and spins are scaled, each by one factor, so that the translational energy is (3/2)(N − 1) kT
         and the rotational energy N times that of `spins`. False: random draws of the canonical ensemble, whose
         energies scatter by a fraction of about √(2/3N). A single grain is at rest, as its momentum is zero, and its
         spin is not scaled.
+    classes : sequence of GrainClass or dict, optional
+        Classes of members, with the keys of `GrainClass`; keys that a class lacks are the arguments above. Grains have
+        the order of the classes.
     seed : int, optional
-        Seed of the random numbers. Positions, velocities, spins and moments use separate streams.
+        Seed of the random numbers. Positions, velocities, spins, moments and each class use separate streams.
+
+    Raises
+    ------
+    BadInput
+        If an argument is invalid, the box is too full for random positions, or members have contacts with displacements
+        (`gas_with_contacts` returns them).
+
+    Notes
+    -----
+    Positions are found in order of decreasing size. An aggregate takes the space of the sphere about its centre of mass
+    that encloses it.
+    """
+    given = {"radius": radius, "material": material, "moment": moment, "charge": charge, "temperature": temperature}
+    given |= {"spins": spins, "exact_temperature": exact_temperature, "classes": classes, "seed": seed}
+    start = gas_with_contacts(number, box, **given)
+    if start.contacts is not None:
+        raise BadInput(
+            "the aggregates come from a frame with contacts, whose displacements would be lost; use "
+            "sand.setup.gas_with_contacts, and Simulation(start.grains, …, contacts=start.contacts)"
+        )
+    return start.grains
+
+
+@checked
+def gas_with_contacts(
+    number: int | None,
+    box: Any,
+    *,
+    radius: Any = None,
+    material: Any = None,
+    moment: Any = None,
+    charge: Any = None,
+    temperature: Any = "0 K",
+    spins: str = "kT/2",
+    exact_temperature: bool = True,
+    classes: Sequence[Any] = (),
+    seed: int = 0,
+    materials: Mapping[str, Material] = PRESETS,
+) -> Start:
+    """The gas of `gas`, and the contacts of aggregates from frames of earlier runs, with their displacements.
+
+    Parameters
+    ----------
+    number, box, radius, material, moment, charge, temperature, spins, exact_temperature, classes, seed
+        As for `gas`.
+    materials : mapping of str to Material, optional
+        Materials by name; by default the presets.
+
+    Returns
+    -------
+    Start
+        Grains, contacts (None if there are none with displacements), and the box.
 
     Raises
     ------
@@ -90,35 +150,92 @@ def gas(
         raise BadInput("a gas needs a box that is periodic on all three axes")
     if spins not in SPINS:
         raise BadInput(f"spins = {spins!r}; {did_you_mean(spins, list(SPINS))}")
-    whole_number(number, "number", 1, MOST_GRAINS)
+    if number is not None or not classes:
+        whole_number(number, "number", 1, MOST_GRAINS)
     kelvin = si(temperature, "K", "temperature", least=0.0)
-    streams = [np.random.default_rng(s) for s in np.random.SeedSequence(seed_given(seed)).spawn(4)]
-    size = in_unit(radius, "m")
-    if number > MANY and size is not None and np.ndim(size) == 0:  # before arrays of this length are allocated
-        _refuse_full(np.full(1, size), number, space)
-    blank = Grains(np.zeros((number, 3)), radius, material, charge=charge)
-    _refuse_hot(blank, kelvin)
-    position = scatter(blank.radius, space, streams[0])
-    mass, inertia = blank.mass[:, None], blank.arrays.inertia[:, None]
-    velocity = streams[1].normal(size=(number, 3)) * np.sqrt(BOLTZMANN * kelvin / mass)
+    streams = np.random.SeedSequence(seed_given(seed)).spawn(4 + max(1, len(classes)))
+    places, speeds, turns, axes = (np.random.default_rng(stream) for stream in streams[:4])
+    defaults = {"radius": radius, "material": material, "moment": moment, "charge": charge}
+    members = _members(number, space, classes, defaults, streams[4:], materials)
+    grains, of, count = members.grains, members.member, len(members.reach)
+    _refuse_hot(grains, kelvin)
+    centre = scatter(members.reach, space, places)
+    rigid = rigid_bodies(grains, of, count)
+    mass = rigid.mass[:, None]
+    velocity = speeds.normal(size=(count, 3)) * np.sqrt(BOLTZMANN * kelvin / mass)
     velocity -= (mass * velocity).sum(axis=0) / mass.sum()
-    spin = streams[2].normal(size=(number, 3)) * np.sqrt(SPINS[spins] * BOLTZMANN * kelvin / inertia)
-    if exact_temperature and number > 1:
-        velocity *= _factor_to(1.5 * (number - 1) * BOLTZMANN * kelvin, mass, velocity)
-        spin *= _factor_to(1.5 * number * SPINS[spins] * BOLTZMANN * kelvin, inertia, spin)
-    moments = None
-    if (vector := vector_for_all(moment)) is not None:
-        moments = np.tile(vector, (number, 1))
-    elif moment is not None:
-        specific = np.array([m.specific_moment for m in blank.materials])[blank.material]
-        moments = directions(number, streams[3]) * moment_size(moment, blank.mass, specific)[:, None]
-    return Grains(position, radius, material, velocity=velocity, spin=spin, moment=moments, charge=charge)
+    rate = turns.normal(size=(count, 3)) * np.sqrt(SPINS[spins] * BOLTZMANN * kelvin / rigid.inertia)
+    if exact_temperature and count > 1:
+        velocity *= _factor_to(1.5 * (count - 1) * BOLTZMANN * kelvin, mass, velocity)
+        rate *= _factor_to(1.5 * count * SPINS[spins] * BOLTZMANN * kelvin, rigid.inertia, rate)
+    spin = rate if rigid.axes is None else np.einsum("mij,mj->mi", rigid.axes, rate)
+    relative = grains.position
+    arrays, rows = grains.arrays, np.flatnonzero(members.directed)
+    arrays.velocity[...] = (velocity[of] + np.cross(spin[of], relative)).T
+    arrays.spin[...] = spin[of].T
+    if len(rows):
+        size = arrays.body_moment[2, rows]
+        arrays.body_moment[:, rows] = directions(len(grains), axes)[rows].T * size
+        arrays.moment[...] = arrays.body_moment
+    arrays.position[...] = space.wrap(centre[of] + relative).T if rigid.axes is not None else centre.T
+    return Start(grains, members.contacts, space, "")
 
 
-def directions(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Isotropic unit vectors (count, 3)."""
-    v = rng.normal(size=(count, 3))
-    return v / np.linalg.norm(v, axis=1)[:, None]
+def _members(
+    number: int | None,
+    space: Box,
+    classes: Sequence[Any],
+    defaults: Mapping[str, Any],
+    streams: Sequence[np.random.SeedSequence],
+    materials: Mapping[str, Material],
+) -> Members:
+    """Members of all classes; without classes there is one, of single grains. Raises BadInput with all errors."""
+    if not classes:
+        if missing := [name for name in ("radius", "material") if defaults[name] is None]:
+            raise BadInput(f"gas: {name} is missing; add {name}=…" for name in missing)
+        size = in_unit(defaults["radius"], "m")
+        if number is not None and number > MANY and size is not None and np.ndim(size) == 0:
+            _refuse_full(np.full(1, size), number, space)  # before arrays of this length are allocated
+        return members_of(GrainClass(number=number, **defaults), number or 0, streams[0], materials)
+    errors, groups = ErrorCollector(), []
+    found = [errors.take(class_from, one, defaults, f"classes.{k}") for k, one in enumerate(classes)]
+    errors.done()
+    numbers = class_numbers(found, number)
+    for k, (one, count) in enumerate(zip(found, numbers, strict=True)):
+        try:
+            groups.append(members_of(one, count, streams[k], materials))
+        except BadInput as error:
+            errors.problems += error.at(f"classes.{k}").problems
+    errors.done()
+    return joined_members(groups)
+
+
+class RigidBodies(NamedTuple):
+    """Masses and principal moments of inertia of the members of a gas."""
+
+    mass: np.ndarray  # (M,) [kg]
+    inertia: np.ndarray  # (M, 3), or (M, 1) for single grains [kg m²]
+    axes: np.ndarray | None  # (M, 3, 3) principal axes in columns; None if all members are single grains
+
+
+def rigid_bodies(grains: Grains, of: np.ndarray, count: int) -> RigidBodies:
+    """Inertia of members: J = Σ (m (x² 1 − x xᵀ) + (2/5) m r² 1) over their grains.
+
+    Parameters
+    ----------
+    grains : Grains
+        Grains of all members, positions relative to the centre of mass of each.
+    of : ndarray
+        Member of each grain (N,), 0 … `count` − 1.
+    """
+    if len(grains) == count:
+        return RigidBodies(grains.mass, grains.inertia[:, None], None)
+    x = grains.position
+    square = ((x**2).sum(axis=1) * grains.mass + grains.inertia)[:, None, None] * np.eye(3)
+    tensor = np.zeros((count, 3, 3))
+    np.add.at(tensor, of, square - grains.mass[:, None, None] * x[:, :, None] * x[:, None, :])
+    inertia, axes = np.linalg.eigh(tensor)
+    return RigidBodies(np.bincount(of, weights=grains.mass, minlength=count), inertia, axes)
 
 
 def _factor_to(energy: float, inertia: np.ndarray, rate: np.ndarray) -> float:

@@ -12,7 +12,6 @@ from ..errors import BadInput, did_you_mean, warn
 from ..grains import Grains, moment_size, vector_for_all
 from ..units import si
 from ._kernels.moment_relaxation import alignment_energy, relax
-from .gas import directions
 
 MOMENT_MODES = ("random", "aligned", "relaxed")
 MOST_RELAXED = 3000
@@ -21,6 +20,12 @@ TOLERANCE = 1e-6
 """Approximate largest angle between a relaxed moment and the local field [rad]."""
 SWEEPS = 20_000
 """Largest number of sweeps."""
+
+
+def directions(count: int, rng: np.random.Generator) -> np.ndarray:
+    """Isotropic unit vectors (count, 3)."""
+    v = rng.normal(size=(count, 3))
+    return v / np.linalg.norm(v, axis=1)[:, None]
 
 
 def magnetic_fraction(moment: Any, mode: str, magnetic: Any) -> float:

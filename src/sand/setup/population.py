@@ -23,6 +23,8 @@ WIDEST = 200.0
 """Largest ratio of radii; above it nearly all grains of a power law are too small to matter."""
 DEEPEST = 0.5
 """Largest equilibrium overlap, in units of the smaller radius, for which JKR theory is used."""
+FRACTION_ROUNDING = 1e-6
+"""Largest deviation of a sum of fractions from 1."""
 FORMS = "a length, N of them, 'lognormal(MEDIAN, SIGMA, LEAST, MOST)' or 'power law(EXPONENT, LEAST, MOST)'"
 
 
@@ -161,10 +163,13 @@ def radii_of(given: Any) -> Any:
     match = re.fullmatch(r"\s*(lognormal|power law)\s*\((.*)\)\s*", given) if isinstance(given, str) else None
     if match:
         words = [word.strip() for word in match.group(2).split(",")]
+        if match.group(1) == "lognormal" and len(words) == 1:
+            raise BadInput(f"radius = {given!r} lacks its width SIGMA; give {FORMS}")
         if not (2 <= len(words) <= 4 if match.group(1) == "lognormal" else len(words) == 3):
             raise BadInput(f"radius = {given!r} has the wrong number of arguments; give {FORMS}")
         return (Lognormal if match.group(1) == "lognormal" else PowerLaw)(*words)
-    values = in_unit(given, "m")
+    texts = isinstance(given, (list, tuple)) and any(isinstance(one, str) for one in given)
+    values = [si(one, "m", f"radius of grain {k}") for k, one in enumerate(given)] if texts else in_unit(given, "m")
     if values is None:
         raise BadInput(f"radius = {shown(given)} is not a radius or a distribution; give {FORMS}")
     if np.ndim(values) == 0:
@@ -195,17 +200,23 @@ def population(count: int, radius: Any, material: Any, rng: np.random.Generator)
     radius : float or str or array_like or Lognormal or PowerLaw
         As for `radii_of`.
     material : Material or str or sequence or mapping
-        One material, N of them, or fractions {"silica": 0.7, "iron": 0.3}: randomly chosen grains get each material, N
-        times the fraction to within rounding (for `rbd` N is the number of grains of the deposit).
+        One material, N of them, or fractions with the sum 1, {"silica": 0.7, "iron": 0.3}: randomly chosen grains get
+        each material, N times the fraction to within rounding (for `rbd` N is the number of grains of the deposit).
     rng : Generator
         Source of random numbers.
 
     Raises
     ------
     BadInput
-        If the number of radii or materials is not N, a fraction is not positive, or grains are too small for JKR
-        contacts.
+        If the number of radii or materials is not N, a fraction is not positive, their sum is not 1, or grains are too
+        small for JKR contacts.
     """
+    size, kinds = drawn(count, radius, material, rng)
+    return Population(size, kinds, grain_set_of(size, kinds))
+
+
+def drawn(count: int, radius: Any, material: Any, rng: np.random.Generator) -> tuple[np.ndarray, list[Material]]:
+    """Radii (N,) [m] and materials of `count` grains; arguments and errors as for `population`, any size of grains."""
     size, kinds = radii_of(radius), _materials(material, count, rng)
     if isinstance(size, np.ndarray) and len(size) != count:
         raise BadInput(f"radius has {len(size)} entries but there are {count} grains; give {count}, or a distribution")
@@ -213,20 +224,45 @@ def population(count: int, radius: Any, material: Any, rng: np.random.Generator)
         size = np.full(count, size)
     elif not isinstance(size, np.ndarray):
         size = size.draw(count, rng)
-    return Population(size, kinds, grain_set_of(size, kinds))
+    return size, kinds
 
 
 def _materials(given: Any, count: int, rng: np.random.Generator) -> list[Material]:
     if not isinstance(given, Mapping):
         distinct, index = materials_of(given, count)
         return [distinct[k] for k in index]
-    parts = np.array([si(part, "1", f"part of {name}", above=0.0) for name, part in given.items()])
-    if not len(parts):
-        raise BadInput("material = {} names no material; give fractions such as {'silica': 0.7, 'iron': 0.3}")
+    numbers = divided(count, fractions_of(given, "material"))
     kinds = [as_material(m) for m in given]
-    ends = np.rint(count * np.cumsum(parts) / parts.sum()).astype(int)
-    index = rng.permutation(np.searchsorted(ends, np.arange(count), side="right"))
-    return [kinds[k] for k in index]
+    return [kinds[k] for k in rng.permutation(np.repeat(np.arange(len(kinds)), numbers))]
+
+
+def fractions_of(given: Mapping[Any, Any], name: str) -> np.ndarray:
+    """Check fractions of a mixture by name, each above 0, with the sum 1 to `FRACTION_ROUNDING`.
+
+    Raises
+    ------
+    BadInput
+        If they are not; `name` is the argument, for the message.
+    """
+    if not given:
+        raise BadInput(f"{name} = {{}} names no material; give fractions such as {{'silica': 0.7, 'iron': 0.3}}")
+    label = {m: getattr(m, "name", m) for m in given}
+    fractions = np.array([si(part, "1", f"{name}: part of {label[m]}", above=0.0) for m, part in given.items()])
+    refuse_sum(fractions, f"{name}: the fractions {', '.join(f'{v:g}' for v in fractions)}")
+    return fractions
+
+
+def refuse_sum(fractions: np.ndarray, label: str) -> None:
+    """Raise BadInput if fractions do not add up to 1; `label` begins the message."""
+    total = float(np.sum(fractions))
+    if abs(total - 1.0) > FRACTION_ROUNDING:
+        raise BadInput(f"{label} have the sum {total:.6g}; it must be 1")
+
+
+def divided(count: int, fractions: np.ndarray) -> np.ndarray:
+    """Divide `count` grains by fractions with the sum 1: N times each fraction, to within rounding."""
+    ends = np.rint(count * np.cumsum(fractions) / np.sum(fractions)).astype(int)
+    return np.diff(ends, prepend=0)
 
 
 def grain_set_of(radius: np.ndarray, kinds: list[Material]) -> GrainSet:

@@ -23,7 +23,9 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
     """
     materials = simulation.grains.materials
     recipe = simulation.recipe or {"kind": "given", "number": len(simulation.grains)}
-    names = [m.name for m in materials]
+    if recipe["kind"] != "gas":  # a gas names the materials from which it is drawn
+        names = [m.name for m in materials]
+        recipe = {**recipe, "material": names[0] if len(names) == 1 else names}
     run = {
         "until": max(until, SHORTEST_DURATION),  # a run to time 0 can also be resumed
         "steps": last_step if last_step == float("inf") else int(last_step),
@@ -43,7 +45,7 @@ def case_of(simulation: Any, until: float, last_step: float, stop: str | None = 
     return {
         "run": {k: v for k, v in run.items() if v is not None and v != float("inf")},
         "box": {} if simulation.box.is_open else {"periodic": lengths},
-        "grains": {**recipe, "material": names[0] if len(names) == 1 else names},
+        "grains": recipe,
         "materials": {
             m.name: {k: v for k, v in dataclasses.asdict(m).items() if k != "name" and v is not None} for m in materials
         },

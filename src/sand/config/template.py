@@ -1,0 +1,170 @@
+"""Case file with every key of `sand run`, its meaning, unit and default, from the classes that read the keys."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import itertools
+import re
+import textwrap
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import tomli_w
+from pydantic import BaseModel
+
+from ..forces.registry import FORCES
+from ..integrate.registry import INTEGRATORS
+from ..material import PRESETS, Material
+from ..neighbours.settings import Neighbours
+from ..setup.grain_classes import GrainClass
+from .case import BoxSection, GrainsSection, MaterialSection, RunSection
+
+WIDTH = 110
+"""Columns of comments."""
+HEAD = """\
+# Case file of SAND with every key.  Check it with `sand info {name}`, run it with `sand run {name}`.
+# Numbers are SI, or text with a unit such as "10 nm".  A line that begins with # and no space is a key, or a table,
+# that is not in use, with its default value; remove the # to use it.
+"""
+EXAMPLES: dict[str, dict[str, Any]] = {
+    "run": {"until": "20 us", "frame_every": "0.1 us", "seed": 1},
+    "box": {"periodic": "3 um"},
+    "grains": {"kind": "gas", "number": 100, "radius": "0.1 um", "material": "silica", "temperature": "300 K"},
+    "forces.contact": {"damping": "critical", "damping_ratio": 0.2},
+}
+"""Keys in use, by table: a gas of silica grains with damped contacts."""
+
+
+REQUIRED = object()
+"""Default of a key that its table must have."""
+
+
+class Key(NamedTuple):
+    """A key of a table."""
+
+    name: str
+    meaning: str
+    default: Any  # None: the key is left out; REQUIRED
+
+
+def template(name: str) -> str:
+    """Text of a case file with all keys; those of `EXAMPLES` are in use, all others are in comments.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, for its first line.
+    """
+    tables: list[tuple[str, str, list[Key]]] = [
+        ("[run]", "", keys_of(RunSection)),
+        ("[box]", "", keys_of(BoxSection)),
+        ("[grains]", "", [key for key in keys_of(GrainsSection) if key.name != "classes"]),
+        ("[[grains.classes]]", _summary(GrainClass), keys_of(GrainClass)),
+        ("[materials.NAME]", _material_note(), _material_keys()),
+        *((f"[forces.{force}]", _summary(kind), keys_of(kind)) for force, kind in FORCES.items()),
+    ]
+    for method, kind in INTEGRATORS.items():
+        chosen = Key("method", f"Integrator; allowed: {', '.join(INTEGRATORS)}.", method)
+        tables.append(("[stepping]", _summary(kind), [chosen, *keys_of(kind)]))
+    tables.append(("[neighbours]", _summary(Neighbours), keys_of(Neighbours)))
+    return HEAD.format(name=name) + "".join("\n" + "\n".join(_table(*one)) + "\n" for one in tables)
+
+
+def _table(head: str, note: str, keys: list[Key]) -> Iterator[str]:
+    """Lines of a table: its note, its name, and each key with its meaning."""
+    used = EXAMPLES.get(head.strip("[]"), {})
+    yield from _comment(note)
+    yield head if used else f"#{head}"
+    for key in keys:
+        default = "required" if key.default is REQUIRED else "default: none" if key.default is None else ""
+        if key.name in used and not default:
+            default = f"default: {_toml(key.default)}"
+        yield from _comment(f"{key.meaning} ({default})" if default else key.meaning)
+        if key.name in used:
+            yield f"{key.name} = {_toml(used[key.name])}"
+        else:
+            yield f"#{key.name} = {'' if default else _toml(key.default)}".rstrip()
+
+
+def _comment(text: str) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
+
+
+def _toml(value: Any) -> str:
+    return tomli_w.dumps({"key": value}).strip().removeprefix("key = ").replace("\n", "")
+
+
+def _summary(kind: type) -> str:
+    """The first line of the docstring of a class."""
+    return (inspect.getdoc(kind) or "").splitlines()[0]
+
+
+def _material_note() -> str:
+    return f"A new material, or changes to a preset. Presets: {', '.join(PRESETS)}."
+
+
+def _material_keys() -> list[Key]:
+    """Keys of [materials.NAME], those of `Material` and `like`."""
+    meaning = {key.name: key.meaning for key in keys_of(Material)}
+    like = "Preset to start from. Without it, density, young_modulus and poisson_ratio are required."
+    return [key._replace(meaning=meaning.get(key.name, like)) for key in keys_of(MaterialSection)]
+
+
+def keys_of(kind: Any) -> list[Key]:
+    """Keys of a table with meaning and default: the fields of a section (a pydantic model), or of a dataclass."""
+    if issubclass(kind, BaseModel):
+        notes = _attribute_docstrings(kind)
+        return [
+            Key(
+                name,
+                notes.get(name, "") + _bounds(field.metadata),
+                REQUIRED if field.is_required() else field.get_default(call_default_factory=True),
+            )
+            for name, field in kind.model_fields.items()
+        ]
+    meanings = parameter_docs(kind)
+    return [
+        Key(one.name, meanings.get(one.name, ""), REQUIRED if one.default is dataclasses.MISSING else one.default)
+        for one in dataclasses.fields(kind)
+        if one.init
+    ]
+
+
+def _bounds(metadata: list[Any]) -> str:
+    """Text for the bounds of a number, or nothing."""
+    words = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
+    found = [f"{text} {getattr(one, key)}" for one in metadata for key, text in words.items() if hasattr(one, key)]
+    return f" A whole number {', '.join(found)}." if found else ""
+
+
+def _attribute_docstrings(kind: type) -> dict[str, str]:
+    """The text below each attribute of a class and of its bases."""
+    found: dict[str, str] = {}
+    for owner in reversed(kind.__mro__):
+        if not owner.__module__.startswith("sand."):
+            continue
+        body = ast.parse(textwrap.dedent(inspect.getsource(owner))).body[0]
+        lines = getattr(body, "body", [])
+        for entry, text in itertools.pairwise(lines):
+            named = isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name)
+            if named and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                found[entry.target.id] = " ".join(str(text.value.value).split())
+    return found
+
+
+def parameter_docs(kind: type) -> dict[str, str]:
+    """Descriptions of the parameters in a numpydoc docstring, by name."""
+    text = inspect.getdoc(kind) or ""
+    _, _, text = text.partition("Parameters\n----------\n")
+    text = re.split(r"\n\n?[A-Z][a-z]+\n-{3,}\n", text)[0]
+    found: dict[str, str] = {}
+    names: list[str] = []
+    for line in text.splitlines():
+        if (match := re.fullmatch(r"(\w+(?:, \w+)*) : .*", line)) is not None:
+            names = match[1].split(", ")
+            found |= dict.fromkeys(names, "")
+        else:
+            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
+    return found
