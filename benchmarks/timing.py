@@ -95,7 +95,7 @@ def replayed(sim: Any, steps: int) -> Callable[[], float]:
     start = sim.state.copy()
 
     def again() -> float:
-        sim._engine.state = start.copy()
+        sim._engine.regular_state = start.copy()
         per_step(sim, steps // 10 + 1)
         return per_step(sim, steps)
 

@@ -168,7 +168,7 @@ def test_the_state_at_a_time_of_output():
     """Free grains move by v t: x(t) = x(0) + v t to rounding at times that no regular step meets."""
     grains = sand.Grains([[0, 0, 0], [0, 1e-6, 0]], "10 nm", "iron", velocity=[[1, 0, 0], [0, 2, 0]])
     sim = sand.Simulation(grains, [sand.Contact()], stepping=sand.Verlet(step="1 ns"))
-    for time in (0.3e-9, 0.4e-9, 17.77e-9, 40e-9):
+    for time in (0.3e-9, 0.4e-9, 5e-9 + 1e-18, 17.77e-9, 40e-9):
         sim.run(until=time)
         assert sim.time == time and sim.steps == int(time / 1e-9 + 1e-6)
         assert np.allclose(sim.grains.position, grains.position + grains.velocity * time, rtol=1e-13, atol=0)

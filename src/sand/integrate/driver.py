@@ -235,7 +235,7 @@ def first_half(
             if not shorten:
                 return Stop.TIME_REACHED.value
             cycle = until - clock[TIME]
-            dt = cycle / math.ceil(cycle / dt - 1e-6)
+            dt = cycle / max(1, math.ceil(cycle / dt - 1e-6))
         begin_cycle(grains, long_range, clock, scratch, respa, forces, program, table, dt, cycle)
     elif respa.impulse:  # between two steps of clock[STEP] and dt seconds
         integrate_displacement(grains, long_range, span, 0.5 * (clock[STEP] + dt))

@@ -134,6 +134,11 @@ class Engine:
         self.restore_user_order()
         return self._state
 
+    @regular_state.setter
+    def regular_state(self, other: State) -> None:
+        self._state, self._is_sorted = other, False
+        self._output_state = self._output_time = None
+
     def restore_user_order(self) -> None:
         """Undo the spatial sorting of the arrays, until the next step."""
         if self._is_sorted:
