@@ -162,7 +162,7 @@ FAULTS = (
     Fault("wrong input ends with exit code 0", "swallowed error", "command", "cli/program.py",
           "return str(error).splitlines(), BAD_INPUT", "return str(error).splitlines(), DONE",
           "unit/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
-    Fault("an end before the start", "swallowed error", "command", "simulation/stop.py",
+    Fault("an end before the start", "swallowed error", "command", "simulation/cadence.py",
           'seconds = si(value, "s", name, above=0.0)', 'return si(value, "s", name)',
           "unit/test_cli.py::test_wrong_input_gives_lines_and_exit_code_2"),
     # analysis

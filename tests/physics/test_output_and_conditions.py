@@ -132,7 +132,7 @@ def test_condition_in_a_case_file(tmp_path, monkeypatch, capsys):
     assert again["outcome"] == "condition_met" and 40e-9 < again["time"] < 100e-9
     assert main(["resume", "run", "--until", "120 ns"]) == 0
     assert "is met and no longer applies" in capsys.readouterr().err
-    assert newest_checkpoint(tmp_path / "run")[1]["shown"] == 120e-9
+    assert newest_checkpoint(tmp_path / "run")[1]["output_time"] == 120e-9
 
 
 @pytest.mark.compiled("contacts")

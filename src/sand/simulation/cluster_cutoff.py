@@ -75,14 +75,14 @@ class ClusterCutoff:
         # the first two moments that exist need a shorter cut-off than half the box, which is used without them
         radius = max(self.force.for_pair(pair, state.grains, self.largest).radius or 0.0, before)
         time = state.time if radius > before else time
-        if CAPTURE_RADII * pair.capture > self.largest and "limited by the box" not in self.at_start.reason:
-            limited = min(limited, state.time)
+        if CAPTURE_RADII * pair.capture > self.largest:
+            limited = min(limited, state.time)  # stays 0 if the first choice was limited, which the start says
         state.cutoff[:] = _values(radius, pair, temperature, time, limited)
         return radius if radius > before else None
 
     def note(self, state: State) -> str:
         """Note of a run in which clusters outgrew the box; "" if none did."""
-        if math.isinf(state.cutoff[CUT_LIMITED]):
+        if math.isinf(state.cutoff[CUT_LIMITED]) or state.cutoff[CUT_LIMITED] == 0.0:
             return ""
         since, now = format_quantity(state.cutoff[CUT_LIMITED], "s"), format_quantity(state.cutoff[CUT_RADIUS], "m")
         full = format_quantity(CAPTURE_RADII * state.cutoff[CUT_CAPTURE], "m")
@@ -147,7 +147,8 @@ def follow_clusters(
     temperature = kinetic_temperature(grains, labels)
     pair = capturing_pair(grains, labels, temperature)
     choice = force.for_pair(pair, grains, largest)
-    values = _values(float(choice.radius or 0.0), pair, temperature, 0.0, math.inf) if saved is None else saved
+    limited = 0.0 if CAPTURE_RADII * pair.capture > largest else math.inf
+    values = _values(float(choice.radius or 0.0), pair, temperature, 0.0, limited) if saved is None else saved
     if not 0.0 < values[CUT_RADIUS] <= largest:
         wrong, most = format_quantity(float(values[CUT_RADIUS]), "m"), format_quantity(largest, "m")
         raise BadInput(f"the cut-off of the dipoles in the checkpoint is {wrong}, but must be above 0, at most {most}")

@@ -136,6 +136,7 @@ class Engine:
 
     @regular_state.setter
     def regular_state(self, other: State) -> None:
+        """Continue from another state, in the user's order."""
         self._state, self._is_sorted = other, False
         self._output_state = self._output_time = None
 

@@ -76,7 +76,7 @@ CUT_CAPTURE = 1  # capture radius b_max of the two clusters for which it was cho
 CUT_TEMPERATURE = 2  # temperature of the clusters' translation at the start [K]
 CUT_TIME = 3  # time of the choice [s]
 CUT_FIRST, CUT_SECOND = 4, 5  # grains of the two clusters
-CUT_LIMITED = 6  # time of the first choice during the run that half the box limited [s]; infinite if none
+CUT_LIMITED = 6  # time of the first choice that half the box limited [s]; infinite if none
 CUTOFF = ("radius", "capture", "temperature", "time", "first", "second", "limited")
 
 # --- indices of PairList.skin (float64), see neighbours.skin ------------------------------------------------
