@@ -164,6 +164,7 @@ def test_a_continued_run_has_the_bits_of_a_direct_one(integrator):
     assert all((arrays[0][name] == arrays[1][name]).all() for name in arrays[0])
 
 
+@pytest.mark.compiled("contacts")
 def test_the_state_at_a_time_of_output():
     """Free grains move by v t: x(t) = x(0) + v t to rounding at times that no regular step meets."""
     grains = sand.Grains([[0, 0, 0], [0, 1e-6, 0]], "10 nm", "iron", velocity=[[1, 0, 0], [0, 2, 0]])
