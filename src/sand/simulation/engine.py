@@ -160,15 +160,16 @@ class Engine:
             if stop is Stop.TIME_REACHED:
                 return stop
             before, is_sorted = self._state.copy(), self._is_sorted
+            compared, self._state.count[COMPARED] = self._state.count[COMPARED], -1
             regular = self.advance(math.inf, 1)
+            # the cut-off that follows the clusters is compared with them by the next `advance`, if the step is kept
+            self._state.count[COMPARED] = compared
             if regular is not Stop.NONE:
                 return regular
             if is_past(self._state.time, time):  # only the shorter step ended before: go on with shorter steps
                 self._state, self._is_sorted = before, is_sorted
                 return self._shorten_copy(time, before, math.inf)
-            if self.steps >= last:
-                return Stop.NONE
-            stop = self.advance(time, last - self.steps)
+            stop = self.advance(time, max(last - self.steps, 0))
             if stop is not Stop.TIME_REACHED:
                 return stop
 
@@ -363,7 +364,7 @@ class Engine:
         state.count[STEPS], state.count[LONG_RANGE_SUMS] = steps, sums
 
     def load_state(self, saved: dict[str, np.ndarray], output_time: float | None = None) -> None:
-        """Restore a saved regular state; `state` is that at a time of output [s]. Recomputes what is not saved."""
+        """Restore the regular state of a checkpoint, with `state` at a time of output [s]; sum loads, rebuild lists."""
         state, self._output_time = self.regular_state, output_time
         state.from_arrays(saved)
         if self.cutoff is None:
